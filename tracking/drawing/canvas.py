@@ -151,8 +151,17 @@ def box_corners(box: Array) -> Array:
 
 
 def ascii_only(words: str) -> str:
-    """The text with a question mark for each character outside ASCII, which cv2 cannot draw."""
+    """The text with a question mark for each character outside ASCII.
+
+    cv2 cannot draw such a character, and a lone surrogate ends the process.
+    """
     return words.encode("ascii", "replace").decode()
+
+
+def text_width(words: str, size: float, bold: int = 1) -> int:
+    """The width in px of words that `text` draws with this font scale and these strokes."""
+    (width, _), _ = cv2.getTextSize(ascii_only(words), cv2.FONT_HERSHEY_SIMPLEX, size, bold)
+    return int(width)
 
 
 def text(image: Image, words: str, at: tuple[float, float], size: float, ink: Colour = INK, bold: int = 1) -> None:

@@ -241,12 +241,12 @@ def draw_captions(image: Image, layer: Layer, index: int, fps: float, size: floa
 def draw_banner(image: Image, words: str, warnings: list[str], size: float) -> None:
     """Fills the whole `image` with a light colour, in place, and writes a line of text on it.
 
-    words: at its left, ASCII. warnings: on red rectangles at its right, the first rightmost; may be empty. size: cv2's
+    words: at its left. warnings: on red rectangles at its right, the first rightmost; may be empty. size: cv2's
     font scale.
     """
     image[:] = FLOOR
     y = image.shape[0] * 0.5 + 9 * size
-    cv2.putText(image, words, (6, round(y)), cv2.FONT_HERSHEY_SIMPLEX, size, INK, 1, cv2.LINE_AA)
+    cv2.putText(image, ascii_only(words), (6, round(y)), cv2.FONT_HERSHEY_SIMPLEX, size, INK, 1, cv2.LINE_AA)
     x = float(image.shape[1] - 4)
     for warning in warnings:
         (width, _), _ = cv2.getTextSize(warning, cv2.FONT_HERSHEY_SIMPLEX, size, 1)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -137,9 +138,13 @@ def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: I
     The old seal is deleted before any other file changes, and the new one appears after all others have. A killed run
     therefore leaves the old files whole or a folder without a seal; if it had none before, the first of `files` is the
     first to appear. names: files that are deleted unless `files` has them. Other files stay. A missing folder is
-    created. Raises WorkError if the disk is full, InputError if the folder cannot be written.
+    created, and what killed runs left for this target is deleted.
+
+    Raises WorkError if the disk is full, InputError if the folder cannot be written.
     """
     first, *others = (name for name in files if name != seal)
+    for path in _leftovers(target):
+        _remove(path)
     with staged_path(target) as partial:
         _write_synced_files(partial, files)
         target.mkdir(exist_ok=True)
@@ -155,6 +160,14 @@ def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: I
         _sync_folder(target)
         os.replace(partial / seal, target / seal)
         _sync_folder(target)
+
+
+def _leftovers(target: Path) -> list[Path]:
+    """Return the temporary files and folders that killed writers of `target`, and of no other, left beside it."""
+    if not target.parent.is_dir():
+        return []
+    form = re.compile(re.escape(f"{PARTIAL}{target.name}-") + "[0-9a-f]{12}")
+    return [path for path in target.parent.iterdir() if form.fullmatch(path.name)]
 
 
 def remove_partials(*folders: Path) -> None:

@@ -210,9 +210,15 @@ def _numpy(column: Any) -> Any:
 def json_text(value: Any) -> str:
     """Return a value as JSON on one line, keys in their order; characters beyond ASCII stay as they are.
 
-    Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
+    Lone surrogates, which Python reads from names of files that are no UTF-8, are escaped. Raises ValueError for NaN
+    and infinity, TypeError for a type that JSON does not have.
     """
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    return _storable(json.dumps(value, ensure_ascii=False, allow_nan=False))
+
+
+def _storable(text: str) -> str:
+    """Return a JSON text with each lone surrogate as the six characters of its escape, so that it can be UTF-8."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def json_document(value: dict[str, Any]) -> bytes:
@@ -220,8 +226,7 @@ def json_document(value: dict[str, Any]) -> bytes:
 
     Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
     """
-    text = json.dumps(value, ensure_ascii=False, allow_nan=False, indent=2) + "\n"
-    return text.encode("utf-8", "backslashreplace")  # of a lone surrogate (names of files), JSON's own \udcff
+    return (_storable(json.dumps(value, ensure_ascii=False, allow_nan=False, indent=2)) + "\n").encode()
 
 
 def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:

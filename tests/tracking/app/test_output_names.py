@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import sys
 from pathlib import Path
 
 import cv2
@@ -22,8 +24,9 @@ def recording(folder: Path, name: str) -> Path:
         (folder / part).parent.mkdir(parents=True, exist_ok=True)
         (folder / part).write_text(text, encoding="utf-8")
     (folder / "img1").mkdir()
+    _, picture = cv2.imencode(".png", np.full((96, 128, 3), 90, np.uint8))
     for k in (1, 2, 3):
-        cv2.imwrite(str(folder / "img1" / f"{k:06d}.png"), np.full((96, 128, 3), 90, np.uint8))
+        (folder / "img1" / f"{k:06d}.png").write_bytes(picture.tobytes())
     return folder
 
 
@@ -94,3 +97,18 @@ def test_a_manifest_names_files_of_its_own_folder_only(tmp_path: Path, capsys) -
     (folder / "manifest.json").write_text(json.dumps(with_hash(manifest)))
     assert run(["export", "webdataset", str(tmp_path / "data"), "--out", str(tmp_path / "out")]) == 2
     assert "../../../camera.json" in capsys.readouterr().err
+
+
+def test_a_folder_whose_name_is_no_text(tmp_path: Path, capsys) -> None:
+    """Bytes that are no UTF-8: cv2 ended the process when it measured them; pages and COCO files ended as bugs."""
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="replace")  # what is printed is another matter
+    name = os.fsdecode(b"caf\xe9")
+    for folder in (name, "other"):
+        recording(tmp_path / "data" / folder, "")
+        (tmp_path / "data" / folder / "seqinfo.ini").unlink()
+    for line in commands(tmp_path / "data", tmp_path / "out"):
+        assert run([*line, *(["--fps", "5"] if line[0] != "export" else [])]) == 0
+    assert {path.name for path in (tmp_path / "out" / "tracks").iterdir()} == {"caf_", "other"}
+    videos = json.loads((tmp_path / "out" / "coco.json").read_text())["videos"]
+    assert name in [video["name"] for video in videos]

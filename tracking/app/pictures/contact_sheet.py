@@ -13,7 +13,7 @@ from sim.io.files.atomic import write_file
 from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
 from tracking.app.pictures.frame_choice import SHOWN_KINDS, choose_frames, is_close
 from tracking.app.pictures.panel_pictures import PanelPictures
-from tracking.drawing.canvas import FLOOR, INK, QUIET, THING, TRAIL_SECONDS, Canvas, colour, text
+from tracking.drawing.canvas import FLOOR, INK, QUIET, THING, TRAIL_SECONDS, Canvas, colour, text, text_width
 from tracking.drawing.layer_painting import KIND_COLOUR, event_words, kind_colour
 from tracking.drawing.plan_area import MARGIN, plan_area
 from tracking.drawing.plan_view import draw_group_hulls, draw_people, draw_scene, draw_trails
@@ -210,7 +210,7 @@ def _draw_head(sheet: Image, sequence: Sequence, truth: Truth) -> None:
     Without people their number is left out.
     """
     text(sheet, sequence.name, (GAP, 48), 1.3, INK, 3)
-    width = cv2.getTextSize(sequence.name, cv2.FONT_HERSHEY_SIMPLEX, 1.3, 3)[0][0]
+    width = text_width(sequence.name, 1.3, 3)
     unit = "m" if truth.pos is not None else "px"
     low, high = sheet_area(sequence, truth)
     if truth.pos is not None and sequence.scene is not None:
@@ -245,5 +245,5 @@ def _draw_foot(area: Image, truth: Truth, chosen: list[int]) -> None:
     for kind in sorted({event.kind for event in events}, key=lambda kind: list(KIND_COLOUR).index(kind)):
         cv2.circle(area, (x + 8, line + 42), 9, colour(KIND_COLOUR[kind]), -1, cv2.LINE_AA)
         text(area, kind, (x + 26, line + 49), 0.7, INK)
-        x += 50 + cv2.getTextSize(kind, cv2.FONT_HERSHEY_SIMPLEX, 0.7, 1)[0][0]
+        x += 50 + text_width(kind, 0.7)
     text(area, "ticks: the pictures above", (x + 10, line + 49), 0.7, QUIET)

@@ -55,5 +55,5 @@ def write_page(
     pieces = page.split("@@")
     text = "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
     path = Path(out)
-    write_file(path, text.encode())
+    write_file(path, text.encode("utf-8", "replace"))  # a title from a file's name may hold lone surrogates
     return path
