@@ -35,7 +35,7 @@ from sim.truth.order_fulfilment import PATIENCE, RULE_TIME
 from sim.types import Array, Motion, Tracks, Truth
 from tracking.scoring import evaluate
 from tracking.scoring.evaluation import Scores
-from tracking.stats import bootstrap, wilson
+from tracking.stats import mean_interval, wilson
 
 WINDOW = 0.8  # s
 KINDS = ("merge", "split", "cross", "queue")
@@ -134,7 +134,7 @@ def difficulty_cells(found: Sequence[Scores]) -> list[str]:
 
 def score_means(found: Sequence[Scores]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns mean, low and high end of the scores of MEANS."""
-    return bootstrap(np.array([[s[key] for key in MEANS.values()] for s in found]))
+    return mean_interval(np.array([[s[key] for key in MEANS.values()] for s in found]))
 
 
 def difficulty(title: str, entries: Sequence[Entry], seeds: range) -> None:

@@ -33,15 +33,15 @@ from scenarios import sensor_settings
 from scenarios.loading.suites import read_entries
 from sim.io.files.atomic import write_file
 from sim.io.source import open_source
-from sim.types import Ints, Sequence, Tracks
+from sim.types import Sequence, Tracks
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.link_rule import LinkRule
+from tracking.recording_intervals import recording_intervals
 from tracking.run import track
-from tracking.scoring.block_resampling import resampled_scorer
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import moving_blocks
+from tracking.scoring.frame_weights import weighted_scorer
 from tracking.tracker_registry import find
 from tracking.tuning import tune
 from tracking.tuning.grouping_episodes import people_as_tracks
@@ -152,15 +152,13 @@ def print_comparison(name: str, sequence: Sequence, mode: str, chosen: dict[str,
     assert truth is not None
     every = list(CATALOGUE)
     at = [every.index(key) for key in KEYS[name]]
-    draws = {
-        which: resampled_scorer(truth, tracks_of(name, sequence, mode, c), None, "hull") for which, c in chosen.items()
-    }
+    scorers = {which: weighted_scorer(truth, tracks_of(name, sequence, mode, c)) for which, c in chosen.items()}
 
-    def score(places: Ints) -> np.ndarray:
-        values = {which: np.asarray(draw(places))[at] for which, draw in draws.items()}
-        return np.concatenate([*values.values(), *(values[which] - values["present"] for which in values)])
+    def score(weights: np.ndarray) -> np.ndarray:
+        values = {which: scorer(weights)[:, at] for which, scorer in scorers.items()}
+        return np.concatenate([*values.values(), *(values[which] - values["present"] for which in values)], axis=1)
 
-    whole, low, high = moving_blocks(score, truth.length, truth.fps, DRAWS)
+    whole, low, high = recording_intervals(truth, score, DRAWS, None)
     size, count = len(at), len(chosen)
     print(
         f"{name} on {sequence.name}, {truth.length / truth.fps:.0f} s, {mode}; in brackets minus the present defaults"

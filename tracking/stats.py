@@ -1,63 +1,76 @@
-"""Confidence intervals of scores: bootstrap over sequences, paired differences, shares, moving blocks of one recording.
+"""Confidence intervals of scores: means over sequences, paired differences, shares, and scores of one recording.
 
-Neighbouring frames are alike, so single frames are never resampled: whole sequences are, or blocks of frames. All
-intervals are 95 % intervals: mean or score, low end and high end, in the unit of the score. The random numbers are
-fixed, so that the same input gives the same interval.
+Neighbouring frames are alike, so single frames are never resampled: whole sequences count as one value each, or blocks
+of frames get weights. All intervals are 95 % intervals: mean or score, low end and high end, in the unit of the score.
+The random numbers are fixed, so that the same input gives the same interval.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import ceil, sqrt
+from typing import Literal
 
 import numpy as np
 
-from sim.types import Array, Ints
+from sim.types import Array
 
 DRAWS = 2000
-"""Bootstrap samples."""
+"""Draws of weights, or bootstrap samples."""
 LEVEL = 0.95
 """Confidence level of all intervals."""
 NORMAL = 1.959963984540054
 """A standard normal variable lies within +- NORMAL with probability LEVEL."""
+FEWEST = 6
+"""A difference over fewer sequences is never called sure."""
 SHORTEST_BLOCK = 1.0
-"""s: least length of a moving block."""
-BLOCKS = 20
-"""A resampled recording consists of at most so many blocks."""
+"""s: least length of a block of frames."""
+BLOCKS = (5, 20)
+"""Least and greatest number of blocks of a recording."""
+UNKNOWN_DRAWS = 0.05
+"""A score that is unknown in a larger share of the draws gets no interval: too few blocks have what it counts."""
 SURE = 60.0
 """s: the interval of a shorter recording is only indicative."""
 
+Scale = Literal["share", "below one", "count", "length", "plain"]
+"""What values a score can have: 0 to 1; up to 1; numbers of things; above 0; any."""
 
-def bootstrap(values: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
-    """Return mean, low end and high end, (K,) each, of 95 % percentile intervals of the mean over S sequences; values
+
+def mean_interval(values: Array) -> tuple[Array, Array, Array]:
+    """Return mean, low end and high end, (K,) each, of Student's 95 % intervals of the mean over S sequences; values
     (S, K).
 
-    draws: number of bootstrap samples. nan and infinite values are left out, for each column by itself; a sample
-    without any number of a column does not count for it. The ends of a column with fewer than two numbers are nan;
-    without any number the mean is nan, too. Average several runs of one sequence (tracker seeds) before the call. The
-    random numbers are fixed.
+    The ends are mean +- t s / sqrt(S), with the standard deviation s over sequences and the quantile t for S - 1
+    degrees of freedom. nan and infinite values are left out, for each column by itself. The ends of a column with fewer
+    than two numbers are nan; without any number the mean is nan, too. Average several runs of one sequence (tracker
+    seeds) before the call.
     """
-    count, columns = values.shape
     known = np.isfinite(values)
-    out = np.full((3, columns), np.nan)
-    drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=draws) if count else None
-    for k in np.flatnonzero(known.any(axis=0)):
-        rows = known[:, k]
-        out[0, k] = values[rows, k].mean()
-        if drawn is not None and rows.sum() > 1:
-            times = drawn[:, rows]
-            times = times[times.any(axis=1)]
-            out[1:, k] = _ends(times @ values[rows, k] / times.sum(axis=1))
-    return out[0], out[1], out[2]
+    count = known.sum(axis=0)
+    some, two = np.maximum(count, 1), np.maximum(count, 2)
+    mean = np.where(known, values, 0.0).sum(axis=0) / some
+    spread = np.sqrt((np.where(known, values - mean, 0.0) ** 2).sum(axis=0) / (two - 1))
+    half = np.where(count > 1, student(two - 1) * spread / np.sqrt(some), np.nan)
+    mean = np.where(count > 0, mean, np.nan)
+    return mean, mean - half, mean + half
 
 
-def paired(first: Array, second: Array, draws: int = DRAWS) -> tuple[Array, Array, Array]:
+def student(degrees: Array | float) -> Array:
+    """Return the t with which Student's t, of so many degrees of freedom (above 0), lies within +- t with probability
+    LEVEL; the shape is that of `degrees`.
+    """
+    from scipy.special import stdtrit
+
+    return np.asarray(stdtrit(degrees, (1 + LEVEL) / 2))
+
+
+def paired(first: Array, second: Array) -> tuple[Array, Array, Array]:
     """Return mean, low end and high end, (K,) each, of second - first over the same S sequences; both (S, K).
 
-    The interval is a 95 % bootstrap interval of the mean from `draws` samples. Pairs with a nan or infinity are left
-    out, for each column by itself; with fewer than two pairs the ends are nan, without any the mean, too.
+    The interval is Student's 95 % interval of the mean difference. Pairs with a nan or infinity are left out, for each
+    column by itself; with fewer than two pairs the ends are nan, without any the mean, too.
     """
-    return bootstrap(second - first, draws)
+    return mean_interval(second - first)
 
 
 def wilson(hits: int, count: int) -> tuple[float, float, float]:
@@ -75,49 +88,97 @@ def wilson(hits: int, count: int) -> tuple[float, float, float]:
     return share, max(0.0, middle - half), min(1.0, middle + half)
 
 
-def moving_blocks(
-    score: Callable[[Ints], Array], frames: int, fps: float, draws: int = DRAWS
+def block_intervals(
+    score: Callable[[Array], Array],
+    frames: int,
+    fps: float,
+    likeness: float = 1.0,
+    draws: int = DRAWS,
+    scales: Sequence[Scale] | None = None,
 ) -> tuple[Array, Array, Array]:
     """Return the scores (K,) of one recording, and the low and the high ends (K,) of their 95 % intervals.
 
-    score: takes indices (frames,) of frames, from 0, some more than once, and returns scores (K,), nan where undefined.
-    It is called 1 + draws times (once without frames), first with every frame once. frames: number in the recording;
-    fps: frames per second; draws: number of samples. Frames are resampled in moving blocks (Künsch 1989): whole
-    stretches of consecutive frames. For an interval of a difference let `score` return the difference of two trackers
-    in the same frames. nan and infinite scores of samples are left out; the ends are nan if none remains, and without
-    frames. The random numbers are fixed. Under SURE = 60 seconds the intervals are indicative.
+    score: takes weights (D, frames) of the frames, and returns scores (D, K), nan where undefined. It is called twice:
+    with weights of 1, and with `draws` draws. frames: number in the recording; fps: frames per second. likeness:
+    the number of frames for which errors persist. scales: the values that each score can have; None: any, as for a
+    difference of two trackers under equal weights.
+
+    A draw puts together blocks of consecutive frames (circular block bootstrap, Politis & Romano 1992); a frame's
+    weight is how often it was drawn. With K blocks, the standard error s is the standard deviation over draws times
+    sqrt(K / (K - 1)). The interval is g(score) +- t s on a scale g on which the error is more symmetric: logit for
+    shares, -log(1 - x) for scores up to 1, the square root for counts, the logarithm for lengths. t is Student's
+    quantile for K - 1 degrees of freedom. The score always lies in its interval.
+
+    The ends are nan where no interval can be believed: the score is the same in all draws, as at the best or worst
+    value, or is undefined in more than 5 % of them. With less than two blocks all ends are nan. The random numbers are
+    fixed. Under SURE = 60 seconds the intervals are indicative.
     """
-    whole = np.asarray(score(np.arange(frames)), float)
-    r = np.random.default_rng(0)
-    drawn = np.array([score(draw_blocks(frames, block_length(frames, fps), r)) for _ in range(draws if frames else 0)])
+    whole = np.asarray(score(np.ones((1, frames))), float)[0]
     ends = np.full((2, len(whole)), np.nan)
-    for k, column in enumerate(drawn.T):
-        if np.isfinite(column).any():
-            ends[:, k] = _ends(column[np.isfinite(column)])
+    block = block_length(frames, fps, likeness)
+    blocks = frames / block if block else 0.0
+    if blocks < 2 or draws < 2:
+        return whole, ends[0], ends[1]
+    drawn = np.asarray(score(block_weights(frames, block, draws, np.random.default_rng(0))), float)
+    known = np.isfinite(drawn)
+    t = float(student(blocks - 1)) * sqrt(blocks / (blocks - 1))
+    for k in np.flatnonzero(np.isfinite(whole) & (known.mean(axis=0) >= 1 - UNKNOWN_DRAWS)).tolist():
+        error = float(drawn[known[:, k], k].std(ddof=1))
+        if error > 1e-12 * max(1.0, abs(whole[k])):
+            ends[:, k] = _ends(whole[k], t * error, scales[k] if scales else "plain")
     return whole, ends[0], ends[1]
 
 
-def block_length(frames: int, fps: float) -> int:
-    """Return the length of a block in frames: the longer of 1 s and a twentieth of the recording, rounded up, but at
-    most all frames.
+def _ends(x: float, half: float, scale: Scale) -> tuple[float, float]:
+    """Returns the ends of the interval of a score x: g(x) +- half |g'(x)|, taken back by the inverse of g.
 
-    frames: number in the recording, 0 gives 0; fps: frames per second.
+    half: half the width on the plain scale. scale: chooses g. At a limit of its scale a score has no interval (nan).
     """
-    return min(frames, max(1, ceil(SHORTEST_BLOCK * fps), ceil(frames / BLOCKS)))
+    if scale == "share":
+        if not 0 < x < 1:
+            return float("nan"), float("nan")
+        middle, reach = np.log(x / (1 - x)), half / (x * (1 - x))
+        return 1 / (1 + np.exp(reach - middle)), 1 / (1 + np.exp(-reach - middle))
+    if scale == "below one":
+        reach = half / (1 - x) if x < 1 else float("nan")
+        return 1 - (1 - x) * np.exp(reach), 1 - (1 - x) * np.exp(-reach)
+    if scale == "length":
+        reach = half / x if x > 0 else float("nan")
+        return x * np.exp(-reach), x * np.exp(reach)
+    if scale == "count":
+        reach = half / (2 * sqrt(x)) if x > 0 else float("nan")
+        return max(0.0, sqrt(max(x, 0.0)) - reach) ** 2, (sqrt(max(x, 0.0)) + reach) ** 2
+    return x - half, x + half
 
 
-def draw_blocks(frames: int, block: int, r: np.random.Generator) -> Ints:
-    """Return indices (frames,) of frames, from 0: blocks of `block` consecutive frames from random starts, the last one
-    cut.
+def block_length(frames: int, fps: float, likeness: float = 1.0) -> int:
+    """Return the length of a block in frames: twice `likeness`, but at least a twentieth and at most a fifth of the
+    recording.
 
-    block: frames of a block, from 1 to `frames`; ZeroDivisionError for 0, ValueError for more. r: the generator, which
-    is advanced.
+    frames: number in the recording, 0 gives 0; fps: frames per second. likeness: the number of frames for which errors
+    persist. An error across the end of a block is cut; in blocks of twice its length a sixth of the variance is lost.
+    A block is never shorter than 1 s, except in a recording of less than a second.
     """
-    starts = r.integers(0, frames - block + 1, -(-frames // block))
-    return np.asarray((starts[:, None] + np.arange(block)).ravel()[:frames])
+    few, many = BLOCKS
+    wanted = min(max(ceil(2 * likeness), ceil(frames / many)), ceil(frames / few))
+    return min(frames, max(1, ceil(SHORTEST_BLOCK * fps), wanted))
 
 
-def _ends(drawn: Array) -> Array:
-    """Returns the low and the high end (2,) of the 95 % interval of samples (N,): their 2.5 % and 97.5 % quantiles."""
-    tail = (1 - LEVEL) / 2
-    return np.asarray(np.quantile(drawn, (tail, 1 - tail)))
+def block_weights(frames: int, block: int, draws: int, r: np.random.Generator) -> Array:
+    """Return weights (draws, frames): how often each frame is drawn if blocks of `block` consecutive frames are put
+    together.
+
+    Blocks start at any frame; the first frame follows the last one, so that every frame is drawn equally often. The
+    last block of a draw is cut, so that each row sums up to `frames`. block: 1 to `frames`; frames: above 0. r: the
+    generator, which is advanced.
+    """
+    count = -(-frames // block)
+    starts = r.integers(0, frames, (draws, count))
+    length = np.full(count, block)
+    length[-1] = frames - block * (count - 1)
+    change = np.zeros((draws, 2 * frames + 1))
+    rows = np.arange(draws)[:, None]
+    np.add.at(change, (rows, starts), 1.0)
+    np.add.at(change, (rows, starts + length), -1.0)
+    weights = np.cumsum(change, axis=1)
+    return np.asarray(weights[:, :frames] + weights[:, frames:-1])

@@ -32,7 +32,7 @@ from sim.types import Detections, Frame
 from sim.types import Sequence as Recording
 from tracking.papers.blob.config import BlobConfig
 from tracking.prepare import prepare
-from tracking.stats import bootstrap as bootstrap_over_scenes
+from tracking.stats import mean_interval
 
 PEERS = ("sort", "bytetrack", "ocsort")
 RUNNER = Path(__file__).parents[1] / "peers" / "run_roboflow.py"
@@ -174,7 +174,7 @@ def compare_scenes(python: str, folder: Path, title: str, made: list[Scene]) -> 
     own = np.array([r["HOTA"] for r in rows["blob"]])
     for name, found in rows.items():
         difference = (own - [r["HOTA"] for r in found])[:, None]
-        mean, low, high = (float(v[0]) for v in bootstrap_over_scenes(difference))
+        mean, low, high = (float(v[0]) for v in mean_interval(difference))
         means = "  ".join(f"{k} {np.mean([r[k] for r in found]):.3f}" for k in found[0])
         print(f"  {name:14s} {means}  blob minus this: {mean:+.3f} [{low:+.3f}, {high:+.3f}]", flush=True)
 

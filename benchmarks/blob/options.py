@@ -18,7 +18,7 @@ from benchmarks.peers.scores import iou, mot_scores
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
 from tracking.prepare import prepare
-from tracking.stats import bootstrap
+from tracking.stats import mean_interval
 
 UNSEEN = (0.0, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0)  # s
 SEEN = (0.0, 1.0, 3.0, np.inf)  # s
@@ -96,7 +96,7 @@ def options(count: int) -> None:
         for name, change in tried.items():
             cells = []
             for key, values in scores(scenes, change).items():
-                mean, low, high = (float(v[0]) for v in bootstrap((values - base[key])[:, None]))
+                mean, low, high = (float(v[0]) for v in mean_interval((values - base[key])[:, None]))
                 cells.append(f"{key} {mean:+.4f} [{low:+.4f}, {high:+.4f}]")
             print(f"  {name:46s} " + "  ".join(cells), flush=True)
 

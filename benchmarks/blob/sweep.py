@@ -2,7 +2,7 @@
 
 The pictures vary in tilt, depth of shadows, noise, or light. One motion for each scenario and seed is rendered in every
 way. Each curve is a setting of the tracker; `boxes` is the tracker on the scenario's simulated detector. Scores are
-means over scenarios and seeds with 95 % intervals (bootstrap over sequences). One SVG chart for each sweep.
+means over scenarios and seeds with 95 % intervals (Student's t over sequences). One SVG chart for each sweep.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sim.crowd.world import run as walk
 from sim.sequence import observe
 from sim.types import Motion
 from tracking import evaluate, track
-from tracking.stats import bootstrap
+from tracking.stats import mean_interval
 
 SCORES = {"HOTA": "HOTA", "MOTA": "MOTA", "IDF1": "IDF1", "group_F1": "group F1"}
 
@@ -105,7 +105,7 @@ def write_sweep(title: str, found: Mapping[str, np.ndarray], out: Path) -> None:
     """Prints the table of a sweep and writes the chart of the same numbers."""
     chosen = SWEEPS[title]
     shape = (3, len(chosen.steps), len(SCORES))
-    ends = {name: np.stack(bootstrap(v.reshape(len(v), -1))).reshape(shape) for name, v in found.items()}
+    ends = {name: np.stack(mean_interval(v.reshape(len(v), -1))).reshape(shape) for name, v in found.items()}
     print(f"\n{title}: {len(next(iter(found.values())))} sequences")
     for k, key in enumerate(SCORES.values()):
         head([key, *chosen.steps])

@@ -14,7 +14,7 @@ consistency  NEES, NIS and whiteness of the centroid's filter
 The docstrings of scenes.py (the first three modes), velocity_difference.py, recordings.py, cost.py and consistency.py
 in this folder say what the columns mean. Detections "file" and "truth" are points, "image" the tracker's own foreground
 pixels. Groups from pixels are scored in the image, all others on the ground. Intervals are 95 % intervals: of means by
-bootstrap over sequences, of shares by Wilson.
+Student's t over sequences, of shares by Wilson.
 """
 
 from __future__ import annotations

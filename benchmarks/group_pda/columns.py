@@ -1,7 +1,7 @@
 """Columns of the tables of `group-pda`: each maps the rows of several sequences to one cell.
 
-A row (`benchmarks.group_pda.runs.Row`) holds the scores of one sequence by key. Means are drawn again by bootstrap over
-sequences, pooled shares have Wilson's interval; all intervals are 95 % intervals.
+A row (`benchmarks.group_pda.runs.Row`) holds the scores of one sequence by key. Means have Student's interval over
+sequences, ratios of sums a bootstrap interval, pooled shares Wilson's; all intervals are 95 % intervals.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.group_pda.runs import Row
 from benchmarks.support.tables import interval, share
 from sim.types import Array
-from tracking.stats import DRAWS, LEVEL, bootstrap
+from tracking.stats import DRAWS, LEVEL, mean_interval
 
 Column = Callable[[Sequence[Row]], str]
 Number = Callable[[Row], float]
@@ -27,7 +27,7 @@ def filled(columns: Mapping[str, Column], rows: Mapping[str, Sequence[Row]]) -> 
 
 def mean_of(key: str, scale: float = 1.0) -> Column:
     """Mean of a score over the sequences in which it is known, times `scale`."""
-    return lambda rows: interval(*(scale * float(x[0]) for x in bootstrap(values(rows, [key]))))
+    return lambda rows: interval(*(scale * float(x[0]) for x in mean_interval(values(rows, [key]))))
 
 
 def ratio(part: Number, whole: Number) -> Column:

@@ -22,9 +22,10 @@ import numpy as np
 from sim.geometry.polygons import gap_pairs, pack
 from sim.truth.encounters import CROSS_GAP
 from sim.types import Array, Groups, Ints, Tracks, Truth
-from tracking.scoring.evaluation import labelled_frames, plane_of
+from tracking.scoring.evaluation import labelled_frames
 from tracking.scoring.group_scores import hull_pairs, matched_groups, shared_members
 from tracking.scoring.people_and_groups import group_rows, people_inside, true_people
+from tracking.scoring.people_comparison import plane_of
 
 SECOND = 1.0
 NEVER = (2**31, 0)

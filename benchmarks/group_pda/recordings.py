@@ -1,9 +1,9 @@
 """Mode `real` of `benchmarks.group_pda`: recordings of real people.
 
 hotel: seq_hotel from the labelled positions of people, without their identities. caviar: Meet_WalkTogether1 from the
-centres of labelled boxes, in the image. Columns: group scores with 95 % intervals by moving blocks of frames; pairwise
-scores by the people in each hull (of the baseline rule: by its members). Identity switches and MOTA have no interval,
-because joining blocks adds switches. Below: number of events of each kind that are reported.
+centres of labelled boxes, in the image. Columns: group scores with 95 % intervals by weights of blocks of frames;
+pairwise scores by the people in each hull (of the baseline rule: by its members). Below: number of events of each kind
+that are reported.
 pets: the first 200 frames of PETS09-S2L1 from pixels. No groups are labelled: printed are the number of groups, the
 events, and in how many frames the two people who walk together (11 and 12) are in one hull. A video is written.
 """
@@ -24,19 +24,18 @@ from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER
 from benchmarks.support.tables import interval, table
 from sim.geometry.polygons import contains
 from sim.io.source import open_source
-from sim.types import Array, Ints, Tracks, Truth
+from sim.types import Tracks, Truth
 from tracking.app.pictures.overlay import write_overlay
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.recording_intervals import recording_intervals
 from tracking.run import track
-from tracking.scoring import evaluate
-from tracking.scoring.block_resampling import resampled_scorer
 from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.frame_weights import weighted_scorer
 from tracking.scoring.people_and_groups import INSIDE
-from tracking.stats import moving_blocks
 from tracking.tuning.grouping_episodes import people_as_tracks
 
-DRAWS = 200
+DRAWS = 1000
 KEYS = ("group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP", "group_MOTA", "group_GDSR2", "group_F1", "group_IDSW")
 TABLE_3B = """columns of Bazzani et al. 2012, Table 3b. DEEPER-JIGT, on its own BIWI frames: 1-FP 53.8 %,
 1-FN 78.0 %, GDSR 53.6 %, MOTP 0.44 m, MOTA 29.4 %; it follows people in the video and restarts from the truth when it
@@ -87,22 +86,10 @@ def labelled_recording(given: argparse.Namespace, path: str, note: str) -> Any:
 
 
 def with_intervals(truth: Truth, answers: Sequence[Tracks], keys: Sequence[str]) -> list[tuple[float, float, float]]:
-    """Returns value, low and high end of each score; the ends of scores without interval are nan."""
-    every = list(CATALOGUE)
-    at = [every.index(key) for key in keys]
-    draw = resampled_scorer(truth, answers, None, "hull")
-
-    def score(places: Ints) -> Array:
-        return draw(places)[at]
-
-    _, low, high = moving_blocks(score, truth.length, truth.fps, DRAWS)
-    whole = evaluate(truth, answers)
-    bare = {"group_IDSW", "group_MOTA"}  # joining blocks adds switches
-    nan = float("nan")
-    return [
-        (whole[key], *((nan, nan) if key in bare else (float(a), float(b))))
-        for key, a, b in zip(keys, low, high, strict=True)
-    ]
+    """Returns value, low and high end of each score; the ends are nan where the interval is unknown."""
+    ends = recording_intervals(truth, weighted_scorer(truth, answers), DRAWS)
+    found = dict(zip(CATALOGUE, zip(*(end.tolist() for end in ends), strict=True), strict=True))
+    return [found[key] for key in keys]
 
 
 def pets(given: argparse.Namespace) -> Any:

@@ -10,17 +10,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from unittest import mock
-
-import numpy as np
 
 from benchmarks.group_pda.encounters import outcomes
 from benchmarks.support.in_memory import in_memory
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry
 from sim.sequence import simulate
-from sim.truth.group_hulls import box_groups
 from sim.types import DetectionMode, Image, Tracks, Truth
 from sim.types import Sequence as Recording
 from sim.workers.pool import process_pool
@@ -29,6 +26,7 @@ from tracking.detect.background_training import Trained, train
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.run import TrackingRun, track
 from tracking.scoring import evaluate
+from tracking.scoring.one_plane import in_image
 
 Row = dict[str, float]
 
@@ -98,7 +96,7 @@ def rows_of_job(job: TrackingJob) -> dict[str, Row] | str:
     sequence = in_memory(live) if streams else live
     with trained_once():
         answers = tracked(sequence, job.variants, job.mode)
-    return {v.name: row(truth, image_tracks(answers[v.name]) if v.in_image else answers[v.name]) for v in job.variants}
+    return {v.name: row(truth, in_image(answers[v.name]) if v.in_image else answers[v.name]) for v in job.variants}
 
 
 def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMode) -> dict[str, TrackingRun]:
@@ -136,23 +134,3 @@ def row(truth: Truth, answers: Sequence[Tracks]) -> Row:
     found = outcomes(truth, answers)
     own = {"pairs": len(found), "kept": sum(f.kept for f in found), "merged": sum(f.merged for f in found)}
     return {**evaluate(truth, answers), **own}
-
-
-def image_tracks(answers: Sequence[Tracks]) -> list[Tracks]:
-    """Returns tracks of people on the ground as tracks in the image, at the centres of their boxes."""
-    return [_image_tracks(t) for t in answers]
-
-
-def _image_tracks(t: Tracks) -> Tracks:
-    box = np.zeros((0, 4)) if t.box is None else t.box
-    middle, none = box[:, :2] + box[:, 2:] / 2, np.full((len(box), 2), np.nan)
-    order = np.argsort(t.id)
-    rows = (t.id[order], t.group[order], middle[order], none, box[order])
-    groups = box_groups(np.full(len(box), t.index), *rows, t.index, 1)[0]
-    events = tuple(replace(e, pos=_centre(middle, np.isin(t.id, e.members))) for e in t.events)
-    return t.replace(plane="image", pos=middle, vel=none, groups=groups, events=events)
-
-
-def _centre(middle: np.ndarray, rows: np.ndarray) -> tuple[float, float]:
-    x, y = middle[rows].mean(axis=0) if rows.any() else (float("nan"), float("nan"))
-    return float(x), float(y)

@@ -18,11 +18,12 @@ from tracking.grouping.grouped_tracks import with_groups
 from tracking.objective.derived_outlines import derived_outlines
 from tracking.objective.hull_overlaps import GroupOutlines, count_inside, found_pairs
 from tracking.scoring.candidate_pairs import FOUND
-from tracking.scoring.evaluation import Scorer, chosen_frames, objective_of, people_pairs, usual_similarity
+from tracking.scoring.evaluation import Scorer, chosen_frames, objective_of
 from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
 from tracking.scoring.group_scores import f1, matched_groups
 from tracking.scoring.hota import hota
 from tracking.scoring.people_and_groups import Surface, bare_groups, hulls_of
+from tracking.scoring.people_comparison import people_pairs, usual_similarity
 from tracking.scoring.rows import FrameRows
 
 

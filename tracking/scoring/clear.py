@@ -11,17 +11,48 @@ without rivals are matched whatever happened before. Frames are processed in ord
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from sim.types import Bools, Ints
+from sim.types import Array, Bools, Ints
 from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
 from tracking.scoring.matching import solve_frame
 
 BONUS = 1000.0  # added to the weight of a pair that was matched in the previous frame
 MOSTLY, LOST = 0.8, 0.2
 """A person matched in more than 80 % of its frames is mostly tracked, in less than 20 % mostly lost."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClearMatches:
+    """The matches of CLEAR: `found`, the matched pairs of similarity 0.5 or more.
+
+    - switched: frame number of each identity switch, the frame of the later match.
+    - resumed: frame number of each match that follows a pause of its true id.
+    - share (N,): matched frames / frames of each of the N true ids, in the order of `Pairs.true_ids[0]`.
+    """
+
+    found: Pairs
+    switched: Ints
+    resumed: Ints
+    share: Array
+
+
+def clear_matches(pairs: Pairs) -> ClearMatches:
+    """Returns the matches of CLEAR; pairs: candidate pairs of any similarity above 0, no id twice in a frame."""
+    near = pairs.keep(pairs.s >= FOUND - EPS)
+    turn = turns(pairs)
+    near = near.keep(follow(near, turn))
+    frame = near.frame
+    who, by, when = near.true_ids[1][near.i], near.est_ids[1][near.j], turn[frame]
+    share = np.bincount(who, minlength=len(pairs.true_ids[0])) / np.bincount(pairs.true_ids[1])
+    order = np.argsort(who, kind="stable")
+    who, by, when, frame = who[order], by[order], when[order], frame[order]
+    same = who[1:] == who[:-1]
+    switched, resumed = same & (by[1:] != by[:-1]), same & (when[1:] > when[:-1] + 1)
+    return ClearMatches(near, frame[1:][switched], frame[1:][resumed], share)
 
 
 def clear(pairs: Pairs) -> dict[str, float]:
@@ -36,20 +67,13 @@ def clear(pairs: Pairs) -> dict[str, float]:
     MOTA = 1 - (FN + FP + IDSW) / true rows, or 0 if either side has no rows. MOTP is the mean similarity of the
     matches, 0 without matches. The counts are 0 where there is nothing to count.
     """
-    near = pairs.keep(pairs.s >= FOUND - EPS)
-    turn = turns(pairs)
-    near = near.keep(follow(near, turn))
-    who, by, when = near.true_ids[1][near.i], near.est_ids[1][near.j], turn[near.frame]
-    order = np.argsort(who, kind="stable")
-    who, by, when = who[order], by[order], when[order]
-    same = who[1:] == who[:-1]
-    n, m, hits = len(pairs.true), len(pairs.est), len(who)
-    switches = int((same & (by[1:] != by[:-1])).sum())
-    share = np.bincount(who, minlength=len(pairs.true_ids[0])) / np.bincount(pairs.true_ids[1])
+    matches = clear_matches(pairs)
+    n, m, hits = len(pairs.true), len(pairs.est), len(matches.found.s)
+    switches, share = len(matches.switched), matches.share
     mostly, tracked = int((share > MOSTLY).sum()), int((share >= LOST).sum())
     return {
         "MOTA": (hits - (m - hits) - switches) / n if n and m else 0.0,
-        "MOTP": float(near.s.sum()) / max(1, hits),
+        "MOTP": float(matches.found.s.sum()) / max(1, hits),
         "TP": float(hits),
         "FN": float(n - hits),
         "FP": float(m - hits),
@@ -57,7 +81,7 @@ def clear(pairs: Pairs) -> dict[str, float]:
         "MT": float(mostly),
         "PT": float(tracked - mostly),
         "ML": float(len(share) - tracked),
-        "Frag": float((same & (when[1:] > when[:-1] + 1)).sum()),
+        "Frag": float(len(matches.resumed)),
     }
 
 

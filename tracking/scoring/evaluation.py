@@ -10,13 +10,12 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
-from sim.types import Array, Bools, Tracks, Truth
+from sim.types import Bools, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
+from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.clear import clear
 from tracking.scoring.group_and_event_scores import ComparedSides, group_and_event_scores
@@ -32,16 +31,33 @@ from tracking.scoring.people_and_groups import (
     true_groups,
     true_people,
 )
-from tracking.scoring.position_errors import REACH, position_scores
+from tracking.scoring.people_comparison import (
+    IncomparableError,
+    Similarity,
+    people_pairs,
+    plane_of,
+    usual_similarity,
+)
+from tracking.scoring.position_errors import position_scores
 
-Similarity = Literal["boxes", "ground", "image"]
-"""How two people are compared: IoU of boxes, or distance of positions on the ground or in the image."""
+__all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity", "evaluate"]
 
 
-class IncomparableError(ValueError):
-    """Raised if the truth or the tracks have people but lack the boxes or positions that are to be compared. By boxes
-    also if the truth has no boxes at all. It is a ValueError.
+@dataclass(frozen=True, eq=False)
+class MatchedSides:
+    """One truth and one tracker's tracks, compared but not counted yet.
+
+    - sides: both sides in the scored frames, people mapped. inside (length + 1,): bool by frame number, which are
+      scored.
+    - similarity: how people are compared. people: their candidate pairs, None for a tracker of whole groups.
+    - groups: the true groups in the scored frames, None if none of these frames is labelled.
     """
+
+    sides: ComparedSides
+    inside: Bools
+    similarity: Similarity
+    people: Pairs | None
+    groups: TrueGroups | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,26 +176,38 @@ class Scorer:
         Raises IncomparableError if boxes or positions are missing, ValueError if an id occurs twice in one frame,
         InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
         """
-        truth, inside = self.truth, chosen_frames(frames, self.truth.length)
+        compared = self.compare(tracks, similarity, chosen_frames(frames, self.truth.length))
+        sides, found = compared.sides, dict.fromkeys(CATALOGUE, float("nan"))
+        if compared.people is not None:
+            found |= people_scores(compared.people)
+            where, frames_scored = (sides.surface, sides.plane, sides.scale), int(compared.inside.sum())
+            found |= position_scores(sides.true, sides.est, sides.mapping, *where, frames_scored)
+        if compared.groups is not None:
+            found |= group_and_event_scores(sides, compared.groups, group_match)
+        found["objective"] = objective_of(found)
+        return Scores(found, compared.similarity, sides.surface, group_match)
+
+    def compare(self, tracks: Iterable[Tracks], similarity: Similarity | None, inside: Bools) -> MatchedSides:
+        """Returns this truth and one tracker's tracks with people mapped, ready to be counted.
+
+        tracks: one `Tracks` per frame, any order; of two with equal frame the later is used. similarity: as in
+        `evaluate`. inside (length + 1,): bool by frame number, the frames to score.
+
+        Raises IncomparableError if boxes or positions are missing, and InputError if groups must be derived in the
+        image and `truth.px_per_m` is 0 or less.
+        """
+        truth = self.truth
         given: Sequence[Tracks] = _in_order(tracks, inside)
         labelled = bool((self.labelled & inside).any())
         if labelled and (truth.events is not None or any(t.groups is None for t in given)):
             given = with_groups(given, truth.fps, truth.px_per_m)
-        sides = self.sides([t for t in given if inside[t.index]], inside)
+        sides, pairs = self.sides([t for t in given if inside[t.index]], inside), None
         chosen = similarity or usual_similarity(truth, sides.tracks)
-        found = dict.fromkeys(CATALOGUE, float("nan"))
         if not sides.groups_only:
             pairs = people_pairs(sides, chosen)
             sides = replace(sides, mapping=mapped_people(pairs))
-            found |= people_scores(pairs)
-            found |= position_scores(
-                sides.true, sides.est, sides.mapping, sides.surface, sides.plane, sides.scale, int(inside.sum())
-            )
-        if labelled:
-            groups = self.groups(sides.surface).in_frames(inside, inside[self.people.rows.frame])
-            found |= group_and_event_scores(sides, groups, group_match)
-        found["objective"] = objective_of(found)
-        return Scores(found, chosen, sides.surface, group_match)
+        groups = self.groups(sides.surface).in_frames(inside, inside[self.people.rows.frame]) if labelled else None
+        return MatchedSides(sides, inside, chosen, pairs, groups)
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:
@@ -218,63 +246,6 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
     last = int(np.flatnonzero(inside)[-1]) if inside.any() else 0
     by_frame = {t.index: t for t in tracks if 1 <= t.index <= last}
     return [by_frame[index] for index in sorted(by_frame)]
-
-
-def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
-    """Returns the plane of one tracker's positions: "ground", "space" or "image".
-
-    It is that of the first `Tracks` with people, else of the first `Tracks`. If `tracks` is empty it is the truth's:
-    "image" if the truth has no positions on the ground, else "ground".
-    """
-    own = "image" if truth.pos is None else "ground"
-    return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else own)
-
-
-def usual_similarity(truth: Truth, tracks: Iterable[Tracks]) -> Similarity:
-    """Returns how people are compared by default: "boxes" if the truth and every non-empty frame of the tracks have
-    boxes.
-
-    Else "image" if the first non-empty frame of the tracks is in the image, else "ground". Tracks without anybody count
-    as having boxes.
-    """
-    some = [t for t in tracks if len(t.id)]
-    if truth.box is not None and all(t.box is not None for t in some):
-        return "boxes"
-    return "image" if some and some[0].plane == "image" else "ground"
-
-
-def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
-    """Returns the candidate pairs of true and tracked people of one frame, with a similarity in (0, 1].
-
-    sides: both sides' people in the scored frames. similarity: "boxes" takes the IoU; "ground" and "image" take 1 -
-    distance / 2 m, the image by `truth.px_per_m` (no pairs if that is nan). Without people on a side there are no
-    pairs. Raises IncomparableError if a side has people but not the boxes or positions to be compared. With "boxes" it
-    is also raised if the truth has no boxes at all.
-    """
-    true, est = sides.true, sides.est
-    if similarity == "boxes":
-        if true.box is None or est.box is None:
-            raise IncomparableError("no boxes to compare: score on the ground")
-        return box_pairs(true.rows, est.rows, true.box, est.box)
-    reach = REACH * sides.truth.px_per_m if similarity == "image" else REACH
-    true_pos, est_pos = _positions(true, similarity, "ground"), _positions(est, similarity, sides.plane)
-    return point_pairs(true.rows, est.rows, true_pos, est_pos, reach)
-
-
-def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
-    """Returns the positions x, y (R, 2) of the R rows of `people` on a surface, in m ("ground") or px ("image").
-
-    plane: plane of the positions in `people`. Without rows and positions the result has shape (0, 2). Raises
-    IncomparableError if there are rows but no positions on the surface.
-    """
-    positions = people.positions_on(surface, plane)
-    if positions is None and len(people.rows):
-        where, other = {
-            "ground": ("on the ground", "boxes or in the image"),
-            "image": ("in the image", "on the ground"),
-        }[surface]
-        raise IncomparableError(f"no positions {where} to compare: score {other}")
-    return np.zeros((0, 2)) if positions is None else positions
 
 
 def people_scores(pairs: Pairs) -> dict[str, float]:

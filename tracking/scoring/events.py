@@ -200,14 +200,14 @@ def lineage_scores(matched: Sequence[MatchedEvents]) -> dict[str, float]:
     head = [m for m in matched if m.kind in HEADLINE]
     n_true = sum(event.has_lineage for m in head for event in m.true)
     pairs = [(a, b) for m in head for a, b in m.pairs if a.has_lineage]
-    right = sum(_same_lineage(a, b) for a, b in pairs)
+    right = sum(same_lineage(a, b) for a, b in pairs)
     return {
         "lineage_accuracy": ratio(right, n_true),
         "lineage_accuracy_found": ratio(right, len(pairs)),
     }
 
 
-def _same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
+def same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
     """True if the parents of both events agree and the children agree; False if any of the four is None.
 
     They agree if both sides have equally many, and each true one has a Jaccard index above 0.5 with some estimated one.

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.types import Bools, Groups, Ints, Tracks, Truth
-from tracking.scoring.events import COUNTS_AS, HEADLINE, event_scores, lineage_scores, match_events
+from tracking.scoring.events import COUNTS_AS, HEADLINE, MatchedEvents, event_scores, lineage_scores, match_events
 from tracking.scoring.events_by_true_people import events_of_hulls, tracked_events, true_events
 from tracking.scoring.group_scores import (
     GroupComparison,
@@ -101,17 +101,30 @@ def group_and_event_scores(sides: ComparedSides, true: TrueGroups, by: GroupMatc
     """
     tracked = tracked_groups(sides)
     found = pairwise_scores(true.groups, tracked.counted, tracked.person)
-    shared = shared_members(true.groups, tracked.counted, tracked.person, len(sides.true.rows))
-    if true.comparable:
-        compared = compare_groups(true.groups, tracked.counted, shared, "hull")
-        found["group_F1_hull"] = detection(compared, sides.frames)["F1"]
-        if by == "hull":
-            found |= strict_and_core(sides, compared)
-    if by == "members":
-        found |= strict_and_core(sides, compare_groups(true.groups, tracked.counted, shared, "members"))
+    by_hull, chosen = group_comparisons(sides, true, tracked, by)
+    if by_hull is not None:
+        found["group_F1_hull"] = detection(by_hull, sides.frames)["F1"]
+    if chosen is not None:
+        found |= strict_and_core(sides, chosen)
     if sides.truth.events is not None:
-        found |= _event_scores(sides, tracked)
+        matched = compared_events(sides, tracked)
+        unknown = unknown_kinds(sides)
+        scores = event_scores(matched, sides.truth.fps) | lineage_scores(matched)
+        found |= {k: float("nan") if k.partition("_")[0] in unknown else v for k, v in scores.items()}
     return found
+
+
+def group_comparisons(
+    sides: ComparedSides, true: TrueGroups, tracked: TrackedGroups, by: GroupMatch
+) -> tuple[GroupComparison | None, GroupComparison | None]:
+    """Returns both sides' groups with their matchings twice: by hull, and as `by` says. The two are one if `by` is
+    "hull".
+
+    A matching by hull is None if `true` is not comparable (has no shapes on the surface).
+    """
+    shared = shared_members(true.groups, tracked.counted, tracked.person, len(sides.true.rows))
+    by_hull = compare_groups(true.groups, tracked.counted, shared, "hull") if true.comparable else None
+    return by_hull, by_hull if by == "hull" else compare_groups(true.groups, tracked.counted, shared, by)
 
 
 def tracked_groups(sides: ComparedSides) -> TrackedGroups:
@@ -172,12 +185,11 @@ def near_changes(truth: Truth) -> Bools:
     return np.asarray(away <= CORE * truth.fps + 1e-9)
 
 
-def _event_scores(sides: ComparedSides, tracked: TrackedGroups) -> dict[str, float]:
-    """Returns a dict of the scores of events ("merge_F1" …) and of lineage. Fails an assertion if the truth has no
-    events.
+def compared_events(sides: ComparedSides, tracked: TrackedGroups) -> list[MatchedEvents]:
+    """Returns the events of both sides that start in labelled frames, matched, one entry per kind. Fails an assertion
+    if the truth has no events.
 
-    sides: both sides' people; tracked: the tracker's groups. For a tracker of whole groups, scores of crossings and
-    queues are nan unless it reports events of this kind itself: they are derived from people otherwise.
+    sides: both sides' people; tracked: the tracker's groups.
     """
     truth, rows, frames, fps = sides.truth, sides.true.rows, sides.frames, sides.truth.fps
     assert truth.events is not None
@@ -187,9 +199,13 @@ def _event_scores(sides: ComparedSides, tracked: TrackedGroups) -> dict[str, flo
     est = events_of_hulls(sides.tracks, tracked.every, rows, frames, fps, names_members)
     if names_members:
         est += tracked_events(sides.tracks, sides.est, sides.mapping, rows, frames, fps)
-    matched = match_events(true, est, fps, sides.scale)
-    found = event_scores(matched, fps) | lineage_scores(matched)
-    if names_members:
-        return found
-    unreported = {"cross", "queue"} - {event.kind for t in sides.tracks for event in t.events}
-    return {k: float("nan") if k.partition("_")[0] in unreported else v for k, v in found.items()}
+    return match_events(true, est, fps, sides.scale)
+
+
+def unknown_kinds(sides: ComparedSides) -> set[str]:
+    """Returns the kinds of events whose scores are unknown: crossings and queues that a tracker of whole groups does
+    not report itself. For a tracker of people they are derived, so the result is empty.
+    """
+    if not sides.groups_only:
+        return set()
+    return {"cross", "queue"} - {event.kind for t in sides.tracks for event in t.events}

@@ -197,8 +197,8 @@ def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
     i, j = chosen.i[kept], chosen.j[kept]
     n_true, n_est, hits = int(frames[true.rows.frame].sum()), int(frames[est.rows.frame].sum()), len(i)
     misses, false = n_true - hits, n_est - hits
-    switches = count_switches(true.rows.frame[i], true.rows.id[i], est.rows.id[j])
-    right, pure = _correct(compared, i, j)
+    switches = len(switch_frames(true.rows.frame[i], true.rows.id[i], est.rows.id[j]))
+    right, pure = correct(compared, i, j)
     distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
     return {
         "1-FP": ratio(n_true - false, n_true),
@@ -216,7 +216,7 @@ def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
         "FN": float(misses),
         **detection(compared, frames),
         **(hota(compared.pairs.in_frames(frames)) if n_true + n_est else {}),
-        "size_error": _mean(np.abs(_sizes(true)[i] - _sizes(est)[j])),
+        "size_error": _mean(np.abs(sizes(true)[i] - sizes(est)[j])),
         "extent_error": _mean(gaussian_wasserstein(true.pos[i], true.extent[i], est.pos[j], est.extent[j])),
     }
 
@@ -232,7 +232,7 @@ def _mean(values: Array) -> float:
     return float(known.mean()) if len(known) else float("nan")
 
 
-def _correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
+def correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
     """Returns two bool masks (K,) of the K matches of true rows i and estimated rows j: correct for GDSR, and for
     GDSR2.
 
@@ -265,16 +265,16 @@ def _by_frame(compared: GroupComparison, frames: Bools, i: Ints) -> dict[str, fl
     }
 
 
-def count_switches(frame: Ints, true: Ints, est: Ints) -> int:
-    """Returns how often a true id is matched with a different estimated id than in its previous match, summed over true
-    ids.
+def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:
+    """Returns the frame number of each switch: a true id is matched with a different estimated id than in its previous
+    match.
 
     frame, true, est (K,): frame number, true id and estimated id of each match, in any order. Frames without a match do
-    not count as a switch.
+    not count as a switch. A switch belongs to the frame of the later match.
     """
     order = np.lexsort((frame, true))
-    t, e = true[order], est[order]
-    return int(((t[1:] == t[:-1]) & (e[1:] != e[:-1])).sum())
+    f, t, e = frame[order], true[order], est[order]
+    return np.asarray(f[1:][(t[1:] == t[:-1]) & (e[1:] != e[:-1])])
 
 
 def detection(compared: GroupComparison, frames: Bools) -> dict[str, float]:
@@ -295,6 +295,6 @@ def f1(hits: int, n_true: int, n_est: int) -> float:
     return ratio(2 * hits, n_true + n_est)
 
 
-def _sizes(groups: GroupRows) -> Array:
+def sizes(groups: GroupRows) -> Array:
     """Returns the number of people in each of G groups, (G,) float: reported size, or if nan the number of members."""
     return np.where(np.isfinite(groups.size), groups.size, groups.count)

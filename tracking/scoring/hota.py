@@ -11,6 +11,8 @@ is the number of matches of these two ids, n_i and m_j their numbers of frames:
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from sim.types import Array, Ints
@@ -18,6 +20,37 @@ from tracking.scoring.candidate_pairs import EPS, Pairs
 from tracking.scoring.matching import match_as_table
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HotaMatches:
+    """The K matches of HOTA, and the U links, a link being a combination of a true and an estimated id.
+
+    - true_id, est_id (U,): the ids of each link, as indices into `Pairs.true_ids[0]` and `Pairs.est_ids[0]`.
+    - link (K,): link of each match; frame (K,): its frame number; s (K,): its similarity.
+    - level (K,): number of thresholds at which the match counts, 0 to 19; these are the lowest ones.
+    """
+
+    true_id: Ints
+    est_id: Ints
+    link: Ints
+    frame: Ints
+    s: Array
+    level: Ints
+
+
+def hota_matches(pairs: Pairs) -> HotaMatches:
+    """Returns the matches that serve all thresholds: in each frame the greatest sum of A(i, j) s(i, j).
+
+    pairs: candidate pairs of any similarity above 0, no id twice in a frame.
+    """
+    true_id, est_id, link = pairs.links
+    n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
+    m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
+    chosen = match_as_table(pairs, alignment(pairs, n + m)[link] * pairs.s)
+    s = pairs.s[chosen]
+    level = np.searchsorted(ALPHAS - EPS, s, side="right")
+    return HotaMatches(true_id, est_id, link[chosen], pairs.frame[chosen], s, level)
 
 
 def hota(pairs: Pairs) -> dict[str, float]:
@@ -38,12 +71,10 @@ def curves(pairs: Pairs) -> dict[str, Array]:
     Det: detection, Ass: association, Loc: localisation; A: accuracy, Re: recall, Pr: precision. pairs: candidate pairs
     of any similarity above 0, no id twice in a frame. At a threshold without matches LocA is 1 and all others are 0.
     """
-    true_id, est_id, link = pairs.links
-    n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link (pair of ids)
-    m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
-    chosen = match_as_table(pairs, alignment(pairs, n + m)[link] * pairs.s)
-    s, link = pairs.s[chosen], link[chosen]
-    level = np.searchsorted(ALPHAS - EPS, s, side="right")  # number of thresholds at which the match counts
+    matches = hota_matches(pairs)
+    n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[matches.true_id]  # n_i of each link
+    m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[matches.est_id]
+    s, link, level = matches.s, matches.link, matches.level
     bins = len(ALPHAS) + 1
     together = np.bincount(link * bins + level, minlength=len(n) * bins).reshape(-1, bins)
     together = np.cumsum(together[:, :0:-1], axis=1)[:, ::-1]  # matches of each link at each threshold

@@ -15,17 +15,31 @@ from tracking.scoring.rows import FrameRows
 
 
 def pairwise_scores(true: GroupRows, est: GroupRows, person: Ints) -> dict[str, float]:
-    """Returns a dict of pairwise_precision (right / estimated pairs), pairwise_recall (right / true pairs) and
-    pairwise_F1 (2 right / both together). A pair is two people of one frame in one group.
+    """Returns a dict of pairwise_F1, pairwise_precision and pairwise_recall over pairs of people in one group.
 
-    Pairs of all frames are counted together. true, est: true and estimated groups in frames; true.member holds row
-    indices of the true people. person (K,): row of the true person that each membership of `est` is mapped to, -1 none.
+    Pairs of all frames are counted together, as `pair_counts` does, which explains the arguments. A score whose
+    denominator is 0 is nan.
+    """
+    n_true, n_est, hits = (int(n) for n in pair_counts(true, est, person).sum(axis=0))
+    return {
+        "pairwise_F1": f1(hits, n_true, n_est),
+        "pairwise_precision": ratio(hits, n_est),
+        "pairwise_recall": ratio(hits, n_true),
+    }
+
+
+def pair_counts(true: GroupRows, est: GroupRows, person: Ints) -> Ints:
+    """Returns for each frame number 0 … last how many pairs of people are in one group, (last + 1, 3): true pairs,
+    estimated pairs, right pairs.
+
+    true, est: true and estimated groups in frames; true.member holds row indices of the true people. person (K,): row
+    of the true person that each membership of `est` is mapped to, -1 none. last: the last frame with a group on either
+    side; shape (0, 3) without groups.
 
     An estimated pair is right if both persons are in one true group. An estimated pair with an unmapped member, or with
     both members mapped to one person, is false. A true pair with a person whom no track is mapped to is missed. A pair
-    inside several estimated groups counts once. A score whose denominator is 0 is nan.
+    inside several estimated groups counts once.
     """
-    n_true = _pairs_in(true)
     group = group_of_person(true, int(max(true.member.max(initial=-1), person.max(initial=-1))) + 1)
     order = np.argsort(est.of, kind="stable")
     mapped = person[order]
@@ -36,19 +50,18 @@ def pairwise_scores(true: GroupRows, est: GroupRows, person: Ints) -> dict[str, 
         return kept, np.ones(len(kept))
 
     both = compare(inside, inside, ordered)
+    frame = est.rows.frame[est.of[order][both.i]]
     pairs = np.stack([mapped[both.i], mapped[both.j]])
-    distinct = np.unique(pairs, axis=1)  # hulls may overlap: a pair inside two of them is one pair
-    n_est = _pairs_in(est) - (pairs.shape[1] - distinct.shape[1])
-    p, q = distinct
-    hits = int(((group[p] >= 0) & (group[p] == group[q])).sum())
-    return {
-        "pairwise_F1": f1(hits, n_true, n_est),
-        "pairwise_precision": ratio(hits, n_est),
-        "pairwise_recall": ratio(hits, n_true),
-    }
+    (p, q), first = np.unique(pairs, axis=1, return_index=True)  # hulls may overlap: a pair inside two of them is one
+    size = 1 + int(max(true.rows.frame.max(initial=-1), est.rows.frame.max(initial=-1)))
+    distinct = np.bincount(frame[first], minlength=size)
+    repeated = np.bincount(frame, minlength=size) - distinct
+    right = np.bincount(frame[first][(group[p] >= 0) & (group[p] == group[q])], minlength=size)
+    return np.column_stack([_pairs_in(true, size), _pairs_in(est, size) - repeated, right])
 
 
-def _pairs_in(groups: GroupRows) -> int:
-    """Returns the number of unordered pairs of members, n (n - 1) / 2 per group of n, summed over groups."""
-    n = groups.count
-    return int((n * (n - 1) // 2).sum())
+def _pairs_in(groups: GroupRows, size: int) -> Ints:
+    """Returns the number of unordered pairs of members, n (n - 1) / 2 per group of n, of each frame number: (size,)."""
+    pairs = np.zeros(size, np.int64)
+    np.add.at(pairs, groups.rows.frame, groups.count * (groups.count - 1) // 2)
+    return pairs

@@ -31,12 +31,28 @@ def position_scores(
     has no velocities; both RMSE are nan without mapped people. GOSPA's cut-off distance is 2 m; its four values are nan
     if frames is 0. The result is empty if one side has no positions on the surface, or if the scale is not finite.
     """
-    true_pos, est_pos = true.positions_on(surface, "ground"), est.positions_on(surface, plane)
-    if true_pos is None or est_pos is None or not np.isfinite(scale):
+    compared = compared_positions(true, est, surface, plane, scale)
+    if compared is None:
         return {}
-    vel: tuple[Array | None, Array | None] = (true.vel, est.vel) if surface == "ground" else (None, None)
+    true_pos, est_pos, *vel = compared
     pairs = point_pairs(true.rows, est.rows, true_pos, est_pos, REACH * scale)
     return people_errors(mapping, true_pos, est_pos, *vel) | gospa(pairs, REACH * scale, frames)
+
+
+def compared_positions(
+    true: PersonRows, est: PersonRows, surface: Surface, plane: str, scale: float
+) -> tuple[Array, Array, Array | None, Array | None] | None:
+    """Returns true and estimated positions on the surface, (R, 2) and (S, 2), then true and estimated velocities or
+    None.
+
+    surface: "ground" or "image". plane: of `est.pos`. scale: units of the surface per metre. Velocities are None in the
+    image and where a side has none. The result is None if a side has no positions on the surface, or if the scale is
+    not finite.
+    """
+    true_pos, est_pos = true.positions_on(surface, "ground"), est.positions_on(surface, plane)
+    if true_pos is None or est_pos is None or not np.isfinite(scale):
+        return None
+    return (true_pos, est_pos, true.vel, est.vel) if surface == "ground" else (true_pos, est_pos, None, None)
 
 
 def people_errors(

@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 
 from sim.types import Groups, Plane, Tracks, Truth
 from tracking.grouping.grouped_tracks import derive
-from tracking.scoring.evaluation import Scores, Similarity, evaluate
+from tracking.scoring.evaluation import Scores, evaluate
 from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.people_comparison import Similarity
 
 COLUMNS = {"frame": (), "id": (), "pos": (2,), "box": (4,), "group": ()}  # name: shape of one row
 PERSON_HEIGHT = 1.7  # m: assumed height of the median box

@@ -11,10 +11,9 @@ from sim.sequence import simulate
 from sim.types import Tracks
 from tests.reference_trackeval import box_similarity, trackeval_scores
 from tracking.scoring import evaluate
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, matrix_pairs, point_pairs
+from tracking.scoring.candidate_pairs import box_pairs, matrix_pairs
 from tracking.scoring.evaluation import people_scores
 from tracking.scoring.rows import FrameRows
-from tracking.stats import draw_blocks, moving_blocks
 
 SEEDS = range(60)
 
@@ -137,41 +136,6 @@ def test_scores_of_every_beginning(seed: int) -> None:
     for n in range(1, len(true) + 1):
         part = whole.in_frames(np.arange(len(true)) < n)
         assert people_scores(part) == people_scores(matrix_pairs(true[:n], est[:n], similarity[:n]))
-
-
-def taken(pairs: Pairs, frames: np.ndarray) -> Pairs:
-    """The pairs of these frames, some perhaps repeated, as frames 0, 1, …"""
-
-    def rows_of(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        found = [np.flatnonzero(frame == f) for f in frames]
-        return np.repeat(np.arange(len(frames)), [len(rows) for rows in found]), np.concatenate(found)
-
-    (at_true, i), (at_est, j), (at, k) = (rows_of(f) for f in (pairs.true.frame, pairs.est.frame, pairs.frame))
-    true, est = FrameRows(at_true, pairs.true.id[i]), FrameRows(at_est, pairs.est.id[j])
-    new_i = [np.flatnonzero((at_true == a) & (i == old))[0] for a, old in zip(at, pairs.i[k], strict=True)]
-    new_j = [np.flatnonzero((at_est == a) & (j == old))[0] for a, old in zip(at, pairs.j[k], strict=True)]
-    return Pairs(true, est, np.array(new_i, int), np.array(new_j, int), pairs.s[k])
-
-
-def test_interval_of_one_recording() -> None:
-    """Two people; one is lost in the second half, the other is followed under two ids: between all right and worse."""
-    rows, half = FrameRows(np.repeat(np.arange(1, 201), 2), np.tile([1, 2], 200)), np.arange(400) < 200
-    kept = half | (rows.id == 2)
-    places = np.column_stack([10.0 * rows.id, np.zeros(400)])
-    told = FrameRows(rows.frame[kept], np.where(half, rows.id, 3)[kept])
-    pairs, keys = point_pairs(rows, told, places, places[kept], 2.0), ("HOTA", "MOTA", "IDF1", "AssA", "DetRe")
-
-    def drawn(frames: np.ndarray) -> np.ndarray:
-        found = people_scores(taken(pairs, frames + 1))
-        return np.array([found[key] for key in keys])
-
-    value, low, high = moving_blocks(drawn, 200, 10.0, draws=200)
-    assert value == pytest.approx([people_scores(pairs)[key] for key in keys])
-    assert (low <= value).all()  # IDF1 is at its lowest where half is right
-    assert (value < high).all()
-    r = np.random.default_rng(0)
-    share = [1 - (draw_blocks(200, 10, r) >= 100).mean() / 2 for _ in range(200)]
-    assert (low[-1], high[-1]) == pytest.approx(tuple(np.quantile(share, (0.025, 0.975))))
 
 
 def test_an_id_twice_in_a_frame_is_refused() -> None:

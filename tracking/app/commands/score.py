@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,22 +10,26 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
-from sim.types import Array, Ints, Sequence
+from sim.types import Array, Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.run_differences import Differences, differences_words, run_differences
 from tracking.app.commands.score_tables import Means, SequenceScores, detections_words, difference_table, tables
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import find_tracks, match_tracks
+from tracking.recording_intervals import recording_intervals
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
 from tracking.scoring import evaluate
-from tracking.scoring.block_resampling import resampled_scorer
-from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import IncomparableError, Similarity
+from tracking.scoring.catalogue import ALL, CATALOGUE
+from tracking.scoring.frame_weights import weighted_scorer
 from tracking.scoring.group_scores import GroupMatch
-from tracking.stats import SURE, bootstrap, moving_blocks, paired
+from tracking.scoring.one_plane import in_one_plane
+from tracking.scoring.people_comparison import IncomparableError, Similarity
+from tracking.stats import SURE, mean_interval, paired
 
 INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{seconds:.4g}} s"
+MOVED = "both runs are compared in the image, because one of them lies there"
 
 
 @dataclass(frozen=True)
@@ -49,92 +52,110 @@ def score(options: ScoreOptions) -> CommandResult:
     tracks.
 
     The result's data: "sequences" (scores of each); "means" (of each set of equal detections: "given", "sequences",
-    "mean"); "mean" (the only one of them, else None); "notes". With --against also "difference" by key and "against"
-    (the others' detections).
+    "mean"); "mean" (the only one of them, else None); "notes". With --against also "difference" by key, "against" (the
+    others' detections) and "differences" (in what the runs differ).
 
     Raises InputError if a file is wrong, if a sequence has no tracks or no labels, if truth and tracks cannot be
-    compared as asked, or if --blocks is given for several sequences.
+    compared as asked, if two runs cannot be compared in one plane, or if --blocks is given for several sequences.
     """
     sequences = open_source(options.truth, fps=options.fps, px_per_m=options.px_per_m, images=False)
     method = ComparisonMethod(options.similarity, options.group_match)
     paths = [options.tracks] if options.against is None else [options.tracks, options.against]
-    if options.blocks:
-        return _score_in_blocks(sequences, paths, method, options.blocks)
-    rows, *others = [_score_all(sequences, path, method) for path in paths]
-    result = _result([(part, summary(part)) for part in _by_detections(rows)])
-    if not others:
-        return result
-    differences = _by_key(paired(_values(others[0]), _values(rows)))
-    return _with_differences(result, differences, len(rows), _givens(others[0]))
-
-
-def _score_in_blocks(
-    sequences: list[Sequence], paths: list[Path], method: ComparisonMethod, draws: int
-) -> CommandResult:
-    """Returns the scores of a single recording, with 95 % intervals by moving blocks of frames, drawn `draws` times.
-
-    paths: its tracks, and the other tracks if any; then the differences, first minus second in the same frames, are
-    added. Raises InputError for several sequences, missing labels or tracks, or tracks that cannot be compared as
-    asked.
-    """
-    if len(sequences) > 1:
+    if options.blocks and len(sequences) > 1:
         raise InputError(
             place="--blocks", got=f"{len(sequences)} sequences", expected="a single recording",
             remedy="leave it out: the interval over sequences is shown anyway",
         )  # fmt: skip
-    (sequence,) = sequences
-    rows, *others = [_score_all(sequences, path, method) for path in paths]
-    scorers = [_resampled_scorer(sequence, path, method) for path in paths]
-    result = _result([(rows, _block_intervals(sequence, draws, scorers[0], _values(rows)[0]))], _notes(sequence))
-    if not others:
+    scored = _score_all(sequences, paths, method)
+    rows, *others = ([each[k].row for each in scored] for k in range(len(paths)))
+    notes = list(dict.fromkeys(each[0].note for each in scored if each[0].note))
+    if options.blocks:
+        means, differences = _block_intervals(sequences[0], scored[0], options.blocks)
+        result = _result([(rows, means)], [*notes, *_short_notes(sequences[0])])
+    else:
+        result = _result([(part, summary(part)) for part in _by_detections(rows)], notes)
+        differences = None if not others else _paired_differences(rows, others[0])
+    if differences is None:
         return result
-    difference = (_values(rows) - _values(others[0]))[0]
-    ends = _block_intervals(sequence, draws, lambda frames: scorers[0](frames) - scorers[1](frames), difference)
-    return _with_differences(result, ends, 1, _givens(others[0]))
+    found = run_differences([(these.run.info, against.run.info) for these, against in scored])
+    return _with_differences(result, differences, found, len(rows), _givens(others[0]))
 
 
-def _resampled_scorer(sequence: Sequence, tracks: Path, method: ComparisonMethod) -> Callable[[Ints], Array]:
-    """Returns a function from frame indices (N,), from 0 and drawn with repetition, to the recording's scores (K,).
-
-    The K scores are in the catalogue's order, nan where unknown. tracks: path of the stored tracks. Raises InputError
-    if there are none or a file is wrong, AssertionError without truth.
+@dataclass(frozen=True)
+class ScoredRun:
+    """A run of one sequence with its scores. run: the tracks as they were compared, and the content of run.json.
+    method: how they were compared. note: what was done to compare them with another run, "" if nothing.
     """
-    ((_, stored),) = match_tracks([sequence], find_tracks(tracks))
-    assert sequence.truth is not None
-    return resampled_scorer(sequence.truth, stored.read(sequence), method.similarity, method.group_match)
+
+    row: SequenceScores
+    run: TrackingRun
+    method: ComparisonMethod
+    note: str = ""
 
 
-def _block_intervals(sequence: Sequence, draws: int, resampled: Callable[[Ints], Array], values: Array) -> Means:
-    """Returns values (K,) by key, as "mean", with the ends of their 95 % intervals by moving blocks of frames.
+def _score_all(sequences: list[Sequence], paths: list[Path], method: ComparisonMethod) -> list[list[ScoredRun]]:
+    """Returns for each sequence, in order, its run at or below each of the one or two paths, scored.
 
-    The ends are nan for core and event scores, which need true time. draws: number of samples. resampled: a function
-    from frame indices (N,), from 0, to scores (K,). values, scores: in the catalogue's order. Shows progress on stderr.
-    AssertionError without truth.
+    Two runs of a sequence are compared with the truth in one plane and by one similarity. Raises InputError if a
+    sequence has no tracks or no labels, a file is wrong, or the tracks cannot be compared as asked. Shows progress on
+    stderr.
     """
-    assert sequence.truth is not None
-    with ProgressMeter("draw", draws + 1) as meter:
-
-        def counted(frames: Ints) -> Array:
-            meter.step("blocks of frames")
-            return resampled(frames)
-
-        _, low, high = moving_blocks(counted, sequence.truth.length, sequence.fps, draws)
-    return _by_key((values, low, high))
-
-
-def _score_all(sequences: list[Sequence], tracks: Path, method: ComparisonMethod) -> list[SequenceScores]:
-    """Returns the scores of every sequence, in order, with its stored tracks at or below the path `tracks`.
-
-    Raises InputError if a sequence has no tracks or no labels, a file is wrong, or the two cannot be compared as asked.
-    Shows progress on stderr.
-    """
-    matched = match_tracks(sequences, find_tracks(tracks))
-    rows = []
-    with ProgressMeter("score", len(matched)) as meter:
-        for sequence, stored in matched:
-            rows.append(score_run(sequence, stored.read(sequence), method))
+    matched = [match_tracks(sequences, find_tracks(path)) for path in paths]
+    found = []
+    with ProgressMeter("score", len(sequences)) as meter:
+        for pairs in zip(*matched, strict=True):
+            sequence = pairs[0][0]
+            runs = [stored.read(sequence) for _, stored in pairs]
+            found.append(_scored_alike(sequence, runs, method))
             meter.step(sequence.name)
-    return rows
+    return found
+
+
+def _scored_alike(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMethod) -> list[ScoredRun]:
+    """Returns one or two runs of a sequence with their scores; two are put into one plane first."""
+    notes = [""] * len(runs)
+    if len(runs) == 2 and sequence.truth is not None:
+        try:
+            *tracks, similarity = in_one_plane(sequence.truth, runs[0], runs[1], method.similarity)
+        except IncomparableError as error:
+            raise InputError(
+                file=sequence.name, place="--against", got=str(error), expected="two runs that can lie in one plane",
+                remedy="track both from the same detections",
+            ) from None  # fmt: skip
+        notes = [MOVED if given is not run else "" for given, run in zip(tracks, runs, strict=True)]
+        runs = [TrackingRun(tuple(given), run.info) for given, run in zip(tracks, runs, strict=True)]
+        method = replace(method, similarity=similarity)
+    note = next((note for note in notes if note), "")
+    return [ScoredRun(score_run(sequence, run, method), run, method, note) for run in runs]
+
+
+def _paired_differences(rows: list[SequenceScores], others: list[SequenceScores]) -> Means:
+    """Returns by key the mean difference, rows minus others in pairs, with its interval and "pairs", their number."""
+    first, second = _values(others), _values(rows)
+    found = _by_key(paired(first, second))
+    pairs = np.isfinite(second - first).sum(axis=0).tolist()
+    return {key: {**d, "pairs": n} for (key, d), n in zip(found.items(), pairs, strict=True)}
+
+
+def _block_intervals(sequence: Sequence, scored: list[ScoredRun], draws: int) -> tuple[Means, Means | None]:
+    """Returns the scores of the first run by key, with 95 % intervals of a single recording, and the differences to the
+    second run, if any, first minus second under equal weights.
+
+    draws: number of draws of weights. AssertionError without truth.
+    """
+    truth = sequence.truth
+    assert truth is not None
+    scorers = [
+        weighted_scorer(truth, each.run.tracks, each.method.similarity, each.method.group_match) for each in scored
+    ]
+    found = _by_key(recording_intervals(truth, scorers[0], draws))
+    if len(scored) == 1:
+        return found, None
+
+    def difference(weights: Array) -> Array:
+        return scorers[0](weights) - scorers[1](weights)
+
+    return found, _by_key(recording_intervals(truth, difference, draws, None))
 
 
 def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = DEFAULT) -> SequenceScores:
@@ -159,7 +180,7 @@ def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = D
     return SequenceScores(sequence.name, scores, input_summary(run.info))
 
 
-def _notes(sequence: Sequence) -> list[str]:
+def _short_notes(sequence: Sequence) -> list[str]:
     """Returns a list with one note if the recording lasts less than 60 s, so that its intervals are only indicative;
     else [].
 
@@ -210,29 +231,35 @@ def _row_data(row: SequenceScores) -> dict[str, Any]:
     return {"name": row.sequence, **chosen, **s}
 
 
-def _with_differences(result: CommandResult, differences: Means, sequences: int, against: list[str]) -> CommandResult:
-    """Returns the result with differences to other tracks added, as a table and as "difference" and "against" of the
-    data.
+def _with_differences(
+    result: CommandResult, differences: Means, found: Differences, sequences: int, against: list[str]
+) -> CommandResult:
+    """Returns the result with differences to other tracks added, as a table and as "difference", "differences" and
+    "against" of the data.
 
-    differences: by key, with interval. sequences: number of pairs. against: the detections that the other trackers got.
+    differences: of scores by key, with interval. found: in what the runs differ; these lines come first. sequences:
+    number of pairs. against: the detections that the other trackers got.
     """
     from rich.console import Group
+    from rich.text import Text
 
     return CommandResult(
-        {**result.data, "difference": differences, "against": against},
+        {**result.data, "difference": differences, "differences": found, "against": against},
         Group(
-            result.text, "", difference_table(differences, sequences),
-            f"--against: detections {detections_words(against)}",
+            Text("\n".join(differences_words(found, sequences)) + "\n"), result.text, "",
+            difference_table(differences, sequences), f"--against: detections {detections_words(against)}",
         ),
     )  # fmt: skip
 
 
 def summary(rows: list[SequenceScores]) -> Means:
-    """Returns the mean over sequences of each score by key, with its 95 % bootstrap interval.
+    """Returns the mean over sequences of each score by key, with its 95 % interval, within the score's range.
 
     rows: at least one. nan values are left out; the ends are nan for fewer than two numbers, the mean without any.
     """
-    return _by_key(bootstrap(_values(rows)))
+    mean, low, high = mean_interval(_values(rows))
+    least, most = (np.array([getattr(score, end) for score in ALL]) for end in ("low", "high"))
+    return _by_key((mean, np.maximum(low, least), np.minimum(high, most)))
 
 
 def _values(rows: list[SequenceScores]) -> Array:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scores
+from tracking.stats import FEWEST
 
 SHOWN = ("HOTA", "MOTA", "IDF1", "group_F1", "group_GDSR2", "group_MOTA", "pairwise_F1", "event_F1", "event_latency")
 """The keys that are shown where there is room for one line only."""
@@ -75,7 +76,7 @@ def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), 
     parts = [_table(title, keys, rows, means) for title, keys in known.items()]
     lines = [detections, *_comparison_lines(rows, people, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
-        lines.append("intervals by moving blocks of frames")
+        lines.append("intervals by weights of blocks of frames")
     partial = len(rows) < total
     head = [f"{len(rows)} of {total} sequences, {detections}", ""] if partial else []
     return Group(*head, *parts, "\n".join([*lines, *notes]), *([""] if partial else []))
@@ -110,13 +111,13 @@ def _empty_table() -> Any:
     return Table(box=None, pad_edge=False, header_style="bold")
 
 
-def _with_title(title: str, table: Any) -> Any:
-    """Returns, for rich to print, the title above the table, not wrapped to the table's width, and an empty
-    line below."""
+def _with_title(title: str, table: Any, foot: str = "") -> Any:
+    """Returns, for rich to print, the title above the table, not wrapped to the table's width, and below it the foot,
+    if any, and an empty line."""
     from rich.console import Group
     from rich.text import Text
 
-    return Group(Text(title, style="italic"), table, "")
+    return Group(Text(title, style="italic"), table, *([foot] if foot else []), "")
 
 
 def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) -> list[str]:
@@ -138,21 +139,33 @@ def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) ->
 def difference_table(differences: Means, sequences: int) -> Any:
     """Returns a rich table of the differences to other tracks, with a star where the interval does not hold zero.
 
-    differences: by key, with "mean", "low" and "high" of the 95 % interval. Keys with an unknown mean are left out.
-    sequences: number of pairs; 1 stands for one recording in blocks of frames. The title calls 2 to 99 an indication.
+    differences: by key, with "mean", "low" and "high" of the 95 % interval, and over sequences "pairs", the number of
+    pairs in which the score is known. Keys with an unknown mean are left out. With fewer than 6 pairs there is no star,
+    and a line below says so. sequences: number of pairs; 1 stands for one recording in blocks of frames. The title
+    calls 2 to 99 an indication.
     """
     over = "the same frames" if sequences == 1 else f"{sequences} sequences"
     title = f"these tracks minus --against, in pairs over {over}"
     title += "" if sequences >= ENOUGH or sequences == 1 else f" (fewer than {ENOUGH}: an indication)"
-    table = _empty_table()
+    table, few = _empty_table(), False
     for name in ("score", "difference", "95 % low", "95 % high", ""):
         table.add_column(name, justify="left" if name == "score" else "right")
     for key in (key for keys in TABLES.values() for key in keys):
         d = differences[key]
         if math.isfinite(d["mean"]):
             cells = (number(key, d[part], mean=True) for part in ("mean", "low", "high"))
-            table.add_row(key, *cells, "*" if d["low"] > 0 or d["high"] < 0 else "")
-    return _with_title(title, table)
+            table.add_row(key, *cells, "*" if is_sure(d) else "")
+            few = few or d.get("pairs", FEWEST) < FEWEST
+    foot = f"no star below {FEWEST} pairs: so few cannot show a sure difference" if few and sequences > 1 else ""
+    return _with_title(title, table, foot)
+
+
+def is_sure(difference: Mapping[str, float]) -> bool:
+    """Returns True if a difference has an interval without zero and, over sequences, at least 6 pairs.
+
+    difference: "low" and "high" (nan: unknown), and over sequences "pairs".
+    """
+    return difference.get("pairs", FEWEST) >= FEWEST and (difference["low"] > 0 or difference["high"] < 0)
 
 
 def number(key: str, value: float, *, mean: bool = False) -> str:

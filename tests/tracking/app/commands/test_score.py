@@ -15,9 +15,10 @@ from sim.types import Sequence
 from tests.groups_as_wholes import wholes
 from tracking import track
 from tracking.app.cli import run
-from tracking.scoring import evaluate
+from tracking.app.commands.score_tables import is_sure
+from tracking.scoring import evaluate, one_plane
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import bootstrap
+from tracking.stats import mean_interval
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +136,8 @@ def test_the_mean_has_every_key_and_an_interval(made: Path, capsys) -> None:
     first, second = (row["pairwise_F1"] for row in found["sequences"])
     mean = found["mean"]["pairwise_F1"]
     assert mean["mean"] == pytest.approx((first + second) / 2)
-    assert min(first, second) <= mean["low"] <= mean["mean"] <= mean["high"] <= max(first, second)
+    _, low, high = mean_interval(np.array([[first], [second]]))
+    assert (mean["low"], mean["high"]) == (max(0.0, low[0]), min(1.0, high[0])), "within the score's range"
     assert found["mean"]["cross_F1"] == {"mean": None, "low": None, "high": None}
     one = scored(capsys, made / "data" / "flockscope-train" / "merge-s00003", made / "file")["mean"]["HOTA"]
     assert one["low"] is one["high"] is None
@@ -145,11 +147,81 @@ def test_differences_are_taken_sequence_by_sequence(made: Path, capsys) -> None:
     found = scored(capsys, made / "data", made / "truth", "--against", made / "file")
     other = scored(capsys, made / "data", made / "file")
     own = [a["HOTA"] - b["HOTA"] for a, b in zip(found["sequences"], other["sequences"], strict=True)]
-    mean, low, high = (float(v[0]) for v in bootstrap(np.array(own)[:, None]))
-    assert found["difference"]["HOTA"] == pytest.approx({"mean": mean, "low": low, "high": high})
+    mean, low, high = (float(v[0]) for v in mean_interval(np.array(own)[:, None]))
+    assert found["difference"]["HOTA"] == pytest.approx({"mean": mean, "low": low, "high": high, "pairs": 2})
     assert mean > 0
-    same = scored(capsys, made / "data", made / "file", "--against", made / "file")["difference"]
-    assert {v for d in same.values() for v in d.values()} <= {0.0, None}
+    same = scored(capsys, made / "data", made / "file", "--against", made / "file")
+    assert {v for d in same["difference"].values() for key, v in d.items() if key != "pairs"} <= {0.0, None}
+    assert same["differences"] == []
+
+
+def test_no_star_for_fewer_than_six(made: Path, capsys) -> None:
+    """Both sequences are better from the truth: a bootstrap of two pairs called every such difference sure."""
+    assert run(["score", str(made / "data"), str(made / "truth"), "--against", str(made / "file")]) == 0
+    output = capsys.readouterr().out
+    assert "no star below 6 pairs" in output
+    assert not [line for line in output.splitlines() if line.rstrip().endswith("*")]
+    certain = {"low": 0.1, "high": 0.2}
+    assert [is_sure({**certain, "pairs": n}) for n in (2, 5, 6, 100)] == [False, False, True, True]
+    assert is_sure(certain), "blocks of one recording"
+    assert not is_sure({"low": -0.1, "high": 0.2, "pairs": 10})
+    assert not is_sure({"low": float("nan"), "high": float("nan")})
+
+
+def test_what_differs_comes_first(made: Path, capsys) -> None:
+    found = scored(capsys, made / "data", made / "truth", "--against", made / "file")
+    assert found["differences"] == [{"what": "detections", "these": "truth", "against": "file", "sequences": 2}]
+    assert run(["score", str(made / "data"), str(made / "truth"), "--against", str(made / "file")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == ["these tracks and --against differ in", "  detections: truth / file"]
+
+
+def in_image(made: Path, folder: Path, scene: Sequence) -> Path:
+    """A run of one sequence whose people lie in the image."""
+    answers = [t.replace(plane="image") for t in one_plane.in_image(track("blob", scene, detections="file"))]
+    info = {"tracker": "blob", "sequence": "merge-s00003", "plane": "image", "fps": scene.fps, "detections": "image"}
+    write_tracks(folder / "merge-s00003", answers, fps=scene.fps, camera=scene.camera, scene=scene.scene, info=info)
+    return folder
+
+
+def test_two_runs_are_compared_in_one_plane(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
+    """One run lies in the image, the other on the ground: metres were subtracted from pixels."""
+    data = made / "data" / "flockscope-train" / "merge-s00003"
+    image = in_image(made, tmp_path / "image", scene)
+    alone = scored(capsys, data, made / "file")["sequences"][0]
+    assert alone["surface"] == "ground"
+    for paths in ([made / "file", image], [image, made / "file"]):
+        found = scored(capsys, data, paths[0], "--against", paths[1])
+        (row,) = found["sequences"]
+        assert (row["similarity"], row["surface"]) == ("boxes", "image")
+        assert row["GOSPA"] > 5 * alone["GOSPA"], "px"
+        assert {d["mean"] for key, d in found["difference"].items() if key in ("GOSPA", "HOTA", "group_F1")} == {0.0}
+        assert "both runs are compared in the image" in found["notes"][0]
+        assert {"plane", "detections"} <= {d["what"] for d in found["differences"]}
+
+
+def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
+    data, folder = made / "data" / "flockscope-train" / "merge-s00003", tmp_path / "wholes"
+    write_tracks(folder / "merge-s00003", wholes(scene, "ground"), fps=scene.fps)
+    image = in_image(made, tmp_path / "image", scene)
+    assert run(["score", str(data), str(folder), "--against", str(image)]) == 2
+    error = capsys.readouterr().err
+    assert "one run in the image (px), the other on the ground (m) with groups without people" in error
+    assert run(["score", str(data), str(folder), "--against", str(made / "file")]) == 0
+
+
+def test_every_score_lies_in_its_interval_of_one_recording(made: Path, capsys) -> None:
+    """Resampled frames were joined, and each join was a switch: IDSW 24 had the interval [46, 76]."""
+    one = made / "data" / "flockscope-train" / "merge-s00003"
+    found = scored(capsys, one, made / "file", "--against", made / "truth", "--blocks", "200")
+    known = 0
+    for means in (found["mean"], found["difference"]):
+        for key, m in means.items():
+            if m["low"] is not None:
+                known += 1
+                assert m["low"] <= m["mean"] <= m["high"], key
+    assert known > 60
+    assert found["mean"]["group_IDSW"]["mean"] > 0
 
 
 @pytest.mark.slow

@@ -1,0 +1,110 @@
+"""Scores under weights of the frames: weights of 1 are the recording; nothing is made by joining frames."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
+from tests.groups_as_wholes import wholes
+from tests.hand_made import Scene, event, tracks, truth
+from tracking import track
+from tracking.scoring import evaluate
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.frame_weights import weighted_scorer
+
+TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
+PAIR = {1: ((1, 2), None)}
+
+
+def scored(true, answers, weights, **options) -> dict[str, float]:
+    (row,) = weighted_scorer(true, answers, **options)(np.array([weights], float))
+    return dict(zip(CATALOGUE, row.tolist(), strict=True))
+
+
+@cache
+def simulated():
+    sequence = simulate(load("mixed", ["camera.fps=5"]), 1, streams=())
+    people = track("blob", sequence, detections="truth", sensor={"detect_prob": 0.8, "clutter_rate": 1.0})
+    return sequence.truth, {"people": people, "wholes": wholes(sequence, "ground")}
+
+
+@pytest.mark.parametrize("who", ["people", "wholes"])
+@pytest.mark.parametrize("by", ["hull", "members"])
+@pytest.mark.parametrize("frames", [None, range(30, 120)])
+def test_weights_of_one_are_the_recording(who: str, by: str, frames: range | None) -> None:
+    true, answers = simulated()
+    expected = evaluate(true, answers[who], group_match=by, frames=frames)
+    found = scored(true, answers[who], np.ones(true.length), group_match=by, frames=frames)
+    assert expected["group_F1"] > 0.2
+    assert sum(v == v for v in expected.values()) > 60
+    for key, value in expected.items():
+        assert found[key] == pytest.approx(value, abs=1e-12, rel=1e-12, nan_ok=True), key
+
+
+FOUND, MISSED = Scene(TWO, PAIR), Scene({1: (0.1, 0.0)})
+FALSE = Scene({**TWO, 9: (30.0, 0.0)}, {1: ((1, 2), None), 7: ((1, 9), (20.0, 20.0, 22.0, 22.0))})
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.integers(0, 3), min_size=12, max_size=12).filter(lambda w: sum(w[:6]) > 0))
+def test_frames_of_weight_n_count_n_times(weight: list[int]) -> None:
+    """Joins make nothing here: the same people stand in every frame, and what goes wrong is at the end."""
+    answers = [FOUND] * 6 + [FALSE] * 4 + [MISSED] * 2
+    order = np.repeat(np.arange(12), weight)
+    expected = evaluate(truth([FOUND] * len(order), None), tracks([answers[k] for k in order]))
+    found = scored(truth([FOUND] * 12, None), tracks(answers), weight)
+    fixed = {"MT", "PT", "ML"}  # shares of the whole recording decide, and people count by the mean weight
+    for key in CATALOGUE.keys() - fixed:
+        assert found[key] == pytest.approx(expected[key], abs=1e-12, nan_ok=True), key
+
+
+def test_a_switch_has_the_weight_of_its_frame() -> None:
+    """The old resampling joined frames, and each join of an early with a late block was a switch."""
+    answers = [FOUND] * 50 + [Scene({1: (0.0, 0.0), 5: (1.0, 0.0)}, {4: ((1, 5), None)})] * 50
+    true = truth([FOUND] * 100)
+    weights = np.ones(100)
+    assert scored(true, tracks(answers), weights)["IDSW"] == 1
+    weights[[10, 90]] = 0, 2
+    assert scored(true, tracks(answers), weights)["IDSW"] == 1
+    weights[50] = 3
+    found = scored(true, tracks(answers), weights)
+    assert (found["IDSW"], found["group_IDSW"]) == (3, 3)
+
+
+def test_events_have_the_weight_of_their_start() -> None:
+    true = truth([FOUND] * 60, [event("merge", 10, (1, 2)), event("merge", 40, (1, 2))])
+    told = [event("merge", 12, (1, 2), emitted=15), event("merge", 25, (1, 2), emitted=26)]
+    answers = tracks([FOUND] * 60, told)
+    weights = np.ones(60)
+    weights[[9, 11, 24, 39]] = 2, 7, 3, 5  # the true start counts, not that of the matched report
+    found = scored(true, answers, weights)
+    assert (found["merge_TP"], found["merge_FP"], found["merge_FN"]) == (2, 3, 5)
+    assert found["merge_F1"] == pytest.approx(4 / 12)
+    assert found["merge_latency"] == pytest.approx(0.5)
+
+
+def test_no_weight_where_a_score_is_defined_makes_it_unknown() -> None:
+    true = truth([FOUND] * 20, [event("merge", 10, (1, 2))])
+    weights = np.ones(20)
+    weights[9] = 0
+    assert np.isnan(scored(true, tracks([FOUND] * 20), weights)["merge_F1"])
+    nothing = scored(true, tracks([FOUND] * 20), np.zeros(20))
+    assert np.isnan([nothing["group_F1"], nothing["GOSPA"], nothing["RMSE_pos"]]).all()
+    assert nothing["HOTA"] == 0
+
+
+def test_each_draw_is_by_itself() -> None:
+    true, answers = simulated()
+    r = np.random.default_rng(0)
+    weights = r.exponential(1.0, (3, true.length))
+    score = weighted_scorer(true, answers["people"])
+    together = score(weights)
+    for row, expected in zip(weights, together, strict=True):
+        assert np.allclose(score(row[None])[0], expected, rtol=1e-12, atol=1e-12, equal_nan=True)
+    assert score(np.zeros((0, true.length))).shape == (0, len(CATALOGUE))

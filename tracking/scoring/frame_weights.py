@@ -1,0 +1,73 @@
+"""Scores of one recording as functions of weights of its frames, for intervals by resampling.
+
+Identities and matchings are those of the whole recording. The weight w(t) of frame t enters every sum: a match, a miss,
+a switch or an event of frame t counts w(t) times. So no frames are joined, and no switch or event is made by a join.
+Weights of 1 give the scores of `evaluate`. Sums by frame are made once; each draw of weights is a matrix product.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from sim.types import Array, Tracks, Truth
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.evaluation import Scorer, chosen_frames
+from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.weighted_group_scores import weighted_groups_and_events
+from tracking.scoring.weighted_people_scores import weighted_people, weighted_positions
+from tracking.scoring.weighted_sums import WeightedScores, mean_of_known
+
+PORTION = 100
+"""Draws that are computed together: bounds memory."""
+
+
+def weighted_scorer(
+    truth: Truth,
+    tracks: Sequence[Tracks],
+    similarity: Similarity | None = None,
+    group_match: GroupMatch = "hull",
+    frames: int | range | None = None,
+) -> Callable[[Array], Array]:
+    """Returns a function from weights of frames to scores.
+
+    The argument of that function is an array (D, length) of D draws of weights, 0 or more, of the frames 1 … length.
+    Their mean should be 1: counts such as `IDSW` are sums of weights. The result is an array (D, K) of all scores in
+    the order of `CATALOGUE`. It is nan where `evaluate` gives nan, and where the frames of a score's denominator have
+    no weight.
+
+    Fixed are the matchings in every frame, who is matched with whom before a switch, the core frames, and the share of
+    matched frames that decides on MT, PT and ML; a person counts there by the mean weight of its frames. Only IDF1,
+    IDP, IDR and IDTP assign ids anew for each draw, because their definition is the best assignment of weighted
+    frames. A true event has the weight of its start, a false one that of its reported start.
+
+    tracks: one tracker's `Tracks`, one per frame. Groups that the tracker leaves out are derived first. similarity:
+    "boxes", "ground", "image" or None (boxes if both sides have them); group_match: "hull" or "members". frames: a
+    number n scores frames 1 … n, a range only its frames, None all; weights of other frames have no effect.
+
+    Raises IncomparableError if boxes or positions to compare are missing, ValueError if an id occurs twice in one
+    frame, and InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
+    """
+    compared = Scorer(truth).compare(tracks, similarity, chosen_frames(frames, truth.length))
+    size = truth.length + 1
+    parts: list[WeightedScores] = []
+    if compared.people is not None:
+        parts += [weighted_people(compared.people, size), weighted_positions(compared.sides, compared.inside)]
+    if compared.groups is not None:
+        parts.append(weighted_groups_and_events(compared.sides, compared.groups, group_match))
+    place = {key: k for k, key in enumerate(CATALOGUE)}
+
+    def score(weights: Array) -> Array:
+        padded = np.pad(np.asarray(weights, float), ((0, 0), (1, 0)))  # frame 0 is no frame
+        out = np.full((len(padded), len(place)), np.nan)
+        for first in range(0, len(padded), PORTION):
+            rows = slice(first, first + PORTION)
+            for part in parts:
+                for key, values in part(padded[rows]).items():
+                    out[rows, place[key]] = values
+        out[:, place["objective"]] = mean_of_known(out[:, [place["HOTA"], place["group_F1_hull"]]])
+        return out
+
+    return score

@@ -1,0 +1,80 @@
+"""How the people of a truth and of a tracker are compared: by boxes, or by positions on the ground or in the image."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Literal
+
+import numpy as np
+
+from sim.types import Array, Tracks, Truth
+from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
+from tracking.scoring.group_and_event_scores import ComparedSides
+from tracking.scoring.people_and_groups import PersonRows, Surface
+from tracking.scoring.position_errors import REACH
+
+Similarity = Literal["boxes", "ground", "image"]
+"""How two people are compared: IoU of boxes, or distance of positions on the ground or in the image."""
+
+
+class IncomparableError(ValueError):
+    """Raised if the truth or the tracks have people but lack the boxes or positions that are to be compared. By boxes
+    also if the truth has no boxes at all. It is a ValueError.
+    """
+
+
+def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
+    """Returns the plane of one tracker's positions: "ground", "space" or "image".
+
+    It is that of the first `Tracks` with people, else of the first `Tracks`. If `tracks` is empty it is the truth's:
+    "image" if the truth has no positions on the ground, else "ground".
+    """
+    own = "image" if truth.pos is None else "ground"
+    return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else own)
+
+
+def usual_similarity(truth: Truth, tracks: Iterable[Tracks]) -> Similarity:
+    """Returns how people are compared by default: "boxes" if the truth and every non-empty frame of the tracks have
+    boxes.
+
+    Else "image" if the first non-empty frame of the tracks is in the image, else "ground". Tracks without anybody count
+    as having boxes.
+    """
+    some = [t for t in tracks if len(t.id)]
+    if truth.box is not None and all(t.box is not None for t in some):
+        return "boxes"
+    return "image" if some and some[0].plane == "image" else "ground"
+
+
+def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
+    """Returns the candidate pairs of true and tracked people of one frame, with a similarity in (0, 1].
+
+    sides: both sides' people in the scored frames. similarity: "boxes" takes the IoU; "ground" and "image" take 1 -
+    distance / 2 m, the image by `truth.px_per_m` (no pairs if that is nan). Without people on a side there are no
+    pairs. Raises IncomparableError if a side has people but not the boxes or positions to be compared. With "boxes" it
+    is also raised if the truth has no boxes at all.
+    """
+    true, est = sides.true, sides.est
+    if similarity == "boxes":
+        if true.box is None or est.box is None:
+            raise IncomparableError("no boxes to compare: score on the ground")
+        return box_pairs(true.rows, est.rows, true.box, est.box)
+    reach = REACH * sides.truth.px_per_m if similarity == "image" else REACH
+    true_pos, est_pos = _positions(true, similarity, "ground"), _positions(est, similarity, sides.plane)
+    return point_pairs(true.rows, est.rows, true_pos, est_pos, reach)
+
+
+def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
+    """Returns the positions x, y (R, 2) of the R rows of `people` on a surface, in m ("ground") or px ("image").
+
+    plane: plane of the positions in `people`. Without rows and positions the result has shape (0, 2). Raises
+    IncomparableError if there are rows but no positions on the surface.
+    """
+    positions = people.positions_on(surface, plane)
+    if positions is None and len(people.rows):
+        where, other = {
+            "ground": ("on the ground", "boxes or in the image"),
+            "image": ("in the image", "on the ground"),
+        }[surface]
+        raise IncomparableError(f"no positions {where} to compare: score {other}")
+    return np.zeros((0, 2)) if positions is None else positions

@@ -1,0 +1,74 @@
+"""Weighted sums over the frames of one recording, and ratios of them, for D draws of weights at once.
+
+Weights are arrays (D, size) by frame number from 0, size being the length of the recording + 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sim.types import Array, Ints
+
+WeightedScores = Callable[[Array], dict[str, Array]]
+"""Takes weights (D, size) by frame number; returns scores (D,) by key."""
+
+
+class FrameSums:
+    """Named sums that are linear in the weights of the frames: counts, and sums of errors.
+
+    State: table (size, columns), the part of each frame in each sum; names of the columns.
+    """
+
+    def __init__(self, size: int) -> None:
+        """Starts without sums; size: number of frame numbers, from 0."""
+        self._size = size
+        self._columns: dict[str, Array] = {}
+
+    def add(self, name: str, frame: Ints, values: Array | Ints | None = None) -> None:
+        """Adds the sum `name` of K items: frame (K,), their frame numbers; values (K,), 1 each by default."""
+        self._columns[name] = np.bincount(frame, weights=values, minlength=self._size).astype(float)
+
+    def add_mean(self, name: str, frame: Ints, values: Array) -> None:
+        """Adds what `mean` needs: the sum `name` of the finite values (K,), and their number."""
+        known = np.isfinite(values)
+        self.add(name, frame[known], values[known])
+        self.add(f"{name} known", frame[known])
+
+    def of(self, weights: Array) -> dict[str, Array]:
+        """Returns the weighted sums (D,) by name; weights (D, size)."""
+        return dict(zip(self._columns, (weights @ np.column_stack(list(self._columns.values()))).T, strict=True))
+
+
+def mean(sums: dict[str, Array], name: str) -> Array:
+    """Returns the weighted means (D,) of the values given to `FrameSums.add_mean`, nan without a finite one."""
+    return ratio(sums[name], sums[f"{name} known"])
+
+
+def ratio(part: Array, whole: Array, empty: float = float("nan")) -> Array:
+    """Returns part / whole, `empty` where whole is 0; both of one shape."""
+    return np.asarray(np.divide(part, whole, out=np.full(np.shape(part), empty), where=np.asarray(whole) > 0))
+
+
+def mean_of_known(values: Array) -> Array:
+    """Returns the means (D,) of the columns of values (D, C) that are not nan; nan where all are."""
+    known = ~np.isnan(values)
+    return ratio(np.where(known, values, 0.0).sum(axis=1), known.sum(axis=1).astype(float))
+
+
+class BinSums:
+    """Numbers of items by bin (for example by id), weighted by their frames.
+
+    State: a sparse matrix (bins, size): how many items of each frame are in each bin.
+    """
+
+    def __init__(self, frame: Ints, bin: Ints, bins: int, size: int) -> None:
+        """Counts K items; frame, bin (K,): their frame numbers and bins from 0; bins, size: number of both."""
+        from scipy.sparse import csr_array
+
+        self._counts = csr_array((np.ones(len(frame)), (bin, frame)), shape=(bins, size))
+
+    def of(self, weights: Array) -> Array:
+        """Returns the weighted numbers of items, (D, bins); weights (D, size)."""
+        return np.asarray((self._counts @ weights.T).T)
