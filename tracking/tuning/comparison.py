@@ -93,8 +93,8 @@ class Candidate:
 
 
 def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: Sequence[Episode]) -> Comparison | None:
-    """Returns the comparison of a goal between `before` and `after`, paired by sequence, with a 95 % bootstrap
-    interval.
+    """Returns the comparison of a goal between `before` and `after`, paired by sequence, with a 95 %
+    interval of the mean difference.
 
     scenes: name for the result. before, after: episodes of the same sequences in the same order, equally many
     (not checked). Sequences where either side lacks the score, or has an infinite one, are left out; None if that
