@@ -3,6 +3,7 @@
     python -m benchmarks.foreground highway [--data FOLDER] [--out PNG]
     python -m benchmarks.foreground rendered [--seeds 20000:20002] [--size 640x480] [--dark]
     python -m benchmarks.foreground adaptation [--seed 40000] [--out adaptation.svg]
+    python -m benchmarks.foreground opening [--seeds 0:4]
 
 highway: CDnet 2014, FOLDER/cdnet-highway. All frames without a mask train the models, the others are scored, each as it
 is and after cleaning (majority, opening, closing at 20 px per m). Masks: 255 foreground; 0 and 50 not; 50 shadow; 85
@@ -28,6 +29,7 @@ import cv2
 import numpy as np
 
 from benchmarks.foreground.adaptation import adaptation
+from benchmarks.foreground.opening import opening
 from benchmarks.support.options import add_data, add_seeds, new_parser, seeds_text
 from scenarios import load
 from sim import simulate
@@ -180,10 +182,10 @@ def add_sequence(
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["highway", "rendered", "adaptation"])
+    parser.add_argument("mode", choices=["highway", "rendered", "adaptation", "opening"])
     add_data(parser)
     parser.add_argument("--out", type=Path, help="highway: a picture of the classes; adaptation: the chart")
-    add_seeds(parser, "20000:20002", what="rendered: ")
+    add_seeds(parser, "20000:20002", what="rendered, opening: ")
     parser.add_argument("--size", default="640x480", help="rendered: size of the image")
     parser.add_argument("--dark", action="store_true", help="rendered: a sweep over the threshold `dark`")
     parser.add_argument("--seed", type=int, default=40_000, help="adaptation")
@@ -192,6 +194,8 @@ def main() -> None:
         highway(args.data / "cdnet-highway", args.out)
     elif args.mode == "rendered":
         rendered(args.seeds, args.size, args.dark)
+    elif args.mode == "opening":
+        opening(args.seeds)
     else:
         adaptation(args.seed, args.out or Path("adaptation.svg"))
 

@@ -1,4 +1,4 @@
-"""Cleaning of a foreground mask, and its connected regions as blobs with ellipses (Gonzalez et al. 2006, 3.3).
+"""Cleaning of a foreground mask, and its connected regions as blobs with ellipses (Gonzalez et al. 2006, sec. 3.3).
 
 `clean` applies majority, opening and closing; its windows are in metres and follow the image's scale (ours). `find`
 labels the regions, drops small ones and computes the ellipse z = (x, y, h, w, theta) of each from its moments:
@@ -25,6 +25,9 @@ from tracking.detect import blobs_kernels as kernels
 Labels = NDArray[np.int32]
 MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15
 """Windows of the three operations, m. Opening removes narrower parts of the foreground, closing fills narrower gaps."""
+LEAST_OPEN = 1
+"""px: least disc of the opening. One pixel is no opening, which is so up to 40 px per m. At 20 px per m a disc of 3 px
+is as wide as a head; it costs HOTA (`python -m benchmarks.foreground opening`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,16 +82,17 @@ class Blobs(Frozen):
 
 def clean(foreground: Bools, px_per_m: float) -> Bools:
     """Returns a foreground mask (H, W) bool after majority, opening and closing, in this order; the argument is not
-    changed (3.3).
+    changed (sec. 3.3).
 
     Majority: a pixel is foreground if more than half of a square window round it is. Opening removes narrow parts,
     closing fills narrow gaps. px_per_m: scale of the image, px per m. The windows are 0.08, 0.05 and 0.15 m wide,
-    rounded to an odd number of px, at least 3, 1 and 3. Raises ValueError if the scale is nan.
+    rounded to an odd number of px, at least 3, 1 and 3. So up to 40 px per m there is no opening. Raises ValueError if
+    the scale is nan.
     """
     mask: NDArray[Any] = foreground.astype(np.uint8)
     size = odd(MAJORITY_M * px_per_m, 3)
     mask = (cv2.boxFilter(mask, cv2.CV_16U, (size, size), normalize=False) > size * size // 2).astype(np.uint8)
-    for operation, metres, least in ((cv2.MORPH_OPEN, OPEN_M, 1), (cv2.MORPH_CLOSE, CLOSE_M, 3)):
+    for operation, metres, least in ((cv2.MORPH_OPEN, OPEN_M, LEAST_OPEN), (cv2.MORPH_CLOSE, CLOSE_M, 3)):
         mask = cv2.morphologyEx(mask, operation, disc(odd(metres * px_per_m, least)))
     return mask.astype(bool)
 
@@ -149,8 +153,9 @@ def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:
     """Returns the ellipses (M, 5) of M regions: centre x, y, full axes h >= w (px), theta (rad); and theta's variance
     (M,).
 
-    n (M,): number of pixels; centre (M, 2): x, y, px; cov (M, 2, 2): covariance of the pixels, px^2 (3.3). theta is the
-    direction of h from the abscissa, v down, from -pi/2 to pi/2. Its variance, rad^2, is inf where both axes are equal.
+    n (M,): number of pixels; centre (M, 2): x, y, px; cov (M, 2, 2): covariance of the pixels, px^2 (sec. 3.3). theta
+    is the direction of h from the abscissa, v down, from -pi/2 to pi/2. Its variance, rad^2, is inf where both axes are
+    equal.
     """
     half, differ = (cov[:, 0, 0] + cov[:, 1, 1]) / 2, (cov[:, 0, 0] - cov[:, 1, 1]) / 2
     root = np.hypot(differ, cov[:, 0, 1])
