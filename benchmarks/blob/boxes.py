@@ -6,7 +6,8 @@ after a warm-up, its input read before; the best round counts.
 train, test: scenes with occlusion (synthetic.walk), of the seeds on which defaults were chosen and of others on which
 nothing was. generated: the catalogue with its own sensor, test seeds; `blob` gets the camera. Printed: means over all
 scenes of HOTA, DetA, AssA, MOTA, IDSW, FP, FN, IDF1, and blob's HOTA minus that of each tracker, paired over scenes,
-with 95 % intervals. `blob, frozen` has the first defaults.
+with 95 % intervals. `blob, paper` is the preset `paper`, `blob, frozen` has the first
+defaults.
 real: PETS09-S2L1-first200 and TUD-Campus with their det/det.txt; the intervals are by moving blocks of frames.
 """
 
@@ -39,6 +40,12 @@ RUNNER = Path(__file__).parents[1] / "peers" / "run_roboflow.py"
 WARM = 30  # frames tracked before the clock starts
 CATALOGUE = ("merge", "split", "cross", "pass-by", "side-by-side", "pillar", "door", "crowd", "clutter", "party")
 FIELDS = ((20, 1.0, 0.0), (100, 1.0, 0.0), (20, 0.9, 5.0), (100, 0.9, 5.0))  # squares, detection probability, clutter
+VARIANTS = {
+    "blob": {},
+    "blob, nearest": {"association": "nearest"},
+    "blob, paper": BlobConfig.preset("paper").as_dict(),
+    "blob, frozen": BlobConfig.frozen().as_dict(),
+}
 Answer = list[tuple[np.ndarray, np.ndarray]]
 """Per frame ids (N,) and boxes (N, 4) left, top, width, height, px."""
 
@@ -118,11 +125,10 @@ def track_peer(python: str, name: str, det: Path, frames: int) -> tuple[Answer, 
 
 
 def all_answers(python: str, folder: Path, sequence: Recording) -> dict[str, Answer]:
-    """Returns the answers of blob (defaults, the paper's association, first defaults) and of the peers."""
+    """Returns the answers of blob (defaults, the paper's association, its preset, first defaults) and of the peers."""
     det = folder / "det.txt"
     write_mot(sequence, det)
-    configs = {"blob": {}, "blob, nearest": {"association": "nearest"}, "blob, frozen": BlobConfig.frozen().as_dict()}
-    answers = {name: track_blob(sequence, params)[0] for name, params in configs.items()}
+    answers = {name: track_blob(sequence, params)[0] for name, params in VARIANTS.items()}
     return answers | {name: track_peer(python, name, det, sequence.length)[0] for name in PEERS}
 
 

@@ -92,7 +92,10 @@ def options(count: int) -> None:
     for title, scenes in training_scenes(count).items():
         base = scores(scenes, {})
         print(f"{title}: defaults " + "  ".join(f"{k} {v.mean():.3f}" for k, v in base.items()))
-        tried = {str(change): change for change in CHANGES} | {"frozen": BlobConfig.frozen().as_dict()}
+        tried = {str(change): change for change in CHANGES} | {
+            "preset paper": BlobConfig.preset("paper").as_dict(),
+            "frozen": BlobConfig.frozen().as_dict(),
+        }
         for name, change in tried.items():
             cells = []
             for key, values in scores(scenes, change).items():

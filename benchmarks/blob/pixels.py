@@ -23,6 +23,7 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Frame
 from sim.types import Sequence as Recording
+from tracking.papers.blob.config import BlobConfig
 from tracking.run import track
 
 KEYS = "HOTA", "DetA", "AssA", "MOTA", "IDF1"
@@ -32,6 +33,7 @@ ABLATIONS: dict[str, dict[str, object]] = {
     "nearest": {"association": "nearest"},
     "axes hardly expected (5 m)": {"person_noise": 5.0},
     "MOG2": {"segmentation": "mog2"},
+    "preset `paper`": dict(BlobConfig.preset("paper").as_dict()),
 }
 SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))
 VIEW = ("image=[480,360]", "fps=7", "focal_px=600", "crop=true", "baseline=0")
@@ -120,4 +122,5 @@ def above(seeds: range) -> None:
     for title, scenes in ABOVE.items():
         made = [simulate(load(name, set=settings), seed) for name, settings in scenes for seed in seeds]
         for mode, what in (("image", "pixels"), ("file", "boxes")):
-            row([f"{title}, {what}", *scores_and_speed(made, {}, mode=mode)])
+            for variant in ("blob", "preset `paper`"):
+                row([f"{title}, {what}, {variant}", *scores_and_speed(made, ABLATIONS[variant], mode=mode)])
