@@ -13,7 +13,7 @@ from sim.types import Array, Camera
 
 HEIGHT = 1.7  # m: the person who gives an image its scale
 WIDTH = 0.42  # m, of the silhouette seen from the side, mean over headings
-SHOULDERS, DEPTH = 0.46, 0.27  # m, from straight above, where shoulders hide the arms: across and along the heading
+SHOULDERS, DEPTH = 0.459, 0.272  # m, from straight above, where shoulders hide the arms: across and along the heading
 
 
 def boxes(camera: Camera, ground: Array) -> Array:

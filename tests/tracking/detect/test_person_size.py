@@ -9,6 +9,7 @@ from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Context
 from tracking.detect import typical_person
 from tracking.detect.person_size import ENOUGH, SMALLEST, PersonSize
+from tracking.papers.group_pda import from_pixels
 
 BARE = Context(10.0, float("nan"), image_size=(480, 360))
 
@@ -65,10 +66,11 @@ def test_the_simulators_body_is_not_the_trackers(monkeypatch):
     """The shares of the drawn body change nothing that a tracker expects."""
     context = Context(10.0, 60.0, camera=camera(0.4), image_size=(480, 360))
     foot = np.array([[240.0, 300.0]])
-    before = PersonSize(context).at(foot)
+    before, of_groups = PersonSize(context).at(foot), from_pixels._person(camera(0.4), 60.0)
     monkeypatch.setattr("sim.scene.body.SHOULDER_SHARE", 0.5)
     monkeypatch.setattr("sim.scene.body.DEPTH_SHARE", 0.5)
     assert PersonSize(context).at(foot) == pytest.approx(before)
+    assert from_pixels._person(camera(0.4), 60.0) == pytest.approx(of_groups)
 
 
 def test_nobody_stands_in_the_sky():

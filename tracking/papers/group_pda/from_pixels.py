@@ -11,6 +11,7 @@ from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Context, Image
 from tracking.detect.foreground import Foreground, convex_areas
 from tracking.detect.person_size import PersonSize
+from tracking.detect.typical_person import DEPTH, SHOULDERS
 from tracking.image_scale import required
 from tracking.papers.group_pda.config import GroupPdaConfig
 
@@ -118,4 +119,5 @@ def _person(camera: Camera | None, scale: float) -> Array:
     if not np.isfinite(middle).all():
         return _person(None, scale)
     place = np.column_stack([np.repeat(middle, len(turns), 0), np.zeros(len(turns))])
-    return np.asarray(person_boxes(camera, place, turns, np.full(len(turns), PERSON_HEIGHT))[:, 2:].mean(0))
+    tall, wide, deep = (np.full(len(turns), size) for size in (PERSON_HEIGHT, SHOULDERS, DEPTH))
+    return np.asarray(person_boxes(camera, place, turns, tall, wide, deep)[:, 2:].mean(0))
