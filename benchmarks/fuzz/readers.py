@@ -8,6 +8,8 @@ from pathlib import Path
 
 SHOWN = 20
 """Frames of a recording that are read."""
+SIMULATED = 500
+"""Most frames times people of a scenario that is simulated."""
 
 
 def _scenario(folder: Path) -> None:
@@ -15,6 +17,21 @@ def _scenario(folder: Path) -> None:
     from scenarios.loading.resolve import dump
 
     dump(load(folder / "scene.toml"))
+
+
+def _simulated(folder: Path) -> None:
+    from scenarios import load
+    from scenarios.loading.value_check import most_people
+    from sim.sequence import simulate
+
+    scenario = load(folder / "scene.toml")
+    if most_people(scenario) * scenario.duration * scenario.camera.fps > SIMULATED:
+        return
+    sequence = simulate(scenario, 40_000)
+    list(islice(sequence.without_pictures(), SHOWN))
+    _ = sequence.truth
+    if sequence.image_size is not None and max(sequence.image_size) <= 256:
+        list(islice(sequence.frames(), 2))
 
 
 def _suite(folder: Path) -> None:
@@ -138,9 +155,19 @@ def _truth(folder: Path) -> None:
     read_detections(folder / "det" / "det.parquet")
 
 
+def _study(folder: Path) -> None:
+    from benchmarks.fuzz.specimens import study_plan
+    from tracking.tuning.study import open_study
+
+    with open_study(study_plan(), folder / "study.journal", "fuzz") as study:
+        study.records()
+        study.finished()
+
+
 READERS: dict[str, Callable[[Path], None]] = {
     "scenario": _scenario,
     "extended scenario": _scenario,
+    "simulated scenario": _simulated,
     "suite": _suite,
     "setting": _setting,
     "tracker setting": _tracker_setting,
@@ -164,6 +191,7 @@ READERS: dict[str, Callable[[Path], None]] = {
     "dataset": _source(),
     "truth": _truth,
     "run": _run,
+    "study": _study,
 }
 """What reads an input of each kind, given its folder."""
 FILES = {"truth": ("gt/", "det/")}

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from tracking.tuning.search_plan import SearchPlan
 
 GROUP = '[[group]]\nid = "a"\nsize = 2\nstart = [4, 4]\ngoal = [12, 4]\nrepeat = 1\n'
 SCENARIO = f"""schema = 1
@@ -56,6 +60,7 @@ group = "ab"
 when = {{ reach = {{ group = "ab", at = [8, 4], radius = 1.0 }} }}
 parts = [{{ id = "c", size = 1, goal = [4, 2] }}, {{ id = "d", goal = [9, 3] }}]
 """
+SIMULATED = SCENARIO[: SCENARIO.index("[[event]]")]
 MADE = f"schema = 1\nduration = 1.0\ncamera = {{ fps = 5, image = [64, 48], focal_px = 60.0 }}\n{GROUP}"
 SUITE = 'about = "x"\nentry = [{ name = "e", scenario = "merge", set = ["duration=9"], repeat = 2 }]\n'
 SENSOR = """schema = 1
@@ -116,6 +121,7 @@ SCENE = (
 )
 TEXTS: dict[str, dict[str, str]] = {
     "scenario": {"scene.toml": SCENARIO},
+    "simulated scenario": {"scene.toml": SIMULATED},
     "extended scenario": {"scene.toml": 'extends = "merge.toml"\nduration = 14.0\ngroup = [{ id = "a", size = 3 }]\n'},
     "suite": {"suite.toml": SUITE},
     "setting": {"setting.txt": "group.a.size={ uniform = [1, 3] }"},
@@ -142,9 +148,9 @@ TEXTS: dict[str, dict[str, str]] = {
 def write_specimens(root: Path) -> dict[str, Path]:
     """Writes all whole inputs below the folder `root`; returns the folder of each, by kind.
 
-    Besides the texts these are: pictures, video, dataset (a stored sequence) and run (stored tracks).
+    Besides the texts these are: pictures, video, dataset (a stored sequence), run (stored tracks), study (of `tune`).
     """
-    return write_texts(root) | _pictures(root) | _made(root)
+    return write_texts(root) | _pictures(root) | _made(root) | {"study": _study(root / "study")}
 
 
 def write_texts(root: Path) -> dict[str, Path]:
@@ -198,3 +204,24 @@ def _made(root: Path) -> dict[str, Path]:
     assert run(track) == 0
     (tracks,) = [path.parent for path in runs.rglob("tracks.parquet")]
     return {"dataset": Path(shutil.move(sequence, root / "dataset")), "run": Path(shutil.move(tracks, root / "run"))}
+
+
+def study_plan() -> SearchPlan:
+    """Returns the plan of the search whose study is damaged; its trials are never played."""
+    from tracking.tuning.options import TuneOptions
+    from tracking.tuning.search_plan import search_plan
+
+    seeds = {"seeds": range(2), "validation": range(10_000, 10_002), "test": range(20_000, 20_002)}
+    return search_plan(TuneOptions(tracker="blob", suite="merge", check="split", trials=4, objective="HOTA", **seeds))
+
+
+def _study(folder: Path) -> Path:
+    from tracking.tuning.study import open_study
+
+    folder.mkdir()
+    with open_study(study_plan(), folder / "study.journal", "fuzz") as study:
+        for value in (0.1, 0.2, 0.3):
+            asked = study.ask()
+            assert asked is not None
+            study.tell(asked, [value])
+    return folder

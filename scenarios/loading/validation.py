@@ -236,9 +236,9 @@ def known_keys(path: KeyPath, table: Table, form: type[BaseModel] = Scenario) ->
         if isinstance(step, int) or model is None:
             continue
         field = next((f for n, f in model.model_fields.items() if step in (n, f.alias)), None)
-        models = [] if field is None else _models(field.annotation)
+        models = [] if field is None else list(dict.fromkeys(_models(field.annotation)))
         model = models[0] if len(models) == 1 else None
-        if len(models) > 1:
+        if len(models) > 1:  # only the kinds of orders
             return _event_keys(models, path, table)
     return [] if model is None else [f.alias or n for n, f in model.model_fields.items()]
 
@@ -247,13 +247,14 @@ def _event_keys(models: list[type[BaseModel]], path: KeyPath, table: Table) -> l
     """Returns the keys known at a path inside a row of `event`, whose model follows from its `type`.
 
     path: begins with "event" and the index of the row. models: of the kinds of orders; the first if `type` is absent or
-    wrong. Empty where the model has no table there; KeyError for a key it does not know.
+    wrong. Empty where the model has no table there or does not know a key.
     """
     row = table["event"][path[1]]
     kind = next((m for m in models if row.get("type") in typing.get_args(m.model_fields["type"].annotation)), models[0])
     keys = kind
     for step in path[2:]:
-        inner = _models(keys.model_fields[step].annotation) if isinstance(step, str) else [keys]
+        field = keys.model_fields.get(step) if isinstance(step, str) else None
+        inner = [keys] if isinstance(step, int) else [] if field is None else _models(field.annotation)
         if not inner:
             return []
         keys = inner[0]

@@ -44,12 +44,17 @@ def check_values(scenario: Scenario) -> None:
     if frames > FRAMES:
         expected = f"at most {FRAMES:,}"
         fail("duration", f"{frames:,.0f} frames", expected, "shorten it, or lower camera.fps")
-    people = sum(group.repeat * _most(group.size) for group in scenario.group)
+    people = most_people(scenario)
     if people > PEOPLE:
         fail("group", f"up to {people:,.0f} people", f"at most {PEOPLE:,}", "make groups smaller or fewer")
     if people * frames > CELLS:
         got = f"{frames:,.0f} frames with up to {people:,.0f} people"
         fail("duration", got, f"at most {CELLS:,} frames times people", "shorten it, or take fewer people")
+
+
+def most_people(scenario: Scenario) -> float:
+    """Returns how many people there can be, by the sizes that 999 of 1000 draws do not exceed."""
+    return sum(group.repeat * _most(group.size) for group in scenario.group)
 
 
 def check_observation(spec: Scenario | ObservationSpec) -> None:

@@ -61,3 +61,15 @@ def test_ids_that_are_no_text_are_no_steps_of_a_setting(tmp_path):
     for setting in ("group.1.size=3", "group.²=3", "group.x.size=1", "list.id=3", "group.99999999999999999999=1"):
         with pytest.raises(InputError):
             load(path, set=[setting])
+
+
+@pytest.mark.parametrize("events", ["", "event = [5]", "event = [{ type = 3 }]", 'event = "x"'])
+def test_unknown_keys_of_distributions(tmp_path, events):
+    path = tmp_path / "s.toml"
+    group = '{ id = "a", size = 2, start = [4, { uniform = [3, 4], clipp = [3, 4] }], goal = [9, 4] }'
+    path.write_text(f"schema = 1\ngroup = [{group}]\n{events}\n")
+    with pytest.raises(InputError, match=r"clipp|event"):
+        load(path)
+    path.write_text(f"schema = 1\n{events}\ngroup = [{{ id = 5, when = {{ tme = 3 }} }}]\n")
+    with pytest.raises(InputError):
+        load(path)

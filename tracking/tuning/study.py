@@ -180,15 +180,29 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
         place = storage if storage is None or "://" in str(storage) else Path(storage)
         locks = _trial_locks(place) if isinstance(place, Path) else None
         try:
-            study = optuna.create_study(
-                storage=_optuna_storage(place, locks), study_name=name, load_if_exists=True,
-                sampler=HillClimbingSampler(plan), pruner=_pruner(plan),
-                directions=[_direction(goal) for goal in plan.goals],
-            )  # fmt: skip
+            study = _create(plan, place, _optuna_storage(place, locks), name)
             yield SearchStudy(plan, study, locks, storage)
         finally:
             if locks is not None:
                 locks.close()
+
+
+def _create(plan: SearchPlan, place: str | Path | None, storage: BaseStorage | str | None, name: str) -> optuna.Study:
+    """Creates the study `name` in Optuna's storage, or loads it; InputError if what is stored there is damaged.
+
+    place: of the storage, for the message.
+    """
+    try:
+        return optuna.create_study(
+            storage=storage, study_name=name, load_if_exists=True, sampler=HillClimbingSampler(plan),
+            pruner=_pruner(plan), directions=[_direction(goal) for goal in plan.goals],
+        )  # fmt: skip
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        got = f"{type(error).__name__}: {error}".partition("\n")[0]
+        expected = "a storage that `flockscope tune` wrote"
+        raise InputError(
+            file=place, place="--storage", got=got, expected=expected, remedy="choose another --out or --storage"
+        ) from error
 
 
 def _direction(goal: Goal) -> optuna.study.StudyDirection:
