@@ -67,9 +67,10 @@ def svg(scenario: Scenario) -> str:
 
 
 def _colours(ways: list[GroupRoute], orders: list[OrderMark]) -> dict[str, str]:
-    """Returns the colour (#rrggbb) of each group name, also of groups that orders make; ten colours in turn.
+    """Returns the colour (#rrggbb) of each group name, also of groups that orders make, from ten colours.
 
-    ways: one per entry of `group`. All groups of a `repeat` have the same colour.
+    ways: one per entry of `group`. All groups of a `repeat` have the same colour. The first ten entries differ; further
+    ones have the first colour. New groups of orders take the colours after those of the entries, in turn.
     """
     named: dict[str, str] = {}
     for course in ways:

@@ -22,8 +22,9 @@ text { font: 13px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 11.
 class SvgPlan:
     """Draws in world metres (y up) on a picture in px (y down), 900 px wide; the methods return SVG elements as text.
 
-    State: world; scale, px per m, such that the plan is at most 848 px wide and 620 px high; left, top: px of the
-    world's upper left corner; bottom: lower end of the plan, px.
+    world: the scenario's, the only argument. State: world; scale, px per m, such that the plan is at most 848 px wide
+    and 620 px high; left, top: px of the world's upper left corner, left such that the plan is in the middle; bottom:
+    lower end of the plan and the line of words beneath it, px.
     """
 
     def __init__(self, world: WorldSpec) -> None:
@@ -52,7 +53,7 @@ class SvgPlan:
     def floor(self) -> list[str]:
         """Returns SVG elements of the ground: a line for each metre, a frame, and the world's size in words.
 
-        Worlds wider than 40 m have a line for each 5 m.
+        Worlds wider than 40 m in x have a line for each 5 m.
         """
         width, depth = self.world.size
         (x0, y1), (x1, y0) = self((0, 0)), self((width, depth))

@@ -16,10 +16,11 @@ LEGEND = "A start of a   ◎ goal   · way   ① order   ○ queue   █ wall   
 
 
 class CharacterPlan:
-    """A grid of characters over the world, the y axis pointing up; blank at first.
+    """A grid of characters over the world, the y axis pointing up; blank at first. Made from size and columns.
 
     State: cells: rows of characters, top row first; scale: columns per m; columns, rows: size of the grid, at least 4
-    rows; a row is as high in m as two columns are wide; size: of the world, x, y, m.
+    rows; a row is about as high in m as two columns are wide, less in worlds so flat that the 4 rows are needed; size:
+    of the world, x, y, m.
     """
 
     def __init__(self, size: XY, columns: int) -> None:
@@ -44,7 +45,7 @@ class CharacterPlan:
         """Writes a name to the right of a point (x, y), m.
 
         It takes the nearest of five rows (the point's own, then one and two below or above) where the name covers only
-        blanks and ways (·); the point's own row if there is none.
+        blanks and ways (·); the point's own row if there is none. The name must not be longer than the grid is wide.
         """
         column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
         step = self.size[1] / self.rows
@@ -77,8 +78,9 @@ def character_plan(scenario: Scenario, columns: int = 64) -> str:
     """Returns the plan of a scenario as lines of text, `columns` characters wide plus a frame, with its size and
     legend.
 
-    Later things cover earlier ones: stairs, ways (on blanks only), queues, walls, pillars, service points, goals, names
-    of groups (first 8 characters, in capitals), orders (① to ⑳, then again from ①).
+    columns: at least 8, so that names fit (not checked). Ways are dots that begin two columns apart. Later things cover
+    earlier ones: stairs, ways (on blanks only), queues, walls, pillars, service points, goals, names of groups (first 8
+    characters, in capitals), orders (① to ⑳, then again from ①).
     """
     world = scenario.world
     plan = CharacterPlan(world.size, columns)

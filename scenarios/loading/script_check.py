@@ -30,7 +30,7 @@ def check_script(scenario: Scenario) -> None:
 
     Orders are taken in the order of the file. Each merge and split ends its groups and makes new groups, whose possible
     sizes follow. Checked are unique ids, triggers (their groups, earlier orders and times), existing groups, new names,
-    sizes of parts, and at least 3 people in queues.
+    sizes of parts, and queues whose groups can have 3 people together.
     """
     alive = {name: _people(bounds(group.size)) for group in scenario.group for name in group_names(group)}
     gone: dict[str, str] = {}

@@ -24,7 +24,9 @@ TALLEST = 3.0
 
 
 class _Range(NamedTuple):
-    """A value of a scenario and the least and greatest number allowed there, in the unit `unit`."""
+    """A value at the key `place` of a scenario, and the least and greatest number allowed there, both included.
+
+    unit: a text for messages, with a blank in front (" m"), "" for none."""
 
     place: str
     value: Value
@@ -36,7 +38,8 @@ class _Range(NamedTuple):
 def check_values(scenario: Scenario) -> None:
     """Raises InputError, without a file, for the first value that is out of its range; returns nothing.
 
-    Also for a scenario of more than 1,000,000 frames, 5000 people, or 20,000,000 frames times people.
+    Also for a scenario of more than 1,000,000 recorded frames, 5000 people in all entries of `group` together, or
+    20,000,000 frames times people. A size that is a distribution counts as `_most` says.
     """
     _require(_crowd(scenario))
     check_observation(scenario)

@@ -14,9 +14,9 @@ from scenarios.schema.values import Distribution, Model, NonNegative, Positive, 
 class LightSwitch(Model):
     """A sudden change of brightness, as of a lamp or a cloud.
 
-    - at: time of the change, s. gain: factor of the brightness from then on, above 0. Either may be a distribution,
-      drawn once per seed.
-    - ramp: duration of the change, s.
+    - at: start of the change, s, 0 = frame 1. gain: factor of the brightness after it, above 0; those of several
+      switches multiply. Either may be a distribution, drawn once per seed.
+    - ramp: duration of the change from `at` on, s; the logarithm of the factor changes evenly; 0 = at once.
     """
 
     at: Value = Field(description="time of the change, s")
@@ -30,9 +30,10 @@ class Light(Model):
     - sun_azimuth_deg (from where the light comes; 0 = from +x, 90 = from +y), sun_elevation_deg (above the ground):
       degrees. Both may be distributions.
     - shadow: share of the brightness lost in a cast shadow; 0 = no shadows. penumbra: width of a shadow's soft edge, m.
-    - drift, drift_time: size of slow changes, and their time constant, s. flicker: changes from frame to frame.
+    - drift, drift_time: size of slow changes, and time after which their correlation is 0.37, s. flicker: size of
+      changes from frame to frame.
     - cloud, cloud_size (distance at which the correlation is 0.6, m), cloud_speed (m/s): soft patches that move over
-      the ground.
+      the ground, all in one direction, which is drawn per seed.
     - switch: sudden changes of brightness, empty for none.
     """
 
@@ -62,10 +63,10 @@ class Picture(Model):
 
     - texture: contrast of the patterns on ground and walls, 0 to 1.
     - noise: standard deviation per pixel and channel at grey level 128, grey levels. shot: share of its variance that
-      is proportional to the brightness.
+      is proportional to the brightness: at level x the variance is noise² (1 - shot + shot x / 128).
     - blur_px: standard deviation of the blur, px. jpeg: quality 0 to 100; 0 = no compression.
-    - foliage: share of the image covered by moving plants. sway_px, sway_time: standard deviation of their movement,
-      px, and the time after which its correlation is 0.6, s.
+    - foliage: share of the image covered by moving plants, on the ground only. sway_px, sway_time: standard deviation
+      of their movement, px, and the time after which its correlation is 0.6, s.
     """
 
     texture: Share = Field(0.5, description="contrast of the patterns on ground and walls")

@@ -78,10 +78,10 @@ class CameraSpec(Model):
     """Place, direction and lens of the camera; size and rate of its images.
 
     kind: "pinhole" (perspective) or "top" (orthographic from above). image: width, height, px. fps: frames per second.
-    focal_px: focal length, px, and baseline: distance of the right camera, m (both pinhole). tilt_deg: by how much it
-    looks down, 90 = straight down. yaw_deg: 0 looks along +y, positive turns left. px_per_m (kind top), height above
-    the ground (m) and position (x, y, m): None: chosen so that all people are in view (height of "top": 20 m). crop:
-    True accepts people who walk out of view; False: they are an InputError."""
+    focal_px: focal length, px, and baseline: distance to the right camera, m, 0 = none (both pinhole). tilt_deg: by how
+    much it looks down, 90 = straight down (pinhole). yaw_deg: 0 looks along +y, 90 along -x. px_per_m (kind top),
+    height above the ground (m) and position (x, y, m): None: chosen so that all people are in view (height of "top":
+    20 m). crop: True accepts people who walk out of view; False: they are an InputError."""
 
     kind: Literal["pinhole", "top"] = Field("pinhole", description="perspective, or orthographic from above")
     image: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = Field(
@@ -147,7 +147,7 @@ class GroupSpec(Model):
 
 
 class Reach(Model):
-    """A trigger: the middle of `group` comes within `radius` m of the place `at` (x, y, m; None: the group's goal)."""
+    """A trigger: the mean place of `group`'s people comes within `radius` m of `at` (x, y, m; None: its goal)."""
 
     group: Name = Field(description="name of the group")
     at: FixedPoint | None = Field(None, description="the place, m; absent: the group's goal")
@@ -157,8 +157,9 @@ class Reach(Model):
 class When(Model):
     """An order fires `delay` s after its trigger: exactly one of the other fields, else pydantic.ValidationError.
 
-    time: s. reach: a group comes near a place. distance_lt: of every two of the order's groups the nearest members are
-    closer than this, m. after: id of an order whose rule has come true. The other three are None."""
+    time: s from the first recorded frame. reach: a group comes near a place. distance_lt: of every two of the order's
+    groups the nearest members are closer than this, m. after: id of an earlier order, once its people have been
+    together, apart or in line long enough. The other three are None. The first time that the trigger is met counts."""
 
     time: Value | None = Field(None, description="the order fires at this time, s")
     reach: Reach | None = None
@@ -180,10 +181,9 @@ class When(Model):
 
 
 class SplitPart(Model):
-    """One part of a group that splits. id: of the new group. goal, via: points in m. at_goal: "stand", "leave" or
-    "walk" on.
+    """One part of a group that splits. id: of the new group. goal, via: in m. at_goal: "stand", "leave" or "walk" on.
 
-    size: number of people; None: an equal share of the people left over."""
+    size: number of people; None: an equal share of those left over; the first such parts get one more of a rest."""
 
     id: Name = Field(description="name of the new group")
     size: Annotated[int, Field(ge=1)] | None = Field(
@@ -252,13 +252,13 @@ ScriptOrder = Annotated[MergeOrder | SplitOrder | QueueOrder, Field(discriminato
 
 
 class Scenario(Model):
-    """A whole scenario with all defaults, after `extends` has been applied: the form that is stored. Unknown keys raise
-    pydantic.ValidationError.
+    """A whole scenario with all defaults, `extends` applied, as stored. Unknown keys raise pydantic.ValidationError.
 
-    schema_: version, 1. name, about: texts. duration: recorded time, warmup: unrecorded time before it, s. turn_deg:
-    turns the script, not the world. lead: time by which walking groups start further on, s. mirror: True mirrors the
-    script with probability 0.5. world, camera, sensor, light, picture, crowd: their settings. group: at least one.
-    event: the orders, in order; () without a script."""
+    schema_: version, 1. name, about: texts. duration: recorded time, warmup: unrecorded time before it, s. mirror: True
+    mirrors the script in x about the world's middle with probability 0.5. turn_deg: then turns it about that middle,
+    counter-clockwise; the world stays. lead: time by which walking groups start further on, at most half-way to their
+    first point, s; negative: further back. world, camera, sensor, light, picture, crowd: their settings. group: at
+    least one. event: the orders, in order; () without a script."""
 
     schema_: Literal[1] = Field(alias="schema", description="version of the file format")
     name: Name = Field("scenario", description="name of the sequences made from it; absent: the file's name")

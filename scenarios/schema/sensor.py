@@ -83,11 +83,13 @@ class BoxNoise(Model):
 class FalseAlarms(Model):
     """False alarms that last, some of them attached to people. Pairs are (mean, standard deviation).
 
-    - life: mean life, s; 0 = one frame. seen: probability that a living one is detected in a frame.
+    - life: mean life, s; 0 = one frame. seen: probability that a living one is detected in a frame. So many live that
+      the mean number detected per frame is the sensor's clutter_rate.
     - near: share that moves with a person. Of these: across, foot: place relative to the person, box heights;
       near_height: logarithm of the height relative to the person's.
     - Of all others: height: logarithm of the height relative to a person there; drift: standard deviation of the
-      velocity per axis, box heights per s; at: possible foot points as shares of the image, None: anywhere.
+      velocity per axis, box heights per s; at: possible foot points x, y as shares of image width and of the rows
+      below the ground's furthest row, met with a standard deviation of 0.03; None: anywhere there.
     - Of all: aspect: logarithm of width / height; jitter: standard deviation of each edge per frame, box heights.
     """
 
@@ -136,11 +138,13 @@ class Sensor(Model):
     """The synthetic detector that makes the points and boxes of det/det.txt.
 
     - detect_prob: probability that a fully visible person of usual size is detected. It is multiplied by visibility ^
-      occlusion_power. Below min_visibility it is 0. At a box height of small_px (px) it is halved; 0 = no effect.
+      occlusion_power and by min(1, box height in px / (2 small_px)), which is 1 if small_px is 0. Below min_visibility
+      it is 0.
     - persistence: correlation of misses from frame to frame. clutter_rate: mean number of false alarms per frame.
     - noise_px: standard deviation of each box edge, px. noise_m: of points along each axis, m.
     - box: "visible" (boxes of the visible parts) or "amodal" (of whole people). hide: artificial occlusions.
-    - by_visibility: factors at evenly spaced visibilities from 0 to 1, for occlusion_power. miss_memory: slow parts of
+    - by_visibility: factors at evenly spaced visibilities from 0 to 1, linear between them, for occlusion_power; below
+      min_visibility the probability is 0 all the same. miss_memory: slow parts of
       the misses, for persistence. box_noise: errors in box heights, for noise_px. These three are measured and replace
       the simpler key; None: they do not.
     - points: "foot" (below the noisy box) or "own" (true position with noise_m); None: as "own". false_alarms: life,

@@ -43,8 +43,8 @@ class Distribution(BaseModel):
     - choice: values of equal probability. clip: least and greatest value kept, both included; draws outside are drawn
       again; None: all are kept.
 
-    Any other combination, a lower bound above its upper bound, values out of range, or unknown keys raise
-    pydantic.ValidationError. `draw` raises ValueError if no draw falls into `clip`.
+    Any other combination, a lower bound above its upper bound, a clip that keeps less than 1 % of the draws, values out
+    of range, or unknown keys raise pydantic.ValidationError.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -59,7 +59,8 @@ class Distribution(BaseModel):
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         """Returns the model; raises ValueError unless exactly one of normal, uniform, exponential, poisson and choice
-        is given, and the bounds of uniform and clip are in order (equal bounds are allowed).
+        is given, the bounds of uniform and clip are in order (equal bounds are allowed), and clip keeps at least 1 % of
+        the draws.
         """
         kinds = [name for name in ("normal", "uniform", "exponential", "poisson", "choice") if getattr(self, name)]
         if len(kinds) != 1:
@@ -153,7 +154,7 @@ def bounds(value: Value) -> tuple[float, float]:
     bound.
 
     A number gives itself twice. Without clip, normal gives -inf and inf, exponential and poisson 0 and inf, choice its
-    least and greatest entry. If no draw can lie within the clip, the first may be above the second.
+    least and greatest entry. A clip narrows these bounds; a value need not reach them, as with choice or poisson.
     """
     if not isinstance(value, Distribution):
         return float(value), float(value)

@@ -136,9 +136,9 @@ def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: I
 
     files: content by name; all are synced to disk before the first replaces its target. seal: the last of their names.
     The old seal is deleted before any other file changes, and the new one appears after all others have. A killed run
-    therefore leaves the old files whole or a folder without a seal; if it had none before, the first of `files` is the
-    first to appear. names: files that are deleted unless `files` has them. Other files stay. A missing folder is
-    created, and what killed runs left for this target is deleted.
+    therefore leaves the old files whole or a folder without a seal. The first of `files` is the first to appear, so
+    that it marks even a folder that never had a seal. names: files that are deleted unless `files` has them. Other
+    files stay. A missing folder is created, and what killed runs left for this target is deleted.
 
     Raises WorkError if the disk is full, InputError if the folder cannot be written.
     """

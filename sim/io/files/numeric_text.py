@@ -70,7 +70,10 @@ def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
 
 
 def crowded(frame: Ints) -> Bools:
-    """Return flags (N,), True for rows of frames that have more than 5000 rows; frame (N,): from 1, bounded."""
+    """Return flags (N,), True for rows of frames that have more than 5000 rows.
+
+    frame (N,): from 0 on. It takes memory in proportion to the highest, so frames must be checked before.
+    """
     return np.asarray(np.bincount(frame, minlength=1)[frame] > DETECTIONS)
 
 

@@ -31,7 +31,7 @@ class Column:
     """A column of a Parquet table to write.
 
     name: of the column. values: an array (R,), or R arrays of any lengths for a column of lists. unit: its unit as a
-    text, "1" for none. kind: number type of the arrays of a column of lists; ignored otherwise.
+    text, "1" for none. kind: number type of the arrays of a column of lists, by default float64; ignored otherwise.
     """
 
     name: str
@@ -114,7 +114,9 @@ class StoredTable:
         return float(value)
 
     def frames(self, name: str) -> set[int]:
-        """Return the value `name` of the metadata, a list of frames; raise InputError if it is another value."""
+        """Return the value `name` of the metadata, a list of whole numbers, as a set; raise InputError for another.
+
+        Whether they are frames of the table is not checked."""
         value = self.fact(name)
         fits = isinstance(value, list) and all(isinstance(v, int) for v in value)
         self.reject(not fits, name, f"{value!r:.40}", "a list of frames")

@@ -59,9 +59,10 @@ def _twice(frame: Ints, id: Ints) -> Bools:
 
 
 def _parted(slot: Ints, people: list[set[int]]) -> Ints:
-    """Return the slots (K,) of K distinct raw frames, so that frames with a common person differ where they can.
+    """Return the slots (K,), our frames from 1, of K >= 1 distinct raw frames, ascending as before.
 
-    slot (K,): ascending. people: the ids in each raw frame. A slot is raised by one at most.
+    slot (K,): as rounded, ascending. people: the ids in each raw frame. A slot is raised by one, and no more, if it is
+    not after the one before it and they have a person in common or that one was raised. So two may still be equal.
     """
     parted = slot.copy()
     here, raised = people[0], False
@@ -79,7 +80,8 @@ def read_groups(path: Path) -> dict[int, int]:
 
     A line lists the ids of one group, separated by blanks or commas; labels count from 1 in the order of the lines.
     Lines with fewer than two different ids are no group. Lines that share a person become one group with the lowest
-    label, with a warning. Raises InputError if the file is unreadable, or, with the line, if a word is no integer.
+    label, with a warning. Raises InputError if the file is unreadable, or, with the line, if a word is no whole number
+    from 0 on.
     """
     label: dict[int, int] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):

@@ -117,13 +117,11 @@ class DetectionTable:
 def read_detections(path: Path, length: int | None) -> DetectionTable:
     """Read a det.txt: points on the ground (m) if every row has one, else the centres of the boxes in the image (px).
 
-    path: the file. length: the last frame allowed, None for any. The boxes are None if any row lacks one. Scores are 1
-    if the file has none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1 (all 1 if
+    path: the file. length: the last frame allowed; None: 1,000,000. The boxes are None if any row lacks one. Scores are
+    1 if the file has none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1 (all 1 if
     equal). A file without lines gives no rows.
 
-    Raises InputError if the file is unreadable, or, with the line, if a cell is no finite number, the number of columns
-    is not 6 to 10, a frame or id is no integer, a frame is outside 1 to `length`, or a box has no area. Also raises
-    InputError for a row without box if any row lacks a ground point.
+    Raises InputError as read_table, and for a row without box (-1,-1,-1,-1) if any row lacks a ground point.
     """
     table = read_table(path, length=length, boxless=True)
     ground, boxless = table.ground(), table.without_box()

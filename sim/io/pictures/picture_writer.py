@@ -186,7 +186,7 @@ def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
     known: the PixelTruth of every frame, from frame 1, at least one (else ValueError). Columns: frame (from 1), id,
     visible_px and amodal_px (numbers of pixels that show the person, and that would without occlusion), visibility_px
     (their ratio, 0 for 0 of 0), modal_left, modal_top, modal_width, modal_height (px; box of the visible pixels, nan if
-    hidden), blob (number of the connected region of people, -1 if hidden).
+    hidden), blob (number, from 0 in each frame, of the region of people who touch in the image, -1 if hidden).
     """
 
     def joined(name: str) -> NDArray[Any]:

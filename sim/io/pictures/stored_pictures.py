@@ -86,11 +86,12 @@ class StoredPictures:
         return width, height
 
     def all(self, stream: str, count: int, wanted: list[int] | None = None) -> Iterator[NDArray[Any]]:
-        """Yield the pictures of a stream in order: `count` in all, or only the numbers `wanted` (ascending, from 1).
+        """Yield the pictures 1 to `count` of a stream, or only the numbers `wanted` (ascending, from 1), in order.
 
         Shape (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity. None or an empty `wanted` yields
         all, except that an empty one yields none of a video. Iterating raises InputError if a file is missing or
-        altered, no picture, or of another size, and, at its end, if a video holds another number of pictures.
+        altered, no picture, or of another size. At its end it raises it if a video did not give as many pictures as
+        `wanted` has, or `count` if that is None.
         """
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))

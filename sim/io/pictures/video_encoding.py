@@ -73,7 +73,9 @@ class VideoWriter:
         context.colorspace = context.color_primaries = context.color_trc = BT601
 
     def add(self, picture: Image) -> None:
-        """Append a picture (H, W, 3) BGR uint8; its size must be that of the video."""
+        """Append a picture (H, W, 3) BGR uint8. Its size must be that of the video, which is not checked.
+
+        A picture of another even size is scaled; an odd size raises cv2.error."""
         import av
         import cv2
 

@@ -64,7 +64,7 @@ def read_run(folder: Path) -> dict[str, Any]:
     """Return the content of the run.json of a folder; the files that it names are not read.
 
     Raises InputError if it is missing, unreadable, no JSON object, of another format number, without a seal (as older
-    versions wrote it), or altered: its bytes are those that we write for its content, down to the last blank.
+    versions wrote it), or altered: its bytes must be those that we write for its content, down to the last blank.
     """
     path = folder / RUN
     if not path.is_file():

@@ -21,8 +21,8 @@ def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["meas
     """Return where the boxes of stored tracks come from, the value `boxes` of run.json.
 
     tracks: those of one tracker, one Tracks per frame. "measured": the tracker gave a box in at least one frame with
-    tracks. "projected": it gave none, its tracks are people on the ground or in space, and the camera is known; also
-    without any frame. "none": otherwise, that is without a camera, for tracks in the image, or for groups.
+    tracks. "projected": it gave none, its tracks are people on the ground or in space, and the camera is known; with a
+    camera also without any Tracks. "none": otherwise, that is without a camera, for tracks in the image, or for groups.
     """
     if any(t.box is not None and len(t.id) for t in tracks):
         return "measured"
