@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from sim.io.store.run_seal import AGAIN, RUN, check_run, is_run, read_run, tracked_hash
+from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.types import Sequence
 from tracking.run import TrackingRun
@@ -40,8 +40,8 @@ class StoredTracks:
     """The stored tracks of one sequence, not read yet.
 
     name: the sequence's name: from run.json, or else the name of the folder or, without suffix, of the text; None for a
-    text file that the user gave itself. path: the folder with the tracks, or the text file. info: the content of
-    run.json as a dictionary, empty for tracks of another program and for a run that was not finished.
+    file that the user gave itself. path: the folder with the tracks, or the file. info: the content of run.json as a
+    dictionary, empty for tracks of another program and for a run that was not finished.
     """
 
     name: str | None
@@ -50,8 +50,9 @@ class StoredTracks:
 
     def check(self) -> None:
         """Raises InputError if these are tracks of a run of ours that is unfinished, damaged or mixed with another."""
-        if is_run(self.path):
-            check_run(self.path)
+        folder = run_folder(self.path)
+        if folder is not None:
+            check_run(folder)
 
     def read(self, sequence: Sequence) -> TrackingRun:
         """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`.
@@ -80,13 +81,15 @@ def find_tracks(path: Path) -> list[StoredTracks]:
     """Returns all stored tracks at or below a path, not read yet, in the order of their paths; text files of a folder
     come last.
 
-    path: a text file in MOTChallenge format, a folder with a run or a tracks.txt, or a folder that holds such folders
-    or *.txt files, at most three levels down. Hidden folders are left out. Of a run only run.json is read. Raises
-    InputError if the path does not exist or holds no tracks, or if a run.json is damaged or has no seal.
+    path: a file of a run, a text in MOTChallenge format, a folder with a run or a tracks.txt, or a folder that holds
+    such folders or *.txt files, at most three levels down. Hidden folders are left out. Of a run only run.json is read.
+    Raises InputError if the path does not exist or holds no tracks, or if a run.json is damaged or has no seal.
     """
     if not path.exists():
         raise InputError(file=path, got="no such file or folder", expected=EXPECTED, remedy="check the path")
-    found = [StoredTracks(None, path, {})] if path.is_file() else list(_below(path, DEPTH))
+    folder = run_folder(path)
+    info = read_run(folder) if folder is not None and path.name in WHOLE else {}
+    found = [StoredTracks(None, path, info)] if path.is_file() else list(_below(path, DEPTH))
     if not found:
         raise InputError(file=path, got="no tracks", expected=EXPECTED, remedy="check the path")
     return found
@@ -113,7 +116,7 @@ def _below(folder: Path, depth: int) -> list[StoredTracks]:
 def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[tuple[Sequence, StoredTracks]]:
     """Returns each sequence with the stored tracks of the same name, in the order of `sequences`; [] without sequences.
 
-    A single text file that was given itself matches a single sequence whatever their names; otherwise its name is that
+    A single file that was given itself matches a single sequence whatever their names; otherwise its name is that
     of the file without suffix. Tracks of other sequences are ignored. `stored` must not be empty if there is a
     sequence.
 

@@ -21,6 +21,9 @@ TABLE = "tracks.parquet"
 NAMES = ("tracks.txt", "tracks.mot.txt", TABLE, "groups.csv", "groups.parquet", "events.json", RUN)
 """Names of the files of a run; files of other names in its folder belong to somebody else."""
 
+WHOLE = ("tracks.txt", TABLE)
+"""Files that stand for the whole run if they are given alone; tracks.mot.txt is a text as other programs read it."""
+
 MEBIBYTE = 2**20  # longer than any run.json
 AGAIN = "track again"
 OLD = "track again; if the tracks are another program's, delete run.json"
@@ -38,6 +41,12 @@ def is_run(folder: Path) -> bool:
         return False
     with path.open("rb") as file:
         return b'"boxes"' in file.read(MEBIBYTE)
+
+
+def run_folder(path: Path) -> Path | None:
+    """Return the folder of the run that a path leads to: itself, or that of a file of ours; None if it is no run's."""
+    folder = path if path.is_dir() else path.parent if path.name in NAMES else None
+    return folder if folder is not None and is_run(folder) else None
 
 
 def reject_foreign(folder: Path) -> None:

@@ -18,7 +18,7 @@ from sim.io.files.atomic import replace_sealed
 from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import event_dict, read_events
 from sim.io.store.group_files import groups_bytes, groups_csv
-from sim.io.store.run_seal import NAMES, RUN, TABLE, check_run, is_run, reject_foreign, sealed_run
+from sim.io.store.run_seal import NAMES, RUN, TABLE, WHOLE, check_run, reject_foreign, run_folder, sealed_run
 from sim.io.store.track_boxes import box_source, upright_boxes
 from sim.io.store.track_tables import RunRows, flatten, read_track_table, track_table
 from sim.io.store.track_text import read_track_text, with_groups
@@ -127,8 +127,8 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
     """
     path = Path(path)
     folder = path if path.is_dir() else path.parent
-    whole = path.is_dir() or path.name in ("tracks.txt", TABLE)
-    if (whole or path.name in NAMES) and is_run(folder):
+    whole = path.is_dir() or path.name in WHOLE
+    if run_folder(path) is not None:
         check_run(folder)
         if whole:
             return _with_events(read_track_table(folder), folder)

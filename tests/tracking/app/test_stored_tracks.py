@@ -120,6 +120,16 @@ def test_another_sequence_of_that_name(made, tracks, tmp_path, capsys):
         assert "track again" in text
 
 
+@pytest.mark.parametrize("name", ["tracks.parquet", "tracks.txt"])
+def test_a_file_of_a_run_is_of_its_sequence(made, capsys, name):
+    """A text alone matches whatever sequence is given, but these files stand for the run."""
+    first, second = sorted(p for p in (made / "data").rglob("scene-s*") if p.is_dir())
+    path = made / "blob" / first.name / name
+    assert run(["score", str(first), str(path)]) == 0
+    assert "detections file" in capsys.readouterr().out
+    assert "tracks of another scene-s40001" in refused(capsys, "score", second, path)
+
+
 def recording(folder: Path, rows: str) -> Path:
     (folder / "gt").mkdir(parents=True)
     (folder / "gt" / "gt.txt").write_text(rows)
