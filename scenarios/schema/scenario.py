@@ -110,7 +110,7 @@ class CrowdSpec(Model):
     """How people walk; the defaults are measured values (docs/experiments/realism.md).
 
     free_speed (of a person alone, m/s), spacing between neighbours in a group (m), body height (m): numbers or
-    distributions. slowdown_per_member: a group of n people is slower by this times (n - 1), m/s."""
+    distributions. slowdown_per_member: n people walk at their mean free speed less this times (n - 1), m/s."""
 
     free_speed: Value = Field(FREE_SPEED, description="walking speed of a person alone, m/s")
     spacing: Value = Field(SPACING, description="distance between neighbours in a group, m")
@@ -124,7 +124,7 @@ class GroupSpec(Model):
     """A group of people who belong together from the start; a person alone is a group of one.
 
     id: its name; repeat = n above 1 makes n such groups, id-1 … id-n. size: number of people, rounded, at least 1.
-    start, goal, via (points to pass): in m. speed: m/s, None: follows from the members. enter: time of entry, s, 0 =
+    start, goal, via (points to pass): in m. speed: m/s, None: by `crowd`. enter: time of entry, s, 0 =
     there from the first frame. at_goal: "stand" there, "leave" the scene or "walk" straight on. Numbers except `repeat`
     may be distributions."""
 

@@ -21,8 +21,8 @@ MeanAndSd = tuple[float, NonNegative]
 class Hide(Model):
     """Artificial occlusion of a group, or of everybody, for some time: the sensor does not detect these people.
 
-    start, end: s, from start on and before end. group: name of the group in the script; None: no person at all is
-    detected.
+    start, end: s, 0 = frame 1; from start on and before end. group: name of the group in the script; None: no person at
+    all is detected.
     """
 
     start: NonNegative = Field(description="start of the occlusion, s")

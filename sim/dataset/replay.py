@@ -69,9 +69,9 @@ def replay(
     Raises InputError if the source is invalid, holds several sequences, has no labelled people or no way to positions
     on the ground; if a calibration is given for labels that are on the ground, is invalid or has another aspect ratio
     than the recording; if the cut is outside the recording, longer than an hour, or empty of people; if `camera` is
-    invalid, people leave its view, a stream is unknown, or "right" or "disparity" is wanted without a baseline. Raises
-    ValueError for a negative seed. Reading detections raises InputError if the sensor is to hide a group by name, since
-    replays have none.
+    invalid, people leave its view (unless its camera.crop is true), a stream is unknown, or "right" or "disparity" is
+    wanted without a baseline. Raises ValueError for a negative seed. Reading detections raises InputError if the sensor
+    is to hide a group by name, since replays have none.
     """
     from sim.io.source import open_source
 

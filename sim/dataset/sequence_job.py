@@ -59,8 +59,8 @@ class JobOutcome:
 def plan_jobs(entries: list[Entry], seeds: range, folder: Path) -> list[SequenceJob]:
     """Return one job per entry and seed, all seeds of the first entry first; the jobs store no pictures.
 
-    folder: OUT/flockscope-<split>; each job's folder is <entry>-s<seed, 5 digits> in it. No entries give no jobs.
-    Raises InputError if two entries would share a folder.
+    folder: OUT/flockscope-<split>; each job's folder is <entry>-s<seed, at least 5 digits> in it. No entries give no
+    jobs. Raises InputError if two entries would share a folder.
     """
     output_paths(folder, [e.name for e in entries], source="entries")
     return [SequenceJob(output_path(folder, e.name, f"-s{seed:05d}"), e, seed) for e in entries for seed in seeds]

@@ -23,8 +23,8 @@ SIMULATED = ("simulated", "generated", "replayed")
 def split_of(seeds: range) -> str:
     """Return the name of the split that holds all seeds: "train", "val", "test", "fit" or "demo".
 
-    The splits begin at the seeds 0, 10,000, 20,000, 30,000 and 40,000. Raises InputError if the range is empty, has a
-    negative seed, or crosses the border between two splits.
+    The splits begin at the seeds 0, 10,000, 20,000, 30,000 and 40,000; "demo" has all from there on. Raises InputError
+    if the range is empty, has a negative seed, or crosses the border between two splits.
     """
     if len(seeds) == 0 or min(seeds) < 0:
         raise InputError(

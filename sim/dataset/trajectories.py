@@ -25,9 +25,9 @@ GAP = 2.0  # s without label after which a person counts as absent
 class Trajectories:
     """Resampled motion of P people in T frames.
 
-    id (P,): person ids, ascending; column k belongs to id[k]. pos (T, P, 2): x, y in m, and vel (T, P, 2): m/s; both
-    nan while absent. present (T, P): True while present. smoothing: the chosen time constant tau in s; faster motion
-    was removed.
+    id (P,): person ids, ascending; column k belongs to id[k]. pos (T, P, 2): x, y in m, and vel (T, P, 2): m/s, the
+    derivative of the smoothed positions; both nan while absent. present (T, P): True while present. smoothing: the
+    chosen time constant tau in s; faster motion was removed.
     """
 
     id: Ints

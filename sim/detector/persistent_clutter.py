@@ -190,7 +190,7 @@ def _boxes_alone(
     image), with a standard deviation of 0.03 and inside that part; without sites, anywhere on it. It moves with
     constant velocity, drawn with standard deviation `model.drift` (box heights per s) per axis. `model.height`: mean
     and standard deviation of the logarithm of its height over a person's. Points are those under the feet if there is a
-    camera; else one fixed point of the labelled area, which does not drift.
+    camera and ground is seen there; else one fixed point of the labelled area (0, 0 without one), which does not drift.
     """
     x, y = at_birth[X], at_birth[Y]
     if model.at:

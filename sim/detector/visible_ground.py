@@ -18,6 +18,8 @@ SMALLEST = 0.25  # ground ends where people are smaller than this share of a per
 class VisibleGround:
     """The part of an image that shows ground, and the height of people there: by the camera, else by the labels.
 
+    Made from truth, camera and size.
+
         truth, camera   as given; camera is None if unknown
         low, high (2,)  upper left and lower right corner of that part, u, v in px; zeros without camera and boxes
         line (2,)       a, b of a person's height a + b v (px) at row v of the feet; used without a camera only

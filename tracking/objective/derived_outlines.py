@@ -29,7 +29,8 @@ def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labe
     group id, these ids define the groups, else the baseline rule does. Hulls are drawn round boxes if the tracks are in
     the image and every track has a box, else round footprints (16-gons on a circle of 0.25 m). Unit: m on the ground,
     px in the image. fps: frames per second. px_per_m: px per m, used only in the image. labelled (length + 1,): bool by
-    frame number, from 1. Group ids of the result are only row numbers. Without groups it has no rows.
+    frame number from 1, index 0 unused. A centre is the mean position of the group's people in the frame. Group ids of
+    the result are only row numbers. Without groups it has no rows.
 
     Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
     """

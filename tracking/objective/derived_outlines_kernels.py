@@ -14,9 +14,9 @@ def connected_people(frame, column, length, people, memory, when, a, b, on):  # 
     connected people seen in the frame; someone connected only to people not seen now is alone. The groups are those of
     tracking.grouping.group_labels.label_people, without its ids.
 
-    frame (R,): from 0, sorted; column (R,): number of the person, from 0; length: number of frames; people: number of
-    columns; memory: frames for which a missed person still connects others. Links switch on or off in frame when (L,),
-    sorted, between the columns a (L,) and b (L,); on (L,): bool, the new state.
+    frame (R,): from 0, sorted; column (R,): number of the person, from 0, ascending in a frame; length: number of
+    frames; people: number of columns; memory: frames for which a missed person still connects others. Links switch on
+    or off in frame when (L,), sorted, between the columns a (L,) and b (L,); on (L,): bool, the new state.
     """
     linked = np.zeros((people, people), np.bool_)
     seen = np.full(people, -memory - 2)

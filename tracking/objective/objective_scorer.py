@@ -30,8 +30,8 @@ from tracking.scoring.rows import FrameRows
 class ObjectiveScorer:
     """Computes the objective (mean of HOTA and group_F1_hull) of any number of trackers against one truth.
 
-    State: scorer, a `Scorer` of the truth, which must not change; _outlines, a dict of the outlines of the true groups
-    by surface ("ground" or "image") used so far, None where the truth has no group shapes.
+    Made from that Truth. State: scorer, a `Scorer` of the truth, which must not change; _outlines, a dict of the
+    outlines of the true groups by surface ("ground" or "image") used so far, None where the truth has no group shapes.
     """
 
     def __init__(self, truth: Truth) -> None:

@@ -30,10 +30,10 @@ def coco(source: str | Path, out: str | Path) -> Path:
 
     source: path of a dataset or recording. out: the JSON file, replaced if it exists. Each frame is an image, each
     sequence a video, both numbered from 1. Annotations have bbox [left, top, width, height] px (amodal, unclipped),
-    track_id (the person's id), group_id (-1 for alone) and visibility; rows with an unknown box are left out. file_name
-    is the frame's picture or video, also where none is stored, in a folder named for the sequence. An unknown image
-    size is replaced by the extent of the boxes. info has the content hash if all exported sequences are generated. The
-    same dataset gives the same bytes.
+    track_id (the person's id), group_id (-1 for alone, or where no groups are labelled) and visibility; rows with an
+    unknown box are left out. file_name is the frame's picture or video, also where none is stored, in a folder named
+    for the sequence. An unknown image size is replaced by the extent of the boxes. info has the content hash if all
+    exported sequences are generated. The same dataset gives the same bytes.
 
     Raises InputError if the source cannot be opened, a file of it is invalid, no sequence has labelled boxes, two
     sequences would share a folder, or `out` cannot be written; WorkError if the disk is full.

@@ -91,8 +91,9 @@ def frame_labels(folder: Path, manifest: dict[str, Any]) -> Iterator[bytes]:
 
     manifest: that of the folder. Keys: sequence (name), fps, image_size [width, height] px, frame (from 1), t in s.
     people, where the truth is stored: id, group (-1 for alone), box (left, top, width, height in px, amodal), x, y in
-    m, vx, vy in m/s, visibility. groups, likewise: id, members (person ids), hull (list of [x, y]) in m; null if
-    unknown. detections, where they are stored: score, box, plane, and x, y, (z) in m or px by the plane.
+    m, vx, vy in m/s (left out if the truth has no velocities), visibility. groups, likewise: id, members (person ids),
+    hull (list of [x, y]) in m; null if unknown. detections, where they are stored: score, box, plane, and x, y, (z) in
+    m or px by the plane.
 
     Iterating raises InputError if a file of the sequence is missing or altered, AssertionError for a truth without
     positions.

@@ -53,8 +53,8 @@ def labelled_truth_fields(
     groups: one Groups per frame, as labelled; a label counts as a group in frames where two or more people have it.
     Merge, split, form, dissolve, enter and leave events are those of groups measured from motion and labels; such a
     group gets the label of its members as id. Cross and queue events are those of the labelled groups. Events are
-    sorted by start, end, kind. near: strangers that came near each other, by person id. labelled: all True. Places and
-    hulls are in the unit of `pos`.
+    sorted by start, end, kind. near: pairs of strangers that satisfied the merge rule, with first and last frame.
+    labelled: all True. Places and hulls are in the unit of `pos`.
     """
     from sim.truth.crossing_events import crossings
     from sim.truth.group_hulls import groups_over_time

@@ -67,7 +67,7 @@ def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str
 
 def read_picture(path: Path) -> Image | None:
     """Return the picture file `path` as (H, W, 3) BGR uint8; None if it is missing, unreadable, truncated, no JPEG,
-    PNG, BMP or TIFF, or declares more than 40 million px.
+    PNG, BMP or TIFF, or declares more than 16,384 px a side or 40 million px.
 
     Grey pictures become BGR, 16-bit pictures keep their upper 8 bits, transparency is dropped. OpenCV's messages are
     silenced meanwhile. Raises nothing.

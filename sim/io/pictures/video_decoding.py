@@ -69,7 +69,8 @@ class PacketIndex:
     def groups(self, wanted: set[int]) -> set[int] | None:
         """Return the numbers (from 1) of the packet groups that hold the frames `wanted` (from 1).
 
-        A packet group can be decoded by itself. Returns None if the time stamps cannot be trusted (see ranks).
+        A packet group can be decoded by itself; packets before the first are group 0. Frames beyond the end are
+        ignored. Returns None if the time stamps cannot be trusted (see ranks).
         """
         ranks = self.ranks()
         if ranks is None:
@@ -85,7 +86,7 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
     """Give (libav container, first video stream) of a file for the length of the block, set to decode in one thread.
 
     Cover pictures are no video stream. Raises InputError if the file is missing, no regular file, empty or no video,
-    has no video stream or pictures of more than 40 million px, or uses an unknown codec.
+    has no video stream, uses an unknown codec, or has pictures of more than 16,384 px a side or 40 million px.
     """
     import av
 

@@ -76,9 +76,9 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
     """Return the groups of each frame of a groups.parquet that was read as a table, in the order of frames.
 
     An item is None for a frame whose groups are unknown, and Groups without rows for a frame without groups. Members
-    are () in a frame that was stored without them. The first item is the first frame stored, which need not be 1.
-    Raises InputError if a column or a value of the metadata is missing or wrong, a row is outside these frames, rows
-    are not sorted by frame, or a hull has half a vertex.
+    are () in a frame that was stored without them, hulls have no vertices. The first item is the first frame stored,
+    which need not be 1. Raises InputError if a column or a value of the metadata is missing or wrong, a row is outside
+    these frames, rows are not sorted by frame, or a hull has half a vertex.
     """
     first, count = table.count("first", FRAMES), table.count("frames", FRAMES)
     missing, memberless = table.frames("missing"), table.frames("memberless")

@@ -111,7 +111,11 @@ def _state(plane: str) -> list[str]:
 
 
 def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
-    """Return tracks.parquet as bytes. rows: those of `every`, one Tracks per frame. fps: frames/s."""
+    """Return tracks.parquet as bytes, a row per track and frame. rows: those of `every`, one Tracks per frame.
+
+    fps: frames/s. Columns: frame (from 1), id, group, x, y, (z), vx, vy, (vz), box_left, box_top, box_width,
+    box_height (nan in frames without boxes), score, and cov_a_b for each pair a, b of positions and velocities.
+    """
     unit, state = "px" if rows.plane == "image" else "m", _state(rows.plane)
     values = np.concatenate([rows.pos, rows.vel], axis=1)
     units = [f"{unit}/s" if name.startswith("v") else unit for name in state]

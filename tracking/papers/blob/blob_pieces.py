@@ -19,8 +19,8 @@ def owners(centre: Array, predicted: Array, d2: Array, free: Bools) -> Ints:
     """Returns the row (M,) of the track of which each blob may be a piece, -1 for none.
 
     It is the nearest track, by d^2, whose predicted box holds the blob's centre. centre (M, 2 or more): columns x, y,
-    px. predicted (N, 4): boxes of the tracks: centre x, y, height, width, px. d2 (N, M): squared Mahalanobis distances.
-    free (M,): False for a blob that is no candidate. Without tracks all are -1.
+    px. predicted (N, 4): boxes of the tracks: centre x, y, height, width, px. d2 (N, M): squared Mahalanobis distances;
+    no gate is applied. free (M,): False for a blob that is no candidate. Without tracks all are -1.
     """
     found = np.full(len(centre), -1)
     if not len(predicted):

@@ -27,7 +27,8 @@ HEADING = 6.0  # seen from straight above, the direction turns with the heading:
 class TrackedEllipses(TrackedPeople):
     """The table of N tracks from pixels: filters of ellipses, with a direction and a nominal covariance for each track.
 
-    State, beside that of TrackedPeople: angle (2, N), direction of the first axis (rad) and its variance (rad^2);
+    Made from config, its nominal filter and context, as TrackedPeople. State, beside that of TrackedPeople: angle (2,
+    N), rows: direction of the first axis h (rad, from the abscissa, v down) and its variance (rad^2);
     nominal (5, N, 4), a bank of filters as `bank`, updated with the nominal noise, from which the uncertainty rho
     follows; angle_var_per_step, growth of the direction's variance in a frame. In `bank` the coordinates are x, y, h,
     w: centre and full axes of the ellipse.

@@ -10,11 +10,12 @@ from sim.types import Array, Ints
 
 
 class Measured(NamedTuple):
-    """Measurements of K tracks, one row each.
+    """Measurements of K tracks, one row each; tracks without a measurement have no row.
 
-    rows (K,): table positions of the tracks, from 0. z (K, 5): ellipse: centre x, y, full axes h, w (px), direction
-    theta of h (rad). noise (K, 4): variances of x, y, h, w, m^2. angle_var (K,): variance of theta, rad^2, inf if it is
-    not measured. support (K,), 0 to 1: how well the template is filled with foreground; 1 for a blob of one person.
+    rows (K,): table positions of the tracks, from 0, each once, in any order. z (K, 5): ellipse: centre x, y, full axes
+    h, w (px), direction theta of h (rad). noise (K, 4): variances of x, y, h, w, m^2. angle_var (K,): variance of
+    theta, rad^2, inf if it is not measured. support (K,), 0 to 1: foreground less half the background, of the pixels
+    that the template alone covers, over its area; 1 for a blob.
     """
 
     rows: Ints

@@ -25,9 +25,10 @@ class ExplainedForeground:
     """One frame's foreground, and what explains it: templates (upright ellipses x, foot, h, w, px) and blobs of one
     person.
 
-    A template fills a box h high and w wide round column x, with its lower edge at row foot. State: foreground (H, W)
-    bool. cover (H, W) int16: the number of templates painted over each pixel, plus kernels.EXPLAINED = 1000 where a
-    blob of one person explains the pixel; 0 at first.
+    A template fills a box h high and w wide round column x, with its lower edge at row foot; whole px are edges of
+    pixels, 0 the left and upper edge of the image. Made from the foreground. State: foreground (H, W) bool. cover (H,
+    W) int16: the number of templates painted over each pixel, plus kernels.EXPLAINED = 1000 where a blob of one person
+    explains the pixel; 0 at first.
     """
 
     def __init__(self, foreground: Bools) -> None:

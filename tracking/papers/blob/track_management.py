@@ -32,11 +32,13 @@ CONFIRMED, MEASURED, MISS_EXPLAINED = range(3)
 class TrackedPeople:
     """The table of N tracks of `blob`: their filters, ages and flags. Tracks are columns of the stacked arrays.
 
-    State; `numbers` (6, N) and `flags` (3, N) stack the named rows, so that few arrays change their length:
+    Made from config, its nominal filter at the frame rate, and context. State; `numbers` (6, N) and `flags` (3, N)
+    stack the named rows, so that few arrays change their length:
         bank (5, N, 4)      Kalman filters of x, y, h, w (tracking.filters.kalman); places px, covariances m^2
         id (N,)             never used again; next_id: that of the next track, from 1
         scale (N,)          px per m
-        rho (N,)            uncertainty: sqrt|S| (innovation covariance) over its asymptote at the last prediction
+        rho (N,)            uncertainty: sqrt|S| (innovation covariance) over its asymptote at the last prediction,
+                            in the frame of birth that of every new track
         born (N,)           time of the first measurement, s
         score (N,)          score of the last measurement, 0 to 1
         hits (N,)           frames with a measurement
@@ -173,10 +175,10 @@ class TrackedPeople:
         """Returns flags (M,): True for each box z (M, 4) that covers several confirmed tracks, at least one of them
         unseen.
 
-        z: centre x, y, height, width, px. unseen (N,): flags of tracks without a measurement. A box covers several
-        tracks if it holds their centres and fits the hull of their boxes: with an IoU of at least SAME = 0.5, and not
-        below that with the best single box. Also sets miss_explained of the unseen tracks in such a box. With
-        merged_time = 0 no box is taken for several people.
+        z: centre x, y, height, width, px. unseen (N,): flags of tracks without a measurement. Tracks have the boxes
+        that the bank holds now. A box covers several tracks if it holds their centres and fits the hull of their boxes:
+        with an IoU of at least SAME = 0.5, and not below that with the best single box. Also sets miss_explained of the
+        unseen tracks in such a box. With merged_time = 0 no box is taken for several people.
         """
         found = np.zeros(len(z), bool)
         if not self.config.merged_time or not len(z) or not unseen.any():
@@ -197,10 +199,11 @@ class TrackedPeople:
     def delete_tracks(self, t: float) -> None:
         """Delete tracks from the table at time t, s (sec. 5, and ours).
 
-        rho is a track's uncertainty, which grows with misses. Deleted are: missed confirmed tracks whose rho reached
-        the value after coast_time (the longer of it and merged_time if the miss is explained); missed tentative tracks
-        whose rho reached its value at birth; tentative tracks older than tentative_time, or than a confirmation takes
-        if that is longer; missed tracks whose centre is outside the image, if the image's size is known.
+        rho is a track's uncertainty, which grows with misses. A measured confirmed track stays. Deleted are: missed
+        confirmed tracks whose rho reached the value after coast_time (the longer of it and merged_time if the miss is
+        explained); missed tentative tracks whose rho reached its value at birth; tentative tracks older than
+        tentative_time, or than a confirmation takes if that is longer; missed tracks whose centre is outside the image,
+        if the image's size is known.
         """
         lost = (~(self.measured & self.confirmed)).nonzero()[0]
         if not len(lost):
@@ -251,8 +254,8 @@ class TrackedPeople:
     def rows_to_report(self, t: float) -> Ints:
         """Returns the table positions (K,), ascending, of the tracks to report at time t, s (ours).
 
-        Reported are measured tracks that are confirmed or at least report_delay old. A missed confirmed track is
-        reported while all of this holds:
+        Reported are measured tracks that are confirmed, or whose first measurement is report_delay or more ago. A
+        missed confirmed track is reported while all of this holds:
         - its uncertainty rho is at most the value after report_coast (the longer of it and report_hidden if the miss is
           explained);
         - its misses since the last measurement are at most report_credit times the frames in which it was measured;

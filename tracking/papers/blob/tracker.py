@@ -65,10 +65,11 @@ from tracking.papers.blob.update_from_pixels import PixelUpdater
 
 
 class Blob:
-    """The tracker `blob`: people tracked from boxes or from pixels.
+    """The tracker `blob`: people tracked from pixels if the context has a background sample, else from boxes.
 
-    State: config, a BlobConfig, which may be replaced between two frames; people, the table of tracks; updater, which
-    updates the table from boxes or from pixels; context, of the sequence. All but config exist after `reset` only.
+    Made from a BlobConfig; None: the defaults. State: config, a BlobConfig, which may be replaced between two frames;
+    people, the table of tracks; updater, which updates the table from boxes or from pixels; context, of the sequence.
+    All but config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "boxes")
@@ -80,9 +81,10 @@ class Blob:
     def reset(self, context: Context, seed: int) -> None:
         """Delete all tracks and start a sequence: from pixels if the context has a background sample, else from boxes.
 
-        `seed` is not used. If the image's size is unknown, it is taken from the background sample. Raises InputError if
-        the config's noises confirm new tracks at once. From pixels it is also raised if the sample has a wrong shape or
-        dtype, too few frames or shows no background, or if the scale px_per_m is zero or negative (nan: it is learned).
+        Ids begin at 1 again. `seed` is not used. If the image's size is unknown, it is taken from the background
+        sample. Raises InputError if the config's noises confirm new tracks at once. From pixels it is also raised if
+        the sample has a wrong shape or dtype, too few frames or shows no background, or if the scale px_per_m is zero
+        or negative (nan: it is learned).
         """
         c = self.config
         if context.image_size is None and context.background is not None:

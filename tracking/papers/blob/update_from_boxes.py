@@ -21,7 +21,7 @@ INSIDE = 0.8  # share of a box that must lie in a larger predicted box to be a p
 
 
 class BoxUpdater:
-    """Updates the tracks of `people` from the boxes of each frame.
+    """Updates the tracks of `people`, a table that must follow `config` already, from the boxes of each frame.
 
     State: people, the table of tracks; config; noise (4,): variance of a measurement of x, y, h, w, m^2; asymptote
     (4,): innovation variance S of a track measured in every frame, m^2; gate, orphan_gate, confirm_gate: largest d^2
@@ -126,7 +126,7 @@ class BoxUpdater:
 
     def _without_merged_boxes(self, rows: Ints, columns: Ints, z: Array) -> tuple[Ints, Ints]:
         """Returns the pairs rows, columns (K,) of tracks and boxes z (M, 4) without those whose box covers several
-        people (ours).
+        people (ours): such a box updates nobody.
 
         z: centre x, y, height, width, px. The wide gate of a long-missed track would let such a box in. Only boxes
         whose size is outside the gate of a track that is measured in every frame are examined; if all tracks are
@@ -186,8 +186,8 @@ class BoxUpdater:
         rows: positions of the measured tracks. pieces (K, 4): centre x, y, height, width, px. d2 (N, K): squared
         Mahalanobis distances of N tracks. A piece belongs to the nearest measured track if it lies in that track's
         orphan_gate, by the variance S of a track measured in every frame. Otherwise it belongs to the confirmed track
-        that covers most of it, if it is smaller than the predicted box, its centre lies inside and INSIDE = 0.8 of it
-        is covered.
+        that covers most of it, if its area is smaller than the predicted box's, its centre lies inside and INSIDE = 0.8
+        of it is covered.
         """
         people = self.people
         place, owner = people.bank[kalman.PLACE], np.full(len(pieces), -1)
