@@ -62,6 +62,10 @@ class StoredTracks:
         event's frame is outside the tracks. Warns about a text without rows.
         """
         fps = self.info.get("fps")
+        if fps is not None and (isinstance(fps, bool) or not isinstance(fps, int | float)):
+            raise InputError(
+                file=self.path / RUN, place="fps", got=repr(fps)[:40], expected="a number", remedy="track again"
+            )
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             raise InputError(
                 file=self.path, place=RUN, got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",

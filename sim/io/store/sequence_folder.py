@@ -23,8 +23,9 @@ from sim.io.store import truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.event_files import read_script
 from sim.io.store.manifest import MANIFEST, damaged_files, identity, read_manifest, with_hash
+from sim.io.store.manifest_check import REDO, check_manifest
 from sim.io.store.streams import check_streams, file_name
-from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence
+from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
 from sim.versions import cpu_level, versions
 
 
@@ -155,7 +156,7 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     without left pictures, or it asks for more frames than there are. Of pictures only the size in bytes is compared at
     once; their hash is checked when they are read, and a damaged one raises InputError then.
     """
-    manifest = read_manifest(folder)
+    manifest = check_manifest(folder / MANIFEST, read_manifest(folder))
     for error in damaged_files(folder, manifest, pictures=False):
         raise error
     about, has, pictures = manifest["sequence"], manifest["files"].keys(), StoredPictures(folder, manifest)
@@ -166,7 +167,14 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
 
     @lru_cache(maxsize=1)
     def detections() -> list[Detections]:
-        return truth_files.read_detections(folder / "det" / "det.parquet")
+        found = truth_files.read_detections(folder / "det" / "det.parquet")
+        _require_length(folder / "det" / "det.parquet", len(found), length)
+        return found
+
+    def truth() -> Truth:
+        found = truth_files.read_truth(folder)
+        _require_length(folder / "gt" / "truth.parquet", found.length, length)
+        return found
 
     def bare() -> Iterator[Frame]:
         for index in range(1, length + 1):
@@ -181,7 +189,7 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
 
     return Sequence(
         name=about["name"], fps=fps, length=length, frames=frames if left or right else bare,
-        load_truth=(lambda: truth_files.read_truth(folder)) if "gt/truth.parquet" in has else None,
+        load_truth=truth if "gt/truth.parquet" in has else None,
         image_size=None if size is None else (size[0], size[1]),
         camera=read_camera(folder / "camera.json") if "camera.json" in has else None,
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
@@ -196,6 +204,13 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         bare=bare if left or right else None,
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
     )  # fmt: skip
+
+
+def _require_length(path: Path, found: int, length: int) -> None:
+    """Raise InputError if the file `path` is of another number of frames, `found`, than the manifest's `length`."""
+    if found != length:
+        expected = f"{length} frames, as manifest.json says"
+        raise InputError(file=path, got=f"{found} frames", expected=expected, remedy=REDO)
 
 
 def _background(
