@@ -3,7 +3,7 @@
     python -m benchmarks.foreground highway [--data FOLDER] [--out PNG]
     python -m benchmarks.foreground rendered [--seeds 20000:20002] [--size 640x480] [--dark]
     python -m benchmarks.foreground adaptation [--seed 40000] [--out adaptation.svg]
-    python -m benchmarks.foreground opening [--seeds 0:4]
+    python -m benchmarks.foreground opening [--seeds 0:8]
 
 highway: CDnet 2014, FOLDER/cdnet-highway. All frames without a mask train the models, the others are scored, each as it
 is and after cleaning (majority, opening, closing at 20 px per m). Masks: 255 foreground; 0 and 50 not; 50 shadow; 85

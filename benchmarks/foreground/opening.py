@@ -22,7 +22,7 @@ from tracking.detect import blobs
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.foreground import Foreground
 from tracking.run import track
-from tracking.stats import bootstrap
+from tracking.stats import mean_interval
 
 WAYS = {"none": 0, "at least 3 px": 3, "at least 5 px": 5}
 SCALES, NOISES, SCENES = (20, 40, 80), (3, 12), ("cross",)
@@ -51,7 +51,7 @@ def opening(seeds: range) -> None:
                     found[name] = np.array([measure(s) for s in made])
             head([f"{scale} px per m, noise {noise}", "F1", "false blobs", "blobs per region", "HOTA", "HOTA gained"])
             for name, values in found.items():
-                gain = bootstrap((values - found["none"])[:, 3:])
+                gain = mean_interval((values - found["none"])[:, 3:])
                 row([name, *(f"{v:.3f}" for v in np.nanmean(values, 0)), interval(*(float(g[0]) for g in gain))])
 
 
