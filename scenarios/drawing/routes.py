@@ -86,8 +86,8 @@ def middle(value: Value) -> float:
 def spread(value: Value) -> float:
     """Returns half the width of the range in which nearly all draws of a value lie; 0 for a number.
 
-    Half the distance between the bounds; for a normal distribution at most two standard deviations; twice the mean if
-    there is no upper bound.
+    Half the distance between the bounds, `clip` included; for a normal distribution at most two standard deviations;
+    for exponential and poisson without an upper bound twice `middle`.
     """
     if not isinstance(value, Distribution):
         return 0.0

@@ -47,7 +47,8 @@ def place_of(text: str) -> str:
 def parse_setting(text: str) -> tuple[list[str], Any]:
     """Returns the steps of the key (`a.b` gives ["a", "b"]) and the TOML value of a setting `a.b=value`.
 
-    A word without quotes is a string. Raises InputError for any other form, an empty step, or a value that is not TOML.
+    The key ends at the first `=` and is cut at every dot, also inside quotes. A word without quotes is a string. Raises
+    InputError for any other form, an empty step, or a value that is not TOML.
     """
     key, equals, value = text.partition("=")
     steps = key.strip().split(".")

@@ -47,8 +47,8 @@ def sense(
     included.
 
     If the truth has positions, `pos` is the ground point (m), with the box beside it if boxes are known. Else `pos` is
-    the centre of the box (px). Detections of a frame are in random order, with scores and without velocities. A frame
-    without any has empty Detections.
+    the centre of the box (px). A person whose box has a nan is not detected. Detections of a frame are in random order,
+    with scores and without velocities. A frame without any has empty Detections.
 
     camera, image_size (width, height in px, ignored with a camera): place and size the false alarms. The camera also
     scales `small_px` seen from above, and turns boxes into ground points if `sensor.points` is "foot". Without both,

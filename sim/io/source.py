@@ -106,7 +106,7 @@ class RecordingOptions:
     background: BackgroundChoice | None
 
     def reject(self, path: Path, kind: str, why: str, *names: str) -> None:
-        """Raise InputError if any of the options `names` (fields of this class) is given; do nothing otherwise.
+        """Raise InputError if any of the options `names` (fields of this class but `images`) is given, else do nothing.
 
         path, kind: the source and what it is, as "a BIWI recording". why: why the options have no effect on it. All
         three are for the error.

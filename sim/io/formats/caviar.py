@@ -185,8 +185,9 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
     """Return the truth of a CAVIAR file in the image: boxes (left, top, width, height in px), no positions on the
     ground.
 
-    Groups are those of the file, one hull around their members' boxes (groups_px), and every frame counts as labelled;
-    events are measured from the motion of the boxes' centres. If the file has no group lists or no boxes, no frame
+    Groups are those of the file, one hull around their members' boxes (groups_px; `groups` stays None), and every frame
+    counts as labelled. Events are measured from the motion of the boxes' centres, differences over 1 s; velocities are
+    not kept (None). If the file has no group lists or no boxes, no frame
     counts as labelled, and groups and events are None. Visibility is 1. fps: frames per second, default 25. px_per_m:
     image scale; None: the median of the boxes' longer sides / 1.7 m.
 

@@ -112,9 +112,9 @@ def open_folder(
 
     Raises InputError if seqinfo.ini, det.txt or an option is invalid, two pictures are the same frame, nothing tells
     the length, the pictures differ from seqinfo.ini in size, the calibration has another aspect ratio, or `background`
-    is given without pictures or asks for more frames than there are. An invalid gt.txt raises InputError at once if
-    seqinfo.ini tells no length, else when the truth is read. Iterating raises InputError for pictures of different
-    sizes or none that can be read.
+    is given without pictures or asks for more frames than there are or fit into 2 GB. An invalid gt.txt raises
+    InputError at once if seqinfo.ini tells no length, else when the truth is read. Iterating raises InputError for
+    pictures of different sizes or none that can be read.
     """
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)

@@ -159,11 +159,11 @@ def unit_scores(score: Array) -> Array:
 def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan")) -> Truth:
     """Read a gt.txt as truth of people, without group labels: everybody is alone (-1), and no frame counts as labelled.
 
-    Rows with flag 0 or a class other than 1 are left out, as in MOTChallenge's own scoring; so are negative ids. The
-    rest is sorted by (frame, id). name, fps (frames/s): of the sequence. length: number of frames; None: up to the last
-    frame kept. px_per_m: image scale; nan: the median height of the boxes / 1.7 m. Positions and velocities are None
-    without ground positions, nan in rows where they are unknown; velocities are differences over 0.5 s. Visibility is 1
-    where the file has none or -1.
+    Rows with flag 0 or (in 8 or 9 columns) a class other than 1 are left out, as in MOTChallenge's own scoring; so are
+    negative ids. They must be valid all the same. The rest is sorted by (frame, id). name, fps (frames/s): of the
+    sequence. length: number of frames; None: up to the last frame kept. px_per_m: image scale; nan: the median height
+    of the boxes / 1.7 m. Positions and velocities are None without ground positions, nan in rows where they are
+    unknown; velocities are differences over 0.5 s. Visibility is 1 where the file has none or -1.
 
     Raises InputError as read_table (unreadable file, invalid line, frame beyond `length`, row without box), for an id
     twice in a frame, and for a visibility outside [0, 1] other than -1.

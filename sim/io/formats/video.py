@@ -47,9 +47,9 @@ def open_video(
     warning. The length is None for VP8 videos, whose packets are not all shown.
 
     Warns if the video is shorter than its header says, has gaps in time, or states no credible frame rate. Raises
-    InputError if the file is no video or no picture can be decoded, the calibration has another aspect ratio, or more
-    background frames are asked for than there are, or there is no file. Iterating raises InputError for a picture of
-    another size.
+    InputError if there is no file, it is no video or no picture can be decoded, the calibration has another aspect
+    ratio, or more background frames are asked for than there are or fit into 2 GB. Iterating raises InputError for a
+    picture of another size.
     """
     index = video_decoding.index_packets(path)
     length = len(index.stamps)

@@ -153,8 +153,8 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     replay).
 
     Raises InputError if the manifest is invalid, a file is missing or altered, `background` is given for a sequence
-    without left pictures, or it asks for more frames than there are. Of pictures only the size in bytes is compared at
-    once; their hash is checked when they are read, and a damaged one raises InputError then.
+    without left pictures, or it asks for more frames than there are or fit into 2 GB. Of pictures only the size in
+    bytes is compared at once; their hash is checked when they are read, and a damaged one raises InputError then.
     """
     manifest = check_manifest(folder / MANIFEST, read_manifest(folder))
     for error in damaged_files(folder, manifest, pictures=False):
