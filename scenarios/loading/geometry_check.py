@@ -80,8 +80,8 @@ def _check_groups(scenario: Scenario) -> None:
 
 
 def _check_sensor(scenario: Scenario) -> None:
-    """Raises InputError for an artificial occlusion of a group that the script does not have, or that ends before it
-    starts.
+    """Raises InputError for an artificial occlusion of a group that the script does not have, or that does not end
+    after its start.
 
     Groups that merges and splits make count, too.
     """

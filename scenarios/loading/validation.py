@@ -27,10 +27,10 @@ M = typing.TypeVar("M", bound=BaseModel)
 def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None = None, *, model: type[M]) -> M:
     """Returns the table as a model: a Scenario or one of its tables.
 
-    Types are strict: no text for a number. Numbers beyond 1e6 are refused. Raises InputError with the first problem:
-    the file, the key, what was expected there, and how many more problems there are. file: for the message. places:
-    texts of `--set` by path of keys and indices, as overrides.apply_settings returns them; an error at or below such a
-    path names the setting.
+    Types are strict: no text for a number. Numbers beyond 1e6 are refused before all else. Raises InputError with the
+    first problem: the file, the key, what was expected there, and how many more problems there are. file: for the
+    message. places: texts of `--set` by path of keys and indices, as overrides.apply_settings returns them; an error at
+    or below such a path names the setting.
     """
     for path, number in _numbers(table):
         if abs(number) > COORDINATE:

@@ -29,10 +29,10 @@ Progress = Callable[[int, int, str], None]
 class ReplayOptions:
     """Options that all replays of a dataset share.
 
-    view: camera, sensor, light and picture. cut: the part of each recording to replay, default all. calibration:
-    camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an error for others.
-    streams: pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none. images: their
-    file type, "jpg", "png" or "mp4".
+    view: camera, sensor, light and picture, with the frame rate. cut: the part of each recording to replay, default
+    all. calibration: camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an
+    error for others. streams: pictures to store, some of "left", "right", "disparity", "ids", "background"; () for
+    none. images: their file type, "jpg", "png" or "mp4".
     """
 
     view: ObservationSpec
@@ -49,7 +49,8 @@ def store_replays(
     folders.
 
     All seeds of the first source come first; no sources give []. <recording> is the recording's name, with "-" for
-    characters other than letters, digits, "_", "." and "-", and with "-t<start in s>" for a cut that begins later. A
+    characters other than letters, digits, "_", "." and "-", with "replay-" in front if it does not begin with a letter,
+    and with "-t<start in s>" for a cut that begins later. A
     stored replay with the same options is kept if its files are intact. progress: called as progress(replays done,
     replays in all, name of the last one) after each replay. The first error ends the work; replays stored before it are
     kept and listed in OUT/seqmaps.
