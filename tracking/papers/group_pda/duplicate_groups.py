@@ -31,7 +31,7 @@ def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
 class DuplicateGroups:
     """Finds pairs of groups that follow the same people.
 
-    State: clock, a dict: the time, s, by pair of ids (in the order of the bank) of groups whose search regions overlap.
+    State: clock, a dict: the time, s, by pair of ids (the smaller first) of groups whose search regions overlap.
     A time grows in frames in which the two may be the same group and falls in the others; at 0, or once the regions do
     not overlap, the pair is dropped.
     """
@@ -48,6 +48,7 @@ class DuplicateGroups:
         points until it is recaptured; `last_seen` is set back in the bank.
         """
         rows = np.flatnonzero(bank.confirmed & (bank.last_seen >= t))
+        rows = rows[np.argsort(bank.id[rows])]
         pairs = {(int(bank.id[i]), int(bank.id[j])): (i, j) for i, j in _overlapping(bank, rows, scaled.config.gate)}
         clock = {}
         for ids, (i, j) in pairs.items():
