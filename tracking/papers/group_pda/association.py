@@ -19,7 +19,7 @@ from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 FASTEST = 2.0
-"""m/s: nobody walks faster than this relative to a group."""
+"""m/s: nobody walks faster than this relative to a group (walking distance)."""
 
 
 @dataclass(frozen=True)

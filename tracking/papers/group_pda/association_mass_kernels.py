@@ -19,7 +19,7 @@ from sim.types import Array
 (GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD, COUNT_SHARE, DETECT_PROB,
  MISS_PROB, FREEZE_SHARE, KEEP_EXTENT, KEEP_SIZE, GATE_FACTOR, REDRAWN, ASSOCIATION,
  LEAST_OTHERS) = range(19)  # fmt: skip
-RULES = 19
+RULES = LEAST_OTHERS + 1
 """Slots of the array `rules`, RULES in all; tracking.papers.group_pda.scaled_parameters fills them.
 
 GATE: squared Mahalanobis radius in the group constraint. LINK: 2 r of R_0. PRIOR_XX, _XY, _YY: covariance that extents

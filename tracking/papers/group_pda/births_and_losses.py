@@ -21,7 +21,7 @@ from tracking.papers.group_pda.report import BankEvent
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 RECAPTURE_GATE = 13.28
-"""99 % quantile of chi-square with 4 degrees of freedom."""
+"""Squared Mahalanobis radius of a recapture: 99 % quantile of chi-square with 4 degrees of freedom."""
 
 
 @dataclass(frozen=True)
