@@ -21,11 +21,11 @@ class Nearest:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         found = detections if detections is not None else Detections(frame.index, frame.t, "ground", np.zeros((0, 2)))
         reach = REACH if found.plane == "ground" else REACH * self.px_per_m
-        n, id, vel = len(found.pos), np.full(len(found.pos), -1), np.zeros((len(found.pos), 2))
+        n, id, vel = len(found.pos), np.full(len(found.pos), -1), np.full((len(found.pos), 2), np.nan)
         apart = np.linalg.norm(found.pos[:, None] - self.pos[None], axis=2)
         while apart.size and apart.min() < reach:
             row, before = np.unravel_index(apart.argmin(), apart.shape)
-            id[row], vel[row] = self.id[before], (found.pos[row] - self.pos[before]) * self.fps
+            id[row] = self.id[before]
             apart[row], apart[:, before] = np.inf, np.inf
         born = id < 0
         id[born] = self.next + np.arange(born.sum())

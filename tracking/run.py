@@ -59,12 +59,12 @@ def track(
 
     tracker: a registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
     (tracking.time_limit), which stops a step that hangs. params: a config, values by name, the name of a preset, or a
-    TOML file; None for the tracker's defaults. detections: "image", "file" or "truth";
-    None for the first of them that can work. sensor: settings as in a scenario's [sensor] that degrade "truth" (misses,
-    clutter, noise, hiding); None: perfect. seed: for the tracker's and the sensor's random numbers. grouping: the rule,
-    or its TOML file, that groups people if the tracker names no groups; None: the default rule. If the tracker names
-    groups, it has no effect, with a UserWarning. progress: called with each frame's number, from 1, when the frame is
-    done.
+    TOML file; None for the tracker's defaults. detections: "image", "file" or "truth"; None for the first of them that
+    can work. sensor: settings as in a scenario's [sensor] that degrade "truth" (misses, clutter, noise, hiding); None:
+    perfect. seed: for the tracker's and the sensor's random numbers. grouping: the rule, or its TOML file, that groups
+    people if the tracker names no groups; None: the default rule. If the tracker names groups, it has no effect, with a
+    UserWarning. Another one says that the tracker's velocities are too far from its motion to derive groups. progress:
+    called with each frame's number, from 1, when the frame is done.
 
     Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit; later for a
     frame whose detections are not finite or whose picture cannot be read; after the last frame if tracks in the image
@@ -72,6 +72,7 @@ def track(
     "truth" if an order of a simulated script was not fulfilled.
     """
     from tracking.grouping.grouped_tracks import names_groups, with_groups
+    from tracking.grouping.velocity_check import velocity_warning
 
     rule = LinkRule.from_toml(grouping) if isinstance(grouping, str | Path) else grouping
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
@@ -88,6 +89,10 @@ def track(
     tracks = with_groups(reported, prepared.context.fps, scale.px_per_m, rule)
     if rule is not None and names_groups(reported):
         warnings.warn(f"{prepared.name} names groups itself: --grouping has no effect", UserWarning, stacklevel=2)
+    elif not names_groups(reported):
+        fault = velocity_warning(prepared.name, reported, prepared.context.fps, scale.px_per_m, rule)
+        if fault is not None:
+            warnings.warn(fault, UserWarning, stacklevel=2)
     speed = Speed(len(reported) / spent, len(reported) / whole) if reported else Speed()
     info = run_info(prepared, tracks, seed, sensor or {}, scale, speed)
     return TrackingRun(tracks, info if rule is None else {**info, "grouping": rule.as_dict()})

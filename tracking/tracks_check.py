@@ -42,12 +42,13 @@ def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory |
     The tracker may use its arrays again: nothing that it does to them later changes the copy. Raises WorkError if the
     tracks are wrong; the error names the tracker, the frame and the first fault.
 
-    Checked are type, frame index, shapes, finite numbers, ids (int64, non-negative, unique in the frame), groups and
-    events. Plane and unit must be those of the first frame in `history`. Members of groups and events must be ids that
-    the tracker has reported in this frame or before; with unit "group" there may be none. Any reported id may come back
-    after a gap. Events must be emitted in this frame, start from frame 1 to this one, and not end before they start.
-    Filled in are empty scores (1) and, in events, `emitted` and `end` where they are None (this frame). history: of
-    this sequence; it is updated here, also if a fault is found later. None stands for an empty history.
+    Checked are type, frame index, shapes, finite numbers (velocities may be nan: unknown), ids (int64, non-negative,
+    unique in the frame), groups and events. Plane and unit must be those of the first frame in `history`. Members of
+    groups and events must be ids that the tracker has reported in this frame or before; with unit "group" there may be
+    none. Any reported id may come back after a gap. Events must be emitted in this frame, start from frame 1 to this
+    one, and not end before they start. Filled in are empty scores (1) and, in events, `emitted` and `end` where they
+    are None (this frame). history: of this sequence; it is updated here, also if a fault is found later. None stands
+    for an empty history.
     """
     if isinstance(tracks, Tracks):
         tracks = _filled(tracks)
@@ -134,15 +135,16 @@ def _arrays_fault(shapes: dict[str, tuple[Any, tuple[int, ...]]]) -> Fault | Non
     """Returns the fault, as (got, expected), of the first array with a wrong type or shape or with nan or infinity, or
     None.
 
-    shapes: by name, the array and the shape that it must have. Only numpy arrays of integers or floats are right.
+    shapes: by name, the array and the shape that it must have. Only numpy arrays of integers or floats are right. nan
+    in "vel" is right, too.
     """
     for name, (a, shape) in shapes.items():
         if not isinstance(a, np.ndarray) or a.dtype.kind not in "iuf":
             return f"{name} of type {getattr(a, 'dtype', type(a).__name__)}", "an array of numbers"
         if a.shape != shape:
             return f"{name} of shape {a.shape}", str(shape)
-        if not finite(a):
-            return f"NaN or infinity in {name}", "finite numbers"
+        if not finite(a) and (name != "vel" or np.isinf(a).any()):
+            return f"NaN or infinity in {name}", "finite numbers" + (", or nan for unknown" if name == "vel" else "")
     return None
 
 

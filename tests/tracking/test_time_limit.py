@@ -62,8 +62,8 @@ class Tracker:
             if how == "writes":
                 detections.pos[:] = 0
         n = len(detections.pos)
-        zero, ids = np.zeros((n, 2)), np.arange(n)
-        return Tracks(frame.index, frame.t, detections.plane, "person", ids, ids - ids - 1, detections.pos, zero,
+        unknown, ids = np.full((n, 2), np.nan), np.arange(n)
+        return Tracks(frame.index, frame.t, detections.plane, "person", ids, ids - ids - 1, detections.pos, unknown,
                       np.tile(np.eye(4), (n, 1, 1)))
 """
 
@@ -110,7 +110,9 @@ def test_the_answers_are_those_of_the_tracker_in_this_process(mine):
         for a, b, c in zip(here, there, again, strict=True):
             for field in ("id", "group", "pos", "vel", "cov", "box", "score"):
                 values = [getattr(t, field) for t in (a, b, c)]
-                assert all(v is None for v in values) or all(np.array_equal(values[0], v) for v in values[1:])
+                assert all(v is None for v in values) or all(
+                    np.array_equal(values[0], v, equal_nan=True) for v in values[1:]
+                )
         assert {k: v for k, v in here.info.items() if "frames_per" not in k} == {
             k: v for k, v in there.info.items() if "frames_per" not in k
         }

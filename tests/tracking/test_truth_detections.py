@@ -29,9 +29,9 @@ class RowNumbers:
 
     def step(self, frame, detections):
         n = len(detections.pos)
-        alone, cov, zero = np.full(n, -1), np.tile(np.eye(4), (n, 1, 1)), np.zeros((n, 2))
+        alone, cov, unknown = np.full(n, -1), np.tile(np.eye(4), (n, 1, 1)), np.full((n, 2), np.nan)
         plane, pos, box = detections.plane, detections.pos, detections.box
-        return Tracks(frame.index, frame.t, plane, "person", np.arange(n), alone, pos, zero, cov, box)
+        return Tracks(frame.index, frame.t, plane, "person", np.arange(n), alone, pos, unknown, cov, box)
 
 
 class RandomNumbers(RowNumbers):

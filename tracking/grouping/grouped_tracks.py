@@ -21,6 +21,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sim.io.formats.velocity import chords
 from sim.truth.crossing_events import SAME_BEFORE, crossings
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of
@@ -43,13 +44,34 @@ def with_groups(
     tracks: one tracker's, one `Tracks` per frame, from frame 1. fps: frames per second. px_per_m: scale, px per m, if
     they are in the image. rule: None stands for the default rule.
 
-    The tracks are returned unchanged if there are none, if all are marked as derived, or if one has unit "group". So
-    are tracks in the image if px_per_m is nan or infinite. Raises InputError if they are in the image and px_per_m is 0
-    or below.
+    Unknown velocities (nan) are replaced by chords of the positions, `with_velocities`. The tracks are returned
+    unchanged if there are none or if all are marked as derived. Only velocities are filled in if one has unit "group",
+    and for tracks in the image if px_per_m is nan or infinite. Raises InputError if they are in the image and px_per_m
+    is 0 or below.
     """
-    if all(t.derived for t in tracks) or (tracks[0].plane == "image" and not math.isfinite(px_per_m)):
+    if all(t.derived for t in tracks):
+        return tuple(tracks)
+    tracks = with_velocities(tracks, fps)
+    if tracks[0].plane == "image" and not math.isfinite(px_per_m):
         return tuple(tracks)
     return tuple(derive(tracks, fps, px_per_m, rule))
+
+
+def with_velocities(tracks: Sequence[Tracks], fps: float) -> Sequence[Tracks]:
+    """Return the tracks with unknown velocities (a row of `vel` with nan) replaced by chords of the positions over the
+    last 0.5 s, as tracks in a text get them.
+
+    tracks: one `Tracks` per frame. fps: frames per second. A velocity stays nan in an id's first frame, and where the
+    id was not seen within that time before. Tracks without nan are returned as they are.
+    """
+    if not any(np.isnan(t.vel).any() for t in tracks):
+        return tracks
+    count = [len(t.id) for t in tracks]
+    frame, id = np.repeat([t.index for t in tracks], count), np.concatenate([t.id for t in tracks])
+    pos, vel = np.concatenate([t.pos for t in tracks]), np.concatenate([t.vel for t in tracks])
+    vel = np.where(np.isnan(vel).any(axis=1)[:, None], chords(frame, id, pos, fps), vel)
+    parts = np.split(vel, np.cumsum(count)[:-1])
+    return [t.replace(vel=part) for t, part in zip(tracks, parts, strict=True)]
 
 
 def names_groups(tracks: Sequence[Tracks]) -> bool:

@@ -9,12 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.truth.merge_split_rules import frames_of
-from sim.types import Array, Ints, Tracks
+from sim.io.formats.velocity import WINDOW, chords
+from sim.types import Array, Bools, Ints, Tracks
 from tracking.grouping.link_rule import LinkRule
-
-DEFAULT_CHORD = 0.5
-"""s: a tracker without velocities gets those of chords over this time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,10 +79,10 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRu
     frame, id, group, pos, vel = frame[order], id[order], group[order], pos[order], vel[order]
     ids, column = np.unique(id, return_inverse=True)
     length = int(max(t.index for t in tracks))
-    unknown = np.isnan(vel[:, 0])
+    unknown: Bools = np.asarray(np.isnan(vel).any(axis=1))
     if rule.smooth > 0 or unknown.any():
-        chords = backward_velocity(frame, column, pos, fps, rule.smooth or DEFAULT_CHORD)
-        vel = chords if rule.smooth > 0 else np.where(unknown[:, None], chords, vel)
+        chord = chords(frame, id, pos, fps, rule.smooth or WINDOW)
+        vel = chord if rule.smooth > 0 else np.where(unknown[:, None], chord, vel)
     return TracksTable(frame, id, column, ids, pos, vel, group, length, scale)
 
 
@@ -104,25 +101,6 @@ def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:
         group_of = {p: g for g, people in members for p in people.tolist()}
         found.append(np.array([group_of.get(p, -1) for p in t.id.tolist()], np.int64))
     return found
-
-
-def backward_velocity(frame: Ints, column: Ints, pos: Array, fps: float, window: float) -> Array:
-    """Return velocities (R, 2), x, y in m/s: the chord to each row from the person's earliest row within the last
-    `window` s.
-
-    A row is one person in one frame: frame (R,) from 0; column (R,) of the person; pos (R, 2) in m. fps: frames per
-    second; the window is rounded up to whole frames, at least 1. nan in a person's first row and where the person has
-    no other row within the window.
-    """
-    order = np.lexsort((frame, column))
-    f, span = frame[order], frames_of(window, fps)
-    key = column[order] * (int(f.max(initial=0)) + span + 2) + f
-    first = np.searchsorted(key, key - span)
-    steps = f - f[first]
-    out = np.empty_like(pos)
-    chord = (pos[order] - pos[order][first]) * fps / np.maximum(steps, 1)[:, None]
-    out[order] = np.where(steps[:, None] > 0, chord, np.nan)
-    return out
 
 
 def boxes_of_rows(tracks: Sequence[Tracks]) -> Array | None:

@@ -1,7 +1,7 @@
 """Reads tracks from MOTChallenge text that any program has written, and adds groups from a groups.csv.
 
 The result is one Tracks per frame, from frame 1. Positions are on the ground (m) if the file has them, else the centres
-of the boxes (px). Velocities are differences of positions.
+of the boxes (px). Velocities are differences of positions over the last 0.5 s.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.mot_text import MotTable, read_table, reject_duplicate_ids, unit_scores
-from sim.io.formats.velocity import differentiate
+from sim.io.formats.velocity import chords
 from sim.io.store.group_files import read_groups_csv
 from sim.types import Array, Ints, Plane, Tracks
 
@@ -45,7 +45,7 @@ def read_track_text(path: Path, fps: float, length: int | None) -> list[Tracks]:
     box = None if table.without_box().any() else table.box[order]
     score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(order)))[order]
     plane: Plane = "image" if ground is None else "ground"
-    vel, count = differentiate(frame, id, pos, fps), length or int(frame.max(initial=0))
+    vel, count = chords(frame, id, pos, fps), length or int(frame.max(initial=0))
     cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()
 
     def arrays(a: int, b: int) -> tuple[Array | Ints | None, ...]:

@@ -7,7 +7,6 @@ from scenarios.errors import InputError
 from sim.types import GroupEvent, Groups, Tracks
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.tracks_table import backward_velocity
 
 FPS = 10.0
 
@@ -159,10 +158,6 @@ def test_a_group_waits_for_a_member_who_is_not_seen():
 def test_velocities_from_positions_when_a_tracker_has_none():
     made, known = derive(tracks(joining(), vel=False), FPS), derive(tracks(joining()), FPS)
     assert [e[1:2] + e[3:] for e in events(made)] == [e[1:2] + e[3:] for e in events(known)]
-    frame, column = np.array([0, 1, 2, 5, 0]), np.array([0, 0, 0, 0, 1])
-    pos = np.array([[0.0, 0], [1, 0], [2, 0], [5, 5], [0, 0]])
-    got = backward_velocity(frame, column, pos, 10.0, 0.2)
-    np.testing.assert_allclose(got, [[np.nan] * 2, [10, 0], [10, 0], [np.nan] * 2, [np.nan] * 2])
 
 
 def test_ids_order_and_place_change_nothing():

@@ -3,7 +3,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.formats import mot_text
-from sim.io.formats.velocity import differentiate
+from sim.io.formats.velocity import chords, differentiate
 from sim.io.source import open_source
 
 
@@ -222,3 +222,13 @@ def test_seqinfo(tmp_path, key, value):
     with pytest.raises(InputError) as error:
         open_source(tmp_path)
     assert error.value.place == key
+
+
+def test_chords_look_back_only():
+    frame, id = np.array([0, 1, 2, 5, 0]), np.array([7, 7, 7, 7, 3])
+    pos = np.array([[0.0, 0], [1, 0], [2, 0], [5, 5], [0, 0]])
+    want = np.array([[np.nan] * 2, [10, 0], [10, 0], [np.nan] * 2, [np.nan] * 2])
+    np.testing.assert_allclose(chords(frame, id, pos, 10.0, 0.2), want)
+    mixed = np.array([3, 1, 4, 0, 2])
+    np.testing.assert_allclose(chords(frame[mixed], id[mixed], pos[mixed], 10.0, 0.2), want[mixed])
+    assert chords(frame[:0], id[:0], pos[:0], 10.0).shape == (0, 2)

@@ -1,0 +1,160 @@
+"""Tracks without velocities, or with bad ones: the same answers score the same from a class, a table and a text."""
+
+from __future__ import annotations
+
+import shutil
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.loading.resolve import load
+from sim.io.store.track_files import read_tracks, write_tracks
+from sim.sequence import simulate
+from sim.types import Sequence, Tracks
+from tracking.grouping.grouped_tracks import with_groups, with_velocities
+from tracking.grouping.link_rule import LinkRule
+from tracking.grouping.velocity_check import velocity_error, velocity_warning
+from tracking.run import grouped, track
+from tracking.scoring import evaluate
+
+FPS = 10.0
+
+
+class Numbers:
+    """Numbers the true people in the order of their first places, on a grid of 1 cm and 1 px. No velocities."""
+
+    needs = ("boxes",)
+    plane = "image"
+
+    def reset(self, context, seed):
+        self.fps, self.before, self.ids, self.next = context.fps, np.zeros((0, 2)), np.zeros(0, np.int64), 0
+
+    def velocities(self, id, pos):
+        return np.full(pos.shape, np.nan)
+
+    def step(self, frame, detections):
+        box = detections.box.round()
+        pos = (box[:, :2] + box[:, 2:] / 2) if self.plane == "image" else detections.pos.round(2)
+        id = np.full(len(pos), -1)
+        apart = np.linalg.norm(pos[:, None] - self.before[None], axis=2)
+        while apart.size and apart.min() < (30.0 if self.plane == "image" else 0.6):
+            row, known = np.unravel_index(apart.argmin(), apart.shape)
+            id[row], apart[row], apart[:, known] = self.ids[known], np.inf, np.inf
+        new = id < 0
+        id[new] = self.next + np.arange(new.sum())
+        vel = self.velocities(id, pos)
+        self.before, self.ids, self.next = pos, id, self.next + int(new.sum())
+        n = len(pos)
+        cov, alone = np.tile(np.eye(4), (n, 1, 1)), np.full(n, -1)
+        return Tracks(frame.index, frame.t, self.plane, "person", id, alone, pos, vel, cov, box, np.ones(n))
+
+
+class OnTheGround(Numbers):
+    plane = "ground"
+
+
+class Differences(Numbers):
+    """The difference to the place of the frame before."""
+
+    def velocities(self, id, pos):
+        known = dict(zip(self.ids.tolist(), self.before, strict=True))
+        return np.array([(p - known.get(i, p)) * self.fps for i, p in zip(id.tolist(), pos, strict=True)]).reshape(
+            -1, 2
+        )
+
+
+class Standing(Numbers):
+    def velocities(self, id, pos):
+        return np.zeros(pos.shape)
+
+
+class Exact(Numbers):
+    """The mean velocity over the last 0.5 s."""
+
+    def reset(self, context, seed):
+        super().reset(context, seed)
+        self.places = {}
+
+    def velocities(self, id, pos):
+        found = np.zeros(pos.shape)
+        for k, i in enumerate(id.tolist()):
+            path = self.places.setdefault(i, [])
+            path.append(pos[k])
+            past = path[-6:]
+            found[k] = (past[-1] - past[0]) * self.fps / max(len(past) - 1, 1)
+        return found
+
+
+@pytest.fixture(scope="module")
+def merge() -> Sequence:
+    return simulate(load("merge", [f"camera.fps={FPS:g}"]), 40_001)
+
+
+def same(a: dict[str, float], b: dict[str, float]) -> list[str]:
+    """The keys whose values differ, apart from scores of the covariances, which a text has not."""
+    keys = [k for k in a if k in b and not (np.isnan(a[k]) or np.isnan(b[k]))]
+    assert {"HOTA", "group_F1_hull", "event_F1", "objective"} <= set(keys)
+    return [k for k in keys if abs(a[k] - b[k]) > 1e-12]
+
+
+@pytest.mark.parametrize("kind", [Numbers, OnTheGround])
+def test_class_table_and_text_of_the_same_answers_score_the_same(merge, tmp_path: Path, kind) -> None:
+    run = track(kind, merge, detections="truth")
+    assert np.isnan(run[0].vel).all()
+    assert np.isfinite(run[-1].vel).all()
+    folder = write_tracks(tmp_path / "run", run, fps=merge.fps, info=run.info)
+    shutil.copy(folder / "tracks.txt", tmp_path / "theirs.txt")
+    text = grouped(read_tracks(tmp_path / "theirs.txt", fps=merge.fps, length=merge.length), merge)
+    scores = evaluate(merge.truth, run)
+    assert scores["group_F1_hull"] > 0.3
+    assert same(scores, evaluate(merge.truth, read_tracks(folder))) == []
+    assert same(scores, evaluate(merge.truth, text)) == []
+
+
+def test_good_velocities_make_no_warning_and_bad_ones_do(merge) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        track(Exact, merge, detections="truth")
+        track(Numbers, merge, detections="truth")
+        track("blob", merge)
+    for kind in (Differences, Standing):
+        with pytest.warns(UserWarning, match=f"{kind.__name__}: one velocity in 5 differs by .* Report nan"):
+            track(kind, merge, detections="file")
+
+
+def moving(vel: float, n: int = 40) -> list[Tracks]:
+    """One person who walks at 1 m/s along x, and reports `vel`."""
+    one, alone = np.array([3]), np.array([-1])
+    return [
+        Tracks(k + 1, k / FPS, "ground", "person", one, alone, np.array([[k / FPS, 0.0]]), np.array([[vel, 0.0]]),
+               np.zeros((1, 4, 4)))
+        for k in range(n)
+    ]  # fmt: skip
+
+
+def test_the_error_of_velocities() -> None:
+    rule = LinkRule()
+    assert velocity_error(moving(1.0, 60), FPS, 1.0, rule) == pytest.approx(0.0, abs=1e-9)
+    assert velocity_error(moving(0.0, 60), FPS, 1.0, rule) == pytest.approx(np.sqrt(2))
+    assert np.isnan(velocity_error(moving(0.0, 20), FPS, 1.0, rule))
+    assert velocity_warning("x", moving(0.0, 60), FPS, 1.0, None) is not None
+    assert velocity_warning("x", moving(np.nan, 60), FPS, 1.0, None) is None
+    assert velocity_warning("x", moving(0.0, 60), FPS, 1.0, LinkRule(smooth=0.5)) is None
+    assert velocity_warning("x", [], FPS, 1.0, None) is None
+
+
+def test_unknown_velocities_become_the_motion_over_half_a_second() -> None:
+    filled = with_velocities(moving(np.nan, 10), FPS)
+    assert np.isnan(filled[0].vel).all()
+    assert all(t.vel == pytest.approx(np.array([[1.0, 0.0]])) for t in filled[1:])
+    known = moving(0.3, 10)
+    assert with_velocities(known, FPS) is known
+    mixed = [*moving(0.3, 6), *moving(np.nan, 10)[6:]]
+    assert [float(t.vel[0, 0]) for t in with_velocities(mixed, FPS)] == pytest.approx([0.3] * 6 + [1.0] * 4)
+
+
+def test_velocities_of_groups_are_filled_too() -> None:
+    groups = [t.replace(unit="group", group=t.id) for t in moving(np.nan, 5)]
+    assert with_groups(groups, FPS, 1.0)[-1].vel == pytest.approx(np.array([[1.0, 0.0]]))
