@@ -160,6 +160,17 @@ def test_errors_of_ours_pass_unchanged():
         pass
 
 
+def test_no_exit_from_within_ends_a_command_as_if_all_were_well(tmp_path, capsys, monkeypatch):
+    """Whatever code of a user is reached by another way, as a property that a command reads."""
+
+    def leave(options):
+        raise SystemExit(0)
+
+    monkeypatch.setattr("tracking.app.commands.track.track", leave)
+    assert run(command(tmp_path, "", "pass")) == 1
+    assert "SystemExit: 0" in capsys.readouterr().err
+
+
 @dataclass(frozen=True)
 class Exiting(Config):
     tracker: ClassVar[str] = "exiting"

@@ -94,7 +94,7 @@ def print_interrupted(as_json: bool) -> int:
     return INTERRUPTED
 
 
-def as_flockscope_error(error: Exception) -> FlockscopeError:
+def as_flockscope_error(error: BaseException) -> FlockscopeError:
     """Returns, not raises, the error for users that stands for an unexpected exception.
 
     An OSError becomes a WorkError (exit code 1) if the disk or memory is full or the disk is broken, else an InputError

@@ -89,7 +89,7 @@ def _run(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
         raise
     except usage_error as error:
         raise _usage(error) from None
-    except Exception as error:
+    except (Exception, SystemExit, GeneratorExit) as error:
         if _comes_from_interrupt(error):
             raise KeyboardInterrupt from None
         raise as_flockscope_error(error) from error
