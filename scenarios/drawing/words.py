@@ -54,7 +54,7 @@ def setting(scenario: Scenario) -> list[str]:
     """Returns three lines in words: duration and how the script is placed; size and content of the world; camera.
 
     The first names a turn and a lead that are not 0, and a mirror. The second says "empty" for a world without things.
-    The third says ", placed to see everybody" if neither height nor px_per_m is given.
+    The third says ", placed to see everybody" if neither height nor px_per_m is given, also with a position.
     """
     world, camera = scenario.world, scenario.camera
     things = {"wall": world.walls, "door": world.doors, "pillar": world.pillars, "flight of stairs": world.stairs}

@@ -164,8 +164,9 @@ def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Ar
     row (L,): the person's rows of the truth. n (9,): standard normals, columns as `at_birth` of Births. `model` gives
     pairs (mean, standard deviation): across and foot, the shift of the middle to the right and of the lower edge
     downwards, in the person's box heights; near_height, the logarithm of height over the person's height. Boxes are 0
-    if the truth has none. The points are under the boxes if there is a camera and ground is seen there. Else they are
-    the person's, moved along x by the shift across × 1.7 m, or 0 if the truth has no positions.
+    if the truth has none. The points are at the middle of the lower edges, for every kind of camera, if there is one
+    and ground is seen there. Else they are the person's, moved along x by the shift across × 1.7 m, or 0 if the truth
+    has no positions.
     """
     truth = ground.truth
     across, down = (mean + sd * n[c] for (mean, sd), c in ((model.across, X), (model.foot, Y)))

@@ -19,7 +19,8 @@ def camera_document(camera: Camera) -> dict[str, Any]:
 
     Keys: format (1), kind ("pinhole" or "top"), image [width, height] px, focal_px [fx, fy], centre_px [cx, cy],
     position [x, y, z] m, rotation 3x3 (world to camera), baseline m (0 without a right camera), px_per_m (None if
-    unknown, as for a pinhole), and radial (number of Tsai's lens distortion), which is left out if it is 0.
+    unknown, as for a pinhole), and radial (Tsai's lens distortion, kappa1 × focal length², without unit), which is left
+    out if it is 0.
     """
     distortion = {"radial": camera.radial} if camera.radial else {}
     return {
