@@ -1,6 +1,6 @@
 """How often 95 % intervals hold the truth, on simulated recordings.
 
-    python -m benchmarks.coverage recordings [--scenes plaza,street,quiet] [--seeds 20000:20030] [--store FOLDER]
+    python -m benchmarks.coverage recordings [--scenes plaza,street,quiet] [--seeds 20000:20008] [--store FOLDER]
     python -m benchmarks.coverage sequences [--store FOLDER]
 
 recordings: stationary scenes of 5 minutes, in which people pass by and groups meet, stand and part at random times.
@@ -235,7 +235,7 @@ def main() -> None:
     parser = new_parser(__doc__)
     parser.add_argument("mode", choices=["recordings", "sequences"])
     parser.add_argument("--scenes", default=",".join(SCENES), metavar="NAMES")
-    add_seeds(parser, "20000:20030")
+    add_seeds(parser, "20000:20008")
     parser.add_argument("--store", type=Path, default=Path("coverage"), metavar="FOLDER")
     given = parser.parse_args()
     one_thread()
