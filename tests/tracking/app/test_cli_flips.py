@@ -481,6 +481,7 @@ ELSEWHERE = {
     ("generate", "sensor"),  # tests/tracking/app/test_fit.py
     ("track", "sensor"),
     ("track", "grouping"),  # tests/tracking/tuning/test_rule.py
+    ("track", "step_timeout"),  # tests/tracking/test_time_limit.py
 }
 OWN = ("replay", "sensor", "tune")
 """Commands whose options are tested one by one in files of their own: test_replay.py, test_fit.py, test_tune.py."""
