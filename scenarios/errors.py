@@ -7,6 +7,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from scenarios.printable import printable, shortened
+
+PARTS = {"file": 400, "place": 200, "got": 200, "expected": 400, "remedy": 400}
+"""The parts of an error, and how many characters of each its line shows at most."""
+
+KEPT = 10_000
+"""How many characters of each part an error keeps at most, for `--json`."""
+
 
 class FlockscopeError(Exception):
     """An error message for users; `str()` is exactly one line. exit_code: 1 unless a subclass says otherwise
@@ -14,30 +22,35 @@ class FlockscopeError(Exception):
 
     - file: the file read or written, "" if there is none. place: the line, key, row or frame in it, "" if there is
       none.
-    - got: what was found there. expected: what should be there. remedy: what the user can do. All are kept as text.
+    - got: what was found there. expected: what should be there. remedy: what the user can do.
+
+    All are kept as text; a part of more than 10,000 characters is cut in the middle.
     """
 
     exit_code: ClassVar[int] = 1
 
     def __init__(self, *, file: object = "", place: object = "", got: object, expected: object, remedy: str) -> None:
-        self.file, self.place = str(file), str(place)
-        self.got, self.expected, self.remedy = str(got), str(expected), remedy
+        self.file, self.place = shortened(str(file), KEPT), shortened(str(place), KEPT)
+        self.got, self.expected = shortened(str(got), KEPT), shortened(str(expected), KEPT)
+        self.remedy = shortened(remedy, KEPT)
         super().__init__(self.line())
 
     def line(self) -> str:
         """Returns the error as one line: "file: place: got …; expected …; remedy".
 
-        An empty file or place is left out. Runs of white space, also line breaks, become one space.
+        An empty file or place is left out. Runs of white space, also line breaks, become one space; other control
+        characters become escapes. A long part is cut in the middle, so that the line can be read: what was found at
+        200 characters.
         """
-        where = ": ".join(part for part in (self.file, self.place) if part)
-        text = f"{where}: " if where else ""
-        text += f"got {self.got}; expected {self.expected}; {self.remedy}"
-        return " ".join(text.split())
+        file, place, got, expected, remedy = (
+            shortened(printable(" ".join(getattr(self, name).split())), longest) for name, longest in PARTS.items()
+        )
+        where = "".join(f"{part}: " for part in (file, place) if part)
+        return f"{where}got {got}; expected {expected}; {remedy}"
 
     def as_dict(self) -> dict[str, str]:
         """Returns the error object that `--json` prints, all values as text: file, place, got, expected, remedy."""
-        names = ("file", "place", "got", "expected", "remedy")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in PARTS}
 
     def __reduce__(self) -> tuple[object, ...]:
         return (_rebuild, (type(self), self.as_dict()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -209,11 +210,33 @@ def main() -> None:
 
     Raises SystemExit for that. After Ctrl-C (code 130) it ends the process at once, without exit handlers.
     """
+    _open_streams()
     code = run(sys.argv[1:])
     if code == INTERRUPTED:
         sys.stdout.flush()
         os._exit(code)  # sys.exit would end by SIGINT, not with 130, where Ctrl-C came inside an exec of a library
     sys.exit(code)
+
+
+def _open_streams() -> None:
+    """Opens stdin, stdout and stderr if the caller has closed them, else a file would take their number and get what is
+    printed; and lets both print every character.
+
+    A closed stdout then fails when it is written, a closed stderr swallows all. A character that their encoding lacks
+    is printed as an escape.
+    """
+    for number, mode in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, mode)  # takes the lowest free number, which is this one
+    if sys.stdout is None:
+        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
+from scenarios.printable import is_control, printable
 
 STATUS = {0: "ok", 1: "failed", 2: "refused", 130: "interrupted"}
 """The "status" of the JSON object, by exit code."""
@@ -31,8 +32,8 @@ class CommandResult:
     """What a command returns.
 
     data: the content of the JSON object that --json prints, without its "status". text: what people see without --json,
-    a string or anything that the library rich can print; "" by default. code: the exit code, 0 (default), or 1 if a
-    check found problems.
+    a string or anything that the library rich can print; "" by default. It is printed letter by letter, markup of rich
+    and control characters included. code: the exit code, 0 (default), or 1 if a check found problems.
     """
 
     data: dict[str, Any]
@@ -50,17 +51,26 @@ def print_result(result: CommandResult, as_json: bool) -> int:
     if as_json:
         _print_json({"status": STATUS[result.code], **result.data})
     else:
-        text = result.text if isinstance(result.text, str) else _rendered(result.text)
+        text = printable(result.text, keep="\n") if isinstance(result.text, str) else _rendered(result.text)
         print(text.rstrip("\n"), flush=True)
     return result.code
 
 
 def _rendered(tables: Any) -> str:
     """Returns what the library rich prints of `tables`, anything it can print: as wide as the terminal and coloured
-    there, else 160 columns of plain text."""
-    from rich.console import Console
+    there, else 160 columns of plain text.
 
-    console = Console(width=None if sys.stdout and sys.stdout.isatty() else WIDTH, highlight=False)
+    Every string in `tables`, as a cell, is printed letter by letter: as data, not as markup of rich.
+    """
+    from rich.console import Console
+    from rich.text import Text
+
+    class PlainConsole(Console):
+        def render_str(self, text: str, **options: Any) -> Text:
+            return super().render_str(printable(text, keep="\n"), **options)
+
+    width = None if sys.stdout.isatty() else WIDTH
+    console = PlainConsole(width=width, highlight=False, markup=False, emoji=False)
     with console.capture() as captured:
         console.print(tables)
     return captured.get()
@@ -117,7 +127,13 @@ def _system_error(error: OSError) -> FlockscopeError:
 
 
 def _print_json(data: dict[str, Any]) -> None:
-    print(json.dumps(as_json_value(data), ensure_ascii=False, allow_nan=False), flush=True)
+    """Prints the data on stdout as one line of JSON. Control characters in texts, and characters that stdout cannot
+    encode, are escapes of JSON."""
+    unicode = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
+    text = json.dumps(as_json_value(data), ensure_ascii=not unicode, allow_nan=False)
+    if not text.isprintable():
+        text = "".join(json.dumps(c)[1:-1] if is_control(c) else c for c in text)
+    print(text, flush=True)
 
 
 def as_json_value(value: Any) -> Any:

@@ -14,6 +14,7 @@ from typing import Any
 import typer
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
+from scenarios.printable import printable, shortened
 from tracking.app.command_result import (
     DEBUG,
     INTERRUPTED,
@@ -26,6 +27,8 @@ from tracking.app.command_result import (
 from tracking.interrupts import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
+LONGEST_WARNING = 400
+"""Characters of a warning that are shown at most."""
 
 
 def run_command(app: typer.Typer, arguments: list[str]) -> int:
@@ -134,12 +137,13 @@ def _print(result: CommandResult, as_json: bool) -> int:
 
 def _print_warnings_once() -> Callable[..., None]:
     """Returns a replacement for `warnings.showwarning` that prints each different text once, as "warning: TEXT" on
-    stderr."""
+    stderr. A long text is cut in the middle."""
     printed: set[str] = set()
 
     def warn(message: Warning | str, *_: object) -> None:
-        if str(message) not in printed:
-            print(f"warning: {message}", file=sys.stderr)
-        printed.add(str(message))
+        text = shortened(printable(" ".join(str(message).split())), LONGEST_WARNING)
+        if text not in printed:
+            print(f"warning: {text}", file=sys.stderr)
+        printed.add(text)
 
     return warn

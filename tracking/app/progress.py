@@ -8,6 +8,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from scenarios.printable import printable
 from tracking.interrupts import raise_if_interrupted
 
 if TYPE_CHECKING:
@@ -60,12 +61,12 @@ class ProgressMeter:
         item: name to show, "" for none. Raises KeyboardInterrupt if the user has pressed Ctrl-C and Python lost it.
         """
         raise_if_interrupted()
-        self.done, self.total, self.item = done, total, item
+        self.done, self.total, self.item = done, total, printable(item)
         if self._bar is not None:
-            self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=item)
+            self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=self.item)
         elif not sys.stderr.isatty() and time.monotonic() - self._last_line > PAUSE:
             self._last_line = time.monotonic()
-            print(f"{self.what}: {done}{'' if total is None else f' of {total}'} {item}".rstrip(), file=sys.stderr)
+            print(f"{self.what}: {done}{'' if total is None else f' of {total}'} {self.item}".rstrip(), file=sys.stderr)
 
     def _show(self) -> None:
         """Shows the bar if stderr is a terminal and the meter has not been left meanwhile. Runs in the
@@ -78,8 +79,9 @@ class ProgressMeter:
         with self._lock:
             if self._timer.finished.is_set():
                 return
-            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-            bar = Progress(*columns, TextColumn("{task.fields[item]}"), console=Console(stderr=True), transient=True)
+            what, item = (TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[item]}"))
+            columns = (what, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), item)
+            bar = Progress(*columns, console=Console(stderr=True), transient=True)
             bar.add_task(self.what, completed=self.done, total=self.total, item=self.item)
             bar.start()
             self._bar = bar

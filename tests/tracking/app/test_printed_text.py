@@ -1,0 +1,136 @@
+"""What a command prints of files and arguments is text: never markup, never commands to the terminal."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from rich.table import Table
+
+from scenarios.errors import InputError
+from tracking.app import progress
+from tracking.app.cli import run
+from tracking.app.command_result import CommandResult, print_error, print_result
+from tracking.app.command_runner import _print_warnings_once
+from tracking.app.progress import ProgressMeter
+
+NAMES = ("[/red]", "x[door]y", ":smile:", "\x1b[31mred", "a\u202eb", "[link=http://x]y[/link]")
+SHOWN = ("[/red]", "x[door]y", ":smile:", "\\x1b[31mred", "a\\u202eb", "[link=http://x]y[/link]")
+COMMAND = [sys.executable, "-m", "tracking.app.cli"]
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.mark.parametrize(("name", "shown"), [*zip(NAMES, SHOWN, strict=True)])
+def test_a_table_shows_names_letter_by_letter(name, shown, capsys):
+    table = Table(name, box=None)
+    table.add_row(name)
+    assert print_result(CommandResult({}, table), as_json=False) == 0
+    assert [line.strip() for line in capsys.readouterr().out.splitlines()] == [shown, shown]
+
+
+@pytest.mark.parametrize(("name", "shown"), [*zip(NAMES, SHOWN, strict=True)])
+def test_text_errors_warnings_and_progress_show_names_letter_by_letter(name, shown, capsys, monkeypatch):
+    print_result(CommandResult({}, f"first\n{name}"), as_json=False)
+    print_error(InputError(got=name, expected="a", remedy="b"), as_json=False)
+    _print_warnings_once()(UserWarning(name))
+    monkeypatch.setattr(progress, "PAUSE", -1.0)
+    with ProgressMeter("track", 2) as meter:
+        meter._last_line = 0.0
+        meter.step(name)
+    printed = capsys.readouterr()
+    assert printed.out == f"first\n{shown}\n"
+    assert printed.err.splitlines() == [
+        f"error: got {shown}; expected a; b", f"warning: {shown}", f"track: 1 of 2 {shown}",
+    ]  # fmt: skip
+
+
+def test_the_bar_on_a_terminal_shows_names_letter_by_letter(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    with ProgressMeter("[/red]", 2) as meter:
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+        meter._show()
+        for name in NAMES:
+            meter.update(1, 2, name)
+            assert meter._bar is not None
+            meter._bar.refresh()
+    shown = capsys.readouterr().err
+    assert "\x1b[31mred" not in shown
+    assert all(name in shown for name in ("[/red]", *SHOWN)), shown
+
+
+@pytest.mark.parametrize("name", [*NAMES, "\udcff", "\x9b", "\U000e0041", "\u2028"])
+def test_json_holds_names_whole_and_as_escapes(name, capsys):
+    print_result(CommandResult({"name": name}), as_json=True)
+    (line,) = capsys.readouterr().out.splitlines()
+    assert json.loads(line)["name"] == name
+    assert line.isprintable()
+
+
+def test_a_name_of_a_recording_is_no_markup(tmp_path, capsys):
+    """`score` crashed for "[/red]", and "[door]" was not shown."""
+    for k, name in enumerate(NAMES[:3]):
+        folder = tmp_path / "data" / str(k)
+        (folder / "gt").mkdir(parents=True)
+        (folder / "seqinfo.ini").write_text(f"[Sequence]\nname={name}\nframeRate=10\nseqLength=2\n")
+        (folder / "gt" / "gt.txt").write_text("1,1,1,1,10,20,1,1,1\n2,1,2,1,10,20,1,1,1\n")
+    assert run(["track", "blob", str(tmp_path / "data"), "--detections", "truth", "--out", str(tmp_path / "out")]) == 0
+    assert all(name in capsys.readouterr().out for name in ("x[door]y",))
+    assert run(["score", str(tmp_path / "data"), str(tmp_path / "out")]) == 0
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in NAMES[:3])
+
+
+def _command(*words: str | bytes, text: bool = True, **env: str) -> subprocess.CompletedProcess:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), **env}
+    return subprocess.run([*COMMAND, *words], env=environment, capture_output=True, check=False, text=text)
+
+
+@pytest.mark.parametrize(
+    "env",
+    [
+        {"LC_ALL": "C"}, {"LC_ALL": "POSIX", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
+        {"PYTHONIOENCODING": "ascii"}, {"TERM": "dumb"}, {"TERM": ""}, {"PYTHONOPTIMIZE": "1"},
+        {"PYTHONDONTWRITEBYTECODE": "1"},
+    ],
+    ids=lambda env: next(iter(env)) + "=" + next(iter(env.values())),
+)  # fmt: skip
+def test_any_terminal_and_locale(env):
+    """A character that the terminal's encoding lacks is printed as an escape."""
+    shown = _command("scenarios", "crossing", **env)
+    assert (shown.returncode, shown.stderr) == (0, "")
+    refused = _command("scenarios", "Zürich", "--json", **env)
+    assert refused.returncode == 2
+    got = json.loads(refused.stdout)["error"]["got"]
+    assert "PYTHONUTF8" in env or "Zürich" in got  # an ASCII command line has no ü
+    refused = _command("scenarios", b"\xff\x1b[31m.toml", **env)
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1
+    assert "\x1b" not in refused.stderr
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", ">&- 2>&-"])
+def test_a_closed_stream(closed):
+    """Without stdout the result is lost, which is said; without stderr, the exit code stays."""
+    line = f"{sys.executable} -m tracking.app.cli scenarios crossing {closed}"
+    done = subprocess.run(
+        line, shell=True, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == (1 if " >" in closed or closed[0] == ">" else 0)
+    assert ("crossing" in done.stdout) == (closed in ("<&-", "2>&-"))
+    assert done.stderr.startswith("error: stdout: got ") == (closed == ">&-")
+
+
+def test_an_error_goes_nowhere_else_without_stderr():
+    line = f"{sys.executable} -m tracking.app.cli scenarios nothing 2>&-"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(line, shell=True, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+
+
+def test_a_long_warning_is_cut(capsys):
+    _print_warnings_once()(UserWarning("9" * 1_000_000))
+    assert len(capsys.readouterr().err) <= 420
