@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import socket
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading.resolve import Entry
+from sim.dataset.setting_differences import setting_differences
 from sim.io.files.output_paths import output_path, output_paths
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import MANIFEST, damaged_files, identity, read_manifest
+from sim.io.store.manifest import damaged_files, identity, is_sequence, read_manifest
 
 MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
 
@@ -70,26 +72,59 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
     """Return the manifest in the job's folder; None if the folder is missing or has no valid manifest of our format.
 
     The files are not compared with the manifest. Raises InputError if the folder holds another sequence, that is, if
-    the manifest differs in scenario, seed, repeat, schema, engine, streams or file type. Also raises InputError if a
-    stream or the file type of the job is unknown.
+    the manifest differs in scenario, seed, repeat, schema, engine, streams or file type; the error names what differs.
+    Also raises InputError if the folder is a file or holds something else than a sequence, or a stream or the file type
+    of the job is unknown.
     """
     from scenarios.loading.resolve import dump
 
     if not job.folder.exists():
         return None
+    if not job.folder.is_dir() or (any(job.folder.iterdir()) and not is_sequence(job.folder)):
+        raise InputError(
+            file=job.folder, got="something that flockscope did not write", expected="a stored sequence, or nothing",
+            remedy="choose another --out, or move it away",
+        )  # fmt: skip
     try:
         manifest = read_manifest(job.folder)
     except InputError:
         return None
-    wanted = identity(dump(job.entry.scenario), job.seed, job.entry.repeat, job.streams, job.images)
-    different = [key for key, value in wanted.items() if manifest.get(key) != value]
+    scenario = dump(job.entry.scenario)
+    wanted = identity(scenario, job.seed, job.entry.repeat, job.streams, job.images)
+    different = {key: value for key, value in wanted.items() if manifest.get(key) != value}
     if different:
         expected = "the same scenario, version, streams and images, or an empty place"
         raise InputError(
-            file=job.folder, place=MANIFEST, got=f"another sequence ({', '.join(different)} differ)",
+            file=job.folder, got=f"another sequence (stored → asked for: {_differences(job, manifest, different)})",
             expected=expected, remedy="choose another --out, or delete that folder",
         )  # fmt: skip
     return manifest
+
+
+def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str, Any]) -> str:
+    """Return what differs between the stored sequence and the job's, as "camera.fps 10 → 5, seed 1 → 2".
+
+    different: wanted values of the fields of `manifest` that differ. Settings are named if the stored scenario.toml is
+    readable; else the field "scenario_hash" stands for them.
+    """
+    from scenarios.loading.resolve import dump
+
+    settings = ""
+    if "scenario_hash" in different:
+        with suppress(OSError, ValueError):
+            settings = setting_differences(
+                (job.folder / "scenario.toml").read_text(encoding="utf-8"), dump(job.entry.scenario)
+            )
+    fields = {key: value for key, value in different.items() if key != "scenario_hash" or not settings}
+    return ", ".join(
+        [settings] * bool(settings) + [f"{k} {_word(manifest.get(k))} → {_word(v)}" for k, v in fields.items()]
+    )
+
+
+def _word(value: Any) -> str:
+    """Return a field of a manifest as a word: a list with commas, "none" for None and an empty list."""
+    text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
+    return "none" if value is None or not text else text
 
 
 def is_stored(job: SequenceJob) -> bool:

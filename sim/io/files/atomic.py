@@ -1,7 +1,7 @@
 """Atomic writing: a file or folder is written under a temporary name, synced to disk, then renamed to its target.
 
 It therefore appears complete or not at all. An OSError becomes a WorkError if the disk is full, else an InputError.
-Killed runs leave files whose names begin with .partial-, which `remove_partials` deletes.
+Killed runs leave files with names .partial-…-<12 hex digits>, which `remove_partials` deletes.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from uuid import uuid4
 from scenarios.errors import FlockscopeError, InputError, WorkError
 
 PARTIAL = ".partial-"  # beginning of temporary names
+OURS = re.compile(re.escape(PARTIAL) + r"(.*-[0-9a-f]{12}|[0-9a-f]{32})", re.DOTALL)  # all of a temporary name
 SYNC_THREADS = 8  # files synced at a time
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -171,11 +172,12 @@ def _leftovers(target: Path) -> list[Path]:
 
 
 def remove_partials(*folders: Path) -> None:
-    """Delete the temporary files and folders (.partial-…) directly in the given folders, left by killed runs.
+    """Delete the temporary files and folders directly in the given folders, left by killed runs.
 
-    Missing folders, and files that cannot be deleted, are ignored.
+    Their names are .partial-<name>-<12 hex digits>, or .partial-<32 hex digits> for a marker of `generate`; files with
+    other names stay. Missing folders, and files that cannot be deleted, are ignored.
     """
-    for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*")]:
+    for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*") if OURS.fullmatch(p.name)]:
         _remove(path)
 
 

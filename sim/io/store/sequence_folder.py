@@ -50,19 +50,39 @@ def write_sequence(
     stays.
 
     Raises InputError if a stream or file type is unknown, the sequence lacks a stream, a video would have an odd width
-    or height, or the folder cannot be written. Raises WorkError if an order of the script was not fulfilled, the stream
-    ids has a person id above 999, or the disk is full. Raises AssertionError if truth and sequence differ in length, or
-    only some frames have detections.
+    or height, the folder cannot be written, or a file of others in it would be lost. Raises WorkError if an order of
+    the script was not fulfilled, the stream ids has a person id above 999, or the disk is full. Raises AssertionError
+    if truth and sequence differ in length, or only some frames have detections.
     """
-    wanted = check_streams(streams, images)
-    with atomic.new_folder(folder, keep) as partial:
+    wanted, names = check_streams(streams, images), set[str]()
+    with atomic.new_folder(folder, lambda: keep() or _refuse_foreign(folder, names)) as partial:
         truth = sequence.truth  # raises for a failed script before a picture is drawn
         assert truth is None or truth.length == sequence.length
         pictures = write_pictures(partial, sequence, wanted, images)
         files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
         for name, body in files.items():
             atomic.write_unsynced(partial / name, body)
+        names |= {*files, *pictures.files}
     return folder
+
+
+def _refuse_foreign(folder: Path, names: set[str]) -> bool:
+    """Raise InputError if the folder holds a file that we did not write; else return False.
+
+    Ours are the files that its own manifest lists, and those that have a name of the new sequence's files, `names`.
+    """
+    try:
+        ours = names | read_manifest(folder)["files"].keys()
+    except InputError:  # a damaged or missing manifest lists nothing
+        ours = names
+    found = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir())
+    for path in [folder] if not folder.is_dir() else sorted(found):
+        if path.relative_to(folder).as_posix() not in ours:
+            raise InputError(
+                file=folder, got=f"{path}, a file that flockscope did not write", expected="its own files only",
+                remedy="move it away, or choose another --out",
+            )  # fmt: skip
+    return False
 
 
 def sequence_files(

@@ -125,19 +125,29 @@ def test_complete_sequences_are_kept_and_others_redone(tmp_path, simulate):
     before = content(tmp_path)
     (made[0] / "gt/gt.txt").write_text("1,1,0,0,1,1,1,1,1\n")
     (made[1] / "manifest.json").unlink()
-    (tmp_path / "flockscope-train" / f".partial-x-s00001-{os.getpid()}").mkdir()
-    (tmp_path / "flockscope-train" / ".partial-x-s00002-99").mkdir()
-    (tmp_path / "seqmaps" / ".partial-flockscope-train.txt-99").write_text("name")
+    (tmp_path / "flockscope-train" / ".partial-x-s00001-0123456789ab").mkdir()
+    (tmp_path / "flockscope-train" / ".partial-x-s00002-0123456789ab").mkdir()
+    (tmp_path / "seqmaps" / ".partial-flockscope-train.txt-0123456789ab").write_text("name")
+    (tmp_path / ".partial-0123456789abcdef0123456789abcdef").write_text("")
     simulate.made.clear()
     generate([Entry("x", scenario())], range(3), tmp_path)
     assert simulate.made == [0, 1]
     assert content(tmp_path) == before
 
 
+def test_temporary_files_of_others_stay(tmp_path, simulate):
+    """Only names that our writers make are deleted, since OUT may be a folder that other programs use, too."""
+    others = [tmp_path / name for name in (".partial-download", ".partial-x-99", ".partial-0123456789abcdeg")]
+    for other in others:
+        other.mkdir()
+    generate([Entry("x", scenario())], range(1), tmp_path)
+    assert all(other.is_dir() for other in others)
+
+
 def test_another_scenario_is_not_overwritten(tmp_path, simulate):
     generate([Entry("x", scenario())], range(1), tmp_path)
     before = content(tmp_path)
-    with pytest.raises(InputError, match="scenario_hash"):
+    with pytest.raises(InputError, match="duration 20 → 3"):
         generate([Entry("x", scenario(duration=3.0))], range(2), tmp_path)
     with pytest.raises(InputError, match="repeat"):
         generate([Entry("x", scenario(), 1)], range(2), tmp_path)

@@ -138,3 +138,64 @@ def test_given_up(job: SequenceJob) -> None:
     outcome = lost_job(job, WorkError(got="an item that killed 3 workers", expected="b", remedy="c"))
     assert outcome == JobOutcome(outcome.error)
     assert str(outcome.error).startswith("x-s00001: got an item that killed 3 workers")
+
+
+@pytest.mark.parametrize("harm", ["nothing", "a file is altered", "no manifest"])
+def test_files_of_others_stay(job: SequenceJob, made: list[int], harm: str) -> None:
+    """Notes in a folder of ours stay with it; a folder that would have to be replaced is refused for them."""
+    run_job(job)
+    notes = job.folder / "gt" / "notes.txt"
+    notes.write_text("mine")
+    if harm != "nothing":
+        (job.folder / "gt/gt.txt").write_text("")
+    if harm == "no manifest":
+        (job.folder / "manifest.json").unlink()
+    before = content(job)
+    outcome = run_job(job)
+    if harm == "nothing":
+        assert outcome == JobOutcome()
+    else:
+        assert isinstance(outcome.error, InputError)
+        assert f"got {notes}, a file that flockscope did not write" in str(outcome.error)
+        assert not outcome.fatal
+    assert content(job) == before
+
+
+@pytest.mark.parametrize("name", ["", "thesis.tex", "a/b/thesis.tex"])
+def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: list[int], name: str) -> None:
+    """Before: a folder or file with the name of the sequence was deleted. name: "" for a file."""
+    mine = job.folder / name
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine")
+    with pytest.raises(InputError, match="something that flockscope did not write"):
+        stored_manifest(job)
+    assert isinstance(run_job(job).error, InputError)
+    assert (mine.read_text(), made) == ("mine", [])
+
+
+def test_an_empty_folder_is_a_place(job: SequenceJob, made: list[int]) -> None:
+    job.folder.mkdir(parents=True)
+    assert run_job(job) == JobOutcome()
+
+
+@pytest.mark.parametrize(
+    ("more", "change", "words"),
+    [
+        ({"camera": {"fps": 5}}, {}, "camera.fps 10 → 5)"),
+        ({"duration": 3.0, "camera": {"fps": 5}}, {"streams": ("left",)}, "duration 20 → 3, camera.fps 10 → 5, "
+         "streams none → left,background, images none → jpg)"),
+        ({"group": [{"id": "b", "start": [1, 1], "goal": [2, 2]}]}, {}, "group[0].id a → b)"),
+    ],
+)  # fmt: skip
+def test_what_differs_is_named(
+    job: SequenceJob, made: list[int], more: dict[str, Any], change: dict[str, Any], words: str
+) -> None:
+    run_job(job)
+    text = {"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}], **more}
+    other = SequenceJob(job.folder, Entry("x", Scenario.model_validate(text)), 1, **change)
+    with pytest.raises(InputError) as refused:
+        stored_manifest(other)
+    assert f"another sequence (stored → asked for: {words}" in refused.value.got
+    (job.folder / "scenario.toml").unlink()
+    with pytest.raises(InputError, match="scenario_hash"):
+        stored_manifest(other)

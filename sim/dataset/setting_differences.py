@@ -1,0 +1,37 @@
+"""Names the settings in which two resolved scenarios differ, for the error that refuses to overwrite a sequence."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+from scenarios.printable import shortened
+
+MOST = 3  # differences that are named; the others are counted
+LONGEST = 40  # characters of a value
+
+
+def setting_differences(stored: str, wanted: str) -> str:
+    """Return the settings that differ between two scenarios, as "camera.fps 10 → 5, duration 20 → 30".
+
+    stored, wanted: TOML texts of resolved scenarios. The stored value stands first, "none" for a missing one. At most 3
+    settings are named, others counted; "" for equal ones. Raises tomllib.TOMLDecodeError for a text that is no TOML.
+    """
+    before, after = (dict(_flat("", tomllib.loads(text))) for text in (stored, wanted))
+    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
+    words = [f"{key} {_value(before, key)} → {_value(after, key)}" for key in keys[:MOST]]
+    return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
+
+
+def _flat(prefix: str, value: Any) -> list[tuple[str, Any]]:
+    """Return pairs (key, value) of a nested value, with keys as "group[0].size". Lists of plain values stay whole."""
+    if isinstance(value, dict):
+        dot = "." if prefix else ""
+        return [pair for key, inner in value.items() for pair in _flat(f"{prefix}{dot}{key}", inner)]
+    if isinstance(value, list) and any(isinstance(inner, dict) for inner in value):
+        return [pair for k, inner in enumerate(value) for pair in _flat(f"{prefix}[{k}]", inner)]
+    return [(prefix, value)]
+
+
+def _value(settings: dict[str, Any], key: str) -> str:
+    return shortened(str(settings[key]).removesuffix(".0"), LONGEST) if key in settings else "none"
