@@ -29,6 +29,11 @@ def _escape(character: str) -> str:
     return character.encode("unicode_escape").decode("ascii")
 
 
+def counted(number: int, noun: str) -> str:
+    """Returns a number with its noun: "1 frame", "2 frames", "0 frames". noun: in the singular; it takes an s."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def shortened(text: str, longest: int) -> str:
     """Returns the text if it has at most `longest` characters, else its beginning and end around a "…".
 

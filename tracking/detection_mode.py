@@ -37,14 +37,21 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
     sequence has stored detections, "truth" if it takes these and the sequence has labels.
 
     Raises InputError, naming the needs and what the sequence has, if the requested mode, or without one every mode,
-    fails.
+    fails. If only the sequence lacks what the requested mode takes, as pictures, the error says that.
     """
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
     if requested in able or (requested is None and able):
         return requested or able[0]  # type: ignore[return-value]
+    remedy = f"try --detections {able[0]}" if able else "take another tracker or source"
+    missing = _missing(requested, needs)
+    if missing:
+        got = f"{sequence.name} without {missing}; it has {_contents(sequence)}"
+        raise InputError(
+            place=f"--detections {requested}", got=got, expected=f"a sequence with {missing}",
+            remedy=f"{remedy}, or give a source with {missing}",
+        )  # fmt: skip
     got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {_contents(sequence)}"
     expected = f"--detections {requested}" if requested else "detections of some kind"
-    remedy = f"try --detections {able[0]}" if able else "take another tracker or source"
     raise InputError(place="--detections", got=got, expected=f"what {expected} needs", remedy=remedy)
 
 
@@ -53,6 +60,15 @@ def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
         return runs_own_detector(needs, sequence)
     takes = {"boxes", "points"} & set(needs)
     return bool(takes) and (sequence.has_detections if mode == "file" else sequence.load_truth is not None)
+
+
+def _missing(mode: DetectionMode | None, needs: tuple[str, ...]) -> str:
+    """Returns what a sequence lacks on which a tracker with these needs cannot work in the mode; "" if the tracker
+    itself cannot work in the mode, or for None."""
+    if mode == "image":
+        return "pictures" if "pixels" in needs else "right pictures" if "stereo" in needs else ""
+    takes = not {"boxes", "points"}.isdisjoint(needs)
+    return {"file": "stored detections", "truth": "labels"}.get(mode or "", "") if takes else ""
 
 
 def _contents(sequence: Sequence) -> str:

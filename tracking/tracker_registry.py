@@ -52,8 +52,10 @@ def find(spec: str) -> type[Tracker]:
 def _from_file(path: Path) -> Any:
     """Returns the module of a Python file, imported under a private name that depends on its path and content.
 
-    The name hides no other module. An unchanged file is imported once, so that a config keeps fitting its tracker; a
-    changed file is imported again. Raises InputError if there is no such file or it cannot be imported.
+    Files beside it can be imported by their names, as from a script, now and later: the folder becomes the last on
+    Python's path, so that they hide no installed module. The name hides no other module. An unchanged file is imported
+    once, so that a config keeps fitting its tracker; a changed file is imported again. Raises InputError if there is no
+    such file or it cannot be imported.
     """
     if not path.is_file():
         raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
@@ -62,6 +64,8 @@ def _from_file(path: Path) -> Any:
     name = f"_flockscope_{resolved.stem}_{content.hexdigest()[:12]}"
     if name in sys.modules:
         return sys.modules[name]
+    if str(resolved.parent) not in sys.path:
+        sys.path.append(str(resolved.parent))
     spec = importlib.util.spec_from_file_location(name, resolved)
     assert spec is not None
     assert spec.loader is not None
@@ -83,7 +87,16 @@ def _from_module(name: str) -> Any:
 
 def _import_failed(where: object, error: BaseException) -> InputError:
     got = what_was_raised(error)
-    return InputError(file=where or "tracker", got=got, expected="a module that can be imported", remedy="correct it")
+    lacks = isinstance(error, ModuleNotFoundError)
+    remedy = "install that module, or put its file beside the tracker's" if lacks else "correct it"
+    return InputError(file=where or "tracker", got=got, expected="a module that can be imported", remedy=remedy)
+
+
+def located(spec: str) -> str:
+    """Return `spec` with an absolute path if it is "file.py:Class", so that a process in another folder finds the file;
+    any other unchanged."""
+    where, colon, name = spec.rpartition(":")
+    return f"{Path(where).resolve()}:{name}" if colon and where.endswith(".py") else spec
 
 
 def checked(found: Any, spec: str) -> type[Tracker]:

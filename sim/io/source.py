@@ -63,6 +63,11 @@ def open_source(
         return [_open_file(path, options)]
     found = list(_find(path, DEPTH))
     if not found:
+        if any(next(path.glob(pattern), None) for pattern in ("run.json", "*/run.json")):
+            raise InputError(
+                file=path, got="tracks, what `flockscope track` wrote", expected=KINDS,
+                remedy="give the sequence or dataset first, then the tracks: swap the arguments",
+            )  # fmt: skip
         raise InputError(file=path, got="a folder without sequences", expected=KINDS, remedy="check the path")
     return [_open_folder(p, options) for p in found]
 

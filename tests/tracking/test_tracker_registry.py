@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+
 import pytest
 
 from scenarios.errors import InputError
@@ -125,3 +128,65 @@ def test_signatures_that_can_be_called_pass(tmp_path):
         "Static",
         "Loose",
     ]
+
+
+NEIGHBOUR = """
+from dataclasses import dataclass
+from wE_neighbour import REACH
+class Mine:
+    needs, reach = ("points",), REACH
+    def reset(self, context, seed): ...
+    def step(self, frame, detections):
+        import wE_later
+        return wE_later.answer
+"""
+
+
+def test_a_file_imports_the_files_beside_it(tmp_path, monkeypatch):
+    """As a script does, at once and later."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    (tmp_path / "wE_neighbour.py").write_text("REACH = 3")
+    (tmp_path / "wE_later.py").write_text("answer = 4")
+    (tmp_path / "mine.py").write_text(NEIGHBOUR)
+    found = tracker_registry.find(f"{tmp_path}/mine.py:Mine")
+    assert (found.reach, found().step(None, None)) == (3, 4)
+    assert sys.path[-1] == str(tmp_path)
+    tracker_registry.find(f"{tmp_path}/mine.py:Mine")
+    assert sys.path.count(str(tmp_path)) == 1
+
+
+def test_a_missing_neighbour_is_named(tmp_path):
+    (tmp_path / "mine.py").write_text("import wE_missing")
+    with pytest.raises(InputError, match=r"No module named 'wE_missing'; .*put its file beside the tracker's"):
+        tracker_registry.find(f"{tmp_path}/mine.py:Mine")
+
+
+def test_workers_in_another_folder_find_the_file(tmp_path, monkeypatch):
+    """`tune FILE.py:Class --cluster` with a relative path was looked for in the folder of each worker."""
+    from tracking.tuning.tuned_tracker import tuned_tracker
+
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "toy.py").write_text(TUNABLE)
+    monkeypatch.chdir(tmp_path)
+    tracker = tuned_tracker("own/toy.py:Mine")
+    assert (tracker.tracker, tracker.name) == (f"{tmp_path.resolve()}/own/toy.py:Mine", "own/toy.py:Mine")
+    monkeypatch.chdir(os.sep)
+    assert tuned_tracker(tracker.tracker).code == tracker.code
+    assert tracker_registry.located("blob") == "blob"
+    assert tracker_registry.located("package.module:Class") == "package.module:Class"
+
+
+TUNABLE = """
+from dataclasses import dataclass
+from tracking.config import Config, param
+
+@dataclass(frozen=True)
+class MineConfig(Config):
+    reach: float = param(1.0, (0.1, 5.0), "m", "reach", "log")
+
+class Mine:
+    needs, config_class = ("points",), MineConfig
+    def __init__(self, config): ...
+    def reset(self, context, seed): ...
+    def step(self, frame, detections): ...
+"""

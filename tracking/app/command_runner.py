@@ -110,11 +110,21 @@ def _comes_from_interrupt(error: BaseException | None) -> bool:
 
 
 def _usage(error: Any) -> InputError:
-    """Returns the InputError for a wrong command line; error: the usage exception of typer or click, with
-    its message."""
+    """Returns the InputError for a wrong command line; a missing option or argument is named with its meaning.
+
+    error: the usage exception of typer or click, with its message.
+    """
     where = "flockscope" if error.ctx is None else error.ctx.command_path
-    message = error.format_message().rstrip(".")
-    got, remedy = message[:1].lower() + message[1:], f"see {where} --help"
+    remedy = f"see {where} --help"
+    if type(error).__name__ == "MissingParameter" and error.param is not None:
+        option = error.param.param_type_name == "option"
+        value = error.param.metavar or error.param.human_readable_name.upper()
+        name, expected = (error.param.opts[0], f"{error.param.opts[0]} {value}") if option else (value, value)
+        if error.param.help:
+            expected += f": {error.param.help.rstrip('.')}"
+        return InputError(place=where, got=f"no {name}", expected=expected, remedy=f"add it; {remedy}")
+    message = error.format_message().rstrip(".").removeprefix("Got ")
+    got = message[:1].lower() + message[1:]
     return InputError(place=where, got=got, expected="a command line as in the help", remedy=remedy)
 
 

@@ -11,6 +11,7 @@ from scenarios.errors import InputError
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.types import Sequence
+from tracking.app.not_tracks import refuse_other_things
 from tracking.run import TrackingRun
 
 DEPTH = 3
@@ -91,6 +92,7 @@ def find_tracks(path: Path) -> list[StoredTracks]:
     """
     if not path.exists():
         raise InputError(file=path, got="no such file or folder", expected=EXPECTED, remedy="check the path")
+    refuse_other_things(path, EXPECTED)
     folder = run_folder(path)
     info = read_run(folder) if folder is not None and path.name in WHOLE else {}
     found = [StoredTracks(None, path, info)] if path.is_file() else list(_below(path, DEPTH))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from scenarios.printable import counted
 from tracking.config import Config
 from tracking.environment.episodes import Episode
 from tracking.stats import paired
@@ -71,7 +72,7 @@ class Comparison:
         """
         ends = f"[{self.low:+.4f}, {self.high:+.4f}]"
         change = f"{self.before:.4f} → {self.after:.4f}, {self.difference:+.4f} {ends}"
-        return f"{self.scenes}: {self.key} {change}, {self.sequences} sequences: {self.verdict}"
+        return f"{self.scenes}: {self.key} {change}, {counted(self.sequences, 'sequence')}: {self.verdict}"
 
 
 @dataclass(frozen=True)

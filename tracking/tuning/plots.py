@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
+from scenarios.printable import counted
 from tracking.config import Config
 from tracking.tuning.comparison import Candidate, TrialRecord
 from tracking.tuning.search_plan import SearchPlan
@@ -98,7 +99,7 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
     legend = [(BLUE, "played to the end"), ("hollow", "pruned, estimated"), (ORANGE, "best so far")]
     legend += [("dashes", "defaults")] if default is not None else []
     note = f"; {outside} far below: ticks" if goal.higher else f"; {outside} far above: ticks"
-    return _page(f"{_title(plan)}: {len(records)} trials" + (note if outside else ""), body, legend)
+    return _page(f"{_title(plan)}: {counted(len(records), 'trial')}" + (note if outside else ""), body, legend)
 
 
 def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: Config) -> str:

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from scenarios.printable import counted
 from sim.io.files.atomic import write_file
 from tracking.config import Config
 from tracking.tuning.comparison import Candidate, Comparison, TrialRecord
@@ -98,7 +99,7 @@ class TuningResult:
         counts = f"{self.pruned} given up early, {self.impossible} impossible"
         lines = [
             f"{plan.tracker_name} tuned on {plan.suite_name}, detections {plan.detections}, for {names}",
-            f"{len(self.trials)} trials, {self.episodes} of {every} episodes played, {counts}; "
+            f"{counted(len(self.trials), 'trial')}, {self.episodes} of {every} episodes played, {counts}; "
             f"training seeds {seeds_text(seeds.training)}, validation {seeds_text(seeds.validation)}, "
             f"test {seeds_text(seeds.test)}",
         ]

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenarios.errors import InputError
+from scenarios.printable import counted
 from sim.types import Tracker
 from tracking.keyword_options import documented, from_keywords
 from tracking.tuning.comparison import Candidate, TrialRecord, pareto_front
@@ -132,7 +133,7 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
     best = max(gains, key=lambda c: goal.gain(c.before, c.after))
     if best.sequences < 2:
         return ["the defaults stay: one validation scene says nothing of others; give more --validation seeds"]
-    ends = f"{best.difference:+.4f} [{best.low:+.4f}, {best.high:+.4f}], {best.sequences} sequences"
+    ends = f"{best.difference:+.4f} [{best.low:+.4f}, {best.high:+.4f}], {counted(best.sequences, 'sequence')}"
     return [f"the defaults stay: nothing is surely better on the validation scenes; at best {goal.key} {ends}"]
 
 

@@ -97,7 +97,7 @@ def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = Non
     unknown or cannot be imported, is no tracker, or declares no parameters; also if the limit is not above 0 or given
     for a class or the rule.
     """
-    from tracking.tracker_registry import checked, code_hash, config_class, find
+    from tracking.tracker_registry import checked, code_hash, config_class, find, located
 
     if tracker == RULE:
         if step_timeout is not None:
@@ -106,5 +106,6 @@ def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = Non
         return TunedTracker(RULE, RULE, LinkRule, ("points", "boxes"))
     name = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
     found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, name)
-    limited = None if step_timeout is None else TimeLimited(cast(str, tracker), step_timeout)
-    return TunedTracker(tracker, name, config_class(found, name), tuple(found.needs), code_hash(found), limited)
+    spec = located(tracker) if isinstance(tracker, str) else tracker  # workers of a cluster run in another folder
+    limited = None if step_timeout is None else TimeLimited(cast(str, spec), step_timeout)
+    return TunedTracker(spec, name, config_class(found, name), tuple(found.needs), code_hash(found), limited)

@@ -22,6 +22,12 @@ def read_calibration(path: Path) -> Camera:
     shape, or the camera cannot be used (sim.scene.camera_check).
     """
     require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
+    if path.suffix.lower() == ".toml":
+        remedy = "give the recording's calibration; a TOML file describes a view for `flockscope replay --camera`"
+        raise InputError(
+            file=path, place="--camera", got="a TOML file", expected="a camera.json, or Tsai's calibration as .xml",
+            remedy=remedy,
+        )  # fmt: skip
     return read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
 
 

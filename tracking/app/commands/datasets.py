@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from scenarios.printable import counted
 from tracking.app import option_parsing
 from tracking.app.command_options import GenerateOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
@@ -32,7 +33,7 @@ def generate(options: GenerateOptions) -> CommandResult:
             options.names, seeds, options.out, set=settings, workers=WorkerOptions(options.workers, options.cluster),
             progress=meter.update, streams=streams, images=images,
         )  # fmt: skip
-    text = f"{len(folders)} sequences in {folders[0].parent}"
+    text = f"{counted(len(folders), 'sequence')} in {folders[0].parent}"
     return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)
 
 
@@ -84,6 +85,7 @@ def export_webdataset(options: WebdatasetOptions) -> CommandResult:
         index = webdataset(options.folder, out, shard_size=size, samples=options.samples, progress=meter.update)
     shards = index["shards"]
     count, total = sum(len(s["sequences"]) for s in shards), sum(s["bytes"] for s in shards)
-    text = f"{count} sequences in {len(shards)} shards, {total / 1e6:.1f} MB; content {index['content_hash'][:16]}"
+    packed = f"{counted(count, 'sequence')} in {counted(len(shards), 'shard')}"
+    text = f"{packed}, {total / 1e6:.1f} MB; content {index['content_hash'][:16]}"
     files = [out / s["name"] for s in shards]
     return CommandResult({"shards": files, "bytes": total, "content_hash": index["content_hash"]}, text)

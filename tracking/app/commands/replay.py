@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from scenarios.errors import InputError
+from scenarios.printable import counted
 from tracking.app import option_parsing
 from tracking.app.command_options import ReplayCommandOptions
 from tracking.app.command_result import CommandResult
@@ -33,5 +34,5 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     replays = ReplayOptions(view, Cut(options.start, options.duration), options.calibration, streams, images)
     with ProgressMeter("replay") as meter:
         folders = store_replays(recordings, replays, seeds, options.out, meter.update)
-    text = f"{len(folders)} sequences in {folders[0].parent}"
+    text = f"{counted(len(folders), 'sequence')} in {folders[0].parent}"
     return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)

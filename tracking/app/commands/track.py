@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from scenarios.printable import counted
 from sim.io.files.output_paths import output_paths
 from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
@@ -185,5 +186,5 @@ def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:
 
 def _line(row: dict[str, Any]) -> str:
     speed = f"{row['frames_per_second']:.0f} frames/s ({row['whole_frames_per_second']:.0f} with reading)"
-    counts = f"{row['frames']} frames, {row['tracks']} tracks, detections {input_summary(row)}, {speed}"
-    return f"{row['sequence']}: {counts} → {row['folder']}"
+    counts = f"{counted(row['frames'], 'frame')}, {counted(row['tracks'], 'track')}"
+    return f"{row['sequence']}: {counts}, detections {input_summary(row)}, {speed} → {row['folder']}"

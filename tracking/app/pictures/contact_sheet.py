@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.printable import counted
 from sim.io.files.atomic import write_file
 from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
 from tracking.app.pictures.frame_choice import SHOWN_KINDS, choose_frames, is_close
@@ -216,7 +217,7 @@ def _draw_head(sheet: Image, sequence: Sequence, truth: Truth) -> None:
     if truth.pos is not None and sequence.scene is not None:
         low, high = np.zeros(2), sequence.scene.size
     people = f"{len(np.unique(truth.id))} people, " if len(truth.id) else ""
-    facts = f"{people}{truth.length} frames, {truth.fps:g}/s, "
+    facts = f"{people}{counted(truth.length, 'frame')}, {truth.fps:g}/s, "
     facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {unit}; trails {TRAIL_SECONDS:g} s"
     text(sheet, facts, (GAP + width + 30, 46), 0.75, QUIET)
 

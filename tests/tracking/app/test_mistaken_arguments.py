@@ -1,0 +1,76 @@
+"""A newcomer's mistakes: the error says what was given, and what to give."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tracking.app.cli import run
+
+SCENE = """
+schema = 1
+duration = 2.0
+warmup = 0.0
+camera = { fps = 5 }
+group = [{ id = "a", size = 2, start = [4, 4], goal = [12, 4] }]
+"""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scene, a dataset of it with two sequences and without pictures, and a run on it."""
+    folder = tmp_path_factory.mktemp("mistakes")
+    (folder / "scene.toml").write_text(SCENE)
+    line = ["generate", str(folder / "scene.toml"), "--seeds", "0:2", "--streams", "none"]
+    assert run([*line, "--out", str(folder / "data")]) == 0
+    assert run(["track", "blob", str(folder / "data"), "--out", str(folder / "run")]) == 0
+    return folder
+
+
+MISTAKES = {
+    "score {0}/data {0}/data": (
+        "{0}/data: got a generated dataset, no tracks;", "give the --out of `flockscope track`",
+    ),
+    "score {0}/data {0}/data/flockscope-train": ("got a generated dataset, no tracks;",),
+    "score {0}/data {0}/data/flockscope-train/scene-s00000": ("got a generated dataset, no tracks;",),
+    "score {0}/data {0}/run --against {0}/data": ("got a generated dataset, no tracks;",),
+    "score {0}/run {0}/data": ("{0}/run: got tracks, what `flockscope track` wrote;", "swap the arguments"),
+    "score {0}/run/scene-s00000 {0}/data": ("scene-s00000: got tracks, what", "swap the arguments"),
+    "view {0}/run {0}/data --out {0}/x": ("{0}/run: got tracks, what", "swap the arguments"),
+    "score {0}/data {0}/scene.toml": ("{0}/scene.toml: got a .toml file, no tracks;", "made by `flockscope track`"),
+    "track blob {0}/data --detections image --out {0}/x": (
+        "--detections image: got scene-s00000 without pictures; it has detections, truth;", "try --detections file",
+    ),
+    "track blob {0}/data --camera {0}/scene.toml --out {0}/x": (
+        "{0}/scene.toml: --camera: got a TOML file; expected a camera.json", "describes a view",
+    ),
+    "generate crossing --seeds 0": ("flockscope generate: got no --out; expected --out ",),
+    "track blob": ("flockscope track: got no SOURCE; expected SOURCE: ",),
+    "score a b c": ("flockscope score: got unexpected extra argument",),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("line", MISTAKES)
+def test_a_mistaken_argument_is_named(line: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([word.format(place) for word in line.split()]) == 2
+    shown = capsys.readouterr().err
+    assert shown.count("\n") == 1
+    for words in MISTAKES[line]:
+        assert words.format(place) in shown, shown
+
+
+@pytest.mark.parametrize("seeds", ["5", "5:7"])
+def test_one_is_no_plural(seeds: str, place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = ["generate", str(place / "scene.toml"), "--streams", "none", "--out", str(tmp_path / "data")]
+    assert run([*line, "--seeds", seeds]) == 0
+    number = "1 sequence" if seeds == "5" else "2 sequences"
+    assert capsys.readouterr().out.startswith(f"{number} in ")
+    assert run(["export", "webdataset", str(tmp_path / "data"), "--out", str(tmp_path / "shards")]) == 0
+    assert capsys.readouterr().out.startswith(f"{number} in 1 shard, ")
+
+
+def test_other_settings_are_named(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line = ["generate", str(place / "scene.toml"), "--seeds", "0", "--streams", "none", "--out", str(place / "data")]
+    assert run([*line, "--set", "camera.fps=10"]) == 2
+    assert "another sequence (stored → asked for: camera.fps 5 → 10)" in capsys.readouterr().err
