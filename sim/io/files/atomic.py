@@ -66,9 +66,8 @@ def write_file(target: Path, content: bytes) -> None:
     Missing parent folders are created. Raises WorkError if the disk is full, InputError if the file cannot be written.
     """
     with staged_path(target) as partial:
-        _write_synced(partial, content)
-        os.replace(partial, target)
-        _sync_folder(target.parent)
+        partial.write_bytes(content)
+        move_synced(partial, target)
 
 
 @contextmanager
@@ -81,9 +80,17 @@ def new_file(target: Path) -> Iterator[Path]:
     """
     with staged_path(target) as partial:
         yield partial
-        _sync_file(partial)
-        os.replace(partial, target)
-        _sync_folder(target.parent)
+        move_synced(partial, target)
+
+
+def move_synced(partial: Path, target: Path) -> None:
+    """Rename the file `partial` to `target`, in the same folder, after its content has reached the disk.
+
+    Some file systems report only then that the disk is full. An existing target is replaced. Raises OSError.
+    """
+    _sync_file(partial)
+    os.replace(partial, target)
+    _sync_folder(target.parent)
 
 
 @contextmanager
@@ -202,13 +209,6 @@ def _sync_tree(folder: Path) -> None:
 
 def _sync_file(path: Path) -> None:
     with path.open("rb+") as file:
-        os.fsync(file.fileno())
-
-
-def _write_synced(path: Path, content: bytes) -> None:
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
         os.fsync(file.fileno())
 
 

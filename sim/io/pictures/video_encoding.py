@@ -1,10 +1,14 @@
 """Write H.264 videos that browsers can play and seek: mp4, yuv420p, a key frame each second, the index in front.
 
-One thread is used and no date is written, so the same pictures give the same bytes.
+One thread is used and no date is written, so the same pictures give the same bytes. libav ignores a write that fails
+or takes only a part, as on a full disk. So the file that it writes to keeps account, and the pictures of the finished
+video are counted.
 """
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -13,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, WorkError
 from sim.types import Image
 
 QUALITY = 18  # x264's constant rate factor: visually near the original
@@ -32,8 +36,10 @@ def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QU
 
     size: (width, height) px of all pictures. fps: frames per second, rounded to a fraction with a denominator up to
     1001. quality: x264's constant rate factor, lower is better, default 18. If the block raises, an incomplete file
-    stays; if it adds no picture, an empty file. Raises InputError if width or height is
-    odd, OSError if the file cannot be opened.
+    stays; if it adds no picture, a file without pictures.
+
+    Raises InputError if width or height is odd, OSError if the file cannot be opened or written, as on a full disk, and
+    WorkError if the finished video holds another number of pictures than were added.
     """
     if size[0] % 2 or size[1] % 2:
         raise InputError(
@@ -43,24 +49,75 @@ def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QU
     # We open the file because libav leaves its own open if a video cannot be finished. It is unbuffered, since Ctrl-C
     # would be lost inside a Python callback from libav.
     with path.open("wb", buffering=0) as file:
-        made = VideoWriter(file, size, fps, quality)
+        made = VideoWriter(WholeFile(file), size, fps, quality)
         try:
             yield made
             made.end()
         finally:
             made.close()
+    written = _pictures_in(path) if made.count else 0
+    if written != made.count:
+        raise WorkError(
+            file=path, got=f"{written} of {made.count} pictures in the finished video", expected="all of them",
+            remedy="free some room on the disk, then run it again",
+        )  # fmt: skip
+
+
+def _pictures_in(path: Path) -> int:
+    """Return the number of whole pictures in a video, still encoded; 0 for an unreadable one."""
+    import av
+
+    try:
+        with av.open(str(path)) as container:
+            return sum(packet.size > 0 and not packet.is_corrupt for packet in container.demux(video=0))
+    except (av.FFmpegError, IndexError):
+        return 0
+
+
+class WholeFile:
+    """The file that libav writes to: every byte is written, or the first exception is kept and writing ends.
+
+    file: the open raw file. libav goes on after a write that failed or was short, so each caller of libav then calls
+    `raise_error`. Ctrl-C, which Python cannot pass through libav, comes out there, too. State: the exception, None as
+    long as all is written.
+    """
+
+    def __init__(self, file: Any):
+        self._file, self.name = file, file.name  # libav opens the name again to move the index
+        self.seek, self.tell = file.seek, file.tell
+        self._error: BaseException | None = None
+
+    def write(self, data: Any) -> int:
+        """Write all bytes; returns their number, also after a failure."""
+        rest = memoryview(data)
+        try:
+            while rest and self._error is None:
+                count = self._file.write(rest)
+                if not count:
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                rest = rest[count:]
+        except BaseException as error:
+            self._error = error
+        return len(data)
+
+    def raise_error(self) -> None:
+        """Raise the exception that ended the writing; do nothing if all was written."""
+        if self._error is not None:
+            raise self._error
 
 
 class VideoWriter:
     """A video that is being written; made by `write_video`, which also ends and closes it.
 
-    file: the open binary file to write to. size: (width, height) of all pictures in px, both even. fps: frames per
-    second. quality: x264's constant rate factor, lower is better. State: libav's open container and stream.
+    file: what to write to. size: (width, height) of all pictures in px, both even. fps: frames per second. quality:
+    x264's constant rate factor, lower is better. State: libav's open container and stream, and `count`, the number of
+    pictures added.
     """
 
-    def __init__(self, file: Any, size: tuple[int, int], fps: float, quality: int):
+    def __init__(self, file: WholeFile, size: tuple[int, int], fps: float, quality: int):
         import av
 
+        self._file, self.count = file, 0
         self._container: Any = av.open(file, "w", format="mp4", options={"movflags": "faststart"})
         group = str(max(1, round(fps)))
         options = {"crf": str(quality), "preset": "veryfast", "g": group, "bf": "2", "threads": "1"}
@@ -75,7 +132,9 @@ class VideoWriter:
     def add(self, picture: Image) -> None:
         """Append a picture (H, W, 3) BGR uint8. Its size must be that of the video, which is not checked.
 
-        A picture of another even size is scaled; an odd size raises cv2.error."""
+        A picture of another even size is scaled; an odd size raises cv2.error. Raises OSError if the video cannot be
+        written, as on a full disk; so do `end` and `close`.
+        """
         import av
         import cv2
 
@@ -83,11 +142,17 @@ class VideoWriter:
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
         frame.color_range, frame.colorspace = NARROW, BT601
         self._container.mux(self._stream.encode(frame))
+        self._file.raise_error()
+        self.count += 1
 
     def end(self) -> None:
         """Encode and write the frames that the encoder still holds; no picture may be added afterwards."""
         self._container.mux(self._stream.encode(None))
+        self._file.raise_error()
 
     def close(self) -> None:
         """Write the index of the file and close the container; the file object that was given stays open."""
-        self._container.close()
+        try:
+            self._container.close()
+        finally:
+            self._file.raise_error()

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -129,6 +129,8 @@ COMMANDS = {
     ),
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
 }
+SMALL = ("scenarios --out", "fit sensor")  # a few kB
+FEW = ("export coco", "sheet", "track", "track blob")  # less than 12 kB
 WRITING = [name for name, (good, _) in COMMANDS.items() if "--out {out}" in good]
 
 
@@ -455,6 +457,33 @@ def test_a_full_disk_of_its_own(place, tmp_path):
         assert all(run(["validate", str(p)]) == 0 for p in sequences)
     finally:
         subprocess.run(["umount", disk], check=True)
+
+
+@pytest.fixture
+def tiny_disk(tmp_path):
+    """A file system of 12 kB, less than any command writes; for commands with a folder, their first file fits."""
+    disk = tmp_path / "tiny"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=12k", "tmpfs", disk], capture_output=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip("no right to mount a small disk")
+    yield disk
+    subprocess.run(["umount", disk], check=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in WRITING if name not in SMALL])
+def test_every_command_on_a_full_disk(name, place, tiny_disk, capsys):
+    """Exit code 1 and one line; no file is half there, and what is there is complete by its own rules."""
+    (tiny_disk / "filler").write_bytes(b"x" * 8192 if name in FEW else b"")
+    tiny = replace(place, out=tiny_disk / "out")
+    assert run(words(COMMANDS[name][0], tiny)) == 1
+    check_output(capsys, 1, as_json=False)
+    left = [p.name for p in tiny_disk.rglob("*") if p.is_file()]
+    assert not [n for n in left if n.startswith(".partial-")]
+    assert not set(left) & {"page.html", "film.mp4", "plan.svg", "toy.toml", "index.json", "manifest.json", "run.json"}
 
 
 def test_a_dataset_altered_is_told_by_every_reader(place, tmp_path, capsys):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
 from pathlib import Path
@@ -12,7 +11,7 @@ import cv2
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.atomic import staged_path
+from sim.io.files.atomic import new_file
 from sim.io.pictures.video_encoding import write_video
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even_size, refuse_source
@@ -67,9 +66,8 @@ def write_overlay(
     path = Path(out)
     refuse_source(sequence, path)
     panels = _panels(sequence, tracks, truth)
-    with staged_path(path) as partial:
+    with new_file(path) as partial:
         _write(partial, sequence, panels, step)
-        os.replace(partial, path)
     return path
 
 

@@ -1,19 +1,25 @@
 """What browsers need of a video, and what they are told of it."""
 
+import errno
+import io
+import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import av
+import numpy as np
 import pytest
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, WorkError
+from sim.io.pictures import video_encoding
 from sim.io.pictures.video_encoding import BT601, NARROW, write_video
 from tests.small_videos import SIZE, picture
 
 
-def made(path: Path, fps: float = 10.0) -> Path:
+def made(path: Path, fps: float = 10.0, shown: Callable[[int], np.ndarray] = picture) -> Path:
     with write_video(path, SIZE, fps) as film:
         for k in range(25):
-            film.add(picture(k))
+            film.add(shown(k))
     return path
 
 
@@ -44,3 +50,77 @@ def test_odd_sizes_are_refused(tmp_path, size):
     with pytest.raises(InputError, match="even"), write_video(tmp_path / "a.mp4", size, 10.0):
         raise AssertionError("no film of that size")
     assert not (tmp_path / "a.mp4").exists()
+
+
+class Disk:
+    """A file system with `room` bytes left that writes at most `most` bytes at a time, as a full one may do."""
+
+    def __init__(self, monkeypatch, room: int, most: int = 1 << 30, error: BaseException | None = None):
+        disk, self.room = self, room
+
+        class File(io.FileIO):
+            def write(self, data):
+                part = bytes(data)[: min(most, disk.room)]
+                if data and not part:
+                    raise error or OSError(errno.ENOSPC, "No space left on device")
+                disk.room -= len(part)
+                return super().write(part)
+
+        monkeypatch.setattr(Path, "open", lambda path, mode, buffering: File(path, mode))
+
+
+def noise(k: int) -> np.ndarray:
+    return np.random.default_rng(k).integers(0, 255, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
+
+
+def test_short_writes_are_continued(tmp_path, monkeypatch):
+    """A write may take less than it is given; what was left over was lost, and the video broken."""
+    whole = made(tmp_path / "a.mp4").read_bytes()
+    with monkeypatch.context() as patch:
+        Disk(patch, 1 << 30, most=1000)
+        made(tmp_path / "b.mp4")
+    assert (tmp_path / "b.mp4").read_bytes() == whole
+
+
+def test_a_full_disk_at_any_byte_is_an_error(tmp_path, monkeypatch):
+    size = made(tmp_path / "a.mp4").stat().st_size
+    for room in np.linspace(0, size - 1, 40).astype(int):
+        with monkeypatch.context() as patch:
+            Disk(patch, int(room))
+            with pytest.raises(OSError, match="No space left"):
+                made(tmp_path / "b.mp4")
+
+
+def test_ctrl_c_while_libav_writes_is_not_lost(tmp_path, monkeypatch):
+    Disk(monkeypatch, 1000, error=KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt):
+        made(tmp_path / "b.mp4")
+
+
+def test_a_video_that_lacks_pictures_is_an_error(tmp_path, monkeypatch):
+    """Whatever has swallowed them: the written file is counted."""
+    counted = video_encoding._pictures_in(made(tmp_path / "a.mp4"))
+    assert counted == 25
+    monkeypatch.setattr(video_encoding, "_pictures_in", lambda path: 24)
+    with pytest.raises(WorkError, match="got 24 of 25 pictures"):
+        made(tmp_path / "b.mp4")
+
+
+def test_a_video_without_pictures_is_no_error(tmp_path):
+    with write_video(tmp_path / "a.mp4", SIZE, 10.0):
+        pass
+    assert (tmp_path / "a.mp4").is_file()
+
+
+@pytest.mark.parametrize("kilobytes", range(8, 64, 8))
+def test_a_real_disk_that_fills_up(tmp_path, kilobytes):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", disk]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("no right to mount a small disk")
+    try:
+        with pytest.raises(OSError, match="No space left"):
+            made(disk / "a.mp4", shown=noise)
+    finally:
+        subprocess.run(["umount", disk], check=True)
