@@ -9,7 +9,8 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numba import njit
+
+from sim.compiler import njit
 
 # isort: off
 # fmt: off

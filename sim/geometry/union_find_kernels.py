@@ -5,9 +5,8 @@ The elements 0 to M - 1 form trees in an array of parents (M,). Used to label co
 
 from __future__ import annotations
 
-from numba import njit
-
 from sim.arrays import Ints
+from sim.compiler import njit
 
 
 @njit(cache=True, error_model="numpy")

@@ -7,8 +7,8 @@ place in the world (m), colour (BGR, grey levels), share of direct sun, and shar
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.render.texture_kernels import COS, SIN, contrast_kept, grain, plant_cover, slabs, value_noise
 from sim.scene.raycast import (
     GROUND,

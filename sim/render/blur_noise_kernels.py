@@ -7,8 +7,8 @@ from index 0, so that the compiler can use vector instructions.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.render.canvas import MID_GREY, TILE_H, TILE_W, UNIT
 
 SCALE, HALF, LOW, HIGH = np.float32(1.0 / UNIT), np.float32(0.5), np.float32(0.0), np.float32(255.0)

@@ -7,8 +7,8 @@ drawing has changed as dirty, and restore dirty tiles to the empty scene.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.render.canvas import TILE_H, TILE_W
 from sim.scene.body import XX, XY, YY
 

@@ -6,8 +6,8 @@ A point of a body or head is given by across (-1 left … 1 right), along (1 fro
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.render.texture_kernels import lattice_value, value_noise
 from sim.scene.body import BODY_PART
 

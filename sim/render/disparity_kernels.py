@@ -7,8 +7,8 @@ point, as it is hidden or outside the right image, and for sky.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.render.canvas import END_COLUMN, END_ROW, FIRST_COLUMN, FIRST_ROW
 from sim.render.canvas_kernels import ellipse_row
 from sim.scene.body import XX, XY, YY

@@ -7,8 +7,8 @@ wind, in px, has moved them.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.render.canvas import RUN_END, RUN_FIRST, RUN_ROW
 from sim.render.canvas_kernels import mark_dirty
 from sim.render.texture_kernels import plant_cover, plant_pattern

@@ -9,8 +9,8 @@ inside the part's outline (`sim.scene.body.outlines`) are tested.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.render.canvas import END_ROW, FIRST_ROW, MOST, UNIT
 from sim.render.canvas_kernels import mark_dirty, outline_columns
 from sim.render.clothing_kernels import ROUND, UP

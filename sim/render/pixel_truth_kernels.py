@@ -6,8 +6,8 @@ They give each person's number of visible pixels, the box round these pixels, an
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.geometry.union_find_kernels import find_root
 from sim.render.canvas import END_COLUMN, END_ROW, FIRST_COLUMN, FIRST_ROW
 

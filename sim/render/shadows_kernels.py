@@ -6,8 +6,8 @@ Of several shadows on a pixel only the darkest counts. The tests compare the res
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.render.canvas import END_COLUMN, END_ROW, FIRST_COLUMN, FIRST_ROW
 from sim.render.canvas_kernels import mark_dirty, outline_columns
 from sim.scene.body import BODY_PART, HEAD_PART, XX, XY, YY

@@ -9,7 +9,8 @@ between the views. A footprint is the size of a pixel on the surface, in m.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from sim.compiler import njit
 
 MASK = 0xFFFFFFFF
 FINER = 0.45  # wavelength of an octave of grain over that of the octave before

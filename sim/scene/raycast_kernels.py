@@ -9,8 +9,8 @@ tread's.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.scene.raycast import (
     CENTRE_X,
     CENTRE_Y,

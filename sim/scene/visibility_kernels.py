@@ -6,8 +6,8 @@ A sample is hidden by nearer people, walls, pillars or stairs. The tests compare
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.scene.body import XX, XY, YY
 from sim.scene.raycast import CENTRE_X, CENTRE_Y, HIT_SLOTS, RADIUS, X1, X2, Y1, Y2
 from sim.scene.raycast_kernels import at_pixel, first_hit

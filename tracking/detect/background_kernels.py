@@ -11,9 +11,9 @@ Colour is the first axis of the model's arrays, so that the loop over pixels vec
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiler import njit
 from sim.types import Bools, Image
 
 Floats = NDArray[np.float32]

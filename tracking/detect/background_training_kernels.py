@@ -8,8 +8,8 @@ tests/reference_background.py. Equations: Horprasert et al. (2000).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.types import Array, Bools, Image, Ints
 from tracking.detect.background_kernels import Floats
 

@@ -7,9 +7,9 @@ of each, in raster order. After the runs are found the mask is not read again. S
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiler import njit
 from sim.geometry.union_find_kernels import find_root
 from sim.types import Array, Bools, Ints
 

@@ -10,8 +10,8 @@ tests/reference_components.py."""
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.geometry.union_find_kernels import find_root
 from sim.types import Array, Bools, Ints
 from tracking.filters.ellipse_overlap_kernels import overlap

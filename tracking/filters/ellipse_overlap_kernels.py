@@ -9,8 +9,8 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.types import Array, Bools
 
 STEPS = 60

@@ -7,7 +7,8 @@ Polygons follow each other in vertex (V, 2), counter-clockwise where y is up, al
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from sim.compiler import njit
 
 
 @njit(cache=True)

@@ -9,9 +9,9 @@ a foreground pixel: they are whole numbers, and exact in any order.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiler import njit
 from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 

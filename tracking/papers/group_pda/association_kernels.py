@@ -10,8 +10,8 @@ association_mass_kernels. Slow twins: tests/reference_group_pda.py.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.types import Array, Bools, Ints
 from tracking.filters.components_kernels import WEIGHT, components, prefixes
 from tracking.papers.group_pda.association_mass_kernels import (

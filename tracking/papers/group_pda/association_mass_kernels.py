@@ -12,8 +12,8 @@ together. Symmetric 2 x 2 matrices are stored as (3,) = xx, xy, yy. The slots of
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sim.compiler import njit
 from sim.types import Array
 
 (GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD, COUNT_SHARE, DETECT_PROB,

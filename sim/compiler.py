@@ -1,0 +1,94 @@
+"""Compiles kernels: numba's njit, whose cache finds a place on every machine.
+
+numba caches compiled kernels beside their files or in the user's cache folder. In a container neither may be writable,
+and numba then refuses to compile. The cache goes to a temporary folder of the user in that case, or is left out.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+import warnings
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numba
+
+config: Any = numba.config
+NO_CACHE = (
+    "kernels are compiled anew in every process: their cache has no place, because neither the installation nor the "
+    "home folder nor the temporary folder can be written; set NUMBA_CACHE_DIR to a folder that can"
+)
+
+
+def cached_njit(**options: Any) -> Callable[[Any], Any]:
+    """Return a decorator that compiles a function with numba's njit and these options, when it is first called.
+
+    With cache=True the compiled code is stored in the first place that can be written: NUMBA_CACHE_DIR, __pycache__
+    beside the function's file, the user's cache folder, a temporary folder of the user. Without any of them nothing is
+    stored, and one warning says so.
+    """
+
+    def compiled(function: Any) -> Any:
+        if not options.get("cache"):
+            return numba.njit(**options)(function)
+        if not config.CACHE_DIR and not _numba_finds_a_place(os.path.dirname(function.__code__.co_filename)):
+            config.CACHE_DIR = temporary_cache() or ""
+        try:
+            return numba.njit(**options)(function)
+        except RuntimeError as error:
+            if "cannot cache function" not in str(error):
+                raise
+            _warn_once()
+            return numba.njit(**{**options, "cache": False})(function)
+
+    return compiled
+
+
+if TYPE_CHECKING:  # a kernel is for mypy what numba's own decorator makes of it
+    from numba import njit as njit
+else:
+    njit = cached_njit
+
+
+@cache
+def _numba_finds_a_place(folder: str) -> bool:
+    """Return True if numba can cache a kernel whose file is in `folder`, there or in the user's cache folder.
+
+    numba takes a user's cache folder that is no absolute path, as without a home, for one in the working directory. It
+    does not count.
+    """
+    users = os.environ.get("XDG_CACHE_HOME", os.path.join(os.path.expanduser("~"), ".cache"))
+    places = [os.path.join(folder, "__pycache__"), *([os.path.join(users, "numba")] if os.path.isabs(users) else [])]
+    return any(_can_be_written(Path(place)) for place in places)
+
+
+def _can_be_written(folder: Path) -> bool:
+    """Return True if a file can be created in the folder, or in a new one of this path. Nothing is created."""
+    existing = next(path for path in (folder, *folder.parents) if path.exists())
+    return existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
+
+
+def temporary_cache() -> str | None:
+    """Return the user's own folder for caches among the temporary files, and create it if it is missing.
+
+    None if it cannot be written, or if it is a link or belongs to others or others may write there: caches hold code,
+    so nobody else may put files into it.
+    """
+    try:
+        user = os.getuid() if hasattr(os, "getuid") else None
+        folder = Path(tempfile.gettempdir()) / f"flockscope-kernels-{'' if user is None else user}"
+        folder.mkdir(mode=0o700, exist_ok=True)
+        facts = folder.lstat()
+    except OSError:
+        return None
+    own = user is None or (facts.st_uid == user and not facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
+    return str(folder) if own and stat.S_ISDIR(facts.st_mode) and _can_be_written(folder) else None
+
+
+@cache
+def _warn_once() -> None:
+    warnings.warn(NO_CACHE, stacklevel=2)
