@@ -1,10 +1,8 @@
 import errno
-import importlib.util
 import os
 import signal
 import subprocess
 import sys
-import types
 from pathlib import Path
 
 import numpy as np
@@ -12,26 +10,23 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
-from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate
 from sim.dataset.splits import split_of
 from sim.io.files import atomic
 from sim.io.source import open_source
 from sim.io.store.validate import validate
 from sim.workers.start import WorkerOptions
+from tests.fake_simulator import content, scenario
 
-FAKES = Path(__file__).resolve().parents[1] / "io" / "conftest.py"
 ROOT = Path(__file__).resolve().parents[3]
 
 # A program of its own: simulate is a fake, in its workers too; argument 1 the folder, 2 workers, 3 what goes wrong.
-PROGRAM = f"""
-import importlib.util, os, signal, sys, types
-spec = importlib.util.spec_from_file_location("fakes", {str(FAKES)!r})
-fakes = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(fakes)
+PROGRAM = """
+import os, signal, sys, types
+from tests import fake_simulator as fakes
 
 def simulate(scenario, seed, repeat, streams=()):
-    deaths = {{-2: 1, -3: 99}}.get(int(sys.argv[3]), 0)
+    deaths = {-2: 1, -3: 99}.get(int(sys.argv[3]), 0)
     if seed == 1 and repeat == 0 and deaths:
         with open(sys.argv[1] + "-deaths", "a") as told:
             print(os.getpid(), file=told)
@@ -63,37 +58,10 @@ if __name__ == "__main__":
             os.kill(os.getpid(), signal.SIGKILL)
 
     atomic.os.fsync = die
-    scenario = Scenario.model_validate({{"schema": 1, "group": [{{"id": "a", "start": [1, 1], "goal": [2, 2]}}]}})
+    scenario = Scenario.model_validate({"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}]})
     entries = [Entry("x", scenario, 0), Entry("y-1", scenario, 1)]
     generate(entries, range(3), out, workers=WorkerOptions(workers), progress=parent_dies, streams=())
 """
-
-
-def scenario(**more) -> Scenario:
-    return Scenario.model_validate({"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}], **more})
-
-
-@pytest.fixture
-def simulate(monkeypatch):
-    """A fake simulator; `wrong` maps seeds to what is raised."""
-    spec = importlib.util.spec_from_file_location("fakes", FAKES)
-    fakes = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(fakes)
-    module = types.SimpleNamespace(made=[], wrong={})
-
-    def run(scenario, seed, repeat, streams=()):
-        module.made.append(seed)
-        if seed in module.wrong:
-            raise module.wrong[seed]
-        return fakes.pictured(seed + 100 * repeat, streams) if streams else fakes.sequence(seed + 100 * repeat)
-
-    module.simulate = run
-    monkeypatch.setitem(sys.modules, "sim.sequence", module)
-    return module
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def run_program(tmp_path, out, workers, kill_after=0):
@@ -129,7 +97,7 @@ def test_complete_sequences_are_kept_and_others_redone(tmp_path, simulate):
     (tmp_path / "flockscope-train" / ".partial-x-s00002-0123456789ab").mkdir()
     (tmp_path / "seqmaps" / ".partial-flockscope-train.txt-0123456789ab").write_text("name")
     (tmp_path / ".partial-0123456789abcdef0123456789abcdef").write_text("")
-    simulate.made.clear()
+    simulate.asked.clear()
     generate([Entry("x", scenario())], range(3), tmp_path)
     assert simulate.made == [0, 1]
     assert content(tmp_path) == before
@@ -217,7 +185,7 @@ def test_a_disk_that_takes_no_more_ends_all_at_once(tmp_path, simulate, monkeypa
     generate([Entry("x", scenario())], range(3), tmp_path / "right")
     room = 1.5 * sum(len(body) for name, body in content(tmp_path / "right").items() if "x-s00000" in name)
     write = atomic.write_unsynced
-    simulate.made.clear()
+    simulate.asked.clear()
 
     def write_while_there_is_room(path, body):
         nonlocal room

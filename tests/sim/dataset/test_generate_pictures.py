@@ -1,36 +1,31 @@
 """Datasets with pictures: the same bytes however they are made, also after a kill in the middle of them."""
 
-import importlib.util
 import json
 import os
 import signal
 import subprocess
 import sys
-import types
 from pathlib import Path
 
 import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
-from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate
 from sim.io.files import atomic
 from sim.io.source import open_source
 from sim.io.store.validate import validate
+from tests.fake_simulator import content, scenario
 
-FAKES = Path(__file__).resolve().parents[1] / "io" / "conftest.py"
 ROOT = Path(__file__).resolve().parents[3]
 STREAMS = ("left", "right", "disparity", "ids")
 
 # A program of its own: simulate is a fake, in its workers too. Arguments: folder, workers, images, and before which
 # frame that is drawn it is killed, 0 = none.
 PROGRAM = f"""
-import importlib.util, os, signal, sys, types
+import os, signal, sys, types
 from dataclasses import replace
-spec = importlib.util.spec_from_file_location("fakes", {str(FAKES)!r})
-fakes = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(fakes)
+from tests import fake_simulator as fakes
 kill_after = int(sys.argv[4]) if len(sys.argv) > 4 else 0
 count = 0
 
@@ -69,30 +64,6 @@ def run(tmp_path, out, workers, images, kill_after=0):
         [sys.executable, str(program), str(out), str(workers), images, str(kill_after)],
         env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, timeout=120, check=False,
     )  # fmt: skip
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
-
-
-def scenario(**more) -> Scenario:
-    return Scenario.model_validate({"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}], **more})
-
-
-@pytest.fixture
-def simulate(monkeypatch):
-    spec = importlib.util.spec_from_file_location("fakes", FAKES)
-    fakes = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(fakes)
-    module = types.SimpleNamespace(asked=[])
-
-    def made(scenario, seed, repeat, streams=()):
-        module.asked.append((seed, streams))
-        return fakes.pictured(seed + 100 * repeat, streams)
-
-    module.simulate = made
-    monkeypatch.setitem(sys.modules, "sim.sequence", module)
-    return module
 
 
 @pytest.mark.slow

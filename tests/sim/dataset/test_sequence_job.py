@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import sys
-import types
 from pathlib import Path
 from typing import Any
 
@@ -13,36 +11,21 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
-from scenarios.schema.scenario import Scenario
 from sim.dataset import sequence_job as jobs
 from sim.dataset.sequence_job import JobOutcome, SequenceJob, is_stored, lost_job, run_job, stored_manifest
 from sim.io.files import atomic
-
-FAKES = Path(__file__).resolve().parents[1] / "io" / "conftest.py"
+from tests.fake_simulator import FakeSimulator, scenario
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Seeds that a fake simulator has made."""
-    spec = importlib.util.spec_from_file_location("fakes", FAKES)
-    assert spec is not None
-    assert spec.loader is not None
-    fakes = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(fakes)
-    seeds: list[int] = []
-
-    def simulate(scenario: Scenario, seed: int, repeat: int, streams: tuple[str, ...]) -> Any:
-        seeds.append(seed)
-        return fakes.sequence(seed)
-
-    monkeypatch.setitem(sys.modules, "sim.sequence", types.SimpleNamespace(simulate=simulate))
-    return seeds
+def made(simulate: FakeSimulator) -> FakeSimulator:
+    """A fake simulator; `made.made` are the seeds that it has made."""
+    return simulate
 
 
 @pytest.fixture
 def job(tmp_path: Path) -> SequenceJob:
-    text = {"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}]}
-    return SequenceJob(tmp_path / "flockscope-train" / "x-s00001", Entry("x", Scenario.model_validate(text)), 1)
+    return SequenceJob(tmp_path / "flockscope-train" / "x-s00001", Entry("x", scenario()), 1)
 
 
 def content(job: SequenceJob) -> dict[str, tuple[bytes, int]]:
@@ -50,17 +33,17 @@ def content(job: SequenceJob) -> dict[str, tuple[bytes, int]]:
     return {p.relative_to(job.folder.parent).as_posix(): (p.read_bytes(), p.stat().st_ino) for p in files}
 
 
-def test_what_is_whole_is_left_alone(job: SequenceJob, made: list[int]) -> None:
+def test_what_is_whole_is_left_alone(job: SequenceJob, made: FakeSimulator) -> None:
     assert stored_manifest(job) is None
     assert run_job(job) == JobOutcome()
     before = content(job)
     assert is_stored(job)
     assert run_job(job) == JobOutcome()
-    assert made == [1]
+    assert made.made == [1]
     assert content(job) == before
 
 
-def test_what_is_altered_is_begun_but_not_done(job: SequenceJob, made: list[int]) -> None:
+def test_what_is_altered_is_begun_but_not_done(job: SequenceJob, made: FakeSimulator) -> None:
     run_job(job)
     before = {name: body for name, (body, _) in content(job).items()}
     (job.folder / "gt/gt.txt").write_text("")
@@ -72,7 +55,7 @@ def test_what_is_altered_is_begun_but_not_done(job: SequenceJob, made: list[int]
 
 @pytest.mark.parametrize("late", [False, True])
 def test_of_two_who_make_it_at_once_the_first_counts(
-    job: SequenceJob, made: list[int], monkeypatch: pytest.MonkeyPatch, late: bool
+    job: SequenceJob, made: FakeSimulator, monkeypatch: pytest.MonkeyPatch, late: bool
 ) -> None:
     """A worker that was thought dead ends first: before ours looks, or between looking and renaming."""
     real, name = (os.rename, "rename") if late else (atomic._sync_tree, "_sync_tree")
@@ -86,14 +69,14 @@ def test_of_two_who_make_it_at_once_the_first_counts(
     others: dict[str, tuple[bytes, int]] = {}
     monkeypatch.setattr(os if late else atomic, name, first_the_other)
     assert run_job(job) == JobOutcome()
-    assert made == [1, 1]
+    assert made.made == [1, 1]
     whole = {k: v for k, v in others.items() if not k.startswith(atomic.PARTIAL)}
     assert content(job) == whole
     assert len(others) == 2 * len(whole)
 
 
 def test_who_does_not_see_the_mark_writes_nothing(
-    job: SequenceJob, made: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: SequenceJob, made: FakeSimulator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(jobs, "MARKER_TIMEOUT", 0.0)
     elsewhere = SequenceJob(job.folder, job.entry, job.seed, marker=tmp_path / "mark")
@@ -107,7 +90,7 @@ def test_who_does_not_see_the_mark_writes_nothing(
 
 
 def test_a_machine_that_cannot_write_is_named(
-    job: SequenceJob, made: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: SequenceJob, made: FakeSimulator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(path: Path, body: bytes) -> None:
         raise PermissionError(13, "Permission denied")
@@ -122,7 +105,7 @@ def test_a_machine_that_cannot_write_is_named(
 
 @pytest.mark.parametrize("error", [KeyError("k"), WorkError(got="a", expected="b", remedy="c")])
 def test_an_error_of_one_is_not_that_of_all(
-    job: SequenceJob, monkeypatch: pytest.MonkeyPatch, made: list[int], error: Exception
+    job: SequenceJob, monkeypatch: pytest.MonkeyPatch, made: FakeSimulator, error: Exception
 ) -> None:
     def simulate(*_: object) -> None:
         raise error
@@ -141,7 +124,7 @@ def test_given_up(job: SequenceJob) -> None:
 
 
 @pytest.mark.parametrize("harm", ["nothing", "a file is altered", "no manifest"])
-def test_files_of_others_stay(job: SequenceJob, made: list[int], harm: str) -> None:
+def test_files_of_others_stay(job: SequenceJob, made: FakeSimulator, harm: str) -> None:
     """Notes in a folder of ours stay with it; a folder that would have to be replaced is refused for them."""
     run_job(job)
     notes = job.folder / "gt" / "notes.txt"
@@ -162,7 +145,7 @@ def test_files_of_others_stay(job: SequenceJob, made: list[int], harm: str) -> N
 
 
 @pytest.mark.parametrize("name", ["", "thesis.tex", "a/b/thesis.tex"])
-def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: list[int], name: str) -> None:
+def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: FakeSimulator, name: str) -> None:
     """Before: a folder or file with the name of the sequence was deleted. name: "" for a file."""
     mine = job.folder / name
     mine.parent.mkdir(parents=True)
@@ -170,10 +153,10 @@ def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: l
     with pytest.raises(InputError, match="something that flockscope did not write"):
         stored_manifest(job)
     assert isinstance(run_job(job).error, InputError)
-    assert (mine.read_text(), made) == ("mine", [])
+    assert (mine.read_text(), made.made) == ("mine", [])
 
 
-def test_an_empty_folder_is_a_place(job: SequenceJob, made: list[int]) -> None:
+def test_an_empty_folder_is_a_place(job: SequenceJob, made: FakeSimulator) -> None:
     job.folder.mkdir(parents=True)
     assert run_job(job) == JobOutcome()
 
@@ -188,11 +171,10 @@ def test_an_empty_folder_is_a_place(job: SequenceJob, made: list[int]) -> None:
     ],
 )  # fmt: skip
 def test_what_differs_is_named(
-    job: SequenceJob, made: list[int], more: dict[str, Any], change: dict[str, Any], words: str
+    job: SequenceJob, made: FakeSimulator, more: dict[str, Any], change: dict[str, Any], words: str
 ) -> None:
     run_job(job)
-    text = {"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}], **more}
-    other = SequenceJob(job.folder, Entry("x", Scenario.model_validate(text)), 1, **change)
+    other = SequenceJob(job.folder, Entry("x", scenario(**more)), 1, **change)
     with pytest.raises(InputError) as refused:
         stored_manifest(other)
     assert f"another sequence (stored → asked for: {words}" in refused.value.got
