@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenarios.errors import InputError
 from scenarios.printable import counted
+from sim.io.files.own_files import refuse_foreign_file
 from sim.types import Tracker
 from tracking.keyword_options import documented, from_keywords
 from tracking.tuning.comparison import Candidate, TrialRecord, pareto_front
@@ -83,10 +84,15 @@ def _check_optuna() -> None:
 
 
 def _checked_target(out: Path) -> Path:
-    """Returns `out`, the file for the result. Raises InputError if its name does not end in .toml or it is a folder."""
+    """Returns `out`, the file for the result.
+
+    Raises InputError if its name does not end in .toml or it is a folder, or if the file of all figures beside it
+    (.json) is not ours.
+    """
     if out.suffix != ".toml" or out.is_dir():
         remedy = "choose a name that ends in .toml"
         raise InputError(file=out, place="--out", got=out.name, expected="a file, *.toml", remedy=remedy)
+    refuse_foreign_file(out.with_suffix(".json"), '"settings"', '"counts"')
     return out
 
 

@@ -23,6 +23,7 @@ from sim.io.export.webdataset_samples import Member, SequenceItem, read_item, ta
 from sim.io.files import tables
 from sim.io.files.atomic import new_file, remove_partials, write_file
 from sim.io.files.lock import lock_folder
+from sim.io.files.own_files import refuse_foreign_file
 from sim.io.source import sequence_folders
 
 SAMPLES = ("sequence", "frame")
@@ -137,9 +138,12 @@ def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
 
     plan: the facts of each shard to write. A shard-*.tar is of another export if the plan does not name it or its .json
     contradicts the plan. A tar without .json is accepted, as an interrupted run leaves it. Also raises InputError if a
-    .json is unreadable or no JSON object.
+    .json is unreadable or no JSON object, or if a file of others has the name of one that will be written.
     """
     wanted = {facts["name"]: facts for facts in plan}
+    refuse_foreign_file(root / INDEX, '"content_hash"', '"shards"')
+    for name in wanted:
+        refuse_foreign_file((root / name).with_suffix(".json"), '"manifests"', '"sequences"')
     for path in sorted(root.glob("shard-*.tar")):
         beside = path.with_suffix(".json")
         facts = wanted.get(path.name)

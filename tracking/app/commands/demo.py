@@ -40,16 +40,17 @@ def demo(out: Path, *, quick: bool) -> CommandResult:
     its pictures. The result's data: "sequences" (number, without the rendered one), "scores" (mean scores with
     intervals, by tracker and input) and "page", the path of the page to open.
 
-    Raises InputError if `out` is a file, cannot be written or holds sequences of other scenarios; WorkError if the disk
-    is full.
+    Raises InputError if `out` is a file, cannot be written or holds sequences of other scenarios or files of others
+    that would be replaced; WorkError if the disk is full.
     """
     from sim.dataset.generate import generate
     from sim.io.files.atomic import write_file
+    from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
     from sim.workers.start import WorkerOptions
 
     start = time.monotonic()
-    option_parsing.output_folder(out)
+    refuse_foreign_file(option_parsing.output_folder(out) / "index.html", "<title>flockscope demo</title>")
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     with ProgressMeter("generate") as meter:
         workers = WorkerOptions(1 if quick else os.cpu_count() or 1)

@@ -1,0 +1,60 @@
+"""No command replaces a file or folder that it did not write, unless the user names that very file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tracking.app.cli import run
+
+ROOT = Path(__file__).resolve().parents[3]
+SCENE = """
+schema = 1
+duration = 2.0
+warmup = 0.0
+camera = { fps = 5 }
+group = [{ id = "a", size = 2, start = [4, 4], goal = [12, 4] }]
+"""
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("foreign")
+    (folder / "scene.toml").write_text(SCENE)
+    line = ["generate", str(folder / "scene.toml"), "--seeds", "20000", "--streams", "none"]
+    assert run([*line, "--out", str(folder / "data")]) == 0
+    return folder
+
+
+COMMANDS = {
+    "generate": ("generate {0}/scene.toml --seeds 0 --streams none --out {1}", "flockscope-train/scene-s00000/mine"),
+    "generate, a file": ("generate {0}/scene.toml --seeds 0 --streams none --out {1}", "flockscope-train/scene-s00000"),
+    "replay": ("replay {0}/data --streams none --out {1}", "flockscope-test/scene-s20000-s20000/mine"),
+    "track": ("track blob {0}/data/flockscope-test/scene-s20000 --out {1}", "groups.csv"),
+    "export webdataset": ("export webdataset {0}/data --out {1}", "index.json"),
+    "export webdataset, a shard": ("export webdataset {0}/data --out {1}", "shard-000000.json"),
+    "tune": ("tune {2}/tests/toy_tracker.py:Toy --suite {0}/scene.toml --check none --trials 1 --out {1}/toy.toml",
+             "toy.json"),
+    "demo": ("demo --quick --out {1}", "index.html"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_file_of_others_stays(name: str, data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line, place = COMMANDS[name]
+    mine = tmp_path / "out" / place
+    mine.parent.mkdir(parents=True)
+    mine.write_text('{"mine": 1}')
+    assert run([word.format(data, tmp_path / "out", ROOT) for word in line.split()]) == 2
+    shown = capsys.readouterr().err
+    assert shown.count("\n") == 1
+    assert str(mine.parent) in shown or str(mine) in shown
+    assert mine.read_text() == '{"mine": 1}'
+    assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [mine]
+
+
+@pytest.mark.parametrize("name", ["generate", "export webdataset", "track"])
+def test_own_files_are_replaced(name: str, data: Path, tmp_path: Path) -> None:
+    line = [word.format(data, tmp_path / "out", ROOT) for word in COMMANDS[name][0].split()]
+    assert run(line) == run(line) == 0
