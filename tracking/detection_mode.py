@@ -43,16 +43,13 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
     if requested in able or (requested is None and able):
         return requested or able[0]  # type: ignore[return-value]
     remedy = f"try --detections {able[0]}" if able else "take another tracker or source"
-    missing = _missing(requested, needs)
-    if missing:
-        got = f"{sequence.name} without {missing}; it has {_contents(sequence)}"
-        raise InputError(
-            place=f"--detections {requested}", got=got, expected=f"a sequence with {missing}",
-            remedy=f"{remedy}, or give a source with {missing}",
-        )  # fmt: skip
     got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {_contents(sequence)}"
-    expected = f"--detections {requested}" if requested else "detections of some kind"
-    raise InputError(place="--detections", got=got, expected=f"what {expected} needs", remedy=remedy)
+    expected = "what detections of some kind need"
+    if requested:
+        missing = _missing(requested, needs)
+        expected = f"a sequence with {missing}" if missing else f"what --detections {requested} needs"
+        got += f", without {missing}" if missing else ""
+    raise InputError(place=f"--detections {requested or ''}".rstrip(), got=got, expected=expected, remedy=remedy)
 
 
 def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
@@ -62,13 +59,13 @@ def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
     return bool(takes) and (sequence.has_detections if mode == "file" else sequence.load_truth is not None)
 
 
-def _missing(mode: DetectionMode | None, needs: tuple[str, ...]) -> str:
+def _missing(mode: DetectionMode, needs: tuple[str, ...]) -> str:
     """Returns what a sequence lacks on which a tracker with these needs cannot work in the mode; "" if the tracker
-    itself cannot work in the mode, or for None."""
+    itself cannot work in the mode."""
     if mode == "image":
         return "pictures" if "pixels" in needs else "right pictures" if "stereo" in needs else ""
     takes = not {"boxes", "points"}.isdisjoint(needs)
-    return {"file": "stored detections", "truth": "labels"}.get(mode or "", "") if takes else ""
+    return {"file": "stored detections", "truth": "labels"}[mode] if takes else ""
 
 
 def _contents(sequence: Sequence) -> str:

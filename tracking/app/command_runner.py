@@ -115,17 +115,14 @@ def _usage(error: Any) -> InputError:
     error: the usage exception of typer or click, with its message.
     """
     where = "flockscope" if error.ctx is None else error.ctx.command_path
-    remedy = f"see {where} --help"
-    if type(error).__name__ == "MissingParameter" and error.param is not None:
-        option = error.param.param_type_name == "option"
-        value = error.param.metavar or error.param.human_readable_name.upper()
-        name, expected = (error.param.opts[0], f"{error.param.opts[0]} {value}") if option else (value, value)
-        if error.param.help:
-            expected += f": {error.param.help.rstrip('.')}"
-        return InputError(place=where, got=f"no {name}", expected=expected, remedy=f"add it; {remedy}")
     message = error.format_message().rstrip(".").removeprefix("Got ")
-    got = message[:1].lower() + message[1:]
-    return InputError(place=where, got=got, expected="a command line as in the help", remedy=remedy)
+    got, expected, remedy = message[:1].lower() + message[1:], "a command line as in the help", f"see {where} --help"
+    if type(error).__name__ == "MissingParameter" and error.param is not None:
+        value = error.param.metavar or error.param.name.upper()
+        expected = f"{error.param.opts[0]} {value}" if error.param.param_type_name == "option" else value
+        expected += f": {error.param.help.rstrip('.')}" if error.param.help else ""
+        remedy = f"add it; {remedy}"
+    return InputError(place=where, got=got, expected=expected, remedy=remedy)
 
 
 def _print(result: CommandResult, as_json: bool) -> int:

@@ -40,13 +40,14 @@ MISTAKES = {
     "view {0}/run {0}/data --out {0}/x": ("{0}/run: got tracks, what", "swap the arguments"),
     "score {0}/data {0}/scene.toml": ("{0}/scene.toml: got a .toml file, no tracks;", "made by `flockscope track`"),
     "track blob {0}/data --detections image --out {0}/x": (
-        "--detections image: got scene-s00000 without pictures; it has detections, truth;", "try --detections file",
+        "and scene-s00000 with detections, truth, without pictures; expected a sequence with pictures;",
+        "try --detections file",
     ),
     "track blob {0}/data --camera {0}/scene.toml --out {0}/x": (
         "{0}/scene.toml: --camera: got a TOML file; expected a camera.json", "describes a view",
     ),
-    "generate crossing --seeds 0": ("flockscope generate: got no --out; expected --out ",),
-    "track blob": ("flockscope track: got no SOURCE; expected SOURCE: ",),
+    "generate crossing --seeds 0": ("flockscope generate: got missing option '--out'; expected --out DIR: ",),
+    "track blob": ("flockscope track: got missing argument 'SOURCE'; expected SOURCE: ",),
     "score a b c": ("flockscope score: got unexpected extra argument",),
 }  # fmt: skip
 

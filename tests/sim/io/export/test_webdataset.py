@@ -141,7 +141,7 @@ def test_what_is_whole_is_kept_and_the_rest_made_anew(data: Path, tmp_path: Path
     (out / "shard-000001.json").unlink()
     shard = out / "shard-000002.tar"
     shard.write_bytes(shard.read_bytes()[:-1])
-    (out / f"{atomic.PARTIAL}x").write_text("")
+    (out / f"{atomic.PARTIAL}x-0123456789ab").write_text("")
     kept = (out / "shard-000000.tar").stat().st_ino
     seen = []
     webdataset(data, out, shard_size=1, progress=lambda *a: seen.append(a))
