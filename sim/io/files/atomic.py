@@ -94,13 +94,13 @@ def move_synced(partial: Path, target: Path) -> None:
 
 
 @contextmanager
-def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterator[Path]:
+def new_folder(target: Path, keep: Callable[[], bool]) -> Iterator[Path]:
     """Give an empty temporary folder for the block to fill; it becomes the folder `target` when the block ends.
 
     An existing target is deleted first, unless `keep()` returns True: then the target stays and the new folder is
-    dropped. By default nothing is kept. `keep` serves two writers of the same sequence, of which the first one wins. If
-    the block ends with an exception, the new folder is deleted and the target stays. An OSError is raised as WorkError
-    if the disk is full, else as InputError.
+    dropped. `keep` serves two writers of the same sequence, of which the first one wins; and it raises for a target
+    that must not be deleted. If the block ends with an exception, the new folder is deleted and the target stays. An
+    OSError is raised as WorkError if the disk is full, else as InputError.
     """
     with staged_path(target) as partial:
         partial.mkdir()
@@ -116,17 +116,6 @@ def new_folder(target: Path, keep: Callable[[], bool] = lambda: False) -> Iterat
             if not keep():
                 raise
         _sync_folder(target.parent)
-
-
-def write_folder(target: Path, files: Mapping[str, bytes]) -> None:
-    """Write a folder of files, complete or not at all; an existing `target` is deleted with all that it holds.
-
-    files: content by name relative to the folder; a name may have subfolders. No files give an empty folder. Raises
-    WorkError if the disk is full, InputError if the folder cannot be written.
-    """
-    with new_folder(target) as partial:
-        for name, content in files.items():
-            write_unsynced(partial / name, content)
 
 
 def write_unsynced(path: Path, content: bytes) -> None:
