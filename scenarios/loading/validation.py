@@ -139,7 +139,7 @@ def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> t
     kind, message = error["type"], str(error["msg"])
     if kind == "extra_forbidden":
         known = known_keys(path[:-1], table, model)
-        return f"unknown key {str(path[-1])!r}", "a known key", did_you_mean(str(path[-1]), known)
+        return f"unknown key {_cut(str(path[-1]))!r}", "a known key", did_you_mean(str(path[-1]), known)
     got = _show(error["input"])
     if kind == "missing" and isinstance(path[-1], int):
         return got, f"at least {path[-1] + 1} numbers", "correct the list"
@@ -200,7 +200,7 @@ def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
     for n in range(len(path), 0, -1):
         if path[:n] in places:
             return place_of(places[path[:n]])
-    return key_text(path, table)
+    return _cut(key_text(path, table))
 
 
 def key_text(path: KeyPath, table: Table) -> str:

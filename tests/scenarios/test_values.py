@@ -73,3 +73,10 @@ def test_unknown_keys_of_distributions(tmp_path, events):
     path.write_text(f"schema = 1\n{events}\ngroup = [{{ id = 5, when = {{ tme = 3 }} }}]\n")
     with pytest.raises(InputError):
         load(path)
+
+
+@pytest.mark.parametrize("text", ['{}{"a":' * 3 + "x" * 20_000, "group.a." + "y" * 20_000 + "=3", "a=" + "[" * 20_000])
+def test_long_settings_make_short_errors(text):
+    with pytest.raises(InputError) as error:
+        load("merge", set=[text])
+    assert len(error.value.place) < 200
