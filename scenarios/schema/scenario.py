@@ -197,8 +197,8 @@ class SplitPart(Model):
 class MergeOrder(Model):
     """An order: the groups named in `groups` (two or more) become the new group `into`. when: its trigger.
 
-    id: of the order. type: "merge". The new group walks past the points `via` to `goal` (m), and there stands, leaves
-    or walks on (at_goal). Goal "meet": it stands in conversation where the groups meet."""
+    id: of the order. type: "merge". `into` walks past the points `via` to `goal` (m), and there does what `at_goal`
+    says: "stand", "leave", "walk". Goal "meet" ignores both: it stands in conversation where they meet."""
 
     id: Name = Field(description="name of the order")
     type: Literal["merge"] = Field(description="several groups become one")

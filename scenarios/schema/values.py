@@ -118,9 +118,9 @@ class Distribution(BaseModel):
         return self.choice[int(rng.integers(len(self.choice)))]
 
     def draw(self, rng: np.random.Generator) -> float:
-        """Returns one value from rng within `clip`, bounds included; draws outside are drawn again.
+        """Returns one value of this distribution from rng. With `clip`, values outside its bounds are drawn again.
 
-        At least 1 of 100 draws lies within a clip, so that this ends.
+        A clip that keeps less than 1 % of the draws was refused when the distribution was made, so this ends.
         """
         while True:
             value = self._draw(rng)

@@ -183,7 +183,7 @@ class GroupState:
         return walking_speed(list(self.free_speed[columns]), self.slowdown)
 
     def take_places(self, columns: list[int], places: Array, middle: Array, g: int, pos: Array) -> None:
-        """Gives each of the people in these n columns one of the places of group index g.
+        """Gives each of the people in these n columns one of the places of group index g, in `places` of this object.
 
         The sum of the squared distances that they have to walk is least. places (n, 2): forward, left of the group's
         middle, m. middle (2,), pos (n, 2): the group's middle and the people's positions in the world, m, in the order

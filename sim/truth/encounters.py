@@ -206,7 +206,8 @@ def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
     (count,).
 
     Left is as seen along path a. An encounter is a stretch in which two groups are near each other. a, b (R, 2): points
-    of both paths in m, encounter after encounter; points with nan are left out. encounter (R,): number of each row's
+    of both paths in m, encounter after encounter; points with nan are left out, of each
+    path for itself. encounter (R,): number of each row's
     encounter, from 0, ascending. An encounter without points gives 0. The two need not be at the crossing at the same
     time.
 

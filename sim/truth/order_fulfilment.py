@@ -85,9 +85,10 @@ def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
     """Returns the index in `truth.events` of the first event that fulfils an order, None if no event does.
 
     group (T, P): group ids, -1 = alone, -2 = absent. The event has the right kind (merge or form, split or dissolve,
-    queue) and people. It starts no earlier than the order fired, and early enough that its rule (2 s; queues 3 s) has
-    held within PATIENCE (10 s) of the firing. An order that never fired is not fulfilled; nor is any order if the truth
-    has no events.
+    queue) and one of the order's people. They are together (parted) in its first frame and not in the frame before; a
+    queue holds 3 of them. It starts no earlier than the order fired, and early enough that its rule (2 s; queues 3 s)
+    has held within PATIENCE (10 s) of the firing. An order that never fired is not fulfilled; nor is any order if the
+    truth has no events.
     """
     if order.fired is None:
         return None

@@ -174,10 +174,10 @@ def _emitted(tracks: SequenceOf[Tracks]) -> tuple[tuple[int, GroupEvent], ...]:
 def _marks_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> FrameMarks:
     """Returns the marks in px of one frame's tracks `t`, over a picture.
 
-    Trails follow the middle of a box's lower edge; without a box the position of tracks in the image plane, else nan.
-    Tracks on the ground without boxes get boxes of upright people through `camera`, nan if it is None. scene: gives the
-    ground's height; None: 0. Groups of people are those of `t.group`, drawn round two or more boxes. Rows that are
-    groups have no boxes and ellipses."""
+    Trails follow the middle of a box's lower edge; without a box the position of tracks in the image plane, else
+    nan. Tracks on the ground without boxes get boxes of upright people through `camera`, nan if it is None. scene:
+    gives the ground's height; None: 0. Groups of people are those of `t.group`, drawn round two or more boxes. Rows
+    that are groups get neither boxes nor ellipses."""
     if t.unit == "group":
         return _whole_groups_in_picture(t, camera, scene)
     n = len(t.id)

@@ -1,4 +1,4 @@
-"""Fast overlaps of group hulls: candidate pairs of an IoU of 0.5 or more, and the number of people inside each hull.
+"""Fast overlaps of group hulls: candidate pairs of an IoU of 0.5 or more, and the people inside each hull.
 
 Compiled kernels are exact up to rounding. Whenever rounding could change the outcome, the value is recomputed by the
 functions of tracking.scoring: where a hull has several partners, where an IoU is within `NEAR` of 0.5, where a person

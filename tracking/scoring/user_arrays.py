@@ -69,12 +69,12 @@ def score_arrays(
 
 
 def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
-    """Returns a dict of all columns (frame, id, pos, box, group) as arrays, rows sorted by frame, then id; a missing
-    column is None.
+    """Returns a dict of all columns (frame, id, pos, box, group) as arrays, rows sorted by frame, then id; an optional
+    column that is missing is None.
 
-    columns: as given by the user. side ("truth" or "tracks") begins the error messages. Raises ValueError if a column
-    is unknown, missing or invalid, if frame, id, or both pos and box are missing, if the columns differ in length, or
-    if a frame is below 1.
+    columns: as given by the user. side ("truth" or "tracks") begins the error messages. Raises ValueError if a
+    column is unknown or invalid, if frame or id is missing, or both pos and box, if the columns differ in length,
+    or if a frame is below 1.
     """
     for name in columns:
         if name not in COLUMNS:

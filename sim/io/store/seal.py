@@ -22,7 +22,8 @@ def file_facts(files: Mapping[str, bytes]) -> dict[str, dict[str, Any]]:
 
 
 def check_facts(path: Path, files: Any, remedy: str) -> None:
-    """Raise InputError if `files`, the entry of the seal `path`, is not what `file_facts` returns.
+    """Raise InputError if `files`, the entry of the seal `path`, has not the form of what
+    `file_facts` returns: "sha256" and "bytes" by name. Whether the files exist and match is not checked.
 
     Every name must lead to a file inside the seal's folder. remedy: for the error.
     """
