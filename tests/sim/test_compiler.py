@@ -84,9 +84,9 @@ def test_a_command_in_a_container(package, tmp_path):
         package, [*program, "generate", "merge", "--seeds", "0", "--set", "camera.fps=5", "--streams", "none",
         "--out", out], **env,
     )  # fmt: skip
-    assert (made.returncode, made.stderr) == (0, "")
+    assert (made.returncode, "warning" in made.stderr) == (0, False), made.stderr
     tracked = _run(package, [*program, "track", "blob", out, "--out", str(tmp_path / "run")], **env)
-    assert (tracked.returncode, tracked.stderr) == (0, "")
+    assert (tracked.returncode, "warning" in tracked.stderr) == (0, False), tracked.stderr
 
 
 def test_a_home_that_is_no_path_is_none(tmp_path, monkeypatch):
