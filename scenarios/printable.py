@@ -17,7 +17,7 @@ def printable(text: str, keep: str = "") -> str:
     """
     if text.isprintable():
         return text
-    return "".join(_escape(c) if is_control(c) and c not in keep else c for c in text)
+    return "".join([c if c.isprintable() or c in keep or not is_control(c) else _escape(c) for c in text])
 
 
 def is_control(character: str) -> bool:

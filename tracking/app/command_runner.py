@@ -44,18 +44,26 @@ def run_command(app: typer.Typer, arguments: list[str]) -> int:
     as_json = "--json" in arguments
     if as_json and not HELP.isdisjoint(arguments):  # some levels of the command line know --help but not --json
         arguments = [argument for argument in arguments if argument != "--json"]
-    with warnings.catch_warnings(), recorded_interrupts():
-        warnings.simplefilter("always", UserWarning)
-        try:
+    code = None
+    try:
+        with warnings.catch_warnings(), recorded_interrupts():
+            warnings.simplefilter("always", UserWarning)
             warnings.showwarning = _print_warnings_once()
-            result = _run_quietly(app, arguments) if as_json else _run(app, arguments)
-            return _print(result, as_json) if isinstance(result, CommandResult) else result
-        except KeyboardInterrupt:
-            return print_interrupted(as_json)
-        except FlockscopeError as error:
-            if error.__cause__ is not None and os.environ.get(DEBUG):
-                raise
-            return print_error(error, as_json)
+            code = _run_and_print(app, arguments, as_json)
+    except KeyboardInterrupt:
+        return print_interrupted(as_json) if code is None else code
+    return code
+
+
+def _run_and_print(app: typer.Typer, arguments: list[str], as_json: bool) -> int:
+    """Runs the command, prints its result or error, and returns its exit code; Ctrl-C passes as KeyboardInterrupt."""
+    try:
+        result = _run_quietly(app, arguments) if as_json else _run(app, arguments)
+        return _print(result, as_json) if isinstance(result, CommandResult) else result
+    except FlockscopeError as error:
+        if error.__cause__ is not None and os.environ.get(DEBUG):
+            raise
+        return print_error(error, as_json)
 
 
 def _run_quietly(app: typer.Typer, arguments: list[str]) -> CommandResult | int:

@@ -74,7 +74,8 @@ class StoredPictures:
 
         name = streams.file_name(stream, self.images, index)
         mode = cv2.IMREAD_UNCHANGED if stream in streams.EXACT else cv2.IMREAD_COLOR
-        picture = cv2.imdecode(np.frombuffer(self.body(name), np.uint8), mode)
+        body = self.body(name)
+        picture = cv2.imdecode(np.frombuffer(body, np.uint8), mode) if body else None  # OpenCV refuses no bytes
         if picture is None or picture.dtype != (np.uint16 if stream in streams.EXACT else np.uint8):
             raise InputError(file=self.folder / name, got="no readable picture", expected="a picture", remedy=REDO)
         return require_size(picture, self.size, self.folder / name)

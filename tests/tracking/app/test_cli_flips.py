@@ -342,6 +342,7 @@ def accepted(name: str, **values: object) -> bool:
     return True
 
 
+@pytest.mark.filterwarnings("ignore:.*velocity in")
 @pytest.mark.parametrize(("name", "parameter"), trackers())
 def test_a_parameter_changes_what_a_tracker_says(name, parameter):
     spec = tracker_registry.find(name).config_class.params()[parameter]
@@ -396,7 +397,7 @@ FILM = "track blob {0}/seen/flockscope-demo/scene-s40000/left.mp4 --px-per-m 12 
 MOT = "track " + FAKE + " {0}/mot --out {1}"
 
 VIEW = "view {0}/seen/flockscope-demo/scene-s40000 --out {1}/page.html"
-DRAWN = "overlay {0}/seen/flockscope-demo/scene-s40000 {0}/tracks/scene-s40000 --out {1}/o.mp4"
+DRAWN = "overlay {0}/seen/flockscope-demo/scene-s40000 {0}/pair.txt --out {1}/o.mp4"
 OVERLAY = "overlay {0}/seen/flockscope-demo/scene-s40000/left.mp4 {0}/pair.txt --out {1}/o.mp4"
 BARE = "overlay {0}/seen/flockscope-demo/scene-s40000/left.mp4 {0}/bare.txt --out {1}/o.mp4"
 
