@@ -23,6 +23,8 @@ from typing import ClassVar
 from sim.types import Tracks
 from tracking.config import Config, param
 
+pytestmark = pytest.mark.slow  # processes that hang and are ended
+
 WAYS = ("well", "python", "compiled", "exit", "killed", "sys_exit", "interrupt", "reset", "writes")
 
 @dataclass(frozen=True)
