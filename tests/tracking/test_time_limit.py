@@ -15,6 +15,8 @@ from tracking.app.cli import run
 from tracking.run import track
 from tracking.time_limit import TimeLimited
 
+pytestmark = pytest.mark.slow  # processes that hang and are ended
+
 TRACKER = """
 import ctypes, os, re, signal, sys, time
 import numpy as np
@@ -22,8 +24,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 from sim.types import Tracks
 from tracking.config import Config, param
-
-pytestmark = pytest.mark.slow  # processes that hang and are ended
 
 WAYS = ("well", "python", "compiled", "exit", "killed", "sys_exit", "interrupt", "reset", "writes")
 
