@@ -114,7 +114,8 @@ def _rows_fault(tracks: Tracks) -> Fault | None:
     or None.
 
     For N tracks with D coordinates, 3 in plane "space", else 2: id and group (N,), pos and vel (N, D), cov (N, 2D, 2D),
-    score (N,), box (N, 4) if it is not None. All numbers must be finite, also velocities, covariances and boxes.
+    score (N,), box (N, 4) if it is not None. All numbers must be finite, except that
+    velocities may be nan (unknown).
     """
     if np.ndim(tracks.id) != 1:
         return f"id of shape {np.shape(tracks.id)}", "(N,)"

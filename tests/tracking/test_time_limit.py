@@ -149,7 +149,6 @@ def test_track_by_command(tmp_path, capsys, mine):
     assert run([*line[:-1], "0", "--out", str(tmp_path / "out")]) == 2
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("workers", ["1", "2"])
 def test_in_a_search_a_trial_that_hangs_is_impossible(tmp_path, capsys, mine, workers):
     line = ["tune", mine, "--only", "reach", "--suite", "merge", "--set", "scenario.camera.fps=2", "--trials", "3"]

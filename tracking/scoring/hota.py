@@ -20,6 +20,7 @@ from tracking.scoring.candidate_pairs import EPS, Pairs
 from tracking.scoring.matching import match_as_table
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
+LEAST = 1e-10  # keeps LocA at 1 where nothing is matched
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +96,7 @@ def curves(pairs: Pairs) -> dict[str, Array]:
         "DetPr": found / max(1, len(pairs.est)),
         "AssRe": mean_share(n),
         "AssPr": mean_share(m),
-        "LocA": np.maximum(1e-10, near) / np.maximum(1e-10, found),
+        "LocA": np.maximum(LEAST, near) / np.maximum(LEAST, found),
     }
 
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -63,18 +63,22 @@ def _renamed(scores: WeightedScores, names: dict[str, str] | None, end: str = ""
 def _pairwise(true: TrueGroups, tracked: TrackedGroups, size: int) -> WeightedScores:
     counts = pair_counts(true.groups, tracked.counted, tracked.person)
     sums = FrameSums(size)
-    for name, column in zip(("true", "est", "right"), counts.T, strict=True):
+    for name, column in zip(("true", "est", "hits"), counts.T, strict=True):
         sums.add(name, np.arange(len(counts)), column)
 
     def score(weights: Array) -> dict[str, Array]:
-        s = sums.of(weights)
-        return {
-            "pairwise_F1": ratio(2 * s["right"], s["true"] + s["est"]),
-            "pairwise_precision": ratio(s["right"], s["est"]),
-            "pairwise_recall": ratio(s["right"], s["true"]),
-        }
+        return {f"pairwise_{key}": values for key, values in _f1_and_parts(sums.of(weights)).items()}
 
     return score
+
+
+def _f1_and_parts(s: Mapping[str, Array]) -> dict[str, Array]:
+    """Returns F1, precision and recall, (D,) each, of weighted numbers (D,) of "hits" among "true" and "est" ones."""
+    return {
+        "F1": ratio(2 * s["hits"], s["true"] + s["est"]),
+        "precision": ratio(s["hits"], s["est"]),
+        "recall": ratio(s["hits"], s["true"]),
+    }
 
 
 def _detection(compared: GroupComparison, frames: Bools) -> WeightedScores:
@@ -87,12 +91,7 @@ def _detection(compared: GroupComparison, frames: Bools) -> WeightedScores:
     sums.add("hits", _kept(found.frame, frames))
 
     def score(weights: Array) -> dict[str, Array]:
-        s = sums.of(weights)
-        return {
-            "F1": ratio(2 * s["hits"], s["true"] + s["est"]),
-            "precision": ratio(s["hits"], s["est"]),
-            "recall": ratio(s["hits"], s["true"]),
-        }
+        return _f1_and_parts(sums.of(weights))
 
     return score
 

@@ -12,12 +12,11 @@ from tracking.scoring.candidate_pairs import FOUND, Pairs, point_pairs
 from tracking.scoring.clear import LOST, MOSTLY, clear_matches
 from tracking.scoring.gospa import POWER, gospa_parts
 from tracking.scoring.group_and_event_scores import ComparedSides
-from tracking.scoring.hota import ALPHAS, hota_matches
+from tracking.scoring.hota import ALPHAS, LEAST, hota_matches
 from tracking.scoring.matching import match
 from tracking.scoring.position_errors import REACH, compared_positions
 from tracking.scoring.weighted_sums import BinSums, FrameSums, WeightedScores, mean, ratio
 
-LEAST = 1e-10  # keeps LocA at 1 where nothing is matched, as in `hota.curves`
 CELLS = 2_000_000  # numbers of matches held at once
 
 

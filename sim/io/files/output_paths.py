@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from scenarios.errors import InputError
+from scenarios.printable import is_control
 
 LONGEST = 200  # bytes of a file name made from a label: 255 less temporary prefixes and our suffixes
 FORBIDDEN = frozenset('/\\:*?"<>|')  # by Windows, or on network drives
@@ -42,7 +43,7 @@ def file_name(label: str) -> str:
 
 
 def _is_forbidden(character: str) -> bool:
-    return character in FORBIDDEN or unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp")
+    return character in FORBIDDEN or is_control(character)
 
 
 def output_path(folder: str | Path, label: str, ending: str = "") -> Path:

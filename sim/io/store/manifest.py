@@ -70,9 +70,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     missing -= manifest.keys()
     if missing:
         raise InputError(file=path, got=f"no {', '.join(sorted(missing))}", expected="all keys", remedy=REDO)
-    if manifest["sha256"] != with_hash(manifest)["sha256"]:
-        raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=REDO)
-    seal.check_facts(path, manifest["files"], REDO)
+    seal.require_intact(path, manifest, REDO)
     return manifest
 
 

@@ -8,9 +8,8 @@ from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAME_RATES, FRAMES, PICTURE_SIDE
+from sim.io.store.manifest import REDO
 from sim.io.store.streams import IMAGES, STREAMS
-
-REDO = "run the same `flockscope generate` again"
 
 
 def _whole(low: int, high: int) -> Callable[[Any], bool]:

@@ -13,6 +13,7 @@ from typing import Any
 from scenarios.errors import InputError
 from sim.hashing import labels_hash
 from sim.io.files import tables
+from sim.io.files.own_files import has_marks
 from sim.io.store import seal
 from sim.types import Sequence
 
@@ -24,7 +25,6 @@ NAMES = ("tracks.txt", "tracks.mot.txt", TABLE, "groups.csv", "groups.parquet", 
 WHOLE = ("tracks.txt", TABLE)
 """Files that stand for the whole run if they are given alone; tracks.mot.txt is a text as other programs read it."""
 
-MEBIBYTE = 2**20  # longer than any run.json
 AGAIN = "track again"
 OLD = "track again; if the tracks are another program's, delete run.json"
 
@@ -37,10 +37,7 @@ def is_run(folder: Path) -> bool:
     if (folder / TABLE).is_file():
         return True
     path = folder / RUN
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        return b'"boxes"' in file.read(MEBIBYTE)
+    return path.is_file() and has_marks(path, '"boxes"')
 
 
 def run_folder(path: Path) -> Path | None:
@@ -83,10 +80,7 @@ def read_run(folder: Path) -> dict[str, Any]:
     if not isinstance(run.get("files"), dict) or "sha256" not in run:
         got, expected = "a run.json without hashes, of an older version", "one that names each file with its hash"
         raise InputError(file=path, got=got, expected=expected, remedy=OLD)
-    same_bytes = path.read_bytes() == tables.json_document(run)
-    if run["sha256"] != seal.with_hash(run)["sha256"] or not same_bytes:
-        raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=AGAIN)
-    seal.check_facts(path, run["files"], AGAIN)
+    seal.require_intact(path, run, AGAIN, exact=True)
     return run
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim import hashing
+from sim.io.files import tables
 
 
 def file_facts(files: Mapping[str, bytes]) -> dict[str, dict[str, Any]]:
@@ -44,6 +45,20 @@ def with_hash(document: dict[str, Any]) -> dict[str, Any]:
     """
     body = {key: value for key, value in document.items() if key != "sha256"}
     return {**body, "sha256": hashing.canonical_hash(body)}
+
+
+def require_intact(path: Path, document: dict[str, Any], remedy: str, *, exact: bool = False) -> None:
+    """Raise InputError if a seal was altered: its fields do not have the hash in its key sha256, or `check_facts`
+    refuses its key files.
+
+    path: of the seal's file; document: what was read from it, with both keys. exact: True also refuses a file whose
+    bytes are not those that we write for the document, down to the last blank. remedy: for the error.
+    """
+    if document["sha256"] != with_hash(document)["sha256"] or (
+        exact and path.read_bytes() != tables.json_document(document)
+    ):
+        raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=remedy)
+    check_facts(path, document["files"], remedy)
 
 
 def damaged_files(

@@ -22,8 +22,8 @@ from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.store import truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.event_files import read_script
-from sim.io.store.manifest import MANIFEST, damaged_files, identity, read_manifest, with_hash
-from sim.io.store.manifest_check import REDO, check_manifest
+from sim.io.store.manifest import MANIFEST, REDO, damaged_files, identity, read_manifest, with_hash
+from sim.io.store.manifest_check import check_manifest
 from sim.io.store.streams import check_streams, file_name
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
 from sim.versions import cpu_level, versions

@@ -6,24 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.short_scene import write_short_scene
 from tracking.app.cli import run
 
 ROOT = Path(__file__).resolve().parents[3]
-SCENE = """
-schema = 1
-duration = 2.0
-warmup = 0.0
-camera = { fps = 5 }
-group = [{ id = "a", size = 2, start = [4, 4], goal = [12, 4] }]
-"""
 
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("foreign")
-    (folder / "scene.toml").write_text(SCENE)
-    line = ["generate", str(folder / "scene.toml"), "--seeds", "20000", "--streams", "none"]
-    assert run([*line, "--out", str(folder / "data")]) == 0
+    write_short_scene(folder, "20000")
     return folder
 
 

@@ -6,24 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from tests.short_scene import write_short_scene
 from tracking.app.cli import run
-
-SCENE = """
-schema = 1
-duration = 2.0
-warmup = 0.0
-camera = { fps = 5 }
-group = [{ id = "a", size = 2, start = [4, 4], goal = [12, 4] }]
-"""
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A scene, a dataset of it with two sequences and without pictures, and a run on it."""
     folder = tmp_path_factory.mktemp("mistakes")
-    (folder / "scene.toml").write_text(SCENE)
-    line = ["generate", str(folder / "scene.toml"), "--seeds", "0:2", "--streams", "none"]
-    assert run([*line, "--out", str(folder / "data")]) == 0
+    write_short_scene(folder, "0:2")
     assert run(["track", "blob", str(folder / "data"), "--out", str(folder / "run")]) == 0
     return folder
 
