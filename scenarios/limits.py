@@ -6,6 +6,10 @@ an InputError. The bounds lie far above real recordings, so that a mistyped numb
 
 from __future__ import annotations
 
+import math
+from numbers import Real
+from typing import Any, TypeGuard
+
 TEXT_BYTES = 128 * 2**20
 """Bytes of a text file of rows."""
 JSON_BYTES = 64 * 2**20
@@ -39,3 +43,10 @@ DETECTIONS = 5000
 """Detections or people in one frame."""
 PEOPLE = 5000
 """People in one scenario."""
+
+
+def is_number(value: object, low: float = -math.inf, high: float = math.inf) -> TypeGuard[float]:
+    """Return True for a finite real number, of Python or numpy, from `low` to `high`, both included; False for a bool
+    and anything else."""
+    number: Any = value
+    return isinstance(value, Real) and not isinstance(value, bool) and low <= number <= high and abs(number) < math.inf

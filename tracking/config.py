@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 
 from scenarios.errors import InputError
+from scenarios.limits import is_number
 from scenarios.loading.toml_files import closest
 from tracking.parameter_files import file_of, first_defaults, preset_file, presets, read, toml_text
 from tracking.user_code import tracker_failed, user_code
@@ -72,7 +73,7 @@ class Param:
         if self.scale == "categorical":
             if any(type(value) is type(c) and value == c for c in self.choices):
                 return value  # type: ignore[return-value]
-        elif isinstance(value, int | float) and not isinstance(value, bool) and self.low <= value <= self.high:
+        elif is_number(value, self.low, self.high):
             if self.scale != "int":
                 return float(value)
             if value == int(value):

@@ -4,7 +4,6 @@ one line.
 
 from __future__ import annotations
 
-import math
 import re
 import typing
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE
+from scenarios.limits import COORDINATE, is_number
 from scenarios.loading.overrides import KeyPath, place_of
 from scenarios.loading.toml_files import Table, did_you_mean
 from scenarios.schema.scenario import Scenario
@@ -49,7 +48,7 @@ def _numbers(value: Any, path: KeyPath = ()) -> typing.Iterator[tuple[KeyPath, f
     if isinstance(value, dict | list):
         for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _numbers(inner, (*path, key))
-    elif isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+    elif is_number(value):
         yield path, value
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAME_RATES, SCALES
+from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.regular_file import is_present, require_regular
 from sim.io.formats import biwi, caviar, mot_folder, video
 from sim.io.formats.calibration import read_calibration
@@ -50,7 +50,7 @@ def open_source(
     """
     path = Path(path)
     for option, value, (low, high) in (("--fps", fps, FRAME_RATES), ("--px-per-m", px_per_m, SCALES)):
-        if value is not None and not low <= value <= high:
+        if value is not None and not is_number(value, low, high):
             expected = f"a number from {low:g} to {high:g}"
             raise InputError(place=option, got=value, expected=expected, remedy=f"correct {option}")
     if isinstance(camera, str | Path):

@@ -13,9 +13,10 @@ import numpy as np
 
 from sim.scene import lens
 from sim.scene.body import PERSON_HEIGHT
-from sim.types import Array, Camera
+from sim.types import Array, Bools, Camera
 
 STEEP_DEG = 70.0  # a camera tilted more than this foreshortens an upright person to a dot
+FARTHEST = 10_000.0  # m: ground further away counts as not seen
 NEAREST_DEPTH = 0.05  # m: points at this depth or nearer are not projected
 
 
@@ -126,19 +127,25 @@ def px_per_m_at_centre(camera: Camera) -> float:
     (1.7 m) there, over PERSON_HEIGHT. If the camera is tilted more than STEEP_DEG (70°), it is the vertical focal
     length over the depth of that point.
 
-    If the centre shows no ground, the point is taken halfway between two rows: the first below the centre that shows
-    ground, and the lower edge of the image. If no row shows ground, the point is 10 m ahead of the camera.
+    If the centre shows no ground within 10 km, the point is taken halfway between two rows: the first below the centre
+    that shows ground, and the lower edge of the image. If no row shows ground, the point is 10 m ahead of the camera.
     """
     if camera.kind == "top":
         return camera.px_per_m
     foot = to_ground(camera, np.array([camera.centre_px]))[0]
-    if not np.isfinite(foot).all():
+    if not shows_ground(camera, foot):
         foot = _low_ground(camera)
     base = np.array([*foot, 0.0])
     uv, depth = project(camera, np.stack([base, base + np.array([0.0, 0.0, PERSON_HEIGHT])]))
     if -camera.rotation[2, 2] > np.sin(np.deg2rad(STEEP_DEG)):
         return float(camera.focal_px[1] / depth[0])
     return float(np.linalg.norm(uv[1] - uv[0]) / PERSON_HEIGHT)
+
+
+def shows_ground(camera: Camera, ground: Array) -> Bools:
+    """Return flags (...,), True for the points on the ground (..., 2), m, that are within 10 km of the camera; nan is
+    not."""
+    return np.asarray(np.linalg.norm(ground - camera.position[:2], axis=-1) < FARTHEST)
 
 
 def _low_ground(camera: Camera) -> Array:
@@ -150,7 +157,7 @@ def _low_ground(camera: Camera) -> Array:
     u, bottom = camera.centre_px[0], float(camera.image[1])
     v = np.linspace(camera.centre_px[1], bottom, 129)
     ground = to_ground(camera, np.column_stack([np.full_like(v, u), v]))
-    seen = np.flatnonzero(np.isfinite(ground).all(axis=1))
+    seen = np.flatnonzero(shows_ground(camera, ground))
     if not len(seen):
         ahead = camera.rotation[2, :2] / max(float(np.linalg.norm(camera.rotation[2, :2])), 1e-12)
         return np.asarray(camera.position[:2] + 10.0 * ahead)

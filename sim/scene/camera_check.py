@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, PICTURE_PIXELS, PICTURE_SIDE, SCALES
-from sim.scene.camera import to_ground
+from scenarios.limits import COORDINATE, PICTURE_PIXELS, PICTURE_SIDE, SCALES, is_number
+from sim.scene.camera import px_per_m_at_centre, shows_ground, to_ground
 from sim.types import Camera
 
 ROTATION_TOLERANCE = 0.01  # difference of R Rᵀ from the identity: rotations are often written with three decimals
@@ -19,7 +19,6 @@ CENTRE = 1.0  # by how many image sizes the image centre may lie outside the ima
 FOLD = -1 / 3  # least radial r² at the image's corner: below it the lens would show two points at one place
 BULGE = 10.0  # greatest radial r² there
 DOWN = 0.99  # least downward part of the forward axis of a camera of kind "top"
-FARTHEST = 10_000.0  # m: ground further away counts as not seen
 
 
 def require_camera(camera: Camera, file: object = "", place: str = "") -> Camera:
@@ -27,8 +26,9 @@ def require_camera(camera: Camera, file: object = "", place: str = "") -> Camera
 
     file, place: for the message. Refused are an image that is empty or above 40 million px; focal lengths of another
     order than the image, or that differ by more than a factor of 2; an image centre far outside; a lens that folds the
-    image; a rotation that is none (rows not orthonormal) or mirrors; a camera at or below the ground (z = 0); a camera
-    whose image shows no ground in its centre or lower half within 10 km.
+    image; a rotation that is none (rows not orthonormal) or mirrors; a camera at or below the ground (z = 0); a
+    scale in the image centre outside 0.01 to 100,000 px per m; a camera whose image shows no ground in its centre or
+    lower half within 10 km.
     """
     for key, good, got, expected in _facts(camera):
         if not good:
@@ -91,12 +91,11 @@ def _position(camera: Camera) -> tuple[str, bool, str, str]:
 
 
 def _scale(camera: Camera) -> tuple[str, bool, str, str]:
-    if camera.kind != "top":
-        return "px_per_m", True, "", ""
-    if not camera.rotation[2, 2] <= -DOWN:
+    if camera.kind == "top" and not camera.rotation[2, 2] <= -DOWN:
         return "rotation", False, "a camera of kind top that does not look down", "one that looks straight down"
-    good = SCALES[0] <= camera.px_per_m <= SCALES[1]
-    return "px_per_m", good, f"{camera.px_per_m:g} px per m", f"from {SCALES[0]:g} to {SCALES[1]:g}"
+    scale = px_per_m_at_centre(camera)
+    good = is_number(scale, *SCALES) or (camera.kind == "pinhole" and np.isnan(scale))
+    return "px_per_m", bool(good), f"{scale:g} px per m in the image centre", f"from {SCALES[0]:g} to {SCALES[1]:g}"
 
 
 def _ground(camera: Camera) -> tuple[str, bool, str, str]:
@@ -104,6 +103,9 @@ def _ground(camera: Camera) -> tuple[str, bool, str, str]:
     w, h = camera.image
     u, v = (a.ravel() for a in np.meshgrid([0.0, w / 2, w], np.linspace(h / 2, h, 5)))
     ground = to_ground(camera, np.concatenate([np.c_[u, v], [camera.centre_px]]))
-    with np.errstate(invalid="ignore"):
-        seen = np.linalg.norm(ground - camera.position[:2], axis=1) < FARTHEST
-    return "rotation", bool(seen.any()), "an image without ground in its lower half", "a camera that sees the ground"
+    return (
+        "rotation",
+        bool(shows_ground(camera, ground).any()),
+        "an image without ground in its lower half",
+        "a camera that sees the ground",
+    )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from scenarios.limits import is_number
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.types import Sequence
@@ -63,7 +64,7 @@ class StoredTracks:
         event's frame is outside the tracks. Warns about a text without rows.
         """
         fps = self.info.get("fps")
-        if fps is not None and (isinstance(fps, bool) or not isinstance(fps, int | float)):
+        if fps is not None and not is_number(fps):
             raise InputError(
                 file=self.path / RUN, place="fps", got=repr(fps)[:40], expected="a number", remedy="track again"
             )

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
-from scenarios.limits import JSON_BYTES
+from scenarios.limits import JSON_BYTES, is_number
 from scenarios.parsing import parse_json
 from scenarios.regular_file import require_regular
 from sim.types import Array, Ints
@@ -109,8 +109,7 @@ class StoredTable:
     def number(self, name: str, low: float, high: float) -> float:
         """Return the value `name` of the metadata, a number from `low` to `high`; raise InputError for another."""
         value = self.fact(name)
-        fits = isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
-        self.reject(not fits, name, f"{value!r}", f"a number from {low:g} to {high:g}")
+        self.reject(not is_number(value, low, high), name, f"{value!r}", f"a number from {low:g} to {high:g}")
         return float(value)
 
     def frames(self, name: str) -> set[int]:

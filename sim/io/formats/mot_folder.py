@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAME_RATES, FRAMES
+from scenarios.limits import FRAME_RATES, FRAMES, is_number
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.regular_file import is_present
 from sim.io.files.numeric_text import read_text
@@ -80,7 +80,7 @@ def frame_rate(given: float | None, found: float | None) -> float:
     """
     if given is not None:
         low, high = FRAME_RATES
-        if not low <= given <= high:
+        if not is_number(given, low, high):
             expected = f"a number from {low:g} to {high:g}"
             raise InputError(place="fps", got=given, expected=expected, remedy="correct --fps")
         return given

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, FRAMES
+from scenarios.limits import COORDINATE, FRAMES, is_number
 from sim.io.files.numeric_text import read_text, whole_number
 from sim.io.files.tables import json_list, nan_to_none, read_document
 from sim.types import EVENT_KINDS, GroupEvent, Near, Order
@@ -103,7 +103,7 @@ def _coordinate(value: Any) -> float:
     """Return a coordinate as float, nan for None. Raises ValueError for other types and beyond 1e6."""
     if value is None:
         return float("nan")
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= COORDINATE:
+    if not is_number(value, -COORDINATE, COORDINATE):
         raise ValueError(f"{value!r}, which is no coordinate within {COORDINATE:g}")
     return float(value)
 

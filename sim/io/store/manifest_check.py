@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, FRAME_RATES, FRAMES, PICTURE_SIDE
+from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIDE, SCALES, is_number
 from sim.io.store.manifest import REDO
 from sim.io.store.streams import IMAGES, STREAMS
 
@@ -17,7 +17,7 @@ def _whole(low: int, high: int) -> Callable[[Any], bool]:
 
 
 def _number(low: float, high: float) -> Callable[[Any], bool]:
-    return lambda v: isinstance(v, int | float) and not isinstance(v, bool) and low <= v <= high
+    return lambda v: is_number(v, low, high)
 
 
 def _or_none(right: Callable[[Any], bool]) -> Callable[[Any], bool]:
@@ -37,7 +37,7 @@ SEQUENCE: dict[str, tuple[Callable[[Any], bool], str]] = {
     "fps": (_number(*FRAME_RATES), "a number from {:g} to {:g}".format(*FRAME_RATES)),
     "length": (_whole(0, FRAMES), f"a whole number from 0 to {FRAMES}"),
     "image_size": (_or_none(_list_of(_whole(1, PICTURE_SIDE), 2)), "null, or width and height in px"),
-    "px_per_m": (_or_none(_number(0.0, COORDINATE)), "null, or a number from 0 on"),
+    "px_per_m": (_or_none(_number(*SCALES)), "null, or a number from {:g} to {:g}".format(*SCALES)),
 }
 """What each value of the key "sequence" must be: whether a value is right, and words for it."""
 TOP: dict[str, tuple[Callable[[Any], bool], str]] = {

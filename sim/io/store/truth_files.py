@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, FRAME_RATES, FRAMES
+from scenarios.limits import FRAME_RATES, FRAMES, SCALES
 from scenarios.regular_file import is_present
 from sim.io.files.tables import REDO, Column, StoredTable, nan_to_none, read_table, table_bytes
 from sim.io.formats.mot_text import ground_cells
@@ -137,7 +137,7 @@ def read_truth(folder: Path) -> Truth:
     _check_rows(table, length)
     return Truth(
         name=str(table.fact("name")), fps=table.number("fps", *FRAME_RATES), length=length,
-        px_per_m=float("nan") if px_per_m is None else table.number("px_per_m", 0.0, COORDINATE),
+        px_per_m=float("nan") if px_per_m is None else table.number("px_per_m", *SCALES),
         frame=frame, id=id, group=table.ints("group"),
         pos=several("x", "y"), vel=several("vx", "vy"), box=several(*BOX), visible_box=several(*VISIBLE),
         visibility=table.floats("visibility"),

@@ -7,8 +7,9 @@ import pytest
 
 from scenarios import load
 from scenarios.errors import InputError
+from scenarios.limits import SCALES, is_number
 from sim.io.formats.calibration import read_calibration
-from sim.scene.camera import camera_rotation
+from sim.scene.camera import camera_rotation, px_per_m_at_centre
 from sim.scene.camera_check import require_camera
 from sim.sequence import simulate
 
@@ -18,6 +19,7 @@ GOOD = {
     "position": [1, 2, 5], "rotation": DOWN, "baseline": 0, "px_per_m": None,
 }  # fmt: skip
 TOP = GOOD | {"kind": "top", "px_per_m": 40.0, "rotation": camera_rotation(np.pi / 2, 0.4).tolist()}
+CLOSE = GOOD | {"focal_px": [6e4, 6e4], "position": [1, 2, 0.1], "rotation": camera_rotation(1.5, 0.4).tolist()}
 MIRRORED = (np.diag([-1.0, 1.0, 1.0]) @ np.array(DOWN)).tolist()
 LARGER = (2 * np.array(DOWN)).tolist()
 
@@ -39,6 +41,7 @@ BAD = {
     "a lens that folds": (GOOD | {"radial": -2.0}, "radial"),
     "far away": (GOOD | {"position": [1e300, 2, 5]}, "position"),
     "no numbers": (GOOD | {"position": ["1", "2", "5"]}, "position"),
+    "a telephoto lens just above the ground": (CLOSE, "px_per_m"),
     "no scale from above": (TOP | {"px_per_m": 0.0}, "px_per_m"),
     "from above, but level": (TOP | {"rotation": DOWN}, "look"),
     "another format": (GOOD | {"format": 2}, "format"),
@@ -63,6 +66,17 @@ def test_good_ones(document, tmp_path):
     assert require_camera(camera) is camera
     rounded = np.round(camera.rotation, 3)
     assert require_camera(camera.replace(rotation=rounded)).rotation.tolist() == rounded.tolist()
+
+
+def test_ground_too_far_away_gives_no_scale(tmp_path):
+    """The scale of an image whose centre shows the ground 50 km away lies within the bounds of stored sequences."""
+    level, nearly = (GOOD | {"rotation": camera_rotation(tilt, 0.4).tolist()} for tilt in (0.0, 1e-4))
+    scales = []
+    for k, document in enumerate((level, nearly)):
+        (tmp_path / f"{k}.json").write_text(json.dumps(document))
+        scales.append(px_per_m_at_centre(read_calibration(tmp_path / f"{k}.json")))
+    assert scales[1] == pytest.approx(scales[0], rel=0.01)
+    assert is_number(scales[1], *SCALES)
 
 
 def test_tsai(tmp_path):
