@@ -33,6 +33,8 @@ PICTURE_SIDE = 16_384
 """Width or height of a picture, px."""
 PICTURE_PIXELS = 40_000_000
 """Width times height of a picture, px; 8K has 33 million."""
+PICTURE_SIZES = f"1 to {PICTURE_SIDE:,} px a side, at most {PICTURE_PIXELS:,} px in all"
+"""Words for the sizes that `fits_picture` accepts."""
 SCALES = (0.01, 100_000.0)
 """Least and greatest image scale, px per m."""
 SAMPLE_BYTES = 2 * 10**9
@@ -50,3 +52,8 @@ def is_number(value: object, low: float = -math.inf, high: float = math.inf) -> 
     and anything else."""
     number: Any = value
     return isinstance(value, Real) and not isinstance(value, bool) and low <= number <= high and abs(number) < math.inf
+
+
+def fits_picture(width: float, height: float) -> bool:
+    """Returns True for a picture size in px that is read and drawn: sides of 1 to 16,384, at most 40 million in all."""
+    return 1 <= width <= PICTURE_SIDE and 1 <= height <= PICTURE_SIDE and width * height <= PICTURE_PIXELS

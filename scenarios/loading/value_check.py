@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from scenarios.limits import CELLS, DETECTIONS, FRAME_RATES, FRAMES, PEOPLE, PICTURE_PIXELS
+from scenarios.limits import CELLS, DETECTIONS, FRAME_RATES, FRAMES, PEOPLE, PICTURE_SIZES, fits_picture
 from scenarios.loading.script_check import fail
 from scenarios.schema.observation import ObservationSpec
 from scenarios.schema.scenario import QueueOrder, Scenario
@@ -63,9 +63,8 @@ def most_people(scenario: Scenario) -> float:
 def check_observation(spec: Scenario | ObservationSpec) -> None:
     """Raises InputError, without a file, for the first value of camera, sensor, light or picture out of its range."""
     _require(_observation(spec))
-    width, height = spec.camera.image
-    if width * height > PICTURE_PIXELS:
-        fail("camera.image", f"{width * height:,} px", f"at most {PICTURE_PIXELS:,}", "make the image smaller")
+    if not fits_picture(*spec.camera.image):
+        fail("camera.image", "{}×{} px".format(*spec.camera.image), PICTURE_SIZES, "make the image smaller")
 
 
 def _require(ranges: Iterator[_Range]) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from scenarios.limits import PICTURE_SIDE
 from scenarios.schema.picture import Light, Picture
 from scenarios.schema.sensor import Sensor
 from scenarios.schema.values import (
@@ -84,7 +85,7 @@ class CameraSpec(Model):
     20 m). crop: True accepts people who walk out of view; False: they are an InputError."""
 
     kind: Literal["pinhole", "top"] = Field("pinhole", description="perspective, or orthographic from above")
-    image: tuple[Annotated[int, Field(ge=16, le=8192)], Annotated[int, Field(ge=16, le=8192)]] = Field(
+    image: tuple[Annotated[int, Field(ge=16, le=PICTURE_SIDE)], Annotated[int, Field(ge=16, le=PICTURE_SIDE)]] = Field(
         (640, 480), description="width and height of an image, px"
     )
     fps: Positive = Field(10.0, description="frames per second")

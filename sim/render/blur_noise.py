@@ -16,12 +16,13 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.limits import PICTURE_SIDE
 from sim.rng import rng
 from sim.types import Ints
 
 POOL = 1 << 20
 FRAMES_PER_DRAW = 16  # frames whose offsets are drawn in one call
-LONGEST = 3 * 8192  # numbers that a row may need: 3 colours, the widest image
+LONGEST = 3 * PICTURE_SIDE  # numbers that a row may need: 3 colours, the widest image
 
 
 def blur_weights(sd: float) -> NDArray[np.float32]:
@@ -39,7 +40,7 @@ def blur_weights(sd: float) -> NDArray[np.float32]:
 def _normals() -> NDArray[np.float32]:
     """Return the pool (POOL + LONGEST,) float32 of standard normals; its first LONGEST numbers are repeated at the end.
 
-    It is the same for all seeds, and kept: do not change it. POOL is 2^20. LONGEST is 3 x 8192, the numbers that a row
+    It is the same for all seeds, and kept: do not change it. POOL is 2^20. LONGEST is 3 x 16384, the numbers that a row
     of the widest image needs.
     """
     normals = rng(0, "noise").standard_normal(POOL, dtype=np.float32)
@@ -49,7 +50,7 @@ def _normals() -> NDArray[np.float32]:
 def noise_pool(sd: float, unit: float) -> NDArray[np.int16]:
     """Return a pool (POOL + LONGEST,) int16 of normal numbers with standard deviation `sd` grey levels, times `unit`.
 
-    POOL is 2^20, LONGEST 3 x 8192: a row of the widest image. unit: canvas value of one grey level. The numbers are
+    POOL is 2^20, LONGEST 3 x 16384: a row of the widest image. unit: canvas value of one grey level. The numbers are
     rounded, and clipped to the range of int16. The underlying normal numbers are the same for all seeds; sd 0 gives
     zeros.
     """

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, PICTURE_PIXELS, PICTURE_SIDE, SCALES, is_number
+from scenarios.limits import COORDINATE, PICTURE_SIZES, SCALES, fits_picture, is_number
 from sim.scene.camera import px_per_m_at_centre, shows_ground, to_ground
 from sim.types import Camera
 
@@ -50,8 +50,7 @@ def _facts(camera: Camera) -> list[tuple[str, bool, str, str]]:
 
 def _image(camera: Camera) -> tuple[str, bool, str, str]:
     w, h = camera.image
-    good = 1 <= w <= PICTURE_SIDE and 1 <= h <= PICTURE_SIDE and w * h <= PICTURE_PIXELS
-    return "image", good, f"{w}×{h} px", f"1 to {PICTURE_SIDE} px a side, at most {PICTURE_PIXELS:,} in all"
+    return "image", fits_picture(w, h), f"{w}×{h} px", PICTURE_SIZES
 
 
 def _lens(camera: Camera) -> tuple[str, bool, str, str]:

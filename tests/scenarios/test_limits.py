@@ -1,11 +1,13 @@
-"""What counts as a number within bounds."""
+"""What counts as a number within bounds, and as the size of a picture that is read and drawn."""
 
 import math
 
 import numpy as np
 import pytest
 
-from scenarios.limits import is_number
+from scenarios import load
+from scenarios.errors import InputError
+from scenarios.limits import PICTURE_PIXELS, PICTURE_SIDE, fits_picture, is_number
 
 
 @pytest.mark.parametrize("value", [0, 1, 0.5, np.float32(0.5), np.float64(1), np.int16(1), np.uint8(0)])
@@ -25,3 +27,17 @@ def test_anything_else(value):
 
 def test_whole_numbers_beyond_float():
     assert not is_number(10**400, 0, 1)
+
+
+def test_sizes_of_pictures():
+    assert fits_picture(1, 1)
+    assert fits_picture(PICTURE_SIDE, PICTURE_PIXELS // PICTURE_SIDE)
+    for width, height in ((0, 1), (1, 0), (-1, -1), (PICTURE_SIDE + 1, 1), (1, PICTURE_SIDE + 1), (8192, 8192)):
+        assert not fits_picture(width, height)
+
+
+def test_a_scenario_has_pictures_of_any_size_that_is_read():
+    assert load("merge", set=[f"camera.image=[{PICTURE_SIDE}, 16]"]).camera.image == (PICTURE_SIDE, 16)
+    for size in (f"[{PICTURE_SIDE + 1}, 16]", "[8192, 8192]"):
+        with pytest.raises(InputError, match="image"):
+            load("merge", set=[f"camera.image={size}"])

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAME_RATES, FRAMES, is_number
+from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, is_number
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.regular_file import is_present
 from sim.io.files.numeric_text import read_text
@@ -42,7 +42,8 @@ def read_seqinfo(path: Path) -> SeqInfo:
     """Read the section [Sequence] of the seqinfo.ini `path`; without that section every key counts as missing.
 
     Other keys are ignored. Raises InputError if the file is unreadable or no ini file, the length is no whole number
-    from 1 to 1,000,000, a side of the image no whole number from 1 to 16,384, or the frame rate not from 0.01 to 1000.
+    from 1 to 1,000,000, a side of the image no whole number from 1 to 16,384, the image larger than 40 million px, or
+    the frame rate not from 0.01 to 1000.
     """
     parser = configparser.ConfigParser(interpolation=None)
     try:
@@ -64,6 +65,9 @@ def read_seqinfo(path: Path) -> SeqInfo:
         return value
 
     length, w, h = (number(k, 1, high) for k, high in (("seqLength", FRAMES), ("imWidth", SIDE), ("imHeight", SIDE)))
+    if w is not None and h is not None and not fits_picture(w, h):
+        got = f"{w:.0f}×{h:.0f} px"
+        raise InputError(file=path, place="imWidth, imHeight", got=got, expected=PICTURE_SIZES, remedy="correct them")
     return SeqInfo(
         section.get("name", path.parent.name),
         number("frameRate", *FRAME_RATES, whole=False),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import struct
 
-from scenarios.limits import PICTURE_PIXELS, PICTURE_SIDE
+from scenarios.limits import fits_picture
 
 WIDTH_TAG, HEIGHT_TAG = 256, 257  # of TIFF
 FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # of JPEG: those that begin a frame
@@ -37,7 +37,7 @@ def declared_size(body: bytes) -> tuple[int, int] | None:
 def is_bearable(body: bytes) -> bool:
     """Return True if the declared size is known, not empty, at most 16,384 px a side and 40 million px in all."""
     size = declared_size(body)
-    return size is not None and min(size) > 0 and max(size) <= PICTURE_SIDE and size[0] * size[1] <= PICTURE_PIXELS
+    return size is not None and fits_picture(*size)
 
 
 def _jpeg(body: bytes) -> tuple[int, int] | None:

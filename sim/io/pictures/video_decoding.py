@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAMES, PICTURE_PIXELS, PICTURE_SIDE
+from scenarios.limits import FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.regular_file import require_regular
 from sim.types import Array, Image
 
@@ -104,9 +104,9 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
         if stream.codec_context is None:
             raise InputError(file=path, got="an unknown codec", expected="H.264 or the like", remedy=REMEDY)
         width, height = stream.codec_context.width, stream.codec_context.height
-        if max(width, height) > PICTURE_SIDE or width * height > PICTURE_PIXELS:
-            expected = f"at most {PICTURE_SIDE} px a side and {PICTURE_PIXELS:,} in all"
-            raise InputError(file=path, got=f"{width}×{height} px", expected=expected, remedy="give a smaller video")
+        if not fits_picture(width, height):
+            got = f"{width}×{height} px"
+            raise InputError(file=path, got=got, expected=PICTURE_SIZES, remedy="give a smaller video")
         stream.codec_context.thread_count = 1
         yield container, stream
 

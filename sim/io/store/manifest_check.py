@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIDE, SCALES, is_number
+from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, SCALES, fits_picture, is_number
 from sim.io.store.manifest import REDO
 from sim.io.store.streams import IMAGES, STREAMS
 
@@ -32,11 +32,15 @@ def _text(value: Any) -> bool:
     return isinstance(value, str)
 
 
+def _size(value: Any) -> bool:
+    return _list_of(_whole(1, FRAMES), 2)(value) and fits_picture(*value)
+
+
 SEQUENCE: dict[str, tuple[Callable[[Any], bool], str]] = {
     "name": (_text, "a text"),
     "fps": (_number(*FRAME_RATES), "a number from {:g} to {:g}".format(*FRAME_RATES)),
     "length": (_whole(0, FRAMES), f"a whole number from 0 to {FRAMES}"),
-    "image_size": (_or_none(_list_of(_whole(1, PICTURE_SIDE), 2)), "null, or width and height in px"),
+    "image_size": (_or_none(_size), f"null, or [width, height]: {PICTURE_SIZES}"),
     "px_per_m": (_or_none(_number(*SCALES)), "null, or a number from {:g} to {:g}".format(*SCALES)),
 }
 """What each value of the key "sequence" must be: whether a value is right, and words for it."""

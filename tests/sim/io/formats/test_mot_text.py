@@ -224,6 +224,13 @@ def test_seqinfo(tmp_path, key, value):
     assert error.value.place == key
 
 
+def test_seqinfo_of_too_large_pictures(tmp_path):
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\nseqLength=4\nimWidth=16384\nimHeight=16384\n")
+    with pytest.raises(InputError, match="16384×16384 px") as error:
+        open_source(tmp_path)
+    assert error.value.place == "imWidth, imHeight"
+
+
 def test_chords_look_back_only():
     frame, id = np.array([0, 1, 2, 5, 0]), np.array([7, 7, 7, 7, 3])
     pos = np.array([[0.0, 0], [1, 0], [2, 0], [5, 5], [0, 0]])

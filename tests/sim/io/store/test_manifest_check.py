@@ -11,7 +11,7 @@ from sim.io.store.sequence_folder import open_sequence, write_sequence
 
 WRONG = {
     "fps": ["10", -5, 0, None, 1e9, True], "length": ["5", -1, 2.5, 10**8, None], "px_per_m": ["x", -1, 0, 1e-3, 2e5],
-    "image_size": [[1], "x", [0, 0], [64, 48, 3], ["64", 48]], "name": [5, None],
+    "image_size": [[1], "x", [0, 0], [64, 48, 3], ["64", 48], [16384, 16384]], "name": [5, None],
 }  # fmt: skip
 TOP = {
     "streams": ["left", ["x"], None, [1]], "images": [5, "gif"], "seed": ["a", -1, None, 1.5], "repeat": ["x"],
