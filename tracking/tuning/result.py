@@ -143,7 +143,7 @@ class TuningResult:
             | {
                 "trials": plan.options.trials, "validation": seeds_text(seeds.validation),
                 "test": seeds_text(seeds.test),
-                "check": list(plan.tests)[1] if plan.check else None, "check_test": seeds_text(seeds.check),
+                "check": plan.check_name, "check_test": seeds_text(seeds.check),
                 "set": list(plan.scene_settings),
             },
             "counts": {

@@ -82,6 +82,13 @@ class SearchPlan:
         return ", ".join(map(_without_folder, self.suite))
 
     @property
+    def check_name(self) -> str | None:
+        """The name of the second suite without its folder; with " (--check)" if the first has the same. None without
+        one."""
+        name = None if self.check is None else _without_folder(self.check)
+        return f"{name} (--check)" if name == self.suite_name else name
+
+    @property
     def defaults(self) -> dict[str, Value]:
         """The values of the searched parameters in the first trial, a dict by parameter name: those of `base`, the
         tracker's defaults.
@@ -121,16 +128,16 @@ class SearchPlan:
 
     @cached_property
     def tests(self) -> dict[str, tuple[Source, ...]]:
-        """The sources (scene and seed) of the episodes that measure the gain, a dict by the name of the suite.
+        """The sources (scene and seed) of the episodes that measure the gain, a dict by `suite_name` and `check_name`.
 
         It has the suite that is tuned on and, if there is one, the second suite. The second suite keeps its own scenes;
         only settings that begin with "sensor." apply to it. Raises InputError if a setting does not fit the second
         suite, or a scene cannot be read.
         """
         found = {self.suite_name: episode_sources(self.suite, self.seeds.test, self.scene_settings)}
-        if self.check is not None:
+        if self.check is not None and self.check_name is not None:
             sensor = [setting for setting in self.scene_settings if setting.startswith("sensor.")]
-            found[_without_folder(self.check)] = episode_sources((self.check,), self.seeds.check, sensor)
+            found[self.check_name] = episode_sources((self.check,), self.seeds.check, sensor)
         return found
 
     def identity(self) -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from scenarios.errors import InputError
@@ -107,6 +109,16 @@ def test_settings_reach_the_scenes(tmp_path):
     assert (unused.duration, unused.sensor.detect_prob) == (4.0, 0.5), "the detector is the same everywhere"
     assert made.base.skip == 2
     assert "skip" not in made.defaults
+
+
+def test_two_suites_of_one_name(tmp_path):
+    """In different folders: both are tested on, and no name tells the folder."""
+    one, two = write_scenes(tmp_path)
+    other = (tmp_path / "other" / "one.toml").resolve()
+    other.parent.mkdir()
+    other.write_text(Path(two).read_text())
+    made = toy_plan(tmp_path, suite=one, check=str(other))
+    assert list(made.tests) == ["one.toml", made.check_name] == ["one.toml", "one.toml (--check)"]
 
 
 def test_scene_with_a_wrong_setting(tmp_path):
