@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import is_number
 from sim.scene.box_scale import scale_of_first_boxes
 from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
 
@@ -53,30 +54,45 @@ def from_boxes(frames: Iterable[Detections | Tracks | None]) -> ImageScale:
     return ImageScale(*scale_of_first_boxes(index, np.concatenate([np.zeros(0), *(h for _, h in boxed)])))
 
 
-def from_tracks(given: ImageScale, learned: object, tracks: SequenceOf[Tracks]) -> ImageScale:
+def from_tracks(given: ImageScale, learned: float, tracks: SequenceOf[Tracks]) -> ImageScale:
     """Return the image scale for deriving groups from tracks; nan if it is unknown.
 
-    The first finite one counts: `given` (the context's), `learned` (px per m: the tracker's own attribute `px_per_m`;
-    anything but a number is ignored), then that of the tracks' boxes. Zero and negative values are not refused.
+    The first finite one counts: `given` (the context's), `learned` (that of `learned_by`), then that of the tracks'
+    boxes. Zero and negative values are not refused.
     """
     if np.isfinite(given.px_per_m):
         return given
-    if isinstance(learned, int | float) and np.isfinite(learned):
-        return ImageScale(float(learned))
-    return from_boxes(tracks)
+    return ImageScale(learned) if np.isfinite(learned) else from_boxes(tracks)
+
+
+def learned_by(tracker: object) -> float:
+    """Return the tracker's own attribute `px_per_m` (px per m), a number of Python or numpy; nan if it has none, or it
+    is anything but a finite number. Raises what reading the attribute raises."""
+    value = getattr(tracker, "px_per_m", None)
+    return float(value) if is_number(value) else float("nan")
 
 
 def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ...] | None) -> ImageScale:
     """Return the image scale that a tracker is given with a sequence; nan if it is unknown.
 
-    It is the camera's scale at the image centre, else the one that the sequence states. If there is neither and `mode`
-    is not "image", it is that of the boxes of `frames`, or of the sequence's stored detections if `frames` is None.
-    Raises InputError if these cannot be read.
+    It is the one that is known before the first frame (`before_frames`). If there is none and `mode` is not "image", it
+    is that of the boxes of `frames`, or of the sequence's stored detections if `frames` is None. Raises InputError if
+    these cannot be read.
+    """
+    known = before_frames(sequence)
+    if np.isfinite(known.px_per_m) or mode == "image":
+        return known
+    return from_boxes(f.detections for f in (sequence.without_pictures() if frames is None else frames))
+
+
+def before_frames(sequence: Sequence) -> ImageScale:
+    """Return the image scale that is known before a sequence is read, nan if there is none.
+
+    It is the camera's scale at the image centre, else the one that the sequence states. Its `frames` are above 0 if the
+    sequence took it from the labelled boxes of its first frames, so that labels of all frames tell it better.
     """
     if sequence.camera is not None:
         from sim.scene.camera import px_per_m_at_centre
 
-        return ImageScale(float(px_per_m_at_centre(sequence.camera)))
-    if np.isfinite(sequence.px_per_m) or mode == "image":
-        return ImageScale(sequence.px_per_m, int(sequence.source.get("px_per_m_frames", 0)))
-    return from_boxes(f.detections for f in (sequence.without_pictures() if frames is None else frames))
+        return ImageScale(px_per_m_at_centre(sequence.camera))
+    return ImageScale(sequence.px_per_m, int(sequence.source.get("px_per_m_frames", 0)))

@@ -66,7 +66,7 @@ class PreparedTracker:
         in the first frames.
         """
         with self._naming("px_per_m", self.sequence.name):
-            learned = getattr(self.tracker, "px_per_m", None)
+            learned = image_scale.learned_by(self.tracker)
         return image_scale.from_tracks(ImageScale(self.context.px_per_m, self.scale_frames), learned, tracks)
 
     def px_per_m(self, tracks: SequenceOf[Tracks]) -> float:

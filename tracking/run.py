@@ -16,6 +16,7 @@ from typing import Any, overload
 import numpy as np
 
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
+from tracking import image_scale
 from tracking.grouping.link_rule import LinkRule
 from tracking.prepare import Params, prepare
 from tracking.run_info import Speed, run_info
@@ -102,13 +103,13 @@ def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...
     """Return one tracker's stored tracks of a sequence, one `Tracks` per frame, with groups and events filled in where
     they are empty.
 
-    The scale in px per m is the sequence's, or its truth's if the sequence states none or learned it from the labels of
-    the first frames; without any, tracks in the image are returned unchanged, as are tracks marked as derived, or of
-    groups. Raises InputError if the truth cannot be read or tracks in the image have a scale of 0 or below; WorkError
-    if an order of a simulated script was not fulfilled.
+    The scale in px per m is the camera's at the image centre, else the sequence's. It is the truth's, from all labelled
+    boxes, if the sequence states none or took it from the boxes of the first frames; without any, tracks in the image
+    are returned unchanged, as are tracks marked as derived, or of groups. Raises InputError if the truth cannot be read
+    or tracks in the image have a scale of 0 or below; WorkError if an order of a simulated script was not fulfilled.
     """
     from tracking.grouping.grouped_tracks import with_groups
 
-    stated = np.isfinite(sequence.px_per_m) and "px_per_m_frames" not in sequence.source
-    truth = None if stated else sequence.truth
-    return with_groups(tracks, sequence.fps, sequence.px_per_m if truth is None else truth.px_per_m)
+    known = image_scale.before_frames(sequence)
+    truth = sequence.truth if known.frames or not np.isfinite(known.px_per_m) else None
+    return with_groups(tracks, sequence.fps, known.px_per_m if truth is None else truth.px_per_m)

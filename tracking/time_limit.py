@@ -9,18 +9,22 @@ from __future__ import annotations
 import itertools
 import signal
 from dataclasses import fields
-from math import isfinite
 from typing import Any, Self
 
 from scenarios.errors import InputError
+from scenarios.limits import is_number
 from sim.arrays import Frozen
 from sim.types import Context, Detections, Frame, Tracker, Tracks
 from sim.workers.process import RemoteTraceback, WorkerProcess
 from tracking import tracker_registry
 from tracking.config import Config
+from tracking.image_scale import learned_by
 
 GRACE = 5.0
 """s after the limit at which a process ends itself, should its parent be gone."""
+
+LONGEST = 1_000_000
+"""s: greatest limit, 11 days. The timer of a pipe counts milliseconds in 32 bits, some 2.1 million s."""
 
 
 class TimeLimited:
@@ -28,16 +32,17 @@ class TimeLimited:
 
     tracker: a registered name, "file.py:Class" or "module:Class". State: the process, started with the first tracker
     that is made, and again after its end. It runs one tracker at a time. A context manager; leaving it, or `close`,
-    ends the process. Raises InputError if the tracker is not given by name, or if the limit is not above 0.
+    ends the process. Raises InputError if the tracker is not given by name, or if the limit is not
+    above 0 or is above 1,000,000 s.
     """
 
     def __init__(self, tracker: str, seconds: float) -> None:
         if not isinstance(tracker, str):
             expected, remedy = "a name that another process can look up", "give file.py:Class or module:Class"
             raise InputError(place="--step-timeout", got="no name of a tracker", expected=expected, remedy=remedy)
-        if not (isfinite(seconds) and seconds > 0):
-            remedy = "correct it, or leave it out"
-            raise InputError(place="--step-timeout", got=seconds, expected="seconds, above 0", remedy=remedy)
+        if not (is_number(seconds, 0.0, LONGEST) and seconds > 0):
+            expected, remedy = f"seconds, above 0, at most {LONGEST:,}", "correct it, or leave it out"
+            raise InputError(place="--step-timeout", got=seconds, expected=expected, remedy=remedy)
         self.tracker, self.seconds = tracker, seconds
         self._process = WorkerProcess()
         self._numbers = itertools.count()
@@ -89,13 +94,13 @@ class TimeLimited:
 class RemoteTracker:
     """A tracker that works in the process of a TimeLimited; a `Tracker` like any other.
 
-    needs, config, px_per_m: as those attributes of the tracker itself; px_per_m is None if it has none. made_from: what
+    needs, config, px_per_m: as those attributes of the tracker itself; px_per_m is nan if it has none. made_from: what
     the process makes the tracker from.
     """
 
     def __init__(self, host: TimeLimited, number: int, config: Config | None) -> None:
         self.needs, self.config = host.needs, config
-        self.px_per_m: object = None
+        self.px_per_m = float("nan")
         self.made_from = (number, host.tracker, None if config is None else config.as_dict())
         self._host = host
 
@@ -134,25 +139,19 @@ def _create(number: int, spec: str, values: dict[str, Any] | None) -> None:
     _made[number] = made
 
 
-def _reset(made_from: tuple[int, str, dict[str, Any] | None], context: Context, seed: int) -> object:
+def _reset(made_from: tuple[int, str, dict[str, Any] | None], context: Context, seed: int) -> float:
     if made_from[0] not in _made:
         _create(*made_from)
     tracker = _made[made_from[0]]
     tracker.reset(_frozen(context), seed)
-    return _number(tracker)
+    return learned_by(tracker)
 
 
-def _step(number: int, frame: Frame) -> tuple[Tracks, object]:
+def _step(number: int, frame: Frame) -> tuple[Tracks, float]:
     if number not in _made:
         raise RuntimeError("the process of this tracker was started again since its reset")
     frame, tracker = _frozen(frame), _made[number]
-    return tracker.step(frame, frame.detections), _number(tracker)
-
-
-def _number(tracker: Tracker) -> object:
-    """Returns the tracker's attribute `px_per_m`, None if it has none or it is no number."""
-    value = getattr(tracker, "px_per_m", None)
-    return float(value) if isinstance(value, int | float) else None
+    return tracker.step(frame, frame.detections), learned_by(tracker)
 
 
 def _frozen(value: Any) -> Any:

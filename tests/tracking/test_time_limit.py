@@ -13,7 +13,7 @@ from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence
 from tracking.app.cli import run
 from tracking.run import track
-from tracking.time_limit import TimeLimited
+from tracking.time_limit import LONGEST, TimeLimited
 
 pytestmark = pytest.mark.slow  # processes that hang and are ended
 
@@ -39,7 +39,7 @@ def hang():
 class Tracker:
     config_class = Settings
     needs = ("points", "boxes")
-    px_per_m = 21
+    px_per_m = np.float32(21)
     def __init__(self, config):
         self.config = config
     def reset(self, context, seed):
@@ -128,10 +128,15 @@ def test_no_process_is_left(mine):
         os.kill(pid, 0)
 
 
-@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf"), 2.2e6])
 def test_the_limit_is_a_time(seconds):
     with pytest.raises(InputError, match="--step-timeout"):
         TimeLimited("blob", seconds)
+
+
+def test_the_longest_limit_is_kept(mine):
+    with TimeLimited(mine, LONGEST) as limited:
+        assert len(track(limited, five_frames())) == 5
 
 
 def test_a_class_cannot_be_looked_up():

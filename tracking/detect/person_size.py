@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Context
 from tracking.detect import person_size_kernels as kernels
 from tracking.detect import typical_person
@@ -140,7 +141,7 @@ class PersonSize:
         1.7 m.
 
         nan without lone blobs. Heights include 1.3 px that cleaning cuts off. From above their longer axis is taken."""
-        return float(np.median(self.lone[:, 2])) / typical_person.HEIGHT if len(self.lone) else float("nan")
+        return float(np.median(self.lone[:, 2])) / PERSON_HEIGHT if len(self.lone) else float("nan")
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
         """Change the size in place by the blobs of a picture that may be one person; the others are ignored.

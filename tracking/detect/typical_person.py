@@ -1,6 +1,7 @@
 """The person whom trackers expect before they have seen anybody: a prior in metres for any camera (ours).
 
-It is the trackers' own belief about real people, not the body that the simulator draws. A real person with arms is some
+Its width and depth are the trackers' own belief about real people, not the body that the simulator draws. Its height is
+PERSON_HEIGHT, which defines the scale of an image. A real person with arms is some
 0.5 m wide and 0.3 m deep, so that the silhouette is some 0.42 m wide in the mean over headings. Stride, bags and wide
 clothes add to that; tracking.detect.person_size learns how much from people who stand alone.
 """
@@ -9,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.scene.body import PERSON_HEIGHT, person_boxes
 from sim.types import Array, Camera
 
-HEIGHT = 1.7  # m: the person who gives an image its scale
 WIDTH = 0.42  # m, of the silhouette seen from the side, mean over headings
 SHOULDERS, DEPTH = 0.459, 0.272  # m, from straight above, where shoulders hide the arms: across and along the heading
 
@@ -22,16 +23,12 @@ def boxes(camera: Camera, ground: Array) -> Array:
     ground (N, 2): where they stand, x, y in m, at z = 0. Each is WIDTH wide from any side. A row is nan if the person
     is not wholly in front of the camera.
     """
-    from sim.scene.body import person_boxes
-
     n = len(ground)
-    tall, wide = np.full(n, HEIGHT), np.full(n, WIDTH)
+    tall, wide = np.full(n, PERSON_HEIGHT), np.full(n, WIDTH)
     return person_boxes(camera, np.column_stack([ground, np.zeros(n)]), np.zeros(n), tall, wide, wide)
 
 
 def axes_from_above(camera: Camera) -> Array:
     """Returns the longer and the shorter axis (2,), px, of a typical person under a camera that looks straight down."""
-    from sim.scene.body import person_boxes
-
-    tall, wide, deep = np.array([HEIGHT]), np.array([SHOULDERS]), np.array([DEPTH])
+    tall, wide, deep = np.array([PERSON_HEIGHT]), np.array([SHOULDERS]), np.array([DEPTH])
     return np.sort(person_boxes(camera, np.zeros((1, 3)), np.zeros(1), tall, wide, deep)[0, 2:])[::-1]

@@ -21,8 +21,7 @@ from scenarios.regular_file import read_regular
 from sim.io.files.numeric_text import whole_number
 from sim.io.formats.group_labels import labelled_truth_fields, require_size
 from sim.io.formats.velocity import differentiate
-from sim.scene.body import PERSON_HEIGHT
-from sim.scene.box_scale import scale_of_first_boxes
+from sim.scene.box_scale import scale_of_all_boxes, scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Frame, Ints, Sequence, Truth
 
@@ -50,11 +49,6 @@ class CaviarRecording:
     centre: Array
     size: Array
     labelled: bool
-
-    @property
-    def px_per_m(self) -> float:
-        """The image scale, px per m: median of the boxes' longer sides in px / 1.7 m; nan without boxes."""
-        return float(np.median(self.size.max(axis=1))) / PERSON_HEIGHT if len(self.size) else float("nan")
 
 
 def read_xml(path: Path) -> CaviarRecording:
@@ -194,7 +188,7 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
     Raises InputError if the file is unreadable, no CVML or invalid (see read_xml). Warns about a person in two groups.
     """
     found = read_xml(path)
-    scale = found.px_per_m if px_per_m is None else px_per_m
+    scale = scale_of_all_boxes(found.size.max(axis=1)) if px_per_m is None else px_per_m
     box = np.concatenate([found.centre - found.size / 2, found.size], axis=1)
     truth = Truth(
         name=found.name, fps=fps, length=found.length, px_per_m=scale, frame=found.frame, id=found.id,

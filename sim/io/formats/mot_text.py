@@ -16,7 +16,7 @@ import numpy as np
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from sim.io.files.numeric_text import NumericTable, crowded, read_numbers
 from sim.io.formats.velocity import differentiate
-from sim.scene.body import PERSON_HEIGHT
+from sim.scene.box_scale import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
 
 PEDESTRIAN = 1
@@ -186,8 +186,8 @@ def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_
         visibility = np.where(v[order] < 0, 1.0, v[order])
     ground = table.ground()
     place = None if ground is None else ground[order]
-    if not np.isfinite(px_per_m) and len(box):
-        px_per_m = float(np.median(box[:, 3])) / PERSON_HEIGHT
+    if not np.isfinite(px_per_m):
+        px_per_m = scale_of_all_boxes(box[:, 3])
     frames = length if length is not None else int(frame.max(initial=0))
     return Truth(
         name=name, fps=fps, length=frames, px_per_m=px_per_m, frame=frame, id=id,
