@@ -82,7 +82,7 @@ def _require_plain(value: Any, file: object) -> None:
     for _ in range(DEPTH + 1):
         for item in level:
             if isinstance(item, int) and abs(item) > INTEGER:
-                raise InputError(file=file, got=f"{str(item)[:40]}…", expected=FAR, remedy="correct the number")
+                raise InputError(file=file, got=item, expected=FAR, remedy="correct the number")
         level = [inner for item in level for inner in _inside(item)]
         if not level:
             return

@@ -79,7 +79,7 @@ class Param:
             if value == int(value):
                 return int(value)
         remedy = f"the default is {self.default}"
-        raise InputError(file=file, place=self.name, got=repr(value)[:80], expected=self.expected, remedy=remedy)
+        raise InputError(file=file, place=self.name, got=repr(value), expected=self.expected, remedy=remedy)
 
     def parse(self, text: str) -> Value:
         """Return the value that `text` stands for: a choice, else a number, as int if scale is "int", else as float.
@@ -178,9 +178,7 @@ class Config:
         if name in declared:
             return declared[name]
         remedy = f"did you mean {closest(name, declared)}?" if declared else "it has no parameters"
-        raise InputError(
-            file=file, place=name[:80], got=repr(name[:80]), expected=f"a parameter of {cls.tracker}", remedy=remedy
-        )
+        raise InputError(file=file, place=name, got=repr(name), expected=f"a parameter of {cls.tracker}", remedy=remedy)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, object], file: object = "") -> Self:
@@ -245,7 +243,7 @@ class Config:
             name, sign, text = assignment.removeprefix("tracker.").partition("=")
             if not sign:
                 remedy = "write --set tracker.NAME=VALUE"
-                raise InputError(place="--set", got=repr(assignment[:80]), expected="name=value", remedy=remedy)
+                raise InputError(place="--set", got=repr(assignment), expected="name=value", remedy=remedy)
             changes[name.strip()] = self.known(name.strip(), "--set").parse(text.strip())
         return dataclasses.replace(self, **changes)
 

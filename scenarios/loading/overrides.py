@@ -16,6 +16,7 @@ from typing import Any
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import Table, did_you_mean
 from scenarios.parsing import parse_toml
+from scenarios.printable import shortened
 
 KeyPath = tuple[str | int, ...]
 SHOWN = 120
@@ -40,8 +41,8 @@ def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> 
 
 
 def place_of(text: str) -> str:
-    """Returns the place of a setting for messages: `--set key=value`, cut after 120 characters."""
-    return f"--set {text if len(text) <= SHOWN else text[:SHOWN] + '…'}"
+    """Returns the place of a setting for messages: `--set key=value`, of the setting at most 120 characters."""
+    return f"--set {shortened(text, SHOWN)}"
 
 
 def parse_setting(text: str) -> tuple[list[str], Any]:

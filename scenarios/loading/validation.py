@@ -34,7 +34,7 @@ def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None 
     for path, number in _numbers(table):
         if abs(number) > COORDINATE:
             raise InputError(
-                file=file, place=_place(path, table, places or {}), got=str(number)[:40],
+                file=file, place=_place(path, table, places or {}), got=number,
                 expected=f"a number within {COORDINATE:g}", remedy="correct the value",
             )  # fmt: skip
     try:
@@ -138,7 +138,7 @@ def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> t
     kind, message = error["type"], str(error["msg"])
     if kind == "extra_forbidden":
         known = known_keys(path[:-1], table, model)
-        return f"unknown key {_cut(str(path[-1]))!r}", "a known key", did_you_mean(str(path[-1]), known)
+        return f"unknown key {str(path[-1])!r}", "a known key", did_you_mean(str(path[-1]), known)
     got = _show(error["input"])
     if kind == "missing" and isinstance(path[-1], int):
         return got, f"at least {path[-1] + 1} numbers", "correct the list"
@@ -172,22 +172,13 @@ def _expectation(message: str) -> str:
 
 
 def _show(value: Any) -> str:
-    """Returns a value as a user writes it in TOML; tables and plain values are cut to 80 characters, lists are not.
-
-    Keys of a table that are None are left out.
-    """
+    """Returns a value as a user writes it in TOML; keys of a table that are None are left out."""
     if isinstance(value, tuple):
         return "[" + ", ".join(map(_show, value)) + "]"
     if isinstance(value, dict):
         value = {key: v for key, v in value.items() if v is not None}
-        return _cut("{ " + ", ".join(f"{key} = {_show(v)}" for key, v in value.items()) + " }")
-    return _cut(
-        repr(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
-    )
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= 80 else text[:77] + "…"
+        return "{ " + ", ".join(f"{key} = {_show(v)}" for key, v in value.items()) + " }"
+    return repr(value) if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
@@ -199,7 +190,7 @@ def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
     for n in range(len(path), 0, -1):
         if path[:n] in places:
             return place_of(places[path[:n]])
-    return _cut(key_text(path, table))
+    return key_text(path, table)
 
 
 def key_text(path: KeyPath, table: Table) -> str:

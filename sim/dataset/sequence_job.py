@@ -107,14 +107,13 @@ def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str
     different: wanted values of the fields of `manifest` that differ. Settings are named if the stored scenario.toml is
     readable; else the field "scenario_hash" stands for them.
     """
-    from scenarios.loading.resolve import dump
+    from scenarios.loading.toml_files import dump, parse
+    from scenarios.parsing import parse_toml
 
     settings = ""
     if "scenario_hash" in different:
-        with suppress(OSError, ValueError):
-            settings = setting_differences(
-                (job.folder / "scenario.toml").read_text(encoding="utf-8"), dump(job.entry.scenario)
-            )
+        with suppress(InputError):
+            settings = setting_differences(parse(job.folder / "scenario.toml"), parse_toml(dump(job.entry.scenario)))
     fields = {key: value for key, value in different.items() if key != "scenario_hash" or not settings}
     return ", ".join(
         [settings] * bool(settings) + [f"{k} {_word(manifest.get(k))} → {_word(v)}" for k, v in fields.items()]

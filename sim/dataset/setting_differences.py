@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import tomllib
 from typing import Any
 
+from scenarios.loading.toml_files import Table
 from scenarios.printable import shortened
 
 MOST = 3  # differences that are named; the others are counted
 LONGEST = 40  # characters of a value
 
 
-def setting_differences(stored: str, wanted: str) -> str:
+def setting_differences(stored: Table, wanted: Table) -> str:
     """Return the settings that differ between two scenarios, as "camera.fps 10 → 5, duration 20 → 30".
 
-    stored, wanted: TOML texts of resolved scenarios. The stored value stands first, "none" for a missing one. At most 3
-    settings are named, others counted; "" for equal ones. Raises tomllib.TOMLDecodeError for a text that is no TOML.
+    stored, wanted: tables of resolved scenarios. The stored value stands first, "none" for a missing one. At most 3
+    settings are named, others counted; "" for equal ones.
     """
-    before, after = (dict(_flat("", tomllib.loads(text))) for text in (stored, wanted))
+    before, after = (dict(_flat("", table)) for table in (stored, wanted))
     keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
     words = [f"{key} {_value(before, key)} → {_value(after, key)}" for key in keys[:MOST]]
     return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
@@ -33,5 +33,6 @@ def _flat(prefix: str, value: Any) -> list[tuple[str, Any]]:
     return [(prefix, value)]
 
 
-def _value(settings: dict[str, Any], key: str) -> str:
-    return shortened(str(settings[key]).removesuffix(".0"), LONGEST) if key in settings else "none"
+def _value(settings: Table, key: str) -> str:
+    value = settings.get(key, "none")
+    return shortened(str(value).removesuffix(".0") if isinstance(value, float) else str(value), LONGEST)

@@ -66,7 +66,7 @@ class StoredTracks:
         fps = self.info.get("fps")
         if fps is not None and not is_number(fps):
             raise InputError(
-                file=self.path / RUN, place="fps", got=repr(fps)[:40], expected="a number", remedy="track again"
+                file=self.path / RUN, place="fps", got=repr(fps), expected="a number", remedy="track again"
             )
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             raise InputError(

@@ -83,7 +83,7 @@ def whole_number(text: str) -> int:
     Raises ValueError for any other text, and for more than 18 digits, which may not fit into 64 bits.
     """
     if not WHOLE.fullmatch(text.strip()):
-        raise ValueError(f"{text[:40]!r} is no whole number")
+        raise ValueError(f"{text!r} is no whole number")
     return int(text)
 
 

@@ -103,13 +103,13 @@ class StoredTable:
         """Return the value `name` of the metadata, a whole number from 0 to `limit`; raise InputError for another."""
         value = self.fact(name)
         fits = isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= limit
-        self.reject(not fits, name, f"{value!r}", f"a whole number from 0 to {limit}")
+        self.reject(not fits, name, repr(value), f"a whole number from 0 to {limit}")
         return int(value)
 
     def number(self, name: str, low: float, high: float) -> float:
         """Return the value `name` of the metadata, a number from `low` to `high`; raise InputError for another."""
         value = self.fact(name)
-        self.reject(not is_number(value, low, high), name, f"{value!r}", f"a number from {low:g} to {high:g}")
+        self.reject(not is_number(value, low, high), name, repr(value), f"a number from {low:g} to {high:g}")
         return float(value)
 
     def frames(self, name: str) -> set[int]:
@@ -118,7 +118,7 @@ class StoredTable:
         Whether they are frames of the table is not checked."""
         value = self.fact(name)
         fits = isinstance(value, list) and all(isinstance(v, int) for v in value)
-        self.reject(not fits, name, f"{value!r:.40}", "a list of frames")
+        self.reject(not fits, name, repr(value), "a list of frames")
         return set(value)
 
     def cuts(self, first: int, count: int) -> Ints:
@@ -183,7 +183,7 @@ def read_table(path: Path) -> StoredTable:
         metadata = (table.schema.metadata or {}).get(KEY, b"{}").decode()
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = f"no readable Parquet ({(str(error).splitlines() or [type(error).__name__])[0]})"
-        raise InputError(file=path, got=reason[:160], expected="a whole Parquet file", remedy=REDO) from None
+        raise InputError(file=path, got=reason, expected="a whole Parquet file", remedy=REDO) from None
     facts = parse_json(metadata, path, REDO)
     if not isinstance(facts, dict):
         raise InputError(file=path, place="schema", got="no JSON object", expected="a JSON object", remedy=REDO)

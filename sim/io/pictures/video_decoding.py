@@ -112,7 +112,7 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
 
 
 def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error).partition("\n")[0][:80]
+    return str(getattr(error, "strerror", None) or error).partition("\n")[0]
 
 
 def index_packets(path: Path) -> PacketIndex:

@@ -94,7 +94,7 @@ def read_scene(path: Path) -> Scene:
     d = tables.read_document(path)
     stairs = _key(path, d, "stairs")
     if not isinstance(stairs, list) or not all(isinstance(s, dict) for s in stairs):
-        got = repr(stairs)[:80]
+        got = repr(stairs)
         raise InputError(file=path, place="stairs", got=got, expected="a list of objects", remedy="correct it")
 
     def flight(k: int, s: dict[str, Any]) -> Stairs:
@@ -142,5 +142,5 @@ def _numbers(path: Path, d: dict[str, Any], key: str, shape: tuple[int, ...]) ->
     fits = a.shape == shape or (free and a.ndim == len(shape) and a.shape[1:] == shape[1:])
     if not fits or not (np.abs(a) <= COORDINATE).all():
         wanted = f"numbers of shape {shape} within {COORDINATE:g}" if shape else f"a number within {COORDINATE:g}"
-        raise InputError(file=path, place=key, got=repr(value)[:80], expected=wanted, remedy="correct it")
+        raise InputError(file=path, place=key, got=repr(value), expected=wanted, remedy="correct it")
     return a

@@ -131,7 +131,7 @@ def read_near(path: Path) -> Near:
     header, *lines = read_text(path).splitlines() or [""]
     if header != NEAR_COLUMNS:
         raise InputError(
-            file=path, place="line 1", got=repr(header[:80]), expected=NEAR_COLUMNS, remedy="restore the header"
+            file=path, place="line 1", got=repr(header), expected=NEAR_COLUMNS, remedy="restore the header"
         )
     rows = [_near_row(path, k, line) for k, line in enumerate(lines, 2)]
     return Near(*np.array(rows, np.int64).reshape(-1, 4).T.copy()) if rows else Near.none()

@@ -64,11 +64,11 @@ def check_manifest(path: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     """
     about = manifest["sequence"]
     if not isinstance(about, dict):
-        raise InputError(file=path, place="sequence", got=repr(about)[:40], expected="an object", remedy=REDO)
+        raise InputError(file=path, place="sequence", got=repr(about), expected="an object", remedy=REDO)
     for table, rules, prefix in ((about, SEQUENCE, "sequence."), (manifest, TOP, "")):
         for key, (right, expected) in rules.items():
             if (key in table or prefix) and not right(table.get(key)):
-                got = repr(table.get(key))[:40] if key in table else "nothing"
+                got = repr(table.get(key)) if key in table else "nothing"
                 raise InputError(file=path, place=prefix + key, got=got, expected=expected, remedy=REDO)
     if manifest.get("streams") and about["image_size"] is None:
         raise InputError(

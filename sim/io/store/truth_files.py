@@ -97,7 +97,7 @@ def _flags(table: StoredTable, spans: Any, length: int) -> Bools:
     flags, ends = np.zeros(length, bool), range(1, length + 1)
     for span in spans if isinstance(spans, list) else [spans]:
         fits = isinstance(span, list) and len(span) == 2 and all(type(v) is int and v in ends for v in span)
-        table.reject(not fits, "labelled", f"{span!r:.40}", f"[first, last] frames from 1 to {length}")
+        table.reject(not fits, "labelled", repr(span), f"[first, last] frames from 1 to {length}")
         flags[span[0] - 1 : span[1]] = True
     return flags
 

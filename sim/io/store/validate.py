@@ -219,7 +219,7 @@ def _text(path: Path, wanted: bytes) -> Iterator[InputError]:
     lines, right = path.read_bytes().split(b"\n"), wanted.split(b"\n")
     for k, (got, expected) in enumerate(zip_longest(lines, right, fillvalue=b""), 1):
         if got != expected:
-            yield _problem(path, got[:80].decode("utf-8", "replace"), expected[:80].decode(), f"line {k}")
+            yield _problem(path, got.decode("utf-8", "replace"), expected.decode(), f"line {k}")
             return
 
 

@@ -13,6 +13,7 @@ from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
 from sim.dataset import sequence_job as jobs
 from sim.dataset.sequence_job import JobOutcome, SequenceJob, is_stored, lost_job, run_job, stored_manifest
+from sim.dataset.setting_differences import setting_differences
 from sim.io.files import atomic
 from tests.fake_simulator import FakeSimulator, scenario
 
@@ -178,6 +179,13 @@ def test_what_differs_is_named(
     with pytest.raises(InputError) as refused:
         stored_manifest(other)
     assert f"another sequence (stored → asked for: {words}" in refused.value.got
-    (job.folder / "scenario.toml").unlink()
-    with pytest.raises(InputError, match="scenario_hash"):
-        stored_manifest(other)
+    for unreadable in ("a = " + "[" * 5000 + "]" * 5000, "a = " + "9" * 5000, None):
+        (job.folder / "scenario.toml").unlink()
+        if unreadable is not None:
+            (job.folder / "scenario.toml").write_text(unreadable)
+        with pytest.raises(InputError, match="scenario_hash"):
+            stored_manifest(other)
+
+
+def test_texts_that_end_like_numbers_stay_whole() -> None:
+    assert setting_differences({"about": "v1.0", "a": 2.0}, {"about": "v1", "a": 2.5}) == "about v1.0 → v1, a 2 → 2.5"

@@ -182,6 +182,18 @@ def test_validate_sees_what_disagrees(tmp_path, make_sequence, name, old, new):
     assert all("\n" not in str(p) for p in problems)
 
 
+def test_validate_shows_a_difference_at_the_end_of_a_long_line(tmp_path, make_sequence):
+    """Long values are cut in one place, where both ends of them stay."""
+    folder = tmp_path / "a"
+    sequence_folder.write_sequence(folder, make_sequence(5), scenario=SCENARIO, seed=5)
+    rows = (folder / "gt/groups.csv").read_text().splitlines()
+    longest = max(rows, key=len)
+    assert len(longest) > 120
+    swap(folder / "gt/groups.csv", longest, longest + "7")
+    problem = next(p for p in validate(folder) if "groups.csv" in p.file)
+    assert (problem.got, problem.expected) == (longest + "7", longest)
+
+
 def test_validate_reports_strangers_files_and_leftovers(tmp_path, make_sequence):
     root = tmp_path / "flockscope-train"
     sequence_folder.write_sequence(root / "a", make_sequence(5), scenario=SCENARIO, seed=5)
