@@ -1,6 +1,7 @@
 """Array types for the fields of frozen dataclasses: Array (float64), Ints (int64), Bools (bool) and Image (uint8).
 
-The base class `Frozen` converts array fields to their declared number type and makes them read-only.
+The base class `Frozen` converts array fields to their declared number type and makes them read-only. `repeated_ids`
+finds ids that stand twice in a frame.
 """
 
 from __future__ import annotations
@@ -109,3 +110,11 @@ def _own(value: Any) -> Any:
 def no_ids() -> Ints:
     """Return an empty array of ids, shape (0,), int64."""
     return np.zeros(0, np.int64)
+
+
+def repeated_ids(frame: Ints, id: Ints) -> Bools:
+    """Return flags (N,), True for each row that has both the frame and the id of an earlier row. Rows need no order."""
+    order = np.lexsort((id, frame))  # stable: equal rows keep their order
+    again = np.zeros(len(order), bool)
+    again[order[1:]] = (np.diff(frame[order]) == 0) & (np.diff(id[order]) == 0)
+    return again

@@ -10,7 +10,6 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.limits import PICTURE_SIDE
 from scenarios.schema.picture import Light, Picture
 from scenarios.schema.sensor import Sensor
 from scenarios.schema.values import (
@@ -22,6 +21,7 @@ from scenarios.schema.values import (
     Pattern,
     Point,
     Positive,
+    Side,
     Value,
 )
 
@@ -85,9 +85,7 @@ class CameraSpec(Model):
     20 m). crop: True accepts people who walk out of view; False: they are an InputError."""
 
     kind: Literal["pinhole", "top"] = Field("pinhole", description="perspective, or orthographic from above")
-    image: tuple[Annotated[int, Field(ge=16, le=PICTURE_SIDE)], Annotated[int, Field(ge=16, le=PICTURE_SIDE)]] = Field(
-        (640, 480), description="width and height of an image, px"
-    )
+    image: tuple[Side, Side] = Field((640, 480), description="width and height of an image, px")
     fps: Positive = Field(10.0, description="frames per second")
     focal_px: Positive = Field(500.0, description="focal length, px (pinhole)")
     baseline: NonNegative = Field(0.12, description="distance from the left to the right camera, m (pinhole)")

@@ -14,6 +14,8 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from scenarios.limits import PICTURE_SIDE
+
 LEAST_SHARE = 0.01
 """Least probability that a draw lies within the clip of its distribution."""
 LARGEST_MEAN = 1000.0
@@ -22,6 +24,7 @@ LARGEST_MEAN = 1000.0
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
+Side = Annotated[int, Field(ge=16, le=PICTURE_SIDE)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$")]
 Pattern = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*\*?$")]
 FixedPoint = tuple[float, float]

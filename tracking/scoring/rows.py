@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from sim.arrays import repeated_ids
 from sim.types import Bools, Ints
 
 NO_ROWS = (0, 0)
@@ -38,12 +39,10 @@ class FrameRows:
         side: "truth" or "tracks", begins the message. The message names the first such frame, and in it the lowest such
         id.
         """
-        frame, number = self.frame, numbered(self.id)[1]
-        key = np.sort(frame * (int(number.max()) + 1 if len(number) else 1) + number)
-        if (key[1:] == key[:-1]).any():
-            order = np.lexsort((self.id, frame))
-            k = order[1:][(np.diff(frame[order]) == 0) & (np.diff(self.id[order]) == 0)][0]
-            raise ValueError(f"{side}: id {self.id[k]} is twice in frame {frame[k]}")
+        again = self.keep(repeated_ids(self.frame, self.id))
+        if len(again):
+            k = np.lexsort((again.id, again.frame))[0]
+            raise ValueError(f"{side}: id {again.id[k]} is twice in frame {again.frame[k]}")
 
 
 def numbered(values: Ints) -> tuple[Ints, Ints]:

@@ -17,9 +17,10 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from scenarios.regular_file import is_present
+from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, crowded, read_numbers, read_text
 from sim.io.formats.group_labels import labelled_truth_fields, require_size
-from sim.types import Bools, Frame, Ints, Sequence, Truth
+from sim.types import Frame, Ints, Sequence, Truth
 
 FPS = 2.5
 LAST_ID = 2**52
@@ -45,17 +46,9 @@ def frame_numbers(raw: Ints, id: Ints | None = None) -> Ints:
     values, counts = np.unique(steps, return_counts=True)
     step = int(values[np.argmax(counts)])
     slot = (2 * (distinct - distinct[0]) + step) // (2 * step) + 1
-    if id is not None and _twice(slot[row], id).any():
+    if id is not None and repeated_ids(slot[row], id).any():
         slot = _parted(slot, [set(p.tolist()) for p in np.split(id[np.argsort(row)], np.cumsum(np.bincount(row))[:-1])])
     return np.asarray(slot[row], np.int64)
-
-
-def _twice(frame: Ints, id: Ints) -> Bools:
-    """Return flags (N,), True for a row whose id stood in the same frame in an earlier row of the order (frame, id)."""
-    order = np.lexsort((id, frame))
-    twice = np.zeros(len(order), bool)
-    twice[order[1:]] = (np.diff(frame[order]) == 0) & (np.diff(id[order]) == 0)
-    return twice
 
 
 def _parted(slot: Ints, people: list[set[int]]) -> Ints:
@@ -131,7 +124,8 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     rows.reject(frame > FRAMES, f"at most {FRAMES} frames", "correct the frame")
     rows.reject(crowded(frame), f"at most {DETECTIONS} people in a frame", CORRECT)
     require_size(path, int(frame.max()), id)
-    rows.reject(_twice(frame, id), "each id once in a frame, also where two frames are nearer than a step", CORRECT)
+    expected = "each id once in a frame, also where two frames are nearer than a step"
+    rows.reject(repeated_ids(frame, id), expected, CORRECT)
     order = np.lexsort((id, frame))
     return NumericTable(rows.file, rows.values[order], rows.line[order]), frame[order], id[order]
 

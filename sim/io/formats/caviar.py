@@ -18,6 +18,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
 from scenarios.regular_file import read_regular
+from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import whole_number
 from sim.io.formats.group_labels import labelled_truth_fields, require_size
 from sim.io.formats.velocity import differentiate
@@ -71,9 +72,9 @@ def read_xml(path: Path) -> CaviarRecording:
             rows.append(_row(path, index, person, label))
     table = np.array(sorted(rows), np.float64).reshape(-1, 7)
     frame, id, label_ = (table[:, k].astype(np.int64) for k in range(3))
-    twice = (np.diff(frame) == 0) & (np.diff(id) == 0)
-    if twice.any():
-        k = int(np.argmax(twice))
+    again = repeated_ids(frame, id)
+    if again.any():
+        k = int(np.argmax(again))
         raise InputError(
             file=path, place=f"frame {frame[k] - 1}", got=f"object {id[k]} twice", expected="each id once in a frame",
             remedy="remove one of the two",

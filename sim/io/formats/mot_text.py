@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
+from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, crowded, read_numbers
 from sim.io.formats.velocity import differentiate
 from sim.scene.box_scale import scale_of_all_boxes
@@ -83,10 +84,9 @@ def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
     keep (N,): True for the rows of the table that count. Negative ids are not checked.
     """
     counted = np.flatnonzero(keep & (table.id >= 0))
-    order = counted[np.lexsort((counted, table.id[counted], table.frame[counted]))]
-    twice = np.zeros(len(table.frame), bool)
-    twice[order[1:]] = (np.diff(table.frame[order]) == 0) & (np.diff(table.id[order]) == 0)
-    table.rows.reject(twice, "each id once in a frame", "remove one of the two lines")
+    again = np.zeros(len(table.frame), bool)
+    again[counted] = repeated_ids(table.frame[counted], table.id[counted])
+    table.rows.reject(again, "each id once in a frame", "remove one of the two lines")
 
 
 @dataclass(frozen=True)

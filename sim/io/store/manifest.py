@@ -54,19 +54,15 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Read the manifest.json of a sequence folder, as a dict.
 
-    Raises InputError if it is missing, unreadable or no JSON object, has another format number or none, lacks a key,
+    Raises InputError if it is missing, unreadable or no JSON object, has another format number, lacks a key,
     names a file outside the folder, or was altered, that is, its fields do not have the hash in its key sha256. The
     files that it names are not read.
     """
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
-    manifest = tables.read_json(path)
-    if manifest.get("format") != tables.FORMAT:
-        raise InputError(
-            file=path, place="format", got=manifest.get("format"), expected=tables.FORMAT, remedy="use the same version"
-        )
-    missing = {"sequence", "files", "seed", "repeat", "scenario_hash", "truth_hash", "content_hash", "sha256"}
+    manifest = tables.read_document(path)
+    missing = {"format", "sequence", "files", "seed", "repeat", "scenario_hash", "truth_hash", "content_hash", "sha256"}
     missing -= manifest.keys()
     if missing:
         raise InputError(file=path, got=f"no {', '.join(sorted(missing))}", expected="all keys", remedy=REDO)

@@ -11,6 +11,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES
+from sim.arrays import repeated_ids
 from sim.io.files import tables
 from sim.io.files.tables import Column, StoredTable, table_bytes
 from sim.io.store.group_files import AXES, read_groups
@@ -58,11 +59,8 @@ class RunRows:
                 raise InputError(file=file, place=place, got=got, expected=expected, remedy=remedy)
 
     def _checks(self) -> Iterator[tuple[Any, str, str]]:
-        order = np.lexsort((self.id, self.frame))
-        again = np.zeros(len(self.id), bool)
-        again[order[1:]] = (np.diff(self.frame[order]) == 0) & (np.diff(self.id[order]) == 0)
         yield self.id < 0, "a negative id", "ids from 0"
-        yield again, "an id a second time in the frame", "unique ids in a frame"
+        yield repeated_ids(self.frame, self.id), "an id a second time in the frame", "unique ids in a frame"
         yield self.group < -1, "a group below -1", "groups from 0, or -1 for alone"
         if self.unit == "group":
             yield self.group != self.id, "a group that is not the id", "group equal to id where the unit is group"
