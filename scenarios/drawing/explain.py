@@ -69,12 +69,12 @@ def svg(scenario: Scenario) -> str:
 def _colours(ways: list[GroupRoute], orders: list[OrderMark]) -> dict[str, str]:
     """Returns the colour (#rrggbb) of each group name, also of groups that orders make, from ten colours.
 
-    ways: one per entry of `group`. All groups of a `repeat` have the same colour. The first ten entries differ; further
-    ones have the first colour. New groups of orders take the colours after those of the entries, in turn.
+    ways: one per entry of `group`. All groups of a `repeat` have the same colour. Entries, then new groups of orders,
+    take the ten colours in turn.
     """
     named: dict[str, str] = {}
-    for course in ways:
-        c = COLOURS[len(set(named.values())) % len(COLOURS)]
+    for k, course in enumerate(ways):
+        c = COLOURS[k % len(COLOURS)]
         named.update(dict.fromkeys([course.id, *(f"{course.id}-{k + 1}" for k in range(course.repeat))], c))
     for k, name in enumerate(name for mark in orders for name in mark.after if name not in named):
         named.setdefault(name, COLOURS[(len(ways) + k) % len(COLOURS)])

@@ -32,22 +32,26 @@ class CharacterPlan:
     def put(self, at: XY, text: str, over: str = "") -> None:
         """Writes text to the right of a point (x, y), m; with `over`, only where the grid has one of its characters.
 
-        A point outside the grid is moved to its edge. Text that would pass the right edge is moved to the left. It must
-        not be longer than the grid is wide.
+        A point outside the grid is moved to its edge. Text that would pass the right edge is moved to the left. What is
+        longer than the grid is wide is cut.
         """
-        column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
+        text, column = text[: self.columns], self._column(at, text)
         row = min(max(int((self.size[1] - at[1]) / self.size[1] * self.rows), 0), self.rows - 1)
         for k, character in enumerate(text):
             if not over or self.cells[row][column + k] in over:
                 self.cells[row][column + k] = character
 
+    def _column(self, at: XY, text: str) -> int:
+        """Returns the column, from 0, in which text at a point begins, so that it ends inside the grid if it fits."""
+        return max(min(int(at[0] * self.scale), self.columns - len(text)), 0)
+
     def name(self, at: XY, text: str) -> None:
         """Writes a name to the right of a point (x, y), m.
 
         It takes the nearest of five rows (the point's own, then one and two below or above) where the name covers only
-        blanks and ways (·); the point's own row if there is none. The name must not be longer than the grid is wide.
+        blanks and ways (·); the point's own row if there is none. A name longer than the grid is wide is cut.
         """
-        column = min(max(int(at[0] * self.scale), 0), self.columns - len(text))
+        column = self._column(at, text)
         step = self.size[1] / self.rows
         for shift in (0, -1, 1, -2, 2):
             y = at[1] + shift * step

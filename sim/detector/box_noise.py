@@ -90,9 +90,13 @@ def foot_points(box: Array, z: Array, camera: Camera) -> Array:
     """
     from sim.scene.camera import rays
 
-    down = 0.5 if camera.kind == "top" else 1.0
-    origin, direction = rays(camera, box[:, :2] + box[:, 2:] * np.array([0.5, down]))
+    origin, direction = rays(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]))
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (z - origin[:, 2]) / direction[:, 2]
     s = np.where(np.isfinite(s) & (s > 0), s, np.nan)
     return np.asarray(origin[:, :2] + s[:, None] * direction[:, :2])
+
+
+def standing_share(camera: Camera | None) -> float:
+    """Return the share of a box's height, from its top, at which a person stands: 0.5 for kind "top", else 1."""
+    return 0.5 if camera is not None and camera.kind == "top" else 1.0

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.detector.box_noise import move_edges
+from sim.detector.box_noise import move_edges, standing_share
 from sim.detector.draws import false_scores, normals, poisson_counts, uniforms
 from sim.detector.readings import Readings
 from sim.detector.visible_ground import VisibleGround, clip_boxes
@@ -164,9 +164,9 @@ def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Ar
     row (L,): the person's rows of the truth. n (9,): standard normals, columns as `at_birth` of Births. `model` gives
     pairs (mean, standard deviation): across and foot, the shift of the middle to the right and of the lower edge
     downwards, in the person's box heights; near_height, the logarithm of height over the person's height. Boxes are 0
-    if the truth has none. The points are at the middle of the lower edges, for every kind of camera, if there is one
-    and ground is seen there. Else they are the person's, moved along x by the shift across × 1.7 m, or 0 if the truth
-    has no positions.
+    if the truth has none. The points are at the middle of the lower edges, for a camera of kind "top" at the middle of
+    the boxes, if there is a camera and ground is seen there. Else they are the person's, moved along x by the shift
+    across × 1.7 m, or 0 if the truth has no positions.
     """
     truth = ground.truth
     across, down = (mean + sd * n[c] for (mean, sd), c in ((model.across, X), (model.foot, Y)))
@@ -177,7 +177,8 @@ def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Ar
     left, top, w, h = truth.box[row].T
     tall = h * np.exp(model.near_height[0] + model.near_height[1] * n[TALL])
     box = _boxes_on_feet(left + w / 2 + h * across, top + h * (1.0 + down), tall, model, n)
-    return box, ground.ground_points(box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3], pos)
+    share = standing_share(ground.camera)
+    return box, ground.ground_points(box[:, 0] + box[:, 2] / 2, box[:, 1] + share * box[:, 3], pos)
 
 
 def _boxes_alone(
@@ -190,8 +191,9 @@ def _boxes_alone(
     standard normals. It starts near one of the sites `model.at` (shares of width and height of the ground part of the
     image), with a standard deviation of 0.03 and inside that part; without sites, anywhere on it. It moves with
     constant velocity, drawn with standard deviation `model.drift` (box heights per s) per axis. `model.height`: mean
-    and standard deviation of the logarithm of its height over a person's. Points are those under the feet if there is a
-    camera and ground is seen there; else one fixed point of the labelled area (0, 0 without one), which does not drift.
+    and standard deviation of the logarithm of its height over a person's. Points are those under the feet, for a camera
+    of kind "top" under the middle of the box, if there is a camera and ground is seen there; else one fixed point of
+    the labelled area (0, 0 without one), which does not drift.
     """
     x, y = at_birth[X], at_birth[Y]
     if model.at:
@@ -202,7 +204,8 @@ def _boxes_alone(
     away = model.drift * tall / ground.truth.fps * np.arange(frames)
     u, v = u + away * n[VX], v + away * n[VY]
     box = _boxes_on_feet(u, v, np.full(frames, tall), model, n)
-    return box, ground.ground_points(u, v, np.tile(ground.labelled_point(x, y), (frames, 1)))
+    foot = v - (1.0 - standing_share(ground.camera)) * tall
+    return box, ground.ground_points(u, foot, np.tile(ground.labelled_point(x, y), (frames, 1)))
 
 
 def _boxes_on_feet(middle: Array, foot: Array, tall: Array, model: FalseAlarms, n: Array) -> Array:

@@ -76,11 +76,12 @@ class VisibleGround:
         """Return the ground points (L, 2), x and y in m, seen at image points u, v (L,) px.
 
         Walls and stairs are ignored. Points from `otherwise` (L, 2) replace those where no ground is seen. `otherwise`
-        itself is returned if there is no camera. Image points above the ground part are moved down to its upper edge.
+        itself is returned if there is no camera. Image points above the ground part are moved down to its upper edge;
+        not those of a camera of kind "top", which has ground on all sides.
         """
         if self.camera is None:
             return otherwise
-        top = self.low[1]
+        top = -np.inf if self.camera.kind == "top" else self.low[1]
         pos = to_ground(self.camera, np.stack([u, np.maximum(v, top)], axis=1))
         return np.where(np.isfinite(pos), pos, otherwise)
 

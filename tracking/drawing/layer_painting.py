@@ -105,14 +105,14 @@ def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
     """Draws one group in place: its hull (outline polygon) filled, its extent dotted, an arrow from its centre to where
     it is in 1 s.
 
-    ink: BGR. The points must not be nan. Whichever of the three has no points is left out.
+    ink: BGR. The points must not be nan. Whichever of the three has no points is left out; so is an arrow without tip.
     """
     if len(group.hull):
         canvas.fill(canvas.map(group.hull), ink, 0.18)
         canvas.line(group.hull, ink, 2, closed=True)
     if len(group.extent):
         _paint_dots(canvas, group.extent, ink)
-    if len(group.motion):
+    if len(group.motion) == 2:
         canvas.arrow(group.motion, FLOOR, 4)
         canvas.arrow(group.motion, ink, 2)
 

@@ -77,7 +77,7 @@ def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
     """Returns the tracks of consecutive frames as rows in m; frame k of the list gets number k, from 0.
 
     tracks: one `Tracks` per frame. scale: units of their plane per metre (px per m in the image, else 1), not 0. Of
-    positions in space x, y remain. Unknown velocities become 0. `reach` is not divided by `scale`.
+    positions in space x, y remain. Unknown velocities become 0.
     """
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
     id = np.concatenate([np.zeros(0, np.int64), *(t.id for t in tracks)])
@@ -86,20 +86,21 @@ def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
         for name in ("pos", "vel")
     )
     cov = np.concatenate([np.zeros((0, 2, 2)), *(t.cov[:, :2, :2] for t in tracks)]) / scale**2
-    return TrackRows(frame, id, pos, np.nan_to_num(vel), cov, np.concatenate([np.zeros(0), *(map(_reach, tracks))]))
+    return TrackRows(
+        frame, id, pos, np.nan_to_num(vel), cov, np.concatenate([np.zeros(0), *(_reach(t, scale) for t in tracks)])
+    )
 
 
-def _reach(t: Tracks) -> Array:
-    """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame; t: its
-    `Tracks`.
+def _reach(t: Tracks, scale: float) -> Array:
+    """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame.
 
-    It is 1 m for a person. For a group (unit "group") 2 standard deviations are added, sqrt(trace of its extent / 2)
-    each, 0 if unknown. The extent is taken in the unit of the plane, also in px.
+    t: the frame's `Tracks`. scale: units of their plane per metre, not 0. The distance is 1 m for a person. For a group
+    (unit "group") 2 standard deviations are added, sqrt(trace of its extent / 2) / scale each, 0 if unknown.
     """
     reach = np.full(len(t.id), REACH)
     if t.unit != "group" or t.groups is None or not len(t.groups.id):
         return reach
-    spread = np.sqrt(np.maximum(np.trace(t.groups.extent, axis1=1, axis2=2) / 2, 0.0))
+    spread = np.sqrt(np.maximum(np.trace(t.groups.extent, axis1=1, axis2=2) / 2, 0.0)) / scale
     by_id = dict(zip(t.groups.id.tolist(), np.nan_to_num(spread).tolist(), strict=True))
     return reach + EXTENT_SIGMAS * np.array([by_id.get(i, 0.0) for i in t.id.tolist()])
 

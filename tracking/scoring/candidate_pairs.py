@@ -198,7 +198,7 @@ def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array
     """Returns the pairs of positions of one frame closer than `reach`, with 1 - distance / reach as similarity.
 
     true_pos (R, 2), est_pos (S, 2): x, y of each row of `true` and `est`, in the unit of `reach` (m or px). A position
-    with a nan or infinity has no pairs. reach: above 0; nan gives no pairs.
+    with a nan or infinity has no pairs. reach: finite, above 0.
     """
     ax, ay, bx, by = (np.ascontiguousarray(pos[:, k]) for pos in (true_pos, est_pos) for k in (0, 1))
 

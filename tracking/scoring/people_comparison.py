@@ -50,18 +50,23 @@ def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
     """Returns the candidate pairs of true and tracked people of one frame, with a similarity in (0, 1].
 
     sides: both sides' people in the scored frames. similarity: "boxes" takes the IoU; "ground" and "image" take 1 -
-    distance / 2 m, the image by `truth.px_per_m` (no pairs if that is nan). Without people on a side there are no
-    pairs. Raises IncomparableError if a side has people but not the boxes or positions to be compared. With "boxes" it
-    is also raised if the truth has no boxes at all.
+    distance / 2 m, the image by `truth.px_per_m`. Without people on a side there are no pairs. Raises
+    IncomparableError if a side has people but not the boxes or positions to be compared; with "image" also if both have
+    people and `truth.px_per_m` is not a finite number above 0. With "boxes" it is also raised if the truth has no boxes
+    at all.
     """
     true, est = sides.true, sides.est
     if similarity == "boxes":
         if true.box is None or est.box is None:
             raise IncomparableError("no boxes to compare: score on the ground")
         return box_pairs(true.rows, est.rows, true.box, est.box)
-    reach = REACH * sides.truth.px_per_m if similarity == "image" else REACH
+    scale = sides.truth.px_per_m if similarity == "image" else 1.0
+    if not 0 < scale < np.inf:
+        if len(true.rows) and len(est.rows):
+            raise IncomparableError(f"no image scale to compare positions by, px_per_m is {scale:g}: state it")
+        scale = 1.0
     true_pos, est_pos = _positions(true, similarity, "ground"), _positions(est, similarity, sides.plane)
-    return point_pairs(true.rows, est.rows, true_pos, est_pos, reach)
+    return point_pairs(true.rows, est.rows, true_pos, est_pos, REACH * scale)
 
 
 def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:

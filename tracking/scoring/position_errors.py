@@ -29,7 +29,8 @@ def position_scores(
 
     Lengths are in m on the ground or px in the image, RMSE_vel in m/s. RMSE_vel is nan in the image and where a side
     has no velocities; both RMSE are nan without mapped people. GOSPA's cut-off distance is 2 m; its four values are nan
-    if frames is 0. The result is empty if one side has no positions on the surface, or if the scale is not finite.
+    if frames is 0. The result is empty if one side has no positions on the surface, or if the scale is not finite
+    and above 0.
     """
     compared = compared_positions(true, est, surface, plane, scale)
     if compared is None:
@@ -47,10 +48,10 @@ def compared_positions(
 
     surface: "ground" or "image". plane: of `est.pos`. scale: units of the surface per metre. Velocities are None in the
     image and where a side has none. The result is None if a side has no positions on the surface, or if the scale is
-    not finite.
+    not finite and above 0.
     """
     true_pos, est_pos = true.positions_on(surface, "ground"), est.positions_on(surface, plane)
-    if true_pos is None or est_pos is None or not np.isfinite(scale):
+    if true_pos is None or est_pos is None or not 0 < scale < np.inf:
         return None
     return (true_pos, est_pos, true.vel, est.vel) if surface == "ground" else (true_pos, est_pos, None, None)
 

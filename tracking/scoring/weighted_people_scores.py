@@ -139,7 +139,7 @@ def weighted_positions(sides: ComparedSides, inside: Bools) -> WeightedScores:
     """Returns a function from weights (D, size) to RMSE_pos, RMSE_vel, GOSPA and its parts, (D,) by key.
 
     sides: both sides, people mapped. inside (size,): bool by frame number, which are scored. The function returns {} if
-    a side has no positions on the surface, or if the scale is not finite.
+    a side has no positions on the surface, or if the scale is not finite and above 0.
     """
     true, est = sides.true, sides.est
     compared = compared_positions(true, est, sides.surface, sides.plane, sides.scale)

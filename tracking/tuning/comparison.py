@@ -117,13 +117,14 @@ def pareto_front(candidates: Sequence[Candidate], goals: Sequence[Goal]) -> list
     first.
 
     A candidate dominates another if it is no worse in any goal and better in one. Of candidates with equal values the
-    first stays. Every candidate needs one validation value per goal, else ValueError is raised; for nan values the
-    result is undefined. No candidates give [].
+    first stays. A candidate with a nan is left out, as nothing is known of its rank. Every candidate needs one
+    validation value per goal, else ValueError is raised. No candidates give [].
     """
+    known = [c for c in candidates if not np.isnan(c.validation).any()]
 
     def dominates(one: Candidate, other: Candidate) -> bool:
         gains = [g.gain(b, a) for g, a, b in zip(goals, one.validation, other.validation, strict=True)]
         return min(gains) >= 0 and max(gains) > 0
 
-    kept = {c.validation: c for c in reversed(candidates) if not any(dominates(other, c) for other in candidates)}
+    kept = {c.validation: c for c in reversed(known) if not any(dominates(other, c) for other in known)}
     return sorted(kept.values(), key=lambda c: goals[0].gain(c.validation[0], 0.0))

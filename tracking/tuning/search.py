@@ -102,9 +102,9 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report:
 
     With one goal the winner is the candidate of best value among those surely better than the defaults (the 95 %
     interval of the gain excludes 0), else the defaults. With several goals it is the one of the Pareto front that is
-    best in the first goal, not simplified. If the defaults win, nothing is compared and a note says why. play: plays
-    episodes. report: called with a text before each set of scenes. Errors of the defaults and of the workers are
-    raised.
+    best in the first goal, not simplified; the defaults if no candidate has a value of every goal. If the defaults win,
+    nothing is compared and a note says why. play: plays episodes. report: called with a text before each set of scenes.
+    Errors of the defaults and of the workers are raised.
     """
     evaluator = HeldOutEvaluator(plan, play, report)
     candidates = evaluator.validated(_candidates(plan, study))
@@ -112,7 +112,11 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report:
     default, several, goal = candidates[0], len(plan.goals) > 1, plan.goals[0]
     front = pareto_front(candidates, plan.goals) if several else []
     better = [c for c in candidates if c.gain is not None and c.gain.verdict == "better"]
-    best = front[0] if several else max([default, *better], key=lambda c: goal.gain(0.0, c.validation[0]))
+    best = (
+        next(iter(front), default)
+        if several
+        else max([default, *better], key=lambda c: goal.gain(0.0, c.validation[0]))
+    )
     config, values = best.config, best.validation
     if not several and best is not default:
         least_first = sorted(importance, key=lambda name: importance[name])

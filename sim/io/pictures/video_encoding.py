@@ -130,14 +130,21 @@ class VideoWriter:
         context.colorspace = context.color_primaries = context.color_trc = BT601
 
     def add(self, picture: Image) -> None:
-        """Append a picture (H, W, 3) BGR uint8. Its size must be that of the video, which is not checked.
+        """Append a picture (H, W, 3) BGR uint8.
 
-        A picture of another even size is scaled; an odd size raises cv2.error. Raises OSError if the video cannot be
-        written, as on a full disk; so do `end` and `close`.
+        Raises InputError for a picture of another size than the video's, and OSError if the video cannot be written, as
+        on a full disk; so do `end` and `close`.
         """
         import av
         import cv2
 
+        width, height = self._stream.width, self._stream.height
+        if picture.shape[:2] != (height, width):
+            raise InputError(
+                file=self._file.name, place=f"picture {self.count + 1}",
+                got="{1}×{0} px".format(*picture.shape), expected=f"{width}×{height} px, the size of the video",
+                remedy="give pictures of one size",
+            )  # fmt: skip
         planes = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420), np.uint8)
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
         frame.color_range, frame.colorspace = NARROW, BT601

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.drawing.explain import svg, text
+from scenarios.drawing.explain import COLOURS, _colours, svg, text
+from scenarios.drawing.plan_text import CharacterPlan
 from scenarios.drawing.routes import group_routes, middle, order_marks, spread
 from scenarios.drawing.words import number, order, trigger
 from scenarios.loading.resolve import load, names
@@ -136,3 +137,21 @@ def test_every_trigger_in_words(path: Path) -> None:
     assert of("{ reach = { group = 'a' }, delay = 2 }") == "when a comes within 1 m of its goal, 2 s later"
     assert of("{ reach = { group = 'a', at = [8, 5], radius = 2 } }") == "when a comes within 2 m of (8, 5)"
     assert "to meet and stand" in order(load(path, ["event.m1.goal=meet"]).event[0])
+
+
+def test_each_of_twelve_groups_has_the_next_of_ten_colours(tmp_path: Path) -> None:
+    rows = "".join(f'[[group]]\nid = "g{k}"\nstart = [1, {k + 1}]\ngoal = [9, {k + 1}]\n' for k in range(12))
+    (tmp_path / "many.toml").write_text(f"schema = 1\nduration = 5\nworld.size = [20, 20]\n{rows}")
+    scenario = load(tmp_path / "many.toml")
+    colour = _colours(group_routes(scenario), order_marks(scenario))
+    assert [colour[f"g{k}"] for k in range(12)] == [*COLOURS, COLOURS[0], COLOURS[1]]
+
+
+@pytest.mark.parametrize("at", [(0.0, 1.0), (3.0, 1.0), (5.0, 1.0), (-4.0, 9.0)])
+def test_words_longer_than_the_plan_are_cut(at: tuple[float, float]) -> None:
+    plan = CharacterPlan((5.0, 5.0), 10)
+    plan.put(at, "abcdefghijklmnop")
+    assert ["".join(row) for row in plan.cells if set(row) != {" "}] == ["abcdefghij"]
+    plan = CharacterPlan((5.0, 5.0), 10)
+    plan.name(at, "abcdefghijklmnop")
+    assert ["".join(row) for row in plan.cells if set(row) != {" "}] == ["abcdefghij"]

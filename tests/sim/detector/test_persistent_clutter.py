@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.schema.sensor import FalseAlarms, Sensor
+from sim.detector.box_noise import foot_points
 from sim.detector.sense import sense
 from sim.scene.camera import project
 from sim.truth.label import bodies
@@ -64,6 +65,17 @@ def test_the_others_are_of_a_person_s_size_where_they_stand() -> None:
     assert box[:, 1] + box[:, 3] == pytest.approx(foot[:, 1])
     assert box[:, 3] == pytest.approx(foot[:, 1] - head[:, 1], rel=0.15)  # bodies are no lines: seen from above
     assert np.log(box[:, 2] / box[:, 3]) == pytest.approx(np.full(len(box), -1.0))
+
+
+@pytest.mark.parametrize("near", [0.0, 1.0])
+def test_points_are_where_people_with_these_boxes_stand(near: float) -> None:
+    """Also from straight above, where a person stands in the middle of the box."""
+    for camera in (CAMERA, above()):
+        truth = bodies(crowd(0, 12, 60), camera)
+        found = alarms(truth, camera=camera, near=near)
+        box, pos = everything(found, "box"), everything(found, "pos")
+        assert len(pos) > 50
+        assert pos == pytest.approx(foot_points(box, np.zeros(len(box)), camera))
 
 
 def test_places_jitter_and_drift() -> None:

@@ -11,6 +11,7 @@ import pytest
 from sim.types import Detections, Frame, GroupEvent, Groups, Tracks
 from tracking.environment import observation
 from tracking.environment.observation import NAMES, STATISTICS, Observer, Statistic, squashed, table
+from tracking.environment.observation_window import track_rows
 
 FPS = 10.0
 
@@ -107,6 +108,15 @@ def test_groups_that_the_tracker_names():
     assert (seen["grouped"], seen["group_size"]) == (0.5, pytest.approx(2))
     assert seen["merges"] == pytest.approx(600)
     assert seen["splits"] == 0
+
+
+@pytest.mark.parametrize("scale", [1.0, 50.0])
+def test_reach_of_whole_groups_is_in_metres(scale):
+    two, none = np.array([[0.0, 0.0], [9.0, 0.0]]) * scale, (np.zeros(0, np.int64),) * 2
+    extent, hull = np.tile(np.eye(2) * 0.25 * scale**2, (2, 1, 1)), (np.zeros((0, 2)),) * 2
+    groups = Groups(np.arange(2), none, two, two * 0, extent, np.array([3.0, 1.0]), hull)
+    made = tracks(1, two.tolist(), (0, 0), group=[0, 1], groups=groups).replace(unit="group")
+    assert track_rows([made], scale).reach == pytest.approx([2.0, 2.0])
 
 
 def test_groups_as_wholes_reach_as_far_as_they_are_wide():

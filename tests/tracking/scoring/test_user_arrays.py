@@ -14,6 +14,7 @@ from sim.sequence import simulate
 from sim.types import Truth
 from tracking import track
 from tracking.scoring import evaluate, score_arrays
+from tracking.scoring.people_comparison import IncomparableError
 
 ROOT = Path(__file__).resolve().parents[3]
 ROWS = {"frame": [1, 1, 2, 2], "id": [1, 2, 1, 2], "pos": [[0, 0], [1, 0], [0, 0], [1, 0]], "group": [7, 7, 7, 7]}
@@ -126,3 +127,13 @@ def test_the_lines_of_the_readme_run(merge: Truth, tmp_path: Path, monkeypatch, 
     said = capsys.readouterr().out
     assert re.search(r"^HOTA +1$", said, re.MULTILINE)
     assert re.search(r"^pairwise_F1 +1$", said, re.MULTILINE)
+
+
+@pytest.mark.parametrize("scale", [0.0, -20.0, float("nan"), float("inf")])
+def test_positions_in_the_image_are_not_compared_without_a_scale(scale: float) -> None:
+    table = {"frame": [1, 2], "id": [1, 1], "box": [[0, 0, 10, 20], [1, 0, 10, 20]]}
+    with pytest.raises(IncomparableError, match="no image scale"):
+        score_arrays(table, table, fps=10.0, similarity="image", px_per_m=scale)
+    nobody = {"frame": [], "id": [], "box": []}
+    assert score_arrays(table, nobody, fps=10.0, similarity="image", px_per_m=scale)["MOTA"] == 0.0
+    assert score_arrays(table, table, fps=10.0, px_per_m=scale)["HOTA"] == 1.0

@@ -54,6 +54,15 @@ def test_front_of_two_goals():
     assert [c.trial for c in kept] == [0, 2, 1]
 
 
+def test_a_candidate_without_a_value_is_not_in_the_front():
+    goals, nan = (Goal("HOTA"), Goal("GOSPA", False)), math.nan
+    points = [(nan, 0.1), (0.9, 5.0), (0.99, nan), (0.5, 6.0), (nan, nan)]
+    for order in (points, points[::-1]):
+        kept = pareto_front([Candidate(k, ToyConfig(), (), p) for k, p in enumerate(order)], goals)
+        assert [c.validation for c in kept] == [(0.9, 5.0)]
+    assert pareto_front([Candidate(0, ToyConfig(), (), (nan, 1.0))], goals) == []
+
+
 @dataclass
 class Game:
     """Plays by a formula: what each parameter is worth, and what is refused. `seen`: configs that were played."""

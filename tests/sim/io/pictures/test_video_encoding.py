@@ -52,6 +52,14 @@ def test_odd_sizes_are_refused(tmp_path, size):
     assert not (tmp_path / "a.mp4").exists()
 
 
+@pytest.mark.parametrize("shape", [(48, 64, 3), (65, 96, 3), (63, 95, 3)])
+def test_a_picture_of_another_size_is_refused(tmp_path, shape):
+    with write_video(tmp_path / "a.mp4", SIZE, 10.0) as film:
+        film.add(picture(0))
+        with pytest.raises(InputError, match=r"picture 2: got .* px; expected 96×64 px"):
+            film.add(np.zeros(shape, np.uint8))
+
+
 class Disk:
     """A file system with `room` bytes left that writes at most `most` bytes at a time, as a full one may do."""
 

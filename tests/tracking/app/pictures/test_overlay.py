@@ -18,7 +18,7 @@ from tests.groups_as_wholes import wholes
 from tracking.app.pictures.overlay import banner_words, overlay_pictures, write_overlay
 from tracking.drawing.canvas import colour
 from tracking.drawing.layer_painting import LayerStyle
-from tracking.drawing.layers import layer_of_tracks
+from tracking.drawing.layers import layer_of_tracks, plan_layer_of_tracks
 
 STRIP = 32
 
@@ -199,6 +199,26 @@ def test_groups_on_the_ground_lie_there_in_the_picture(sequence: Sequence) -> No
     assert not any(len(part) for r in blind.groups for part in (r.hull, r.extent, r.motion))
     behind = layer_of_tracks([a_group((8.0, -40.0), "ground")], sequence.camera, None).at(1)
     assert not any(len(part) for r in behind.groups for part in (r.hull, r.extent, r.motion))
+
+
+def without_velocity(group: Tracks) -> Tracks:
+    return group.replace(vel=np.full((1, 2), np.nan), groups=None)
+
+
+def test_a_group_of_unknown_velocity_has_its_place_and_no_arrow() -> None:
+    side = layer_of_tracks([without_velocity(a_group((40, 30)))], None, None)
+    assert side.at(1).at.tolist() == [[40, 30]]
+    (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
+    assert len(coloured(picture, 4)) > 20
+
+
+def test_a_group_of_unknown_velocity_has_its_place_on_the_ground(sequence: Sequence) -> None:
+    given = a_group((8.0, 5.0), "ground")
+    known, unknown = (layer_of_tracks([g], sequence.camera, None).at(1).at for g in (given, without_velocity(given)))
+    assert np.isfinite(known).all()
+    np.testing.assert_array_equal(unknown, known)
+    (region,) = plan_layer_of_tracks([without_velocity(given)]).at(1).groups
+    assert region.motion.tolist() == [[8.0, 5.0]]
 
 
 def test_what_is_unknown_of_a_group_is_left_out() -> None:
