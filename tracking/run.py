@@ -27,8 +27,8 @@ from tracking.time_limit import TimeLimited
 class TrackingRun(SequenceOf[Tracks]):
     """The tracks of one run; as a sequence, one `Tracks` per frame in order: item 0 is frame 1, a slice gives a tuple.
 
-    tracks: the `Tracks` of every frame. info: the content of run.json (tracker, config, seed, detections, speed), {} by
-    default.
+    tracks: the `Tracks` of every frame. info: what run.json tells of the run (tracker, config, seed, detections,
+    speed), {} by default. `write` adds what it tells of the labels and files.
     """
 
     tracks: tuple[Tracks, ...]
@@ -43,6 +43,20 @@ class TrackingRun(SequenceOf[Tracks]):
 
     def __len__(self) -> int:
         return len(self.tracks)
+
+    def write(self, folder: str | Path, sequence: Sequence) -> Path:
+        """Store the tracks in the folder as `flockscope track` does, and return the folder.
+
+        sequence: what was tracked. run.json gets its truth_hash, so that the tracks are scored with these labels only.
+        Files of an earlier run are replaced. Raises InputError if the folder holds files of another program with names
+        of a run's, it cannot be written, or the labels cannot be read; WorkError if the disk is full or an order of a
+        simulated script was not fulfilled.
+        """
+        from sim.io.store.run_seal import tracked_hash
+        from sim.io.store.track_files import write_tracks
+
+        info = {**self.info, "truth_hash": tracked_hash(sequence)}
+        return write_tracks(folder, self, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=info)
 
 
 def track(

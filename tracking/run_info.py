@@ -40,13 +40,12 @@ def run_info(
     scale: ImageScale,
     speed: Speed,
 ) -> dict[str, Any]:
-    """Return the content of run.json as a dictionary. Two equal runs differ only in their speeds.
+    """Return what run.json tells of a run, as a dictionary. Two equal runs differ only in their speeds.
 
     tracks: of the whole run, one `Tracks` per frame, possibly none. seed: of the run. sensor: settings of mode "truth",
     empty if none. scale: of the image, by which groups were derived; nan is stored as None.
 
-    Keys: tracker (name); config (values by name, {} without); seed; sequence (name); truth_hash (of a generated
-    sequence, as its manifest states it, else None: the labels are not read); detections (the mode); sensor;
+    Keys: tracker (name); config (values by name, {} without); seed; sequence (name); detections (the mode); sensor;
     plane (of the first tracks, None without); boxes ("measured", "projected" or "none"); fps; px_per_m;
     px_per_m_frames (number of first frames whose boxes gave the scale, 0 for none); background (text on the sample,
     None without); causal (True if there is a frame from which on no later frame is used); causal_from (the first such
@@ -63,7 +62,6 @@ def run_info(
         "config": prepared.config.as_dict() if prepared.config else {},
         "seed": seed,
         "sequence": prepared.sequence.name,
-        "truth_hash": prepared.sequence.source.get("truth_hash"),
         "detections": prepared.mode,
         "sensor": dict(sensor),
         "plane": tracks[0].plane if len(tracks) else None,

@@ -18,7 +18,7 @@ from scenarios.loading.resolve import Entry
 from sim.dataset.setting_differences import setting_differences
 from sim.io.files.output_paths import output_path, output_paths
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import damaged_files, identity, is_sequence, read_manifest
+from sim.io.store.manifest import damaged_files, identity, is_own_sequence, read_manifest
 
 MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
 
@@ -80,7 +80,7 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
 
     if not job.folder.exists():
         return None
-    if not job.folder.is_dir() or (any(job.folder.iterdir()) and not is_sequence(job.folder)):
+    if not job.folder.is_dir() or (any(job.folder.iterdir()) and not is_own_sequence(job.folder)):
         raise InputError(
             file=job.folder, got="something that flockscope did not write", expected="a stored sequence, or nothing",
             remedy="choose another --out, or move it away",

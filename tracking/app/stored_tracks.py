@@ -1,4 +1,4 @@
-"""Stores the tracks of a run, finds stored tracks below a path, and matches them with sequences by name."""
+"""Finds stored tracks below a path, and matches them with sequences by name."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.limits import is_number
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
-from sim.io.store.track_files import read_tracks, write_tracks
+from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.app.not_tracks import refuse_other_things
 from tracking.run import TrackingRun
@@ -25,16 +24,6 @@ METHOD = ("tracker", "config", "grouping")
 
 SHOWN = 3
 """Most parameters that the error on two configs names."""
-
-
-def store_run(folder: Path, sequence: Sequence, run: TrackingRun) -> None:
-    """Writes the tracks of a run of a tracker over the sequence into the folder, sealed by a run.json.
-
-    Raises InputError if the folder cannot be written or the sequence's labels cannot be read; WorkError if the disk is
-    full.
-    """
-    info = {**run.info, "truth_hash": tracked_hash(sequence)}
-    write_tracks(folder, run, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=info)
 
 
 @dataclass(frozen=True)
@@ -59,28 +48,24 @@ class StoredTracks:
     def read(self, sequence: Sequence) -> TrackingRun:
         """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`.
 
-        Raises InputError if run.json states another frame rate or other labels than the sequence's, there are no
-        tracks, or a run is not whole. Also if a MOTChallenge text has a frame beyond the sequence's length, or an
-        event's frame is outside the tracks. Warns about a text without rows.
+        Whether a run is whole is left to `check`. Raises InputError if run.json states another frame rate or other
+        labels than the sequence's, or there are no tracks. Also if a MOTChallenge text has a frame beyond the
+        sequence's length, or an event's frame is outside the tracks. Warns about a text without rows.
         """
-        fps = self.info.get("fps")
-        if fps is not None and not is_number(fps):
-            raise InputError(
-                file=self.path / RUN, place="fps", got=repr(fps), expected="a number", remedy="track again"
-            )
+        fps, seal = self.info.get("fps"), (self.path if self.path.is_dir() else self.path.parent) / RUN
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             raise InputError(
-                file=self.path, place=RUN, got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",
+                file=seal, place="fps", got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",
                 remedy=f"read the sequence with --fps {fps:g}, as `track` did",
             )  # fmt: skip
         tracked = self.info.get("truth_hash")
         if tracked is not None and tracked_hash(sequence) not in (None, tracked):
             raise InputError(
-                file=self.path, place=f"{RUN}: truth_hash", got=f"tracks of another {sequence.name}",
+                file=seal, place="truth_hash", got=f"tracks of another {sequence.name}",
                 expected=f"those of {sequence.source.get('path', 'this sequence')}",
                 remedy=f"{AGAIN}: its labels, scenario or settings are others",
             )  # fmt: skip
-        return TrackingRun(tuple(read_tracks(self.path, fps=sequence.fps, length=sequence.length)), self.info)
+        return TrackingRun(tuple(read_checked_tracks(self.path, fps=sequence.fps, length=sequence.length)), self.info)
 
 
 def find_tracks(path: Path) -> list[StoredTracks]:
@@ -110,7 +95,7 @@ def _below(folder: Path, depth: int) -> list[StoredTracks]:
     """
     if is_run(folder):
         info = read_run(folder) if (folder / RUN).is_file() else {}
-        return [StoredTracks(str(info.get("sequence", folder.name)), folder, info)]
+        return [StoredTracks(info.get("sequence", folder.name), folder, info)]
     if (folder / "tracks.txt").is_file():
         return [StoredTracks(folder.name, folder, {})]
     texts = [StoredTracks(p.stem, p, {}) for p in sorted(folder.glob("*.txt"))]

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from scenarios.errors import InputError
 from scenarios.printable import counted
 from sim.io.files.own_files import refuse_foreign_file
+from sim.io.files.value_check import TABLE, TEXT, Rules, list_of
 from sim.types import Tracker
 from tracking.keyword_options import documented, from_keywords
 from tracking.tuning.comparison import Candidate, TrialRecord, pareto_front
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 
 JOURNAL = ".journal"
 """Suffix of the journal beside `--out`."""
+
+RESULT_MARKS: Rules = {"settings": TABLE, "counts": TABLE, "taken_back": list_of(TEXT)}
+"""What every .json file of a search has."""
 
 
 @documented(TuneOptions, positional=3)
@@ -92,7 +96,7 @@ def _checked_target(out: Path) -> Path:
     if out.suffix != ".toml" or out.is_dir():
         remedy = "choose a name that ends in .toml"
         raise InputError(file=out, place="--out", got=out.name, expected="a file, *.toml", remedy=remedy)
-    refuse_foreign_file(out.with_suffix(".json"), '"settings"', '"counts"')
+    refuse_foreign_file(out.with_suffix(".json"), RESULT_MARKS)
     return out
 
 

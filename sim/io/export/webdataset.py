@@ -24,11 +24,15 @@ from sim.io.files import tables
 from sim.io.files.atomic import new_file, remove_partials, write_file
 from sim.io.files.lock import lock_folder
 from sim.io.files.own_files import refuse_foreign_file
+from sim.io.files.value_check import TABLE, TEXT, Rules, list_of
 from sim.io.source import sequence_folders
 
 SAMPLES = ("sequence", "frame")
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
 INDEX = "index.json"
+INDEX_MARKS: Rules = {"content_hash": TEXT, "shards": list_of(TABLE)}
+SHARD_MARKS: Rules = {"manifests": TEXT, "sequences": TABLE}
+"""What every index.json, and every .json of a shard, has."""
 
 Progress = Callable[[int, int, str], None]
 
@@ -141,9 +145,9 @@ def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
     .json is unreadable or no JSON object, or if a file of others has the name of one that will be written.
     """
     wanted = {facts["name"]: facts for facts in plan}
-    refuse_foreign_file(root / INDEX, '"content_hash"', '"shards"')
+    refuse_foreign_file(root / INDEX, INDEX_MARKS)
     for name in wanted:
-        refuse_foreign_file((root / name).with_suffix(".json"), '"manifests"', '"sequences"')
+        refuse_foreign_file((root / name).with_suffix(".json"), SHARD_MARKS)
     for path in sorted(root.glob("shard-*.tar")):
         beside = path.with_suffix(".json")
         facts = wanted.get(path.name)

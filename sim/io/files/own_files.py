@@ -1,29 +1,106 @@
-"""Tells a file that an earlier run wrote from a file of the same name that somebody else wrote."""
+"""Tells a file that flockscope wrote from a file of the same name that somebody else wrote, by its parsed content.
+
+JSON files have keys that only we write, Parquet tables our metadata. Pages, PNG pictures and MP4 videos name the
+program that made them.
+"""
 
 from __future__ import annotations
 
+import struct
+import zlib
+from html.parser import HTMLParser
 from pathlib import Path
 
 from scenarios.errors import InputError
+from sim.io.files import tables
+from sim.io.files.value_check import Rules
 
-MEBIBYTE = 1 << 20
+GENERATOR = "flockscope"
+"""The name in the element <meta name="generator"> of a page, and in the comment of a video."""
+
+HEAD = 1 << 16
+"""Bytes of a page in which its generator stands."""
+
+IHDR_END = 33
+"""Bytes of a PNG file up to the end of its first chunk."""
 
 
-def has_marks(path: Path, *marks: str) -> bool:
-    """Return True if all of the texts `marks` stand in the first MiB of the file."""
-    with path.open("rb") as file:
-        head = file.read(MEBIBYTE)
-    return all(mark.encode() in head for mark in marks)
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
-def refuse_foreign_file(path: Path, *marks: str) -> None:
-    """Raise InputError if a file exists at `path` and lacks one of the marks; do nothing otherwise.
+SOFTWARE = _chunk(b"tEXt", b"Software\0" + GENERATOR.encode())
+"""The second chunk of our PNG files."""
+
+
+def marked_png(picture: bytes) -> bytes:
+    """Return a PNG file's bytes with the name of our program in it."""
+    return picture[:IHDR_END] + SOFTWARE + picture[IHDR_END:]
+
+
+def is_ours(path: Path, marks: Rules | None = None) -> bool | None:
+    """Return True if flockscope wrote the file, False if it did not, None if the file is missing or cannot be parsed.
+
+    marks: of a .json file, rules for keys that such a file of ours always has and no other program writes. Other files
+    are recognised if their names end in .parquet, .html, .png or .mp4.
+    """
+    if not path.is_file():
+        return None
+    try:
+        if path.suffix == ".json" and marks:
+            found = tables.read_json(path)
+            return all(key in found and rule.accepts(found[key]) for key, rule in marks.items())
+        kinds = {".parquet": tables.is_own_table, ".html": _page, ".png": _picture, ".mp4": _video}
+        return path.suffix in kinds and kinds[path.suffix](path)
+    except (InputError, OSError, ValueError):
+        return None
+
+
+def refuse_foreign_file(path: Path, marks: Rules | None = None) -> None:
+    """Raise InputError if a file exists at `path` that is not ours by `is_ours`; do nothing otherwise.
 
     For files that the user has not named, such as an index in an output folder: these are replaced only if we wrote
-    them. marks: texts that all of our files of this kind have in their first MiB.
+    them. marks: of a .json file, as for `is_ours`.
     """
-    if path.exists() and not has_marks(path, *marks):
+    if path.exists() and not is_ours(path, marks):
         raise InputError(
             file=path, got="a file that flockscope did not write", expected="its own file, or none",
             remedy="move it away, or choose another --out",
         )  # fmt: skip
+
+
+class _Generator(HTMLParser):
+    """Reads a page. State: name, the generator that the page names last, "" for none."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.name = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Keep the content of a <meta name="generator">."""
+        found = dict(attrs)
+        if tag == "meta" and found.get("name") == "generator":
+            self.name = found.get("content") or ""
+
+
+def _page(path: Path) -> bool:
+    with path.open("rb") as file:
+        head = file.read(HEAD).decode("utf-8", "replace")
+    parser = _Generator()
+    parser.feed(head)
+    return parser.name == GENERATOR
+
+
+def _picture(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(IHDR_END + len(SOFTWARE))[IHDR_END:] == SOFTWARE
+
+
+def _video(path: Path) -> bool:
+    import av
+
+    try:
+        with av.open(str(path), metadata_errors="ignore") as container:
+            return container.metadata.get("comment") == GENERATOR
+    except av.FFmpegError:
+        return False

@@ -199,6 +199,20 @@ def read_table(path: Path) -> StoredTable:
     return StoredTable(path, columns, facts)
 
 
+def is_own_table(path: Path) -> bool:
+    """Return True if the Parquet table `path` was written by table_bytes; only its schema is read.
+
+    Raises InputError if the file is no Parquet table, OSError if it cannot be read.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return KEY in (pq.read_schema(path).metadata or {})
+    except pa.ArrowException:
+        raise InputError(file=path, got="no Parquet table", expected="one", remedy=REDO) from None
+
+
 def _numpy(column: Any) -> Any:
     import pyarrow as pa
 
@@ -241,27 +255,27 @@ def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
     return f'{{"format": {FORMAT}, "{name}": {body}}}\n'.encode()
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path, remedy: str = REDO) -> dict[str, Any]:
     """Read the file `path`, which holds one JSON object, as a dict.
 
-    Raises InputError if it is unreadable, no regular file, above 64 MB or no JSON object, holds NaN, is nested deeper
-    than 32 levels, or has a whole number beyond 64 bits.
+    remedy: for the error about a file that is no JSON object. Raises InputError if it is unreadable, no regular file,
+    above 64 MB or no JSON object, holds NaN, is nested deeper than 32 levels, or has a whole number beyond 64 bits.
     """
     from sim.io.files.numeric_text import read_text
 
-    value = parse_json(read_text(path, JSON_BYTES), path, REDO)
+    value = parse_json(read_text(path, JSON_BYTES), path, remedy)
     if not isinstance(value, dict):
-        raise InputError(file=path, got=type(value).__name__, expected="a JSON object", remedy=REDO)
+        raise InputError(file=path, got=type(value).__name__, expected="a JSON object", remedy=remedy)
     return value
 
 
-def read_document(path: Path) -> dict[str, Any]:
+def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
     """Read a JSON object that we wrote, as a dict.
 
-    A file without the key "format" is accepted. Raises InputError if the file is unreadable, no JSON object, or of
-    another format number than 1.
+    remedy: for the error about a file that is no JSON object. A file without the key "format" is accepted. Raises
+    InputError if the file is unreadable, no JSON object, or of another format number than 1.
     """
-    value = read_json(path)
+    value = read_json(path, remedy)
     found = value.get("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
         raise InputError(file=path, place="format", got=repr(found), expected=FORMAT, remedy="use the same version")

@@ -30,13 +30,15 @@ def rate_of(fps: float) -> Fraction:
 
 
 @contextmanager
-def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY) -> Iterator[VideoWriter]:
+def write_video(
+    path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY, comment: str = ""
+) -> Iterator[VideoWriter]:
     """Give a VideoWriter for an H.264 mp4 file `path`, which is complete after the block; an existing file is
     overwritten.
 
     size: (width, height) px of all pictures. fps: frames per second, rounded to a fraction with a denominator up to
-    1001. quality: x264's constant rate factor, lower is better, default 18. If the block raises, an incomplete file
-    stays; if it adds no picture, a file without pictures.
+    1001. quality: x264's constant rate factor, lower is better, default 18. comment: stored in the file, "" for none.
+    If the block raises, an incomplete file stays; if it adds no picture, a file without pictures.
 
     Raises InputError if width or height is odd, OSError if the file cannot be opened or written, as on a full disk, and
     WorkError if the finished video holds another number of pictures than were added.
@@ -49,7 +51,7 @@ def write_video(path: Path, size: tuple[int, int], fps: float, quality: int = QU
     # We open the file because libav leaves its own open if a video cannot be finished. It is unbuffered, since Ctrl-C
     # would be lost inside a Python callback from libav.
     with path.open("wb", buffering=0) as file:
-        made = VideoWriter(WholeFile(file), size, fps, quality)
+        made = VideoWriter(WholeFile(file), size, fps, quality, comment)
         try:
             yield made
             made.end()
@@ -110,15 +112,17 @@ class VideoWriter:
     """A video that is being written; made by `write_video`, which also ends and closes it.
 
     file: what to write to. size: (width, height) of all pictures in px, both even. fps: frames per second. quality:
-    x264's constant rate factor, lower is better. State: libav's open container and stream, and `count`, the number of
-    pictures added.
+    x264's constant rate factor, lower is better. comment: stored in the file, "" for none. State: libav's open
+    container and stream, and `count`, the number of pictures added.
     """
 
-    def __init__(self, file: WholeFile, size: tuple[int, int], fps: float, quality: int):
+    def __init__(self, file: WholeFile, size: tuple[int, int], fps: float, quality: int, comment: str):
         import av
 
         self._file, self.count = file, 0
         self._container: Any = av.open(file, "w", format="mp4", options={"movflags": "faststart"})
+        if comment:
+            self._container.metadata["comment"] = comment
         group = str(max(1, round(fps)))
         options = {"crf": str(quality), "preset": "veryfast", "g": group, "bf": "2", "threads": "1"}
         self._stream: Any = self._container.add_stream("libx264", rate=rate_of(fps), options=options)

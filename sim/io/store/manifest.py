@@ -13,12 +13,17 @@ from typing import Any
 from scenarios.errors import InputError
 from sim import hashing
 from sim.io.files import tables
+from sim.io.files.own_files import is_ours
+from sim.io.files.value_check import TEXT, Rules
 from sim.io.store import seal
 from sim.io.store.seal import with_hash as with_hash
 from sim.io.store.streams import check_streams, coding, is_picture
 
 SCHEMA = 1
 MANIFEST = "manifest.json"
+MARKS: Rules = {"scenario_hash": TEXT, "content_hash": TEXT}
+"""What every manifest.json of ours has, and no other program writes."""
+
 REDO = "run the same `flockscope generate` again"
 
 
@@ -27,6 +32,13 @@ def is_sequence(folder: Path) -> bool:
     one.
     """
     return (folder / MANIFEST).is_file() or (folder / "scenario.toml").is_file()
+
+
+def is_own_sequence(folder: Path) -> bool:
+    """Return True if flockscope wrote the sequence in the folder: its manifest is ours or, if that is missing or
+    damaged, one of its tables.
+    """
+    return any(is_ours(path, MARKS) for path in (folder / MANIFEST, *folder.rglob("*.parquet")))
 
 
 def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (), images: str = "jpg") -> dict[str, Any]:
@@ -61,7 +73,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
-    manifest = tables.read_document(path)
+    manifest = tables.read_document(path, REDO)
     missing = {"format", "sequence", "files", "seed", "repeat", "scenario_hash", "truth_hash", "content_hash", "sha256"}
     missing -= manifest.keys()
     if missing:

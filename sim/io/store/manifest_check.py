@@ -2,56 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, SCALES, fits_picture, is_number
+from scenarios.limits import FRAME_RATES, FRAMES, INTEGER, PICTURE_SIDE, PICTURE_SIZES, SCALES, fits_picture
+from sim.io.files.value_check import TEXT, Rule, Rules, check_values, list_of, number, one_of, or_none, whole
 from sim.io.store.manifest import REDO
 from sim.io.store.streams import IMAGES, STREAMS
 
+SIDES = list_of(whole(1, PICTURE_SIDE))
+SIZE = Rule(lambda v: SIDES.accepts(v) and len(v) == 2 and fits_picture(*v), f"[width, height], {PICTURE_SIZES}")
 
-def _whole(low: int, high: int) -> Callable[[Any], bool]:
-    return lambda v: isinstance(v, int) and not isinstance(v, bool) and low <= v <= high
-
-
-def _number(low: float, high: float) -> Callable[[Any], bool]:
-    return lambda v: is_number(v, low, high)
-
-
-def _or_none(right: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda v: v is None or right(v)
-
-
-def _list_of(right: Callable[[Any], bool], length: int | None = None) -> Callable[[Any], bool]:
-    return lambda v: isinstance(v, list) and length in (None, len(v)) and all(map(right, v))
-
-
-def _text(value: Any) -> bool:
-    return isinstance(value, str)
-
-
-def _size(value: Any) -> bool:
-    return _list_of(_whole(1, FRAMES), 2)(value) and fits_picture(*value)
-
-
-SEQUENCE: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "name": (_text, "a text"),
-    "fps": (_number(*FRAME_RATES), "a number from {:g} to {:g}".format(*FRAME_RATES)),
-    "length": (_whole(0, FRAMES), f"a whole number from 0 to {FRAMES}"),
-    "image_size": (_or_none(_size), f"null, or [width, height]: {PICTURE_SIZES}"),
-    "px_per_m": (_or_none(_number(*SCALES)), "null, or a number from {:g} to {:g}".format(*SCALES)),
+SEQUENCE: Rules = {
+    "name": TEXT,
+    "fps": number(*FRAME_RATES),
+    "length": whole(0, FRAMES),
+    "image_size": or_none(SIZE),
+    "px_per_m": or_none(number(*SCALES)),
 }
-"""What each value of the key "sequence" must be: whether a value is right, and words for it."""
-TOP: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "seed": (_whole(0, 2**63 - 1), "a whole number from 0 on"),
-    "repeat": (_whole(0, 2**63 - 1), "a whole number from 0 on"),
-    "truth_hash": (_text, "a hash"),
-    "content_hash": (_text, "a hash"),
-    "scenario_hash": (_text, "a hash"),
-    "streams": (_list_of(lambda v: v in STREAMS), f"some of {', '.join(STREAMS)}"),
-    "images": (_or_none(lambda v: v in IMAGES), f"null, or {' or '.join(IMAGES)}"),
+"""What each value of the key "sequence" must be."""
+TOP: Rules = {
+    "seed": whole(0, INTEGER),
+    "repeat": whole(0, INTEGER),
+    "truth_hash": TEXT,
+    "content_hash": TEXT,
+    "scenario_hash": TEXT,
+    "streams": list_of(one_of(*STREAMS)),
+    "images": or_none(one_of(*IMAGES)),
 }
 """What other values must be; keys that a manifest may lack are checked if they are there."""
 
@@ -62,15 +40,9 @@ def check_manifest(path: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     path: of the manifest.json, for the message. Checked are the values of "sequence" and seed, repeat, hashes, streams
     and images. Pictures need an image size.
     """
-    about = manifest["sequence"]
-    if not isinstance(about, dict):
-        raise InputError(file=path, place="sequence", got=repr(about), expected="an object", remedy=REDO)
-    for table, rules, prefix in ((about, SEQUENCE, "sequence."), (manifest, TOP, "")):
-        for key, (right, expected) in rules.items():
-            if (key in table or prefix) and not right(table.get(key)):
-                got = repr(table.get(key)) if key in table else "nothing"
-                raise InputError(file=path, place=prefix + key, got=got, expected=expected, remedy=REDO)
-    if manifest.get("streams") and about["image_size"] is None:
+    check_values(path, manifest["sequence"], SEQUENCE, REDO, inside="sequence")
+    check_values(path, manifest, TOP, REDO)
+    if manifest.get("streams") and manifest["sequence"]["image_size"] is None:
         raise InputError(
             file=path, place="sequence.image_size", got="null", expected="the size of the pictures", remedy=REDO
         )

@@ -6,38 +6,60 @@ It says which tracker ran and on what, and seals the run's files as manifest.jso
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from scenarios.limits import FRAME_RATES, INTEGER
 from sim.hashing import labels_hash
 from sim.io.files import tables
-from sim.io.files.own_files import has_marks
+from sim.io.files.own_files import is_ours
+from sim.io.files.value_check import FLAG, TABLE, TEXT, Rules, check_values, number, one_of, or_none, whole
 from sim.io.store import seal
 from sim.types import Sequence
 
 RUN = "run.json"
-TABLE = "tracks.parquet"
-NAMES = ("tracks.txt", "tracks.mot.txt", TABLE, "groups.csv", "groups.parquet", "events.json", RUN)
+EXACT = "tracks.parquet"
+NAMES = ("tracks.txt", "tracks.mot.txt", EXACT, "groups.csv", "groups.parquet", "events.json", RUN)
 """Names of the files of a run; files of other names in its folder belong to somebody else."""
 
-WHOLE = ("tracks.txt", TABLE)
+WHOLE = ("tracks.txt", EXACT)
 """Files that stand for the whole run if they are given alone; tracks.mot.txt is a text as other programs read it."""
 
 AGAIN = "track again"
-OLD = "track again; if the tracks are another program's, delete run.json"
+OLD = "delete run.json, then track again; tracks of another program are read without it"
+
+MARKS: Rules = {"boxes": one_of("measured", "projected", "none")}
+"""What every run.json of ours has, also of an older version, and no other program writes."""
+
+VALUES: Rules = {
+    **MARKS,
+    "tracker": TEXT,
+    "sequence": TEXT,
+    "config": or_none(TABLE),
+    "grouping": or_none(TABLE),
+    "sensor": or_none(TABLE),
+    "seed": or_none(whole(-INTEGER, INTEGER)),
+    "detections": or_none(TEXT),
+    "background": or_none(TEXT),
+    "plane": or_none(TEXT),
+    "causal": or_none(FLAG),
+    "truth_hash": or_none(TEXT),
+    "fps": or_none(number(*FRAME_RATES)),
+    "px_per_m": or_none(number(-math.inf, math.inf)),
+}
+"""What the values of run.json must be that commands read; keys that it lacks are not checked."""
 
 
 def is_run(folder: Path) -> bool:
-    """Return True if the folder holds a run of ours, perhaps an unfinished or damaged one.
+    """Return True if the folder holds a run of ours, perhaps an unfinished or damaged one; text alone is no such run.
 
-    It does if it has a tracks.parquet, or a run.json with our key "boxes". Text files alone are another program's.
+    It does if its run.json or its tracks.parquet is ours, or cannot be parsed and so may be ours.
     """
-    if (folder / TABLE).is_file():
-        return True
-    path = folder / RUN
-    return path.is_file() and has_marks(path, '"boxes"')
+    paths = [folder / name for name in (RUN, EXACT) if (folder / name).is_file()]
+    return any(is_ours(path, MARKS) is not False for path in paths)
 
 
 def run_folder(path: Path) -> Path | None:
@@ -47,12 +69,16 @@ def run_folder(path: Path) -> Path | None:
 
 
 def reject_foreign(folder: Path) -> None:
-    """Raise InputError if the folder holds a file with a name of ours, but no run of ours: it would be replaced."""
-    found = [name for name in NAMES if (folder / name).exists()]
-    if found and not is_run(folder):
+    """Raise InputError if the folder holds a file with a name of ours, but no run of ours: it would be replaced.
+
+    Its run.json tells whether the run is ours, without one its tracks.parquet.
+    """
+    found = [name for name in (RUN, EXACT, *NAMES) if (folder / name).exists()]
+    if found and not is_ours(folder / found[0], MARKS):
+        got = "a file of another program, or a damaged one"
         raise InputError(
-            file=folder / found[0], got="a file of another program", expected="a new folder, or one with a run",
-            remedy="choose another --out, or move the file",
+            file=folder / found[0], got=got, expected="a new folder, or one with a run",
+            remedy="choose another --out, or move the file; delete a damaged run",
         )  # fmt: skip
 
 
@@ -60,27 +86,32 @@ def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
     """Return the run.json of a run as bytes: `info` with the facts of all its other files and its own hash.
 
     info: what ran; the keys format, files and sha256 are added. files: content by name, without run.json. Raises
-    ValueError if `info` holds NaN or infinity, TypeError if it holds what JSON cannot.
+    InputError if a value of `info` is of another kind than `read_run` accepts, ValueError if it holds NaN or infinity,
+    TypeError if it holds what JSON cannot.
     """
     stated = {"format": tables.FORMAT, **info, "files": seal.file_facts(files)}
-    return tables.json_document(seal.with_hash(json.loads(tables.json_text(stated))))  # hashed as it will be read
+    read = json.loads(tables.json_text(stated))  # hashed as it will be read
+    check_values(Path(RUN), read, VALUES, "correct info")
+    return tables.json_document(seal.with_hash(read))
 
 
 def read_run(folder: Path) -> dict[str, Any]:
     """Return the content of the run.json of a folder; the files that it names are not read.
 
     Raises InputError if it is missing, unreadable, no JSON object, of another format number, without a seal (as older
-    versions wrote it), or altered: its bytes must be those that we write for its content, down to the last blank.
+    versions wrote it), or altered: its bytes must be those that we write for its content, down to the last blank. Also,
+    with the key, for a value of the wrong kind.
     """
     path = folder / RUN
     if not path.is_file():
         got, expected = f"tracks without {RUN}", "a run that was finished"
         raise InputError(file=folder, got=got, expected=expected, remedy=f"incomplete: {AGAIN}")
-    run = tables.read_document(path)
+    run = tables.read_document(path, OLD)
     if not isinstance(run.get("files"), dict) or "sha256" not in run:
         got, expected = "a run.json without hashes, of an older version", "one that names each file with its hash"
         raise InputError(file=path, got=got, expected=expected, remedy=OLD)
     seal.require_intact(path, run, AGAIN, exact=True)
+    check_values(path, run, VALUES, AGAIN)
     return run
 
 

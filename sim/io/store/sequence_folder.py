@@ -6,6 +6,7 @@ A sequence that is read back equals the one written to the last bit, except pict
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import lru_cache
 from itertools import repeat
 from pathlib import Path
@@ -22,7 +23,7 @@ from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.store import truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.event_files import read_script
-from sim.io.store.manifest import MANIFEST, REDO, damaged_files, identity, read_manifest, with_hash
+from sim.io.store.manifest import MANIFEST, REDO, damaged_files, identity, is_own_sequence, read_manifest, with_hash
 from sim.io.store.manifest_check import check_manifest
 from sim.io.store.streams import check_streams, file_name
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
@@ -69,12 +70,12 @@ def write_sequence(
 def _refuse_foreign(folder: Path, names: set[str]) -> bool:
     """Raise InputError if the folder holds a file that we did not write; else return False.
 
-    Ours are the files that its own manifest lists, and those that have a name of the new sequence's files, `names`.
+    Ours are the files that its own manifest lists, and those that have a name of the new sequence's files, `names`. In
+    a folder that is no sequence of ours, none are.
     """
-    try:
-        ours = names | read_manifest(folder)["files"].keys()
-    except InputError:  # a damaged or missing manifest lists nothing
-        ours = names
+    ours = names if is_own_sequence(folder) else set()
+    with suppress(InputError):  # a damaged or missing manifest lists nothing
+        ours = ours | read_manifest(folder)["files"].keys()
     found = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir())
     for path in [folder] if not folder.is_dir() else sorted(found):
         if path.relative_to(folder).as_posix() not in ours:

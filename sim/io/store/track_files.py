@@ -18,7 +18,7 @@ from sim.io.files.atomic import replace_sealed
 from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import event_dict, read_events
 from sim.io.store.group_files import groups_bytes, groups_csv
-from sim.io.store.run_seal import NAMES, RUN, TABLE, WHOLE, check_run, reject_foreign, run_folder, sealed_run
+from sim.io.store.run_seal import EXACT, NAMES, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
 from sim.io.store.track_boxes import box_source, upright_boxes
 from sim.io.store.track_tables import RunRows, flatten, read_track_table, track_table
 from sim.io.store.track_text import read_track_text, with_groups
@@ -46,9 +46,9 @@ def write_tracks(
     such boxes. scene: gives the height of the ground under 2-D positions; None: 0. info: content of run.json, to which
     "format", "boxes" (where the boxes come from: "measured", "projected" or "none"), "files" and "sha256" are added.
 
-    Raises InputError if the tracks have wrong ids or unknown positions, the folder holds such a file of another
-    program, or it cannot be written. Raises WorkError if the disk is full, ValueError if `info` holds NaN or infinity,
-    TypeError if it holds what JSON cannot.
+    Raises InputError if the tracks have wrong ids or unknown positions, a value of `info` is of the wrong kind, the
+    folder holds such a file of another program, or it cannot be written. Raises WorkError if the disk is full,
+    ValueError if `info` holds NaN or infinity, TypeError if it holds what JSON cannot.
     """
     folder = Path(folder)
     reject_foreign(folder)
@@ -72,8 +72,8 @@ def tracks_files(
     of the ground; None: 0. info: content of run.json, to which "format", "boxes", "files" and "sha256" are added.
 
     Nothing is written. No tracks give tables without rows, in the plane "ground". Raises InputError if an id is
-    negative or stands twice in a frame, or a position or score is not finite. Raises ValueError if `info` holds NaN or
-    infinity, TypeError if it holds what JSON cannot.
+    negative or stands twice in a frame, a position or score is not finite, or a value of `info` is of the wrong kind.
+    Raises ValueError if `info` holds NaN or infinity, TypeError if it holds what JSON cannot.
     """
     every = list(tracks)
     rows, boxes = flatten(every), box_source(every, camera)
@@ -82,7 +82,7 @@ def tracks_files(
     if boxes == "projected" and camera is not None and place is not None:
         text_box = upright_boxes(camera, place)
     files = {
-        TABLE: track_table(rows, every, fps),
+        EXACT: track_table(rows, every, fps),
         "tracks.txt": _text(rows, text_box, place, full=True),
         "tracks.mot.txt": _text(rows, text_box, place, full=False),
     }
@@ -125,13 +125,19 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
     or invalid, a frame is beyond `length`, or an event's frame is outside the tracks. Warns about a text without rows
     if `length` is given.
     """
+    folder = run_folder(Path(path))
+    if folder is not None:
+        check_run(folder)
+    return read_checked_tracks(path, fps=fps, length=length)
+
+
+def read_checked_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:
+    """Read tracks as `read_tracks` does, but of a run that `check_run` found whole: no hash is compared again."""
     path = Path(path)
     folder = path if path.is_dir() else path.parent
     whole = path.is_dir() or path.name in WHOLE
-    if run_folder(path) is not None:
-        check_run(folder)
-        if whole:
-            return _with_events(read_track_table(folder), folder)
+    if whole and run_folder(path) is not None:
+        return _with_events(read_track_table(folder), folder)
     text = folder / "tracks.txt" if path.is_dir() else path
     if not text.is_file():
         raise InputError(

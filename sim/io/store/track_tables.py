@@ -15,7 +15,7 @@ from sim.arrays import repeated_ids
 from sim.io.files import tables
 from sim.io.files.tables import Column, StoredTable, table_bytes
 from sim.io.store.group_files import AXES, read_groups
-from sim.io.store.run_seal import TABLE
+from sim.io.store.run_seal import EXACT
 from sim.io.store.truth_files import BOX, scores_or_ones
 from sim.types import Array, Groups, Tracks
 
@@ -144,7 +144,7 @@ def read_track_table(folder: Path) -> list[Tracks]:
     Events are not read. Raises InputError if a file is missing or damaged, a column or value is missing or of the wrong
     type, rows are outside the frames or out of order, a number is not finite, or an id is wrong.
     """
-    table = tables.read_table(folder / TABLE)
+    table = tables.read_table(folder / EXACT)
     plane, unit = table.fact("plane"), table.fact("unit")
     table.reject(plane not in PLANES, "plane", repr(plane), "ground, space or image")
     table.reject(unit not in UNITS, "unit", repr(unit), "person or group")

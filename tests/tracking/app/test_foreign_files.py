@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from tests.short_scene import write_short_scene
@@ -16,6 +18,13 @@ ROOT = Path(__file__).resolve().parents[3]
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("foreign")
     write_short_scene(folder, "20000")
+    for name in ("walk", "other"):
+        (folder / "two" / name / "gt").mkdir(parents=True)
+        (folder / "two" / name / "gt" / "gt.txt").write_text("1,1,10,10,20,40,1,1,1\n2,1,12,10,20,40,1,1,1\n")
+        (folder / "two" / name / "img1").mkdir()
+        (folder / "two" / name / "seqinfo.ini").write_text(f"[Sequence]\nname={name}\nframeRate=5\nseqLength=2\n")
+        for k in (1, 2):
+            cv2.imwrite(str(folder / "two" / name / "img1" / f"{k:06d}.png"), np.full((64, 96, 3), 9 * k, np.uint8))
     return folder
 
 
@@ -28,6 +37,15 @@ COMMANDS = {
     "export webdataset, a shard": ("export webdataset {0}/data --out {1}", "shard-000000.json"),
     "tune": ("tune {2}/tests/toy_tracker.py:Toy --suite {0}/scene.toml --check none --trials 1 --out {1}/toy.toml",
              "toy.json"),
+    "generate, a manifest": (
+        "generate {0}/scene.toml --seeds 0 --streams none --out {1}", "flockscope-train/scene-s00000/manifest.json"
+    ),
+    "track, run.json": ("track blob {0}/data/flockscope-test/scene-s20000 --out {1}", "run.json"),
+    "track, a table": ("track blob {0}/data/flockscope-test/scene-s20000 --out {1}", "tracks.parquet"),
+    "view": ("view {0}/two --out {1}", "other.html"),
+    "view, the film": ("view {0}/two/walk --video beside --out {1}/walk.html", "walk.view.mp4"),
+    "sheet": ("sheet {0}/two --out {1}", "other.png"),
+    "overlay": ("overlay {0}/two --out {1}", "other.mp4"),
     "demo": ("demo --quick --out {1}", "index.html"),
 }  # fmt: skip
 
@@ -46,7 +64,17 @@ def test_a_file_of_others_stays(name: str, data: Path, tmp_path: Path, capsys: p
     assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [mine]
 
 
-@pytest.mark.parametrize("name", ["generate", "export webdataset", "track"])
+@pytest.mark.parametrize(
+    "name", ["generate", "export webdataset", "track", "view", "view, the film", "sheet", "overlay"]
+)
 def test_own_files_are_replaced(name: str, data: Path, tmp_path: Path) -> None:
     line = [word.format(data, tmp_path / "out", ROOT) for word in COMMANDS[name][0].split()]
     assert run(line) == run(line) == 0
+
+
+@pytest.mark.parametrize("line", ["view {0}/two/walk --video none --out {1}.html", "sheet {0}/two/walk --out {1}.png"])
+def test_a_file_that_the_user_names_is_replaced(line: str, data: Path, tmp_path: Path) -> None:
+    words = [word.format(data, tmp_path / "mine") for word in line.split()]
+    Path(words[-1]).write_text("mine")
+    assert run(words) == 0
+    assert Path(words[-1]).read_bytes() != b"mine"

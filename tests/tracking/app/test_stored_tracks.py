@@ -9,8 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sim.hashing import file_hash
+from sim.io.source import open_source
+from sim.io.store import seal
+from sim.io.store.run_seal import read_run
 from tests.sealing import seal_again
 from tracking.app.cli import run
+from tracking.run import track
 
 SCENE = """
 schema = 1
@@ -143,6 +148,30 @@ def test_another_recording_of_that_name(tmp_path, capsys):
     assert run(["score", str(one), str(tmp_path / "t"), "--fps", "5"]) == 0
     assert run(["score", str(one), str(tmp_path / "t"), "--fps", "5", "--px-per-m", "30"]) == 0
     assert "tracks of another walk" in refused(capsys, "score", two, tmp_path / "t", "--fps", "5")
+
+
+def test_python_stores_what_was_tracked(tmp_path, capsys):
+    """The same run.json as the command's, so that tracks of another recording are refused."""
+    walk = recording(tmp_path / "walk", ROWS)
+    (sequence,) = open_source(walk, fps=5.0)
+    made = track("blob", sequence, detections="truth")
+    made.write(tmp_path / "t", sequence)
+    assert run(["track", "blob", str(walk), "--detections", "truth", "--fps", "5", "--out", str(tmp_path / "u")]) == 0
+    by_python, by_command = (read_run(tmp_path / name) for name in "tu")
+    assert by_python["truth_hash"] == by_command["truth_hash"] is not None
+    assert by_python.keys() == by_command.keys()
+    assert "truth_hash" not in made.info, "labels are not read while tracking"
+    (walk / "gt" / "gt.txt").write_text(ROWS.replace("12,", "13,"))
+    assert "tracks of another walk" in refused(capsys, "score", walk, tmp_path / "t", "--fps", "5")
+
+
+def test_score_hashes_each_file_once(made, capsys, monkeypatch):
+    hashed = []
+    monkeypatch.setattr(seal, "_hash_of", lambda path: hashed.append(path) or file_hash(path.read_bytes()))
+    assert run(["score", str(made / "data"), str(made / "blob")]) == 0
+    capsys.readouterr()
+    files = [path for path in hashed if path.is_relative_to(made / "blob")]
+    assert sorted(files) == sorted(p for p in (made / "blob").rglob("*.*") if p.name != "run.json")
 
 
 def test_what_was_tracked_before_anybody_labelled_it(tmp_path):

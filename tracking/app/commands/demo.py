@@ -18,7 +18,6 @@ from tracking.app.commands.score_tables import SHOWN, SequenceScores, number
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.replay_page.video import PageVideo
-from tracking.app.stored_tracks import store_run
 from tracking.run import TrackingRun
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
@@ -50,7 +49,7 @@ def demo(out: Path, *, quick: bool) -> CommandResult:
     from sim.workers.start import WorkerOptions
 
     start = time.monotonic()
-    refuse_foreign_file(option_parsing.output_folder(out) / "index.html", "<title>flockscope demo</title>")
+    refuse_foreign_file(option_parsing.output_folder(out) / "index.html")
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     with ProgressMeter("generate") as meter:
         workers = WorkerOptions(1 if quick else os.cpu_count() or 1)
@@ -92,7 +91,7 @@ def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
             run = TrackerSetup(tracker, detections=mode).run(sequence)
             row, name = score_run(sequence, run), f"{tracker} from {_input_word(tracker, mode)}"
             page = folder / f"{tracker}-{mode}.html"
-            store_run(output_path(out / "tracks" / f"{tracker}-{mode}", sequence.name), sequence, run)
+            run.write(output_path(out / "tracks" / f"{tracker}-{mode}", sequence.name), sequence)
             _write_page(name, sequence, run, row, page, video)
             section.add(row, page, name)
             if mode == "image":
@@ -121,7 +120,7 @@ def _section(tracker: str, sequences: list[Sequence], out: Path, meter: Progress
         run = TrackerSetup(tracker).run(sequence)
         row = score_run(sequence, run)
         page = output_path(out / "pages" / tracker, sequence.name, ".html")
-        store_run(output_path(out / "tracks" / tracker, sequence.name), sequence, run)
+        run.write(output_path(out / "tracks" / tracker, sequence.name), sequence)
         _write_page(tracker, sequence, run, row, page, None)
         section.add(row, page, sequence.name)
         meter.step(f"{tracker} on {sequence.name}")

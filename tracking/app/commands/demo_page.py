@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
+from sim.io.files.own_files import GENERATOR
 from tracking.app.commands.score import summary
 from tracking.app.commands.score_tables import SHOWN, SequenceScores, number
 from tracking.scoring.catalogue import CATALOGUE
@@ -82,7 +83,8 @@ def demo_page(root: Path, scene: PixelScene, sections: list[ResultSection]) -> s
     root: the folder that will hold the page and holds everything it links to; links are relative to it. Raises
     ValueError for a page or video outside it.
     """
-    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>flockscope demo</title><style>{STYLE}</style>'
+    generator = f'<meta charset="utf-8"><meta name="generator" content="{GENERATOR}">'
+    head = f'<!doctype html><html lang="en">{generator}<title>flockscope demo</title><style>{STYLE}</style>'
     first = FROM_PIXELS.format(frames=scene.frames) + _videos(root, scene) + _table(scene.section, root)
     rest = "\n".join(_section(section, root) for section in sections)
     return f"{head}{INTRO}{first}{rest}</html>\n"

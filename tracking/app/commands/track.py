@@ -16,7 +16,6 @@ from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
-from tracking.app.stored_tracks import store_run
 from tracking.config import Config
 from tracking.grouping.link_rule import LinkRule
 from tracking.run import TrackingRun
@@ -98,7 +97,7 @@ def track(options: TrackOptions) -> CommandResult:
         for sequence, folder in zip(sequences, folders, strict=True):
             tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
             run = setup.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
-            store_run(folder, sequence, run)
+            run.write(folder, sequence)
             rows.append(_row(run, folder))
     return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(map(_line, rows)))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from scenarios.errors import InputError
 from sim.io.files.output_paths import output_paths
+from sim.io.files.own_files import refuse_foreign_file
 from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app import option_parsing
@@ -128,7 +129,8 @@ def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     """Returns the file for each sequence, in order: `out` itself for a single one, else out/<sequence name><suffix>.
 
     The sequence name becomes a file name. Raises InputError if `out` ends in `suffix` and there are several sequences,
-    or two of them would share a file; for a single one if `out` ends otherwise or is a folder.
+    two of them would share a file, or a file exists that flockscope did not write; for a single one if `out` ends
+    otherwise or is a folder.
     """
     if len(sequences) == 1:
         return [option_parsing.output_file(out, suffix)]
@@ -137,4 +139,7 @@ def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
             file=out, place="--out", got=f"one file for {len(sequences)} sequences", expected="a folder",
             remedy="give a folder, or one sequence",
         )  # fmt: skip
-    return output_paths(out, [sequence.name for sequence in sequences], suffix)
+    files = output_paths(out, [sequence.name for sequence in sequences], suffix)
+    for file in files:
+        refuse_foreign_file(file)
+    return files

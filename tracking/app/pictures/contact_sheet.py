@@ -11,6 +11,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.printable import counted
 from sim.io.files.atomic import write_file
+from sim.io.files.own_files import marked_png
 from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
 from tracking.app.pictures.frame_choice import SHOWN_KINDS, choose_frames, is_close
 from tracking.app.pictures.panel_pictures import PanelPictures
@@ -51,7 +52,7 @@ def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
     path = Path(out)
     done, code = cv2.imencode(".png", picture)
     assert done, "PNG holds any 8-bit picture"
-    write_file(path, code.tobytes())
+    write_file(path, marked_png(code.tobytes()))
     return path
 
 

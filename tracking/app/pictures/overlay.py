@@ -12,6 +12,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.files.atomic import new_file
+from sim.io.files.own_files import GENERATOR
 from sim.io.pictures.video_encoding import write_video
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even_size, refuse_source
@@ -99,7 +100,7 @@ def _write(path: Path, sequence: Sequence, panels: list[Panel], step: Callable[[
     first = next(pictures, None)
     if first is None:
         raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
-    with write_video(path, (first.shape[1], first.shape[0]), sequence.fps) as video:
+    with write_video(path, (first.shape[1], first.shape[0]), sequence.fps, comment=GENERATOR) as video:
         video.add(first)
         step(sequence.name)
         for picture in pictures:

@@ -13,6 +13,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.files.atomic import move_synced, staged_path
+from sim.io.files.own_files import GENERATOR, refuse_foreign_file
 from sim.io.pictures.video_encoding import rate_of, write_video
 from sim.types import Image, Sequence
 
@@ -54,7 +55,8 @@ def page_video(
     Returns None if it is "none" or the sequence has no pictures. An existing FILE.view.mp4 is replaced by a video
     beside the page, else left. step: called with the sequence's name after each frame.
 
-    Raises InputError if FILE.view.mp4 is the file that the sequence is read from, a picture cannot be read or the
+    Raises InputError if FILE.view.mp4 is the file that the sequence is read from or one that flockscope did not write,
+    a picture cannot be read or the
     folder cannot be written; WorkError if the disk is full.
     """
     if placement == "none" or not sequence.has_images:
@@ -66,6 +68,7 @@ def page_video(
         lost = _encode(sequence, partial, step)
         if placement == "inside" or (placement == "auto" and partial.stat().st_size < LARGE):
             return PageVideo("", base64.b64encode(partial.read_bytes()).decode(), rate, lost)
+        refuse_foreign_file(beside)
         move_synced(partial, beside)
     return PageVideo(quote(beside.name), "", rate, lost)
 
@@ -91,7 +94,7 @@ def _encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tupl
     width, height = sequence.image_size
     last: Image = np.full((height, width, 3), GREY, np.uint8)
     lost = []
-    with write_video(path, (width + width % 2, height + height % 2), sequence.fps, QUALITY) as video:
+    with write_video(path, (width + width % 2, height + height % 2), sequence.fps, QUALITY, GENERATOR) as video:
         for frame in sequence:
             if frame.image is None:
                 lost.append(frame.index)

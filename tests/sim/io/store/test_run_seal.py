@@ -11,6 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from scenarios.errors import InputError
@@ -132,6 +134,52 @@ def test_files_of_others_are_not_replaced(tmp_path, make_tracks, name):
     with pytest.raises(InputError, match="another program"):
         write_tracks(tmp_path, make_tracks(1), fps=10.0)
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {name: "mine"}
+
+
+def _parquet() -> bytes:
+    sink = pa.BufferOutputStream()
+    pq.write_table(pa.table({"frame": [1], "boxes": [2]}), sink)
+    return sink.getvalue().to_pybytes()
+
+
+FOREIGN = {
+    "tracks.parquet": _parquet(),
+    "a broken tracks.parquet": b"PAR1",
+    "run.json": b'{"boxes": [1, 2], "format": 1}',
+    "a broken run.json": b'{"boxes": "measured"',
+    "a list in run.json": b'["boxes"]',
+}
+
+
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_a_file_with_our_name_and_words_is_not_replaced(tmp_path, make_tracks, kind):
+    name = kind.split()[-1]
+    (tmp_path / name).write_bytes(FOREIGN[kind])
+    with pytest.raises(InputError, match=r"another program.*choose another --out") as error:
+        write_tracks(tmp_path, make_tracks(1), fps=10.0)
+    assert error.value.file == str(tmp_path / name)
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == {name: FOREIGN[kind]}
+
+
+def test_a_foreign_run_json_beside_our_table_is_not_replaced(tmp_path, make_tracks):
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    (folder / "run.json").write_text('{"mine": 1}')
+    with pytest.raises(InputError, match=r"run\.json: got a file of another program"):
+        write_tracks(folder, make_tracks(2), fps=10.0)
+    (folder / "run.json").unlink()
+    check_run(write_tracks(folder, make_tracks(2), fps=10.0))
+
+
+@pytest.mark.parametrize("body", [b'{"boxes": "measured"', b"", b"[]"])
+def test_texts_beside_a_damaged_run_json_are_no_other_program_s(tmp_path, make_tracks, body):
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    (folder / "run.json").write_bytes(body)
+    for _ in range(2):
+        with pytest.raises(InputError, match=r"run\.json.*delete run\.json, then track again"):
+            read_tracks(folder)
+        (folder / "tracks.parquet").unlink(missing_ok=True)
+    (folder / "run.json").write_text('{"mine": 1}')
+    assert len(read_tracks(folder)) > 0
 
 
 FAULTS = {
