@@ -173,6 +173,14 @@ class GroupArrays(NamedTuple):
             np.zeros((g, 10)),
         )
 
+    def with_room(self, w: int) -> GroupArrays:
+        """Returns the same arrays with room for at least w waypoints; route and kind are copied if they have less."""
+        more = max(w - self.kind.shape[1], 0)
+        if not more:
+            return self
+        room = ((0, 0), (0, more))
+        return self._replace(route=np.pad(self.route, (*room, (0, 0))), kind=np.pad(self.kind, room))
+
 
 class PeopleArrays(NamedTuple):
     """What the kernels know of the N people present, in the order of the physics engine's rows.

@@ -28,7 +28,7 @@ TARGET_TIME = 0.7  # s: time in which a person reaches a place in a queue, speed
 GATHER_TIME = 0.8  # s: time in which a member reaches its place at the gathering point, speed permitting
 STANDING_SPEED = 0.3  # m/s: fastest shift of a group that has arrived; fluctuations grow up to this speed
 TURN_DISTANCE = 0.3  # m: nearer to the waypoint the heading is kept
-ARRIVED, NEARLY_ARRIVED = 0.25, 1.5  # m from the end: arrived; still arrived after having been so
+ARRIVED = 0.25  # m from the end
 DOOR_DISTANCE = 0.45  # m from the middle of a door: the person is through
 DOOR_PACE = 0.6  # share of the speed of those who are through and wait for the others
 LOOSE = 2.2  # m: a group with a larger radius is not avoided as a whole
@@ -135,7 +135,7 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
         if w == last and kind == END:
             if groups.finish[g] == STAND:
                 pace = min(pace, d / slow_time)
-                if d < ARRIVED or (groups.arrived[g] and d < NEARLY_ARRIVED):
+                if d < ARRIVED:
                     groups.arrived[g] = True
             elif d < radius:
                 groups.arrived[g] = True

@@ -30,7 +30,7 @@ from sim.crowd.navigation import Navigator
 from sim.crowd.population import EnteringGroup, walking_speed
 from sim.types import Array, Ints
 
-MAX_WAY = 32  # waypoints
+WAY = 32  # waypoints of a group for which there is room from the start
 WALK_ON = 1000.0  # m that a group walks on beyond its goal
 MAX_QUEUE_SPEED = 1.4  # m/s, of people on the way to their place in a queue
 
@@ -57,7 +57,7 @@ class GroupState:
         """
         people = [m for g in entering for m in g.members]
         self.navigator, self.slowdown = navigator, slowdown
-        self.arrays = GroupArrays.empty(len(entering) + new, MAX_WAY)
+        self.arrays = GroupArrays.empty(len(entering) + new, WAY)
         self.next_group = len(entering)
         self.alive: dict[str, int] = {g.name: g.index for g in entering}
         self.members: dict[int, list[int]] = {g.index: [m.column for m in g.members] for g in entering}
@@ -122,9 +122,8 @@ class GroupState:
 
         start, goal, gather (2,) and each of via (2,): m. finish: "stand", "leave" or "walk" (straight on in the
         direction of the last leg, for 1000 m beyond the goal). speed: m/s. gather: first waypoint, where the group
-        waits for all members; None to start at once. Where no way exists, the group walks straight. Waypoints after the
-        first MAX_WAY (32) are dropped, the goal with them; such a group never arrives. The group turns at once to its
-        way, `arrived` becomes False, and its members start at the first waypoint.
+        waits for all members; None to start at once. Where no way exists, the group walks straight. The group turns at
+        once to its way, `arrived` becomes False, and its members start at the first waypoint.
         """
         way: list[tuple[Array, int]] = [] if gather is None else [(gather, GATHER)]
         here = start if gather is None else gather
@@ -137,18 +136,18 @@ class GroupState:
             along = goal - (way[-2][0] if len(way) > 1 else start)
             way[-1] = (goal + WALK_ON * along / max(float(np.linalg.norm(along)), 1e-9), END)
         way[-1] = (way[-1][0], END)
-        self.write_way(g, way[:MAX_WAY], finish, speed, start)
+        self.write_way(g, way, finish, speed, start)
 
     def write_way(self, g: int, way: list[tuple[Array, int]], finish: str, speed: float, start: Array) -> None:
         """Overwrites the way of group index g: its waypoints, speed (m/s) and finish; the group starts at the first
         waypoint.
 
-        way: 1 to MAX_WAY (32) pairs of a point (2,) in m and a kind (PASS, NARROW, GATHER or END); more raise
-        IndexError. finish: "leave" leaves the scene at the end; any other word stands. start (2,): where the group is,
-        m. The heading turns from start to the first waypoint; from a gathering point to the waypoint after it. It stays
-        as it was if these two points coincide. `arrived` becomes False, and the members' waypoints 0.
+        way: pairs of a point (2,) in m and a kind (PASS, NARROW, GATHER or END), at least one. finish: "leave" leaves
+        the scene at the end; any other word stands. start (2,): where the group is, m. The heading turns from start to
+        the first waypoint; from a gathering point to the waypoint after it. It stays as it was if these two points
+        coincide. `arrived` becomes False, and the members' waypoints 0.
         """
-        arrays = self.arrays
+        self.arrays = arrays = self.arrays.with_room(len(way))
         for k, (point, kind) in enumerate(way):
             arrays.route[g, k], arrays.kind[g, k] = point, kind
         arrays.length[g], arrays.current[g], arrays.speed[g] = len(way), 0, speed
@@ -193,15 +192,16 @@ class GroupState:
         self.places[columns] = places[assign(pos, points)]
 
     def settle_arrived(self, state: Array) -> bool:
-        """Gives the members of groups that have just arrived and stand the places of a circle; returns True if there
-        was one.
+        """Gives the members of existing groups that have just arrived and stand the places of a circle; returns True if
+        there was one.
 
         state (P, 4): x, y, vx, vy of each person by column, m, m/s; nan while absent. Members who are absent get no
         place. The groups' indices join `settled`, so this happens once for each group until it walks on.
         """
         changed = False
-        for g in np.flatnonzero(self.arrays.arrived).tolist():
-            if g not in self.settled and self.arrays.finish[g] == STAND:
+        arrived = self.arrays.arrived & (self.arrays.finish == STAND)
+        for g in self.alive.values():
+            if arrived[g] and g not in self.settled:
                 self.settled.add(g)
                 columns = [c for c in self.members[g] if self.present[c]]
                 pos = state[columns, :2]

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
+from sim.crowd.forces import Steering
+from sim.crowd.formation import standing
 from sim.crowd.queue_service import ServiceQueue
 from sim.crowd.triggers import concerned
-from sim.crowd.world import run
+from sim.crowd.world import World, run
 
 HEAD = """
 schema = 1
@@ -61,6 +63,27 @@ def test_a_group_that_merges_leaves_its_queue(tmp_path):
     assert len(last) == len(made.group) + 4
     assert np.all(np.linalg.norm(last[[0, 1, 4]] - [3, 10], axis=1) < 3.5), "the merged group goes to its goal"
     assert np.all(np.linalg.norm(last[[2, 3, 5, 6]] - [28, 10], axis=1) < 3.5), "all others are served"
+
+
+def test_a_merge_as_a_parent_arrives_keeps_the_places_of_the_new_group(tmp_path):
+    """Whatever the frame in which it fires, also the one in which the old group begins to stand in a circle."""
+    merge = '{{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", when = {{ time = {} }} }}'
+    first = World(scenario(tmp_path), 0, 0, Steering())
+    arrival = next(f for f, _ in enumerate(first.frames(120)) if first.groups.arrays.arrived[0]) / 5
+    for t in arrival + np.arange(-2, 3) / 5:
+        world = World(scenario(tmp_path, merge.format(t)), 0, 0, Steering())
+        assert len(list(world.frames(120))) == 120
+        g = world.groups.alive["ab"]
+        kept = world.groups.places[world.groups.members[g]]
+        assert sorted(kept.tolist()) == sorted(standing(4, world.groups.spacing[g]).tolist()), t
+
+
+def test_a_way_may_have_many_points(tmp_path):
+    via = ", ".join(f"[{3 + 0.25 * k}, {4 + k % 2}]" for k in range(40))
+    path = tmp_path / "scene.toml"
+    path.write_text(HEAD)
+    motion = run(load(path, set=[f"group.a.via=[{via}]", "duration=40"]), 0)
+    assert np.linalg.norm(motion.pos[-1, :2] - [14, 4], axis=1).max() < 1.0
 
 
 @pytest.mark.parametrize("place", ["joined", "coming"])
