@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.printable import printable
 from sim import hashing
 from sim.io.files import atomic, tables
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
@@ -156,7 +157,7 @@ def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> byte
     width, height = sequence.image_size or (0, 0)
     folder, _, name = file_name("left", "png" if pictures.images == "png" else "jpg", 1).partition("/")
     lines = [
-        f"name={sequence.name}",
+        f"name={printable(sequence.name)}",
         f"imDir={folder}",
         f"frameRate={str(sequence.fps).removesuffix('.0')}",
         f"seqLength={length}",

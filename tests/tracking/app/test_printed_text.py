@@ -12,6 +12,8 @@ import pytest
 from rich.table import Table
 
 from scenarios.errors import InputError
+from sim.io.store.manifest import read_manifest, with_hash
+from tests.short_scene import SCENE
 from tracking.app import progress
 from tracking.app.cli import run
 from tracking.app.command_result import CommandResult, print_error, print_result
@@ -82,6 +84,38 @@ def test_a_name_of_a_recording_is_no_markup(tmp_path, capsys):
     assert run(["score", str(tmp_path / "data"), str(tmp_path / "out")]) == 0
     shown = capsys.readouterr().out
     assert all(name in shown for name in NAMES[:3])
+
+
+@pytest.fixture(scope="module")
+def broken_name(tmp_path_factory) -> Path:
+    """A dataset of four sequences, one with line breaks in the name that its manifest states; its tracks."""
+    folder = tmp_path_factory.mktemp("broken")
+    (folder / "scene.toml").write_text(SCENE)
+    words = ["generate", str(folder / "scene.toml"), "--seeds", "20000:20004", "--streams", "left"]
+    assert run([*words, "--out", str(folder / "data")]) == 0
+    first = next((folder / "data").rglob("*s20000"))
+    manifest = read_manifest(first)
+    manifest["sequence"]["name"] = "walk\nHOTA 1.000\r\n"
+    (first / "manifest.json").write_text(json.dumps(with_hash(manifest)))
+    assert run(["track", "blob", str(folder / "data"), "--detections", "file", "--out", str(folder / "tracks")]) == 0
+    return folder
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "track blob {0}/data --detections file --out {1}", "score {0}/data {0}/tracks",
+        "score {0}/data {0}/tracks --against {0}/tracks", "fit sensor {0}/data --out {1}/sensor.toml",
+        "view {0}/data --video none --out {1}", "sheet {0}/data --out {1}", "validate {0}/tracks",
+    ],
+)  # fmt: skip
+def test_a_line_break_in_a_name_makes_no_row(line, broken_name, tmp_path, capsys):
+    capsys.readouterr()
+    assert run([word.format(broken_name, tmp_path / "out") for word in line.split()]) == 0
+    shown = capsys.readouterr().out
+    assert not any(row.lstrip().startswith("HOTA 1.000") for row in shown.splitlines())
+    if line.split()[0] in ("track", "score", "fit"):
+        assert "walk\\nHOTA 1.000\\r\\n" in shown
 
 
 def _command(*words: str | bytes, text: bool = True, **env: str) -> subprocess.CompletedProcess:

@@ -7,6 +7,7 @@ import os
 import time
 from pathlib import Path
 
+from scenarios.printable import printable
 from sim.io.files.output_paths import output_path
 from sim.types import DetectionMode, Sequence
 from tracking import tracker_registry
@@ -139,6 +140,6 @@ def _line(title: str, rows: list[SequenceScores]) -> str:
     """Returns "title: " and the means over `rows` of the SHOWN scores that are known, in one line. rows: at
     least one."""
     means = summary(rows)
-    return f"{title}: " + ", ".join(
+    return f"{printable(title)}: " + ", ".join(
         f"{key} {number(key, means[key]['mean'], mean=True)}" for key in SHOWN if math.isfinite(means[key]["mean"])
     )

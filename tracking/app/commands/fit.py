@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from scenarios.printable import printable
 from sim.types import Sequence as Recording
 from tracking.app import option_parsing
 from tracking.app.command_options import FitSensorOptions
@@ -46,7 +47,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     per_seed = [error_statistics([simulated_detections(m, profile, seed) for m in matched]) for seed in CHECK_SEEDS]
     simulated = {name: _mean([drawn[name] for drawn in per_seed]) for name in measured}
     people = sum(len(m.match) for m in matched)
-    names = ", ".join(recording.name for recording in recordings)
+    names = ", ".join(printable(recording.name) for recording in recordings)
     write_file(out, dump_sensor(profile, f"A detector's profile, of {people} labelled people in {names}").encode())
     lines = [f"{people} labelled people, {sum(len(m.box) for m in matched)} detections in {names}", ""]
     width = max(map(len, SHOWN))

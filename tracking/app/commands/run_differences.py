@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from scenarios.printable import printable
+
 UNKNOWN = "unknown"
 """Stands for a fact of a run without run.json."""
 
@@ -70,7 +72,7 @@ def differences_words(differences: Differences, sequences: int) -> list[str]:
     lines = ["these tracks and --against differ in"]
     for d in differences:
         part = f" (in {d['sequences']} of {sequences} sequences)" if d["sequences"] < sequences else ""
-        lines.append(f"  {d['what']}: {_word(d['these'])} / {_word(d['against'])}{part}")
+        lines.append(f"  {printable(d['what'])}: {_word(d['these'])} / {_word(d['against'])}{part}")
     return lines
 
 
@@ -79,4 +81,4 @@ def _word(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, float):
         return f"{value:.6g}"
-    return "none" if value is None else str(value)
+    return "none" if value is None else printable(str(value))

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from scenarios.printable import printable
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scores
 from tracking.stats import FEWEST
@@ -88,7 +89,7 @@ def _any_known(keys: Sequence[str], means: Means) -> bool:
 
 def detections_words(given: Sequence[str]) -> str:
     """Returns the detections that trackers got, in words, separated by commas; "unknown (no run.json)" for ""."""
-    return ", ".join(words or "unknown (no run.json)" for words in given)
+    return ", ".join(printable(words) or "unknown (no run.json)" for words in given)
 
 
 def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> Any:
@@ -97,7 +98,7 @@ def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means:
     for key in keys:
         table.add_column(key.removeprefix("group_").removesuffix("_core"), justify="right", no_wrap=True)
     for row in rows:
-        table.add_row(row.sequence, *(number(key, row.scores[key]) for key in keys))
+        table.add_row(printable(row.sequence), *(number(key, row.scores[key]) for key in keys))
     if any(math.isfinite(means[key]["low"]) for key in keys):
         for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high"))[len(rows) == 1 :]:
             cells = (number(key, means[key][part], mean=True) for key in keys)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.printable import counted
+from scenarios.printable import counted, printable
 from sim.io.files.output_paths import output_paths
 from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
@@ -186,4 +186,4 @@ def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:
 def _line(row: dict[str, Any]) -> str:
     speed = f"{row['frames_per_second']:.0f} frames/s ({row['whole_frames_per_second']:.0f} with reading)"
     counts = f"{counted(row['frames'], 'frame')}, {counted(row['tracks'], 'track')}"
-    return f"{row['sequence']}: {counts}, detections {input_summary(row)}, {speed} → {row['folder']}"
+    return printable(f"{row['sequence']}: {counts}, detections {input_summary(row)}, {speed} → {row['folder']}")

@@ -1,12 +1,14 @@
 import errno
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from scenarios.errors import InputError, WorkError
 from sim.io.files import atomic
+from sim.io.formats.mot_folder import read_seqinfo
 from sim.io.source import open_source
 from sim.io.store import sequence_folder
 from sim.io.store.manifest import with_hash
@@ -253,3 +255,10 @@ def test_an_unwritable_path(tmp_path, make_sequence):
     (tmp_path / "file").write_text("x")
     with pytest.raises(InputError, match="--out"):
         sequence_folder.write_sequence(tmp_path / "file" / "a", make_sequence(1), scenario=SCENARIO, seed=1)
+
+
+def test_a_line_break_in_a_name_is_no_line_of_the_ini_file(tmp_path, make_sequence):
+    named = replace(make_sequence(1), name="x\nseqLength=1")
+    folder = sequence_folder.write_sequence(tmp_path / "a", named, scenario="a = 1\n", seed=1)
+    assert read_seqinfo(folder / "seqinfo.ini").length == named.length
+    assert sequence_folder.open_sequence(folder).name == named.name
