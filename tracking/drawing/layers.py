@@ -221,8 +221,7 @@ def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[Grou
     to_drawing: maps points (K, 2 or 3) to drawing coordinates (K, 2), or to no rows if they cannot be seen. motion is
     the row's position now and in 1 s at its velocity, the position alone if the velocity is nan. hull and size (number
     of people) are those of the row's id in t.groups. extent is the 99 % ellipse of `t.groups.extent` (a covariance)
-    round the row's position. A row whose id is not in t.groups (or None) has no hull and extent, and its size is nan.
-    """
+    round the row's position. A row whose id is not in t.groups has no hull and extent, and its size is nan."""
     groups = t.groups or Groups.none()
     rows = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
 

@@ -18,7 +18,7 @@ from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.clear import clear
-from tracking.scoring.group_and_event_scores import ComparedSides, group_and_event_scores
+from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.hota import hota
 from tracking.scoring.identity import identity
@@ -39,6 +39,8 @@ from tracking.scoring.people_comparison import (
     usual_similarity,
 )
 from tracking.scoring.position_errors import position_scores
+from tracking.scoring.weighted_group_scores import weighted_groups_and_events
+from tracking.scoring.weighted_sums import unweighted
 
 __all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity", "evaluate"]
 
@@ -183,7 +185,8 @@ class Scorer:
             where, frames_scored = (sides.surface, sides.plane, sides.scale), int(compared.inside.sum())
             found |= position_scores(sides.true, sides.est, sides.mapping, *where, frames_scored)
         if compared.groups is not None:
-            found |= group_and_event_scores(sides, compared.groups, group_match)
+            scores = weighted_groups_and_events(sides, compared.groups, group_match)
+            found |= unweighted(scores, len(sides.frames))
         found["objective"] = objective_of(found)
         return Scores(found, compared.similarity, sides.surface, group_match)
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array
-from tracking.scoring.group_scores import ratio
 
 KINDS = ("merge", "split", "cross", "queue", "enter", "leave")
 COUNTS_AS = {"form": "merge", "dissolve": "split"}
@@ -146,67 +145,6 @@ def _one_to_one(
     return [(true[i], est[j]) for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if similarity[i, j] > 0]
 
 
-def event_scores(matched: Sequence[MatchedEvents], fps: float) -> dict[str, float]:
-    """Returns a dict of the event scores of each kind, and of merge and split together.
-
-    matched: from `match_events`, one entry per kind; fps: frames per second. Keys: "<kind>_F1", "_precision",
-    "_recall", "_TP", "_FP", "_FN" and "_latency" for each entry of `matched`; "event_F1", "event_precision",
-    "event_recall" and "event_latency". Event F1, precision and recall are means of the values of merge and split that
-    are not nan. Latency is the mean of (emitted - true start) / fps over matched events, in s, those with emitted None
-    left out; event_latency pools the matched merges and splits. A share is nan if its denominator is 0, a latency if
-    nothing matched.
-    """
-    out: dict[str, float] = {}
-    for m in matched:
-        hits, n_true, n_est = len(m.pairs), len(m.true), len(m.est)
-        out |= {
-            f"{m.kind}_F1": ratio(2 * hits, n_true + n_est),
-            f"{m.kind}_precision": ratio(hits, n_est),
-            f"{m.kind}_recall": ratio(hits, n_true),
-            f"{m.kind}_TP": float(hits),
-            f"{m.kind}_FP": float(n_est - hits),
-            f"{m.kind}_FN": float(n_true - hits),
-            f"{m.kind}_latency": _mean(_latencies([m], fps)),
-        }
-    head = [m for m in matched if m.kind in HEADLINE]
-    return {
-        **{f"event_{s}": _mean([out[f"{m.kind}_{s}"] for m in head]) for s in ("F1", "precision", "recall")},
-        "event_latency": _mean(_latencies(head, fps)),
-        **out,
-    }
-
-
-def _latencies(matched: Sequence[MatchedEvents], fps: float) -> list[float]:
-    """Returns the delays of matched events in s: frame of the report (`emitted`) minus the true start, divided by fps.
-
-    matched: matched events of one or more kinds, whose delays come one after the other. Negative if reported before the
-    true start. Reports without `emitted` are left out.
-    """
-    return [(b.emitted - a.start) / fps for m in matched for a, b in m.pairs if b.emitted is not None]
-
-
-def lineage_scores(matched: Sequence[MatchedEvents]) -> dict[str, float]:
-    """Returns a dict with lineage_accuracy and lineage_accuracy_found: shares of true merges and splits with right
-    lineage (groups before and after the event).
-
-    matched: from `match_events`. A matched event is right if both sides have equally many parents, each true parent has
-    a Jaccard index above 0.5 with some estimated one, and the same holds for children. It is wrong if the tracker's
-    parents or children are unknown (None).
-
-    lineage_accuracy divides by all true merges and splits, lineage_accuracy_found by the matched ones. True events with
-    unknown parents or children are left out of both (labels that never change say nothing about lineage). nan if no
-    event is left.
-    """
-    head = [m for m in matched if m.kind in HEADLINE]
-    n_true = sum(event.has_lineage for m in head for event in m.true)
-    pairs = [(a, b) for m in head for a, b in m.pairs if a.has_lineage]
-    right = sum(same_lineage(a, b) for a, b in pairs)
-    return {
-        "lineage_accuracy": ratio(right, n_true),
-        "lineage_accuracy_found": ratio(right, len(pairs)),
-    }
-
-
 def same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
     """True if the parents of both events agree and the children agree; False if any of the four is None.
 
@@ -222,9 +160,3 @@ def _same_parts(true: Sequence[EventMembers], est: Sequence[EventMembers]) -> bo
     with some estimated part. True if both have none.
     """
     return len(true) == len(est) and all(any(a.jaccard(b) > SAME_PART for b in est) for a in true)
-
-
-def _mean(values: Sequence[float]) -> float:
-    """Returns the mean of the values that are not nan; nan if there are none."""
-    known = [v for v in values if v == v]
-    return sum(known) / len(known) if known else float("nan")

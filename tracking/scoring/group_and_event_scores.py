@@ -1,7 +1,7 @@
-"""Coordinates the scores that need labelled groups: groups, pairwise membership, events, lineage.
+"""Both sides' people, groups and events in the scored frames, matched, for the scores that need labelled groups.
 
 Scores of groups come twice: strict (all labelled frames) and core (without frames up to 1 s from a true merge or
-split). Inputs are both sides' people and groups in the scored frames; the result is one dict of scores.
+split). weighted_group_scores.py computes them.
 """
 
 from __future__ import annotations
@@ -12,17 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.types import Bools, Groups, Ints, Tracks, Truth
-from tracking.scoring.events import COUNTS_AS, HEADLINE, MatchedEvents, event_scores, lineage_scores, match_events
+from tracking.scoring.events import COUNTS_AS, HEADLINE, MatchedEvents, match_events
 from tracking.scoring.events_by_true_people import events_of_hulls, tracked_events, true_events
 from tracking.scoring.group_scores import (
     GroupComparison,
     GroupMatch,
     compare_groups,
-    detection,
-    group_scores,
     shared_members,
 )
-from tracking.scoring.pairwise_membership import pairwise_scores
 from tracking.scoring.people_and_groups import (
     GroupRows,
     PersonRows,
@@ -88,32 +85,6 @@ class TrackedGroups:
     person: Ints
 
 
-def group_and_event_scores(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> dict[str, float]:
-    """Returns a dict of all scores of groups ("group_…", "group_…_core"), pairwise membership ("pairwise_…"), events
-    ("merge_F1" …, "event_…") and lineage ("lineage_…"), keys as in the catalogue.
-
-    sides: both sides in the scored frames, with people mapped. true: the true groups in these frames. by: matches
-    groups by "hull" (IoU) or by "members" (Jaccard index).
-
-    Keys are missing if the truth lacks data. group_F1_hull, and with by = "hull" all group scores, are missing if
-    `true` is not comparable (has no shapes on the surface). Scores of events and lineage are missing if the truth has
-    no events. A score with a denominator of 0 is nan.
-    """
-    tracked = tracked_groups(sides)
-    found = pairwise_scores(true.groups, tracked.counted, tracked.person)
-    by_hull, chosen = group_comparisons(sides, true, tracked, by)
-    if by_hull is not None:
-        found["group_F1_hull"] = detection(by_hull, sides.frames)["F1"]
-    if chosen is not None:
-        found |= strict_and_core(sides, chosen)
-    if sides.truth.events is not None:
-        matched = compared_events(sides, tracked)
-        unknown = unknown_kinds(sides)
-        scores = event_scores(matched, sides.truth.fps) | lineage_scores(matched)
-        found |= {k: float("nan") if k.partition("_")[0] in unknown else v for k, v in scores.items()}
-    return found
-
-
 def group_comparisons(
     sides: ComparedSides, true: TrueGroups, tracked: TrackedGroups, by: GroupMatch
 ) -> tuple[GroupComparison | None, GroupComparison | None]:
@@ -158,18 +129,6 @@ def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
     groups.member: rows of the tracked people, -1 unknown; mapping (S,): true row of each tracked row, -1 none.
     """
     return np.where(groups.member >= 0, np.append(mapping, -1)[groups.member], -1)
-
-
-def strict_and_core(sides: ComparedSides, compared: GroupComparison) -> dict[str, float]:
-    """Returns a dict of the scores of `group_scores` (1-FP, MOTA, F1 …) over all labelled frames as "group_…", and over
-    the core frames as "group_…_core".
-
-    Core frames are the labelled frames more than 1 s away from the start of every true merge, split, form or dissolve.
-    sides: gives the truth and the labelled frames. compared: both sides' groups with their matchings.
-    """
-    strict = group_scores(compared, sides.frames)
-    core = group_scores(compared, sides.frames & ~near_changes(sides.truth))
-    return {f"group_{k}": v for k, v in strict.items()} | {f"group_{k}_core": v for k, v in core.items()}
 
 
 def near_changes(truth: Truth) -> Bools:

@@ -1,9 +1,9 @@
-"""Scores of groups: one-to-one matching in every frame by hulls or by members, then detection and tracking scores.
+"""Groups matched one to one in every frame, by hulls or by members, and what their scores count.
 
 Detection follows Bazzani, Cristani & Murino (2012), "Decentralized Particle Filter for Joint Individual-Group
 Tracking": 1-FP and 1-FN (1 - false or missed / true groups), GDSR (share of true groups whose match holds 60 % of their
 members). MOTP (mean distance of centres) and MOTA follow Bernardin & Stiefelhagen (2008). Sums run over labelled
-frames. A score whose denominator is 0 is nan.
+frames (weighted_group_scores.py).
 """
 
 from __future__ import annotations
@@ -17,10 +17,8 @@ import numpy as np
 from sim.geometry.polygons import iou_pairs, pack
 from sim.types import Array, Bools, Ints
 from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs, compare
-from tracking.scoring.hota import hota
 from tracking.scoring.matching import match
 from tracking.scoring.people_and_groups import GroupRows
-from tracking.scoring.position_errors import gaussian_wasserstein
 
 GroupMatch = Literal["hull", "members"]
 CORRECT = (3, 5)  # 3/5 of the members must be common for a group to be correct; integers avoid rounding
@@ -182,56 +180,6 @@ def nearest_distances(true: GroupRows, est: GroupRows) -> Array:
     return out
 
 
-def group_scores(compared: GroupComparison, frames: Bools) -> dict[str, float]:
-    """Returns a dict of the group scores over the frames f where frames[f] is true.
-
-    Keys: 1-FP, 1-FN, 1-FP_frames, 1-FN_frames, GDSR, GDSR2, MOTP, MSE, MOTP_ungated, MOTA, IDSW, TP, FP, FN, F1,
-    precision, recall, those of `hota` (HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr, LocA), size_error, extent_error.
-    The catalogue explains them with "group_" in front. compared: both sides' groups with their matchings. frames
-    (length + 1,): bool by frame number. MOTP, MOTP_ungated and extent_error are in m or px, MSE squared, size_error in
-    people. A score with a denominator of 0, or a mean of nothing, is nan. The keys of `hota` are missing if neither
-    side has a group in these frames.
-    """
-    true, est, chosen = compared.true, compared.est, compared.chosen
-    kept = frames[true.rows.frame[chosen.i]]
-    i, j = chosen.i[kept], chosen.j[kept]
-    n_true, n_est, hits = int(frames[true.rows.frame].sum()), int(frames[est.rows.frame].sum()), len(i)
-    misses, false = n_true - hits, n_est - hits
-    switches = len(switch_frames(true.rows.frame[i], true.rows.id[i], est.rows.id[j]))
-    right, pure = correct(compared, i, j)
-    distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
-    return {
-        "1-FP": ratio(n_true - false, n_true),
-        "1-FN": ratio(n_true - misses, n_true),
-        **_by_frame(compared, frames, i),
-        "GDSR": ratio(int(right.sum()), n_true),
-        "GDSR2": ratio(int(pure.sum()), n_true),
-        "MOTP": _mean(distance),
-        "MSE": _mean(distance**2),
-        "MOTP_ungated": _mean(compared.nearest[frames[true.rows.frame]]),
-        "MOTA": ratio(n_true - misses - false - switches, n_true),
-        "IDSW": float(switches),
-        "TP": float(hits),
-        "FP": float(false),
-        "FN": float(misses),
-        **detection(compared, frames),
-        **(hota(compared.pairs.in_frames(frames)) if n_true + n_est else {}),
-        "size_error": _mean(np.abs(sizes(true)[i] - sizes(est)[j])),
-        "extent_error": _mean(gaussian_wasserstein(true.pos[i], true.extent[i], est.pos[j], est.extent[j])),
-    }
-
-
-def ratio(part: float, whole: int) -> float:
-    """Returns part / whole, nan if whole is 0. It may exceed 1 or be negative."""
-    return part / whole if whole else float("nan")
-
-
-def _mean(values: Array) -> float:
-    """Returns the mean of the finite values, nan if there are none."""
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else float("nan")
-
-
 def correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
     """Returns two bool masks (K,) of the K matches of true rows i and estimated rows j: correct for GDSR, and for
     GDSR2.
@@ -246,25 +194,6 @@ def correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
     return right, pure
 
 
-def _by_frame(compared: GroupComparison, frames: Bools, i: Ints) -> dict[str, float]:
-    """Returns a dict with 1-FP_frames and 1-FN_frames: 1 - the mean over frames of false (missed) groups / max(true
-    groups, 1).
-
-    compared: both sides' groups. frames: bool by frame number, the frames that count. i: rows of the true groups that
-    are matched in these frames. Both are nan if no frame counts. Bazzani et al. (2012) leave open whether they mean
-    these or the ratios of sums.
-    """
-    size = len(frames)
-    n, m = (np.bincount(side.rows.frame, minlength=size)[frames] for side in (compared.true, compared.est))
-    hits = np.bincount(compared.true.rows.frame[i], minlength=size)[frames]
-    if not len(n):
-        return {"1-FP_frames": float("nan"), "1-FN_frames": float("nan")}
-    return {
-        "1-FP_frames": float(1 - ((m - hits) / np.maximum(n, 1)).mean()),
-        "1-FN_frames": float(1 - ((n - hits) / np.maximum(n, 1)).mean()),
-    }
-
-
 def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:
     """Returns the frame number of each switch: a true id is matched with a different estimated id than in its previous
     match.
@@ -277,22 +206,9 @@ def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:
     return np.asarray(f[1:][(t[1:] == t[:-1]) & (e[1:] != e[:-1])])
 
 
-def detection(compared: GroupComparison, frames: Bools) -> dict[str, float]:
-    """Returns a dict with F1, precision and recall of groups over the frames f where frames[f] is true.
-
-    A hit is a match of similarity 0.5 or more. Precision is hits / estimated groups, recall hits / true groups, F1 2
-    hits / both together; nan if the denominator is 0. compared: both sides' groups with their matchings. frames: bool
-    by frame number.
-    """
-    f = compared.found
-    hits = int(frames[f.true.frame[f.i]].sum())
-    n_true, n_est = (int(frames[side.rows.frame].sum()) for side in (compared.true, compared.est))
-    return {"F1": f1(hits, n_true, n_est), "precision": ratio(hits, n_est), "recall": ratio(hits, n_true)}
-
-
 def f1(hits: int, n_true: int, n_est: int) -> float:
     """Returns 2 hits / (n_true + n_est), nan if both are 0; hits: matches, n_true, n_est: number on each side."""
-    return ratio(2 * hits, n_true + n_est)
+    return 2 * hits / (n_true + n_est) if n_true + n_est else float("nan")
 
 
 def sizes(groups: GroupRows) -> Array:

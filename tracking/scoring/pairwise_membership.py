@@ -9,23 +9,9 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.scoring.candidate_pairs import compare
-from tracking.scoring.group_scores import f1, group_of_person, ratio
+from tracking.scoring.group_scores import group_of_person
 from tracking.scoring.people_and_groups import GroupRows
 from tracking.scoring.rows import FrameRows
-
-
-def pairwise_scores(true: GroupRows, est: GroupRows, person: Ints) -> dict[str, float]:
-    """Returns a dict of pairwise_F1, pairwise_precision and pairwise_recall over pairs of people in one group.
-
-    Pairs of all frames are counted together, as `pair_counts` does, which explains the arguments. A score whose
-    denominator is 0 is nan.
-    """
-    n_true, n_est, hits = (int(n) for n in pair_counts(true, est, person).sum(axis=0))
-    return {
-        "pairwise_F1": f1(hits, n_true, n_est),
-        "pairwise_precision": ratio(hits, n_est),
-        "pairwise_recall": ratio(hits, n_true),
-    }
 
 
 def pair_counts(true: GroupRows, est: GroupRows, person: Ints) -> Ints:

@@ -1,6 +1,7 @@
-"""Scores of groups, pairwise membership, events and lineage under weights of the frames.
+"""Scores of groups, pairwise membership, events and lineage, from their matchings, under weights of the frames.
 
-`group_scores.py`, `pairwise_membership.py` and `events.py` define these scores; here their sums are weighted.
+`evaluate` gives every frame the weight 1, intervals by resampling give it others. A score whose denominator is 0 is
+nan. `group_scores.py`, `pairwise_membership.py` and `events.py` match both sides and count.
 """
 
 from __future__ import annotations
@@ -29,9 +30,17 @@ from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, mean
 
 
 def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> WeightedScores:
-    """Returns a function from weights (D, size) by frame number to all scores of `group_and_event_scores`, (D,) by key.
+    """Returns a function from weights (D, size) by frame number to all scores of groups ("group_…", "group_…_core"),
+    pairwise membership ("pairwise_…"), events ("merge_F1" …, "event_…") and lineage ("lineage_…"), (D,) by the keys of
+    the catalogue.
 
-    sides: both sides, people mapped. true: the true groups. by: matches groups by "hull" or by "members".
+    sides: both sides in the scored frames, people mapped. true: the true groups in these frames. by: matches groups by
+    "hull" (IoU) or by "members" (Jaccard index). Core frames are the labelled frames more than 1 s away from the start
+    of every true merge, split, form or dissolve.
+
+    Keys are missing if the truth lacks data. group_F1_hull, and with by = "hull" all group scores, are missing if
+    `true` is not comparable (has no shapes on the surface). Scores of events and lineage are missing if the truth has
+    no events, those of crossings and queues if the tracker says nothing of them (`unknown_kinds`).
     """
     size = len(sides.frames)
     tracked = tracked_groups(sides)
@@ -83,7 +92,7 @@ def _f1_and_parts(s: Mapping[str, Array]) -> dict[str, Array]:
 
 def _detection(compared: GroupComparison, frames: Bools) -> WeightedScores:
     """Returns a function from weights (D, size) to F1, precision and recall of groups in the frames f where frames[f]
-    is true.
+    is true. A hit is a match of similarity 0.5 or more.
     """
     sums, found = FrameSums(len(frames)), compared.found
     sums.add("true", _kept(compared.true.rows.frame, frames))
@@ -101,10 +110,16 @@ def _kept(frame: Ints, frames: Bools) -> Ints:
 
 
 def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
-    """Returns a function from weights (D, size) to the scores of `group_scores` over the frames f where frames[f] is
-    true, (D,) by its keys.
+    """Returns a function from weights (D, size) to the scores of groups over the frames f where frames[f] is true, (D,)
+    by key.
 
-    compared: both sides' groups with their matchings. A switch has the weight of the later match.
+    Keys: 1-FP, 1-FN, 1-FP_frames, 1-FN_frames, GDSR, GDSR2, MOTP, MSE, MOTP_ungated, MOTA, IDSW, TP, FP, FN, F1,
+    precision, recall, those of `hota` (HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr, LocA), size_error, extent_error.
+    The catalogue explains them with "group_" in front. 1-FP_frames and 1-FN_frames are 1 - the mean over frames of
+    false (missed) groups / max(true groups, 1); Bazzani et al. (2012) leave open whether they mean these or the ratios
+    of sums. compared: both sides' groups with their matchings. A switch has the weight of the later match. MOTP,
+    MOTP_ungated and extent_error are in m or px, MSE squared, size_error in people. The keys of `hota` are missing if
+    neither side has a group in these frames.
     """
     true, est, sums = compared.true, compared.est, _sums_of_groups(compared, frames)
     detection = _detection(compared, frames)
@@ -161,7 +176,17 @@ def _sums_of_groups(compared: GroupComparison, frames: Bools) -> FrameSums:
 def weighted_events(matched: Sequence[MatchedEvents], fps: float, size: int) -> WeightedScores:
     """Returns a function from weights (D, size) to the scores of events and lineage, (D,) by key.
 
-    matched: the events of each kind; fps: frames per second. A true event, matched or not, has the weight of the frame
+    matched: the events of each kind, from `match_events`; fps: frames per second. Keys: "<kind>_F1", "_precision",
+    "_recall", "_TP", "_FP", "_FN" and "_latency" for each entry of `matched`; "event_F1", "event_precision",
+    "event_recall" and "event_latency"; lineage_accuracy and lineage_accuracy_found.
+
+    Event F1, precision and recall are means of the values of merge and split that are not nan. Latency is the mean of
+    (emitted - true start) / fps over matched events, in s, those with emitted None left out; event_latency pools the
+    matched merges and splits. lineage_accuracy divides the matched merges and splits with right lineage
+    (`same_lineage`) by all true ones, lineage_accuracy_found by the matched ones. True events with unknown parents or
+    children are left out of both (labels that never change say nothing about lineage).
+
+    A true event, matched or not, has the weight of the frame
     of its start; a report that matches none has the weight of the start that it reports.
     """
     sums = FrameSums(size)

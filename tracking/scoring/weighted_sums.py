@@ -15,6 +15,11 @@ WeightedScores = Callable[[Array], dict[str, Array]]
 """Takes weights (D, size) by frame number; returns scores (D,) by key."""
 
 
+def unweighted(scores: WeightedScores, size: int) -> dict[str, float]:
+    """Returns the scores by key if every frame has the weight 1; size: number of frame numbers, from 0."""
+    return {key: float(value[0]) for key, value in scores(np.ones((1, size))).items()}
+
+
 class FrameSums:
     """Named sums that are linear in the weights of the frames: counts, and sums of errors.
 

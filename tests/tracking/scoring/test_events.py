@@ -11,7 +11,9 @@ from sim.types import Tracks
 from tests.hand_made import Scene, event, tracks, truth
 from tests.reference_social import event_hits
 from tracking.scoring import evaluate
-from tracking.scoring.events import ComparableEvent, EventMembers, event_scores, match_events
+from tracking.scoring.events import ComparableEvent, EventMembers, match_events
+from tracking.scoring.weighted_group_scores import weighted_events
+from tracking.scoring.weighted_sums import unweighted
 
 FRAMES = 60
 CROWD = {p: (4.0 * p, 0.0) for p in range(1, 9)}  # far apart: everybody is who they are
@@ -268,7 +270,7 @@ def test_as_many_hits_as_there_can_be(seed):
         [ComparableEvent("merge", s, s, EventMembers(people, wrong), (0.0, 0.0)) for s, people, wrong in side]
         for side in (happened, said)
     )
-    found = event_scores(match_events(true, told, 10.0, 1.0), 10.0)
+    found = unweighted(weighted_events(match_events(true, told, 10.0, 1.0), 10.0, 60), 60)
     assert found["merge_TP"] == event_hits(happened, said, 10.0)
 
 
