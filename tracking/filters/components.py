@@ -18,8 +18,10 @@ arbitrary-dimensional ellipsoids in fault-detection of Kalman filters" (2012); G
 
 `prefixes` decides the group constraint for all associations of a group at once. The sets Y_ns (points of the group
 alone) + the first j of the shared points grow by one point each, and G_0 grows with them (4.2.1), with running moments
-of each component. A point is compared with the 20 grid cells around it, and M > 1 components are compared with each
-other: n points cost O(n log n + n M^2). The least weight bounds M.
+of each component. A point is compared with the points of 20 grid cells around it that are not in its component yet.
+While a single component is heavy enough, n points cost O(n). Of more components, only the region of the last point's is
+new; it is compared with the M others if no two of those overlap. Else all regions are sorted along x and joined in
+rounds, which costs each point O(M^1.5) or less on scattered points. The least weight bounds M.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.filters import components_kernels as kernels
 from tracking.filters import ellipse_overlap_kernels
+from tracking.filters.component_regions_kernels import WEIGHT, closure
 
 
 @dataclass(frozen=True)
@@ -72,10 +75,10 @@ def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
     regions (ellipses round their means) overlap, also through others, are one group. No points give an empty array.
     """
     label, sums = kernels.components(points, weights, rule.link)
-    parts = np.flatnonzero(sums[:, kernels.WEIGHT] >= rule.least)
+    parts = np.flatnonzero(sums[:, WEIGHT] >= rule.least)
     group = np.full(len(sums), -1)
     if len(parts):
-        joined = kernels.closure(sums[parts], rule.gate, rule.prior_entries, rule.strength)
+        joined = closure(sums[parts], rule.gate, rule.prior_entries, rule.strength)[0]
         group[parts] = np.unique(joined, return_inverse=True)[1]
     return np.asarray(group[label])
 

@@ -1,10 +1,9 @@
-"""Kernels of tracking.filters.components: linked points by a grid of cells, and regions joined until none overlap.
+"""Kernels of tracking.filters.components: linked points by a grid of cells, and sets of points that grow by one.
 
 The diagonal of a cell is `link`, the largest distance of linked points, so that points of one cell are linked, and
 other points can be linked only from the 20 cells around. A new point is compared with the points of those cells that
 are not of its component yet and whose bounding box is near enough. At the first linked point the two components are
-joined, and so are their moments. Columns of `sums` (K, 6), a component's moments: weight N, mean x, y, and N times the
-covariance xx, xy, yy. Moments are joined without raw sums, in which precision would cancel. Slow twins:
+joined, and so are their moments, the rows of `sums` (component_regions_kernels). Slow twins:
 tests/reference_components.py."""
 
 from __future__ import annotations
@@ -14,14 +13,10 @@ import numpy as np
 from sim.compiler import njit
 from sim.geometry.union_find_kernels import find_root
 from sim.types import Array, Bools, Ints
-from tracking.filters.ellipse_overlap_kernels import overlap
+from tracking.filters.component_regions_kernels import WEIGHT, XX, XY, YY, X, Y, closure, fit, meet, pool
 
 AROUND = 20
 """Cells round a cell from which points can be linked with its points."""
-WEIGHT, X, Y, XX, XY, YY = range(6)
-"""Columns of `sums`."""
-MEAN_X, MEAN_Y, A_XX, A_XY, A_YY = range(5)
-"""Slots of `shape`: an ellipse (y - mean)' A^-1 (y - mean) <= 1."""
 LOW_X, LOW_Y, HIGH_X, HIGH_Y = range(4)
 """Columns of `box`."""
 VISITS, COMPONENTS = range(2)
@@ -33,23 +28,22 @@ FAR = 2.0**40
 @njit(cache=True)
 def cells(points: Array, link: float) -> tuple[Ints, Ints]:
     """Returns the cell of each point (M,), 0, 1, …, and the 20 cells around each cell (C, 20), -1 for an empty one.
-    points (M, 2), M at least 1. A cell's diagonal is `link`, in the points' unit, above 0. Cells are numbered by
-    column, then row of the grid; points 2^40 cells or more from the first count as at that distance."""
+    points (M, 2), M at least 1. A cell's diagonal is `link`, in the points' unit, above 0. Cells are numbered
+    in the order of their first points; points 2^40 cells or more from the first count as at that distance."""
     m = len(points)
     side = link / np.sqrt(2.0) * (1 - 1e-12)
     place = np.empty((m, 2), np.int64)
+    table = np.full(1 << int(np.ceil(np.log2(2 * m))), -1)
+    cell, first = np.empty(m, np.int64), np.empty(m, np.int64)
+    count = 0
     for k in range(m):
         for axis in range(2):
             place[k, axis] = np.int64(np.floor(min(max((points[k, axis] - points[0, axis]) / side, -FAR), FAR)))
-    order = _sorted(place)
-    cell, first = np.empty(m, np.int64), np.empty(m, np.int64)
-    count = 0
-    for n in range(m):
-        k, before = order[n], order[n - 1]
-        if n == 0 or place[k, 0] != place[before, 0] or place[k, 1] != place[before, 1]:
-            first[count] = k
+        slot = _slot(table, place, first, place[k, 0], place[k, 1])
+        if table[slot] < 0:
+            table[slot], first[count] = count, k
             count += 1
-        cell[k] = count - 1
+        cell[k] = table[slot]
     around = np.full((count, AROUND), -1)
     for c in range(count):
         x, y = place[first[c], 0], place[first[c], 1]
@@ -57,34 +51,24 @@ def cells(points: Array, link: float) -> tuple[Ints, Ints]:
         for dx in range(-2, 3):
             for dy in range(-2, 3):
                 if (dx != 0 or dy != 0) and abs(dx) + abs(dy) < 4:
-                    around[c, n] = _find(place, first, count, x + dx, y + dy)
+                    around[c, n] = table[_slot(table, place, first, x + dx, y + dy)]
                     n += 1
     return cell, around
 
 
 @njit(cache=True)
-def _sorted(place: Ints) -> Ints:
-    """Returns the indices (M,) that sort places (M, 2), grid column x and row y, by x, then y (stable)."""
-    by_y = np.argsort(place[:, 1], kind="mergesort")
-    return by_y[np.argsort(place[by_y, 0], kind="mergesort")]
+def _slot(table: Ints, place: Ints, first: Ints, x: int, y: int) -> int:
+    """Returns the slot of the hash table that holds the number of the cell in column x and row y of the grid, or the
+    free slot, -1, where it belongs.
 
-
-@njit(cache=True)
-def _find(place: Ints, first: Ints, count: int, x: int, y: int) -> int:
-    """Returns the number of the cell in column x and row y of the grid, by bisection, or -1 if it is empty. place (M,
-    2): grid column and row of each point; first (C,): a point of each cell, cells sorted by column, then row;
-    count: C."""
-    low, high = 0, count
-    while low < high:
-        middle = (low + high) // 2
-        k = first[middle]
-        if place[k, 0] < x or (place[k, 0] == x and place[k, 1] < y):
-            low = middle + 1
-        else:
-            high = middle
-    if low < count and place[first[low], 0] == x and place[first[low], 1] == y:
-        return low
-    return -1
+    table (T,): T a power of two, at least one slot free; place (M, 2): grid column and row of each point; first (C,): a
+    point of each cell. Slots are tried one after the other."""
+    last = len(table) - 1
+    mixed = (x * 73_856_093) ^ (y * 19_349_663)
+    slot = (mixed ^ (mixed >> 15)) & last
+    while table[slot] >= 0 and (place[first[table[slot]], 0] != x or place[first[table[slot]], 1] != y):
+        slot = (slot + 1) & last
+    return slot
 
 
 @njit(cache=True)
@@ -103,6 +87,7 @@ def insert(
     parent[k] = k
     sums[k, WEIGHT], sums[k, X], sums[k, Y] = weight, x, y
     sums[k, XX], sums[k, XY], sums[k, YY] = 0.0, 0.0, 0.0
+    work[VISITS] += 1
     work[COMPONENTS] += 1
     if head[c] >= 0:
         _join(parent, sums, k, head[c], work)
@@ -111,12 +96,15 @@ def insert(
     else:
         box[c, LOW_X], box[c, LOW_Y], box[c, HIGH_X], box[c, HIGH_Y] = x, y, x, y
     after[k], head[c] = head[c], k
+    top = find_root(parent, k)
     for n in range(AROUND):
         other = around[c, n]
+        if work[COMPONENTS] == 1:
+            break
         if other < 0 or head[other] < 0:
             continue
         work[VISITS] += 1
-        if find_root(parent, head[other]) == find_root(parent, k):
+        if find_root(parent, head[other]) == top:
             continue
         gap_x = max(box[other, LOW_X] - x, x - box[other, HIGH_X], 0.0)
         gap_y = max(box[other, LOW_Y] - y, y - box[other, HIGH_Y], 0.0)
@@ -127,6 +115,7 @@ def insert(
             work[VISITS] += 1
             if (points[p, 0] - x) ** 2 + (points[p, 1] - y) ** 2 <= link * link:
                 _join(parent, sums, k, p, work)
+                top = find_root(parent, k)
                 break
             p = after[p]
 
@@ -143,22 +132,6 @@ def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
     parent[high] = low
     pool(sums[low], sums[high])
     work[COMPONENTS] -= 1
-
-
-@njit(cache=True)
-def pool(into: Array, other: Array) -> None:
-    """Change the moments `into` (6,) of a set of points to those of its union with another set, `other` (6,) (3.1).
-    Columns: weight N, mean x, y, and N times the covariance (with 1/N) xx, xy, yy. N of the union must be above 0."""
-    n = into[WEIGHT] + other[WEIGHT]
-    share = other[WEIGHT] / n
-    dx, dy = other[X] - into[X], other[Y] - into[Y]
-    w = into[WEIGHT] * share
-    into[WEIGHT] = n
-    into[X] += share * dx
-    into[Y] += share * dy
-    into[XX] += other[XX] + w * dx * dx
-    into[XY] += other[XY] + w * dx * dy
-    into[YY] += other[YY] + w * dy * dy
 
 
 @njit(cache=True)
@@ -190,60 +163,6 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
 
 
 @njit(cache=True)
-def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
-    """Returns for each of K components the index of the first component it is joined with, or its own, (K,) (G_x, 3.1).
-
-    sums (K, 6): weight N, mean x, y, N times the covariance xx, xy, yy; not changed. Components whose search regions
-    overlap, also through others, are joined; then the joined ones are compared, until no two overlap: a joined region
-    may overlap one that none of its parts did. gate: squared Mahalanobis radius of a region. prior (3,), strength:
-    covariance xx, xy, yy to which a component's own is shrunk, and its weight."""
-    k = len(sums)
-    label = np.arange(k)
-    if k < 2:
-        return label
-    pooled, shape = sums.copy(), np.empty((k, 5))
-    alive = np.ones(k, np.bool_)
-    fresh = np.ones(k, np.bool_)  # only pairs with a changed component are compared again
-    changed = True
-    while changed:
-        changed = False
-        for i in range(k):
-            if alive[i] and fresh[i]:
-                fit(pooled[i], gate, prior, strength, shape[i])
-        tree = np.arange(k)
-        for i in range(k):
-            for j in range(i):
-                if alive[i] and alive[j] and (fresh[i] or fresh[j]) and find_root(tree, i) != find_root(tree, j):
-                    dx, dy = shape[j, MEAN_X] - shape[i, MEAN_X], shape[j, MEAN_Y] - shape[i, MEAN_Y]
-                    a, b = shape[i, A_XX:], shape[j, A_XX:]
-                    if overlap(dx, dy, a[0], a[1], a[2], b[0], b[1], b[2]):
-                        p, q = find_root(tree, i), find_root(tree, j)
-                        tree[max(p, q)] = min(p, q)
-        fresh[:] = False
-        for i in range(k):
-            top = find_root(tree, i)
-            if alive[i] and top != i:
-                pool(pooled[top], pooled[i])
-                alive[i], fresh[top], changed = False, True, True
-        for i in range(k):
-            label[i] = find_root(tree, label[i])
-    return label
-
-
-@njit(cache=True)
-def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -> None:
-    """Write a component's search region, an ellipse, into `shape` (5,): mean x, y, entries xx, xy, yy of its matrix A.
-    The region is (y - mean)' A^-1 (y - mean) <= 1. sums (6,): weight N, mean x, y, N S as xx, xy, yy. A is `gate`
-    (squared radius) times the shrunk covariance (N S + n0 S0) / (N + n0), S the covariance with 1/N, S0 the `prior`
-    (3,) xx, xy, yy, n0 the `strength`. Returns nothing."""
-    shape[MEAN_X], shape[MEAN_Y] = sums[X], sums[Y]
-    scale = gate / (sums[WEIGHT] + strength)
-    shape[A_XX] = scale * (sums[XX] + strength * prior[0])
-    shape[A_XY] = scale * (sums[XY] + strength * prior[1])
-    shape[A_YY] = scale * (sums[YY] + strength * prior[2])
-
-
-@njit(cache=True)
 def prefixes(
     points: Array, weights: Array, start: int, link: float, gate: float, prior: Array, strength: float, least: float
 ) -> tuple[Bools, int]:
@@ -261,40 +180,48 @@ def prefixes(
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     head, after, box = np.full(len(around), -1), np.full(m, -1), np.empty((len(around), 4))
     work = np.zeros(2, np.int64)
-    tops, some = np.empty(m, np.int64), 0  # roots of the components so far
-    part = np.empty((m, 6))
+    heavy = np.empty(0, np.int64)  # roots of the components that are not left out, from the first prefix asked for
+    shape = np.empty((m, 5))  # their regions
+    apart = False  # True if no two of the regions overlap
     for k in range(m):
+        before = work[COMPONENTS]
         insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
-        tops[some] = k
-        some += 1
-        if work[COMPONENTS] < some:
-            kept = 0
-            for n in range(some):
-                if parent[tops[n]] == tops[n]:
-                    tops[kept] = tops[n]
-                    kept += 1
-            work[VISITS] += some
-            some = kept
-        if k + 1 >= start:
-            one[k + 1 - start] = _whole(sums, tops[:some], part, gate, prior, strength, least, work)
+        if k + 1 < start:
+            continue
+        top, now = find_root(parent, k), k + 1 - start
+        if k + 1 == max(start, 1):
+            heavy = _heavy(np.arange(k + 1), parent, sums, least)
+            for n in range(len(heavy)):
+                top = heavy[n]
+                fit(sums[top], gate, prior, strength, shape[top])
+        elif sums[top, WEIGHT] < least:  # the others are as before
+            one[now] = one[now - 1]
+            continue
+        elif work[COMPONENTS] != before or not (heavy == top).any():
+            heavy = _heavy(np.unique(np.append(heavy, top)), parent, sums, least)
+        fit(sums[top], gate, prior, strength, shape[top])
+        if len(heavy) < 2:
+            one[now], apart = len(heavy) == 1, True
+            continue
+        if apart or len(heavy) == 2:  # no region has changed but that of the last point's component
+            apart = True
+            for n in range(len(heavy)):
+                other = heavy[n]
+                work[VISITS] += 1
+                if other != top and meet(shape[max(top, other)], shape[min(top, other)]):
+                    apart = False
+                    break
+            one[now] = len(heavy) == 2 and not apart
+        if not apart and len(heavy) > 2:
+            label, compared = closure(sums[heavy], gate, prior, strength)
+            one[now], apart = label.max() == 0, bool((label == np.arange(len(heavy))).all())
+            work[VISITS] += len(heavy) + compared
     return one, work[VISITS]
 
 
 @njit(cache=True)
-def _whole(
-    sums: Array, tops: Ints, part: Array, gate: float, prior: Array, strength: float, least: float, work: Ints
-) -> bool:
-    """Returns True if the components with roots `tops` (K,) are one group, leaving out those lighter than `least`. sums
-    (M, 6): moments at the roots. gate, prior (3,), strength: as in `fit`, of the search regions. False if all are left
-    out. part (M, 6) and work (2,) are changed: working space, number of comparisons."""
-    if len(tops) == 1:
-        return bool(sums[tops[0], WEIGHT] >= least)
-    count = 0
-    for n in range(len(tops)):
-        if sums[tops[n], WEIGHT] >= least:
-            part[count] = sums[tops[n]]
-            count += 1
-    work[VISITS] += len(tops) + count * count
-    if count < 2:
-        return count == 1
-    return bool(closure(part[:count], gate, prior, strength).max() == 0)
+def _heavy(points: Ints, parent: Ints, sums: Array, least: float) -> Ints:
+    """Returns those of the points (K,) that are roots of components of at least the weight `least`, in their order.
+    parent (M,): union-find forest; sums (M, 6): moments at the roots."""
+    kept = (parent[points] == points) & (sums[points, WEIGHT] >= least)
+    return np.asarray(points[kept])

@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from tests import reference_components as reference
 from tracking.filters import components_kernels as kernels
+from tracking.filters.component_regions_kernels import FEW
 from tracking.filters.components import Constraint, linked, partition, prefixes
 
 LINK = 1.5
@@ -49,6 +50,19 @@ def test_every_prefix_of_a_thousand_random_sets() -> None:
         assert same(found, reference.prefixes(points, weights, start, rule)), seed
         verdicts += found.tolist()
     assert 0.2 < np.mean(verdicts) < 0.8
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_every_prefix_of_many_components(seed: int) -> None:
+    """More components than are compared pair by pair, some light, joined in several rounds or far from each other."""
+    r = np.random.default_rng(seed)
+    points = r.uniform(0, r.choice([10.0, 16.0, 40.0]), (60, 2)) + r.choice([0.0, 1e6])
+    weights, least = r.uniform(0.1, 2, 60), float(r.choice([0.0, 1.5]))
+    rule = Constraint(1.0, float(r.uniform(2, 9.21)), r.uniform(0.01, 0.1) * np.eye(2), r.uniform(0.1, 3), least)
+    assert linked(points, rule.link).max() >= FEW
+    start = int(r.integers(0, 40))
+    assert same(prefixes(points, weights, start, rule), reference.prefixes(points, weights, start, rule))
+    assert same(partition(points, weights, rule), reference.partition(points, weights, rule))
 
 
 def test_partitions_of_a_thousand_random_sets() -> None:
@@ -256,17 +270,19 @@ def test_work_grows_with_the_number_of_points(shape: str) -> None:
 
 
 def test_clutter_is_bounded_by_the_least_weight() -> None:
-    """Scattered points are components each, and overlaps of all with all; too light ones are only counted."""
+    """Scattered points are components each; light ones are only counted. Heavy regions far from each other
+    cost a comparison of the last one with each; regions joined in several rounds cost less than all pairs."""
 
-    def scattered(n):
+    def lattice(n):
         side = int(np.sqrt(n))
         return 4.0 * np.stack(np.divmod(np.arange(side * side), side), axis=1)
 
-    with_all = [work(scattered(n)) for n in (100, 400)]
-    light = [work(scattered(n), least=2.0) for n in (100, 400, 1_600)]
-    assert with_all[1] / with_all[0] > 40  # n M^2
-    assert light[1] < with_all[1] / 100
-    for n, cost in zip((100, 400, 1_600), light, strict=True):
-        assert cost <= n * (n + 1) / 2 + 21 * n
-    clump = np.concatenate([outwards(round_clump(np.random.default_rng(0), 400, 2.0)), scattered(400) + 20.0])
+    def scattered(n):
+        return np.random.default_rng(0).uniform(0, np.sqrt(2 * n) * LINK, (n, 2))
+
+    for n in (100, 400, 1_600):
+        assert work(lattice(n), least=2.0) <= 2 * n
+        assert work(lattice(n)) <= n * (n + 5) / 2
+        assert work(scattered(n)) <= n**2.5
+    clump = np.concatenate([outwards(round_clump(np.random.default_rng(0), 400, 2.0)), lattice(400) + 20.0])
     assert prefixes(clump, np.ones(800), 1, Constraint(LINK, 9.21, RULE.prior, 3.0, least=2.0))[10:].all()

@@ -13,7 +13,8 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Bools, Ints
-from tracking.filters.components_kernels import WEIGHT, components, prefixes
+from tracking.filters.component_regions_kernels import WEIGHT
+from tracking.filters.components_kernels import AROUND, cells, components, prefixes
 from tracking.papers.group_pda.association_mass_kernels import (
     ASSOCIATION,
     COUNT_SD,
@@ -75,26 +76,26 @@ def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider
 def any_within(place: Array, points: Array, reach: float) -> Bools:
     """Return flags (K,): True if any of the points (M, 2) is at most `reach` from the place (K, 2); all in one unit.
 
-    Without points all are False. The points are looked at outwards along x.
+    Without points all are False. reach: above 0. The points of a place's cell and of the cells around it are compared.
     """
-    order = np.argsort(points[:, 0])
-    x = points[order, 0]
     found, most = np.zeros(len(place), np.bool_), reach * reach
+    if len(points) == 0 or len(place) == 0:
+        return found
+    cell, around = cells(np.concatenate((points, place)), reach * (1 + 1e-9))  # no point within reach is further away
+    head, after = np.full(len(around), -1), np.empty(len(points), np.int64)
+    for p in range(len(points)):
+        after[p], head[cell[p]] = head[cell[p]], p
     for k in range(len(place)):
-        up = np.searchsorted(x, place[k, 0])
-        down = up - 1
-        while not found[k] and (up < len(x) or down >= 0):
-            right = x[up] - place[k, 0] if up < len(x) else np.inf
-            left = place[k, 0] - x[down] if down >= 0 else np.inf
-            if min(left, right) > reach:
+        c = cell[len(points) + k]
+        for n in range(-1, AROUND):
+            near = c if n < 0 else around[c, n]
+            p = head[near] if near >= 0 else -1
+            while p >= 0 and not found[k]:
+                dx, dy = points[p, 0] - place[k, 0], points[p, 1] - place[k, 1]
+                found[k] = dx * dx + dy * dy <= most
+                p = after[p]
+            if found[k]:
                 break
-            at = order[up] if right <= left else order[down]
-            dx, dy = points[at, 0] - place[k, 0], points[at, 1] - place[k, 1]
-            found[k] = dx * dx + dy * dy <= most
-            if right <= left:
-                up += 1
-            else:
-                down -= 1
     return found
 
 

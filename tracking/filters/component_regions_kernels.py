@@ -1,0 +1,117 @@
+"""Kernels of tracking.filters.components: search regions of components, and regions joined until none overlap.
+
+A component's moments are a row of `sums` (K, 6): weight N, mean x, y, and N times the covariance xx, xy, yy. Its region
+is a row of `shape` (K, 5), an ellipse. Moments are joined without raw sums, in which precision would cancel. Slow
+twins: tests/reference_components.py."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.compiler import njit
+from sim.geometry.union_find_kernels import find_root
+from sim.types import Array, Ints
+from tracking.filters.ellipse_overlap_kernels import overlap
+
+WEIGHT, X, Y, XX, XY, YY = range(6)
+"""Columns of `sums`."""
+MEAN_X, MEAN_Y, A_XX, A_XY, A_YY = range(5)
+"""Slots of `shape`: an ellipse (y - mean)' A^-1 (y - mean) <= 1."""
+FEW = 16
+"""Components of which all pairs are compared; more are sorted first."""
+SLACK, ROUNDING = 1 + 1e-6, 1e-15
+"""A region's box is larger by this factor, and by this share of its place, so that rounding excludes no pair."""
+
+
+@njit(cache=True)
+def pool(into: Array, other: Array) -> None:
+    """Change the moments `into` (6,) of a set of points to those of its union with another set, `other` (6,) (3.1).
+    Columns: weight N, mean x, y, and N times the covariance (with 1/N) xx, xy, yy. N of the union must be above 0."""
+    n = into[WEIGHT] + other[WEIGHT]
+    share = other[WEIGHT] / n
+    dx, dy = other[X] - into[X], other[Y] - into[Y]
+    w = into[WEIGHT] * share
+    into[WEIGHT] = n
+    into[X] += share * dx
+    into[Y] += share * dy
+    into[XX] += other[XX] + w * dx * dx
+    into[XY] += other[XY] + w * dx * dy
+    into[YY] += other[YY] + w * dy * dy
+
+
+@njit(cache=True)
+def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -> None:
+    """Write a component's search region, an ellipse, into `shape` (5,): mean x, y, entries xx, xy, yy of its matrix A.
+    The region is (y - mean)' A^-1 (y - mean) <= 1. sums (6,): weight N, mean x, y, N S as xx, xy, yy. A is `gate`
+    (squared radius) times the shrunk covariance (N S + n0 S0) / (N + n0), S the covariance with 1/N, S0 the `prior`
+    (3,) xx, xy, yy, n0 the `strength`. Returns nothing."""
+    shape[MEAN_X], shape[MEAN_Y] = sums[X], sums[Y]
+    scale = gate / (sums[WEIGHT] + strength)
+    shape[A_XX] = scale * (sums[XX] + strength * prior[0])
+    shape[A_XY] = scale * (sums[XY] + strength * prior[1])
+    shape[A_YY] = scale * (sums[YY] + strength * prior[2])
+
+
+@njit(cache=True)
+def meet(a: Array, b: Array) -> bool:
+    """Returns True if two search regions overlap; a, b (5,): written by `fit`."""
+    dx, dy = b[MEAN_X] - a[MEAN_X], b[MEAN_Y] - a[MEAN_Y]
+    far = 2 * SLACK  # (p + q)^2 <= 2 p^2 + 2 q^2 of the half widths p, q
+    if dx * dx > far * (a[A_XX] + b[A_XX]) or dy * dy > far * (a[A_YY] + b[A_YY]):
+        return False
+    return overlap(dx, dy, a[A_XX], a[A_XY], a[A_YY], b[A_XX], b[A_XY], b[A_YY])
+
+
+@njit(cache=True)
+def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[Ints, int]:
+    """Returns for each of K components the index of the first component it is joined with, or its own, (K,) (G_x, 3.1),
+    and the number of pairs compared.
+
+    sums (K, 6): weight N, mean x, y, N times the covariance xx, xy, yy; not changed. Components whose search regions
+    overlap, also through others, are joined; then the joined ones are compared, until no two overlap: a joined region
+    may overlap one that none of its parts did. gate: squared Mahalanobis radius of a region. prior (3,), strength:
+    covariance xx, xy, yy to which a component's own is shrunk, and its weight."""
+    k, compared = len(sums), 0
+    label, alive, tree = np.arange(k), np.arange(k), np.arange(k)
+    pooled, shape, box = sums.copy(), np.empty((k, 5)), np.empty((2, k))
+    left, wide = box[0], box[1]  # of a region: least x, half of its width
+    fresh = np.ones(k, np.bool_)  # only pairs with a changed component are compared again
+    changed = k > 1
+    while changed:
+        for n in range(len(alive)):
+            i = alive[n]
+            if fresh[i]:
+                fit(pooled[i], gate, prior, strength, shape[i])
+                wide[i] = SLACK * np.sqrt(shape[i, A_XX]) + ROUNDING * abs(shape[i, MEAN_X])
+                left[i] = shape[i, MEAN_X] - wide[i]
+        many = len(alive) > FEW
+        order = alive[np.argsort(left[alive])] if many else alive
+        for n in range(len(order)):
+            for later in range(n + 1, len(order)):
+                p, q = order[n], order[later]
+                if many and left[q] > left[p] + 2 * wide[p]:
+                    break
+                compared += 1
+                if (
+                    (fresh[p] or fresh[q])
+                    and find_root(tree, p) != find_root(tree, q)
+                    and meet(shape[max(p, q)], shape[min(p, q)])
+                ):
+                    i, j = find_root(tree, p), find_root(tree, q)
+                    tree[max(i, j)] = min(i, j)
+        fresh[:] = False
+        kept = 0
+        for n in range(len(alive)):
+            i = alive[n]
+            top = find_root(tree, i)
+            if top == i:
+                alive[kept] = i
+                kept += 1
+            else:
+                pool(pooled[top], pooled[i])
+                fresh[top] = True
+        changed = 1 < kept < len(alive)
+        alive = alive[:kept]
+    for i in range(k):
+        label[i] = find_root(tree, i)
+    return label, compared
