@@ -43,8 +43,8 @@ class GroupMark:
 
     id: of the group. hull: (V, 2) polygon round the members. The other fields are known only of a group that is tracked
     as a whole. extent: (32, 2), points of the ellipse that holds 99 % of the group by the covariance of its members.
-    motion: (2, 2), its centre now and in 1 s, or (1, 2), its centre alone if its velocity is unknown. size: its
-    estimated number of people. Unknown or unseen arrays have no rows; an unknown size is nan."""
+    motion: its centre now and, if its velocity is known, in 1 s, (2, 2) or (1, 2). size: its estimated count.
+    Unknown or unseen arrays have no rows; an unknown size is nan."""
 
     id: int
     hull: Array
@@ -220,14 +220,14 @@ def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[Grou
 
     to_drawing: maps points (K, 2 or 3) to drawing coordinates (K, 2), or to no rows if they cannot be seen. motion is
     the row's position now and in 1 s at its velocity, the position alone if the velocity is nan. hull and size (number
-    of people) are those of the row's id in t.groups. extent is the 99 % ellipse of `t.groups.extent` (a covariance)
-    round the row's position. A row whose id is not in t.groups has no hull and extent, and its size is nan."""
+    of people) are those of the row's id in t.groups, none and nan without that id. extent is the 99 % ellipse of
+    `t.groups.extent` (a covariance) round the row's position."""
     groups = t.groups or Groups.none()
     rows = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
 
     def mark(k: int, name: int) -> GroupMark:
-        ends = np.stack([t.pos[k], t.pos[k] + t.vel[k]])
-        row, motion = rows.get(name), to_drawing(ends[: 2 if np.isfinite(ends).all() else 1])
+        ends = [t.pos[k], t.pos[k] + t.vel[k]][: 1 + np.isfinite(t.vel[k]).all()]
+        row, motion = rows.get(name), to_drawing(np.stack(ends))
         if row is None:
             return GroupMark(name, NO_POINTS, motion=motion)
         hull = groups.hull[row] if groups.hull else NO_POINTS
@@ -280,8 +280,7 @@ def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
     `centre`.
 
     cov: (2, 2) covariance matrix; negative eigenvalues count as 0. Returns (0, 2) if an entry of `cov` is not finite; a
-    nan in `centre` gives nan.
-    """
+    nan in `centre` gives nan."""
     if not np.isfinite(cov).all():
         return NO_POINTS
     values, vectors = np.linalg.eigh(cov)
