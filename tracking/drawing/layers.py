@@ -43,7 +43,7 @@ class GroupMark:
 
     id: of the group. hull: (V, 2) polygon round the members. The other fields are known only of a group that is tracked
     as a whole. extent: (32, 2), points of the ellipse that holds 99 % of the group by the covariance of its members.
-    motion: its centre now and, if its velocity is known, in 1 s, (2, 2) or (1, 2). size: its estimated count.
+    motion: its centre now and, if its velocity is known, in 1 s, (2, 2) or (1, 2). size: number of people, estimated.
     Unknown or unseen arrays have no rows; an unknown size is nan."""
 
     id: int
