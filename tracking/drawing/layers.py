@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -17,14 +18,8 @@ from sim.geometry.polygons import convex_hull
 from sim.io.store.track_boxes import upright_boxes
 from sim.io.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
+from tracking.drawing.covariance_ellipse import SIGMA_95, SIGMA_99, UNIT_CIRCLE, ellipse
 
-SIGMA_95 = math.sqrt(5.991)
-"""Standard deviations: the ellipse at this distance holds 95 % of a normal distribution in the plane."""
-
-SIGMA_99 = math.sqrt(9.21)
-"""The same for 99 %: the points d from a group's centre with d' E^-1 d = 9.21 for its extent E."""
-
-UNIT_CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f in (np.cos, np.sin)], axis=1)
 BOX_MARGIN = 5.0
 """px between members' boxes and the outline of their group."""
 
@@ -178,21 +173,20 @@ def _marks_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> 
     nan. Tracks on the ground without boxes get boxes of upright people through `camera`, nan if it is None. scene:
     gives the ground's height; None: 0. Groups of people are those of `t.group`, drawn round two or more boxes. Rows
     that are groups get neither boxes nor ellipses."""
+    n, to_picture = len(t.id), partial(_in_picture, plane=t.plane, camera=camera, scene=scene)
     if t.unit == "group":
-        return _whole_groups_in_picture(t, camera, scene)
-    n = len(t.id)
+        return _whole_groups_in_picture(t, to_picture)
     box = t.box if t.box is not None else np.full((n, 4), np.nan)
     if t.box is None and t.plane != "image" and camera is not None:
         box = upright_boxes(camera, with_ground_height(t.pos, scene))
     at = _feet(box)
     if t.plane == "image":
         at = np.where(np.isfinite(at), at, t.pos)
-    return FrameMarks(t.id, box, at, _ellipses(t, camera, scene), np.zeros(n, bool), _box_hulls(t.group, box))
+    return FrameMarks(t.id, box, at, _ellipses(t, to_picture), np.zeros(n, bool), _box_hulls(t.group, box))
 
 
-def _whole_groups_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> FrameMarks:
-    n = len(t.id)
-    groups = _whole_groups(t, lambda points: _in_picture(points, t.plane, camera, scene))
+def _whole_groups_in_picture(t: Tracks, to_picture: Callable[[Array], Array]) -> FrameMarks:
+    n, groups = len(t.id), _whole_groups(t, to_picture)
     at = np.array([g.motion[0] if len(g.motion) else [np.nan, np.nan] for g in groups]).reshape(n, 2)
     no_box, no_ellipse = np.full((n, 4), np.nan), np.full((n, len(UNIT_CIRCLE), 2), np.nan)
     return FrameMarks(t.id, no_box, at, no_ellipse, np.zeros(n, bool), groups, whole_groups=True)
@@ -205,14 +199,12 @@ def _marks_on_plan(t: Tracks) -> FrameMarks:
     these are groups; without both there are none."""
     n, groups, at = len(t.id), t.groups or Groups.none(), t.pos[:, :2]
     if t.unit == "group":
-        marks = _whole_groups(t, lambda points: points[:, :2])
+        marks = _whole_groups(t, _on_plan)
     else:
         hulls = groups.hull or tuple(NO_POINTS for _ in groups.id)
         marks = tuple(GroupMark(g, hull) for g, hull in zip(groups.id.tolist(), hulls, strict=True))
-    rings = [ellipse(p, cov, SIGMA_95) for p, cov in zip(at, t.cov[:, :2, :2], strict=True)]
-    unknown = np.full((len(UNIT_CIRCLE), 2), np.nan)
-    ellipses = np.array([ring if len(ring) else unknown for ring in rings]).reshape(n, len(UNIT_CIRCLE), 2)
-    return FrameMarks(t.id, np.full((n, 4), np.nan), at, ellipses, np.zeros(n, bool), marks, t.unit == "group")
+    no_box, ellipses = np.full((n, 4), np.nan), _ellipses(t, _on_plan)
+    return FrameMarks(t.id, no_box, at, ellipses, np.zeros(n, bool), marks, t.unit == "group")
 
 
 def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[GroupMark, ...]:
@@ -275,26 +267,18 @@ def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene |
     return uv if (depth > 0).all() and np.isfinite(uv).all() else NO_POINTS
 
 
-def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
-    """Returns 32 points (32, 2) of the ellipse at `sigmas` standard deviations round `centre` (2,), in the unit of
-    `centre`.
-
-    cov: (2, 2) covariance matrix; negative eigenvalues count as 0. Returns (0, 2) if an entry of `cov` is not finite; a
-    nan in `centre` gives nan."""
-    if not np.isfinite(cov).all():
-        return NO_POINTS
-    values, vectors = np.linalg.eigh(cov)
-    return np.asarray(centre + sigmas * (UNIT_CIRCLE * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+def _on_plan(points: Array) -> Array:
+    return points[:, :2]
 
 
-def _ellipses(t: Tracks, camera: Camera | None, scene: Scene | None) -> Array:
-    """Returns the 95 % ellipses of the positions of the N people of one frame's tracks `t` in a picture, (N, 32, 2) px.
+def _ellipses(t: Tracks, to_drawing: Callable[[Array], Array]) -> Array:
+    """Returns the 95 % ellipses of the positions of the N people of one frame's tracks `t`, (N, 32, 2), in drawing
+    coordinates.
 
-    A row is nan where the covariance is not finite, or a point of the ellipse cannot be seen by the camera. camera:
-    None: rows of tracks on the ground are nan. scene: gives the ground's height; None: 0."""
+    to_drawing: as in `_whole_groups`. A row is nan where the covariance is not finite, or a point cannot be seen."""
     found = np.full((len(t.id), len(UNIT_CIRCLE), 2), np.nan)
     for k, cov in enumerate(t.cov[:, :2, :2]):
-        points = _in_picture(ellipse(t.pos[k, :2], cov, SIGMA_95), t.plane, camera, scene)
+        points = to_drawing(ellipse(t.pos[k, :2], cov, SIGMA_95))
         if len(points):
             found[k] = points
     return found
