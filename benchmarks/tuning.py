@@ -38,7 +38,7 @@ from tracking.config import Config
 from tracking.environment.episodes import Episode, Source
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.link_rule import LinkRule
-from tracking.recording_intervals import recording_intervals
+from tracking.recording_intervals import recording_differences
 from tracking.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.frame_weights import weighted_scorer
@@ -153,22 +153,16 @@ def print_comparison(name: str, sequence: Sequence, mode: str, chosen: dict[str,
     every = list(CATALOGUE)
     at = [every.index(key) for key in KEYS[name]]
     scorers = {which: weighted_scorer(truth, tracks_of(name, sequence, mode, c)) for which, c in chosen.items()}
-
-    def score(weights: np.ndarray) -> np.ndarray:
-        values = {which: scorer(weights)[:, at] for which, scorer in scorers.items()}
-        return np.concatenate([*values.values(), *(values[which] - values["present"] for which in values)], axis=1)
-
-    whole, low, high = recording_intervals(truth, score, DRAWS, None)
-    size, count = len(at), len(chosen)
     print(
         f"{name} on {sequence.name}, {truth.length / truth.fps:.0f} s, {mode}; in brackets minus the present defaults"
     )
-    for k, which in enumerate(chosen):
+    for which, scorer in scorers.items():
+        whole = scorer(np.ones((1, truth.length)))[0]
+        less, low, high = recording_differences(truth, scorer, scorers["present"], DRAWS)
         cells = []
-        for j, key in enumerate(KEYS[name]):
-            v, d = k * size + j, (count + k) * size + j
-            less = "" if which == "present" else f" ({whole[d]:+.3f} [{low[d]:+.3f}, {high[d]:+.3f}])"
-            cells.append(f"{key} {whole[v]:.3f}{less}")
+        for k, key in zip(at, KEYS[name], strict=True):
+            ends = "" if which == "present" else f" ({less[k]:+.3f} [{low[k]:+.3f}, {high[k]:+.3f}])"
+            cells.append(f"{key} {whole[k]:.3f}{ends}")
         print(f"  {which:8} " + "   ".join(cells), flush=True)
 
 

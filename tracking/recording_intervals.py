@@ -6,7 +6,7 @@ This module says how long a block is, and on which scale the error of each score
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -32,15 +32,29 @@ SCALES = tuple(map(scale_of, ALL))
 
 
 def recording_intervals(
-    truth: Truth, score: Callable[[Array], Array], draws: int = DRAWS, scales: Sequence[Scale] | None = SCALES
+    truth: Truth, score: Callable[[Array], Array], draws: int = DRAWS
 ) -> tuple[Array, Array, Array]:
     """Returns the scores (K,) of one recording, and the low and the high ends (K,) of their 95 % intervals.
 
-    truth: of the recording. score: from weights (D, length) of its frames to scores (D, K), nan where unknown, as
-    `weighted_scorer` gives it. draws: number of draws of weights. scales: of the K scores; None: any values, as for
-    differences of two trackers under equal weights.
+    truth: of the recording. score: from weights (D, length) of its frames to all scores (D, K), nan where unknown, as
+    `weighted_scorer` gives it. draws: number of draws of weights.
     """
-    return block_intervals(score, truth.length, truth.fps, presence(truth.id), draws, scales)
+    return block_intervals(score, truth.length, truth.fps, presence(truth.id), draws, SCALES)
+
+
+def recording_differences(
+    truth: Truth, first: Callable[[Array], Array], second: Callable[[Array], Array], draws: int = DRAWS
+) -> tuple[Array, Array, Array]:
+    """Returns the differences (K,) of the scores of two runs of one recording, first minus second, and the low and the
+    high ends (K,) of their 95 % intervals.
+
+    first, second: as `score` in `recording_intervals`. Both get the same weights in each draw.
+    """
+
+    def difference(weights: Array) -> Array:
+        return first(weights) - second(weights)
+
+    return block_intervals(difference, truth.length, truth.fps, presence(truth.id), draws)
 
 
 def presence(id: Ints) -> float:

@@ -24,14 +24,15 @@ from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER
 from benchmarks.support.tables import interval, table
 from sim.geometry.polygons import contains
 from sim.io.source import open_source
-from sim.types import Tracks, Truth
+from sim.types import Array, Tracks, Truth
 from tracking.app.pictures.overlay import write_overlay
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.recording_intervals import recording_intervals
+from tracking.recording_intervals import recording_differences, recording_intervals
 from tracking.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.frame_weights import weighted_scorer
+from tracking.scoring.one_plane import in_one_plane
 from tracking.scoring.people_and_groups import INSIDE
 from tracking.tuning.grouping_episodes import people_as_tracks
 
@@ -87,7 +88,25 @@ def labelled_recording(given: argparse.Namespace, path: str, note: str) -> Any:
 
 def with_intervals(truth: Truth, answers: Sequence[Tracks], keys: Sequence[str]) -> list[tuple[float, float, float]]:
     """Returns value, low and high end of each score; the ends are nan where the interval is unknown."""
-    ends = recording_intervals(truth, weighted_scorer(truth, answers), DRAWS)
+    return chosen(keys, recording_intervals(truth, weighted_scorer(truth, answers), DRAWS))
+
+
+def paired_on_recording(
+    truth: Truth, before: Sequence[Tracks], today: Sequence[Tracks], keys: Sequence[str]
+) -> list[tuple[float, float, float]]:
+    """Returns the difference of each score, today minus before, with the low and high end of its 95 % interval.
+
+    before, today: one `Tracks` per frame. They are compared as by `score --against`: in one plane, under equal weights
+    of the frames. The ends are nan where the interval is unknown, as for a difference of 0 in all draws. Raises
+    IncomparableError if the runs cannot lie in one plane.
+    """
+    before, today, similarity = in_one_plane(truth, before, today)
+    later, earlier = (weighted_scorer(truth, tracks, similarity) for tracks in (today, before))
+    return chosen(keys, recording_differences(truth, later, earlier, DRAWS))
+
+
+def chosen(keys: Sequence[str], ends: tuple[Array, Array, Array]) -> list[tuple[float, float, float]]:
+    """Returns value, low and high end of the scores with these keys; ends: of all scores of the catalogue."""
     found = dict(zip(CATALOGUE, zip(*(end.tolist() for end in ends), strict=True), strict=True))
     return [found[key] for key in keys]
 

@@ -17,7 +17,7 @@ from tracking.app.commands.run_differences import Differences, differences_words
 from tracking.app.commands.score_tables import Means, SequenceScores, detections_words, difference_table, tables
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import find_tracks, match_tracks
-from tracking.recording_intervals import recording_intervals
+from tracking.recording_intervals import recording_differences, recording_intervals
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
 from tracking.scoring import evaluate
@@ -151,11 +151,7 @@ def _block_intervals(sequence: Sequence, scored: list[ScoredRun], draws: int) ->
     found = _by_key(recording_intervals(truth, scorers[0], draws))
     if len(scored) == 1:
         return found, None
-
-    def difference(weights: Array) -> Array:
-        return scorers[0](weights) - scorers[1](weights)
-
-    return found, _by_key(recording_intervals(truth, difference, draws, None))
+    return found, _by_key(recording_differences(truth, scorers[0], scorers[1], draws))
 
 
 def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = DEFAULT) -> SequenceScores:
