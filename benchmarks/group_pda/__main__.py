@@ -7,7 +7,7 @@ scenarios    merging, splitting, crossing, queueing, side by side: lineage, ids,
 decisions    each decision of the tracker switched off: paired differences
 events       merges and splits of the suites standard and friends-meet
 difference   groups that pass and cross: ids kept against the difference of their velocities; a chart
-real         seq_hotel, Meet_WalkTogether1, PETS09-S2L1 (--data)
+real         seq_hotel, zara01, Meet_WalkTogether1, PETS09-S2L1 (--data)
 cost         CPU time of a step against the number of measurements
 consistency  NEES, NIS and whiteness of the centroid's filter
 

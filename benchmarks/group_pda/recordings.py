@@ -1,9 +1,10 @@
 """Mode `real` of `benchmarks.group_pda`: recordings of real people.
 
-hotel: seq_hotel from the labelled positions of people, without their identities. caviar: Meet_WalkTogether1 from the
-centres of labelled boxes, in the image. Columns: group scores with 95 % intervals by weights of blocks of frames;
-pairwise scores by the people in each hull (of the baseline rule: by its members). Below: number of events of each kind
-that are reported.
+hotel, zara: seq_hotel and zara01 from the labelled positions of people, without their identities. caviar:
+Meet_WalkTogether1 from the centres of labelled boxes, in the image, at two scales: that of the first 100 boxes, which
+is the default, and that of all boxes, given as by `--px-per-m`. Columns: group scores with 95 % intervals by weights of
+blocks of frames; pairwise scores by the people in each hull (of the baseline rule: by its members). Below: number of
+events of each kind that are reported.
 pets: the first 200 frames of PETS09-S2L1 from pixels. No groups are labelled: printed are the number of groups, the
 events, and in how many frames the two people who walk together (11 and 12) are in one hull. A video is written.
 """
@@ -19,15 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.group_pda.runs import Variant
-from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER
+from benchmarks.group_pda.runs import trackers
+from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER, ZARA
 from benchmarks.support.tables import interval, table
 from sim.geometry.polygons import contains
 from sim.io.source import open_source
 from sim.types import Array, Tracks, Truth
 from tracking.app.pictures.overlay import write_overlay
 from tracking.grouping.grouped_tracks import with_groups
-from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.recording_intervals import recording_differences, recording_intervals
 from tracking.run import track
 from tracking.scoring.catalogue import CATALOGUE
@@ -38,17 +38,21 @@ from tracking.tuning.grouping_episodes import people_as_tracks
 
 DRAWS = 1000
 KEYS = ("group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP", "group_MOTA", "group_GDSR2", "group_F1", "group_IDSW")
-TABLE_3B = """columns of Bazzani et al. 2012, Table 3b. DEEPER-JIGT, on its own BIWI frames: 1-FP 53.8 %,
+POSITIONS = """the input is the position of every labelled person in each frame (2.5 frames/s) without identities: no
+misses and no false alarms"""
+TABLE_3B = f"""columns of Bazzani et al. 2012, Table 3b. DEEPER-JIGT, on its own BIWI frames: 1-FP 53.8 %,
 1-FN 78.0 %, GDSR 53.6 %, MOTP 0.44 m, MOTA 29.4 %; it follows people in the video and restarts from the truth when it
-loses one. The input here is the position of every labelled person in each frame (2.5 frames/s) without identities: no
-misses and no false alarms, but no restart from the truth either"""
+loses one. Here {POSITIONS}, but no restart from the truth either"""
+ALL_BOXES = 18.8
+"""px/m: scale of Meet_WalkTogether1 by all its boxes."""
+
 PAIR = (11, 12)
 OUT = Path("group-pda-pets.mp4")
 
 
 def real(given: argparse.Namespace) -> Any:
     """Prints the parts of --only (default: all) and returns what they measured."""
-    parts = {"hotel": hotel, "caviar": caviar, "pets": pets}
+    parts = {"hotel": hotel, "zara": zara, "caviar": caviar, "pets": pets}
     chosen = given.only.split(",") if given.only else parts
     return {name: parts[name](given) for name in chosen}
 
@@ -57,24 +61,35 @@ def hotel(given: argparse.Namespace) -> Any:
     return labelled_recording(given, HOTEL, TABLE_3B)
 
 
+def zara(given: argparse.Namespace) -> Any:
+    return labelled_recording(given, ZARA, POSITIONS)
+
+
 def caviar(given: argparse.Namespace) -> Any:
-    return labelled_recording(given, WALK_TOGETHER, "from centres of labelled boxes; MOTP in px")
+    note = "from centres of labelled boxes; MOTP in px"
+    return labelled_recording(given, WALK_TOGETHER, note, (None, ALL_BOXES))
 
 
-def labelled_recording(given: argparse.Namespace, path: str, note: str) -> Any:
-    """Prints the table of a recording with labelled groups and returns values and intervals by tracker."""
+def labelled_recording(
+    given: argparse.Namespace, path: str, note: str, scales: Sequence[float | None] = (None,)
+) -> Any:
+    """Prints the table of a recording with labelled groups and returns values and intervals by tracker.
+
+    scales: each tracker has a row for each, px/m; None: the recording's own. The truth has its own scale.
+    """
     sequence = open_source(given.data / path)[0]
     truth = sequence.truth
     assert truth is not None
-    variants = (
-        Variant(given.tracker, given.tracker),
-        Variant("preset paper", given.tracker, GroupPdaConfig.preset("paper").as_dict()),
-        Variant('association="none"', given.tracker, {"association": "none"}),
-    )
-    answers: dict[str, Sequence[Tracks]] = {
-        v.name: track(v.tracker, sequence, params=v.params or None, detections="truth") for v in variants
-    }
-    answers["baseline rule, given identities"] = with_groups(people_as_tracks(truth), truth.fps, truth.px_per_m)
+    boxed = truth.box is not None
+    variants = [v for v in trackers(given.tracker, "truth") if boxed or v.tracker != "blob"]  # blob needs boxes
+    answers: dict[str, Sequence[Tracks]] = {}
+    for scale in scales:
+        scaled = sequence if scale is None else open_source(given.data / path, px_per_m=scale)[0]
+        at = f", {scaled.px_per_m:.1f} px/m" if scaled.px_per_m > 0 else ""
+        for v in variants:
+            answers[v.name + at] = track(v.tracker, scaled, params=v.params or None, detections="truth")
+        by_rule = with_groups(people_as_tracks(truth), truth.fps, scaled.px_per_m)
+        answers[f"baseline rule, given identities{at}"] = by_rule
     keys = [*KEYS, "pairwise_F1", "pairwise_precision", "pairwise_recall"]
     found = {name: with_intervals(truth, tracks, keys) for name, tracks in answers.items()}
     rows = {name: [interval(*ends) for ends in row] for name, row in found.items()}

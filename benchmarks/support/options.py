@@ -12,6 +12,7 @@ SHARED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 PETS = "mot/PETS09-S2L1-first200"
 CAMPUS = "mot/TUD-Campus"
 HOTEL = "biwi/seq_hotel"
+ZARA = "biwi/zara01"
 WALK_TOGETHER = "caviar/mwt1gt.xml"
 
 
