@@ -11,7 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from sim.types import Array, Ints, Truth
-from tracking.scoring.catalogue import ALL, Score
+from tracking.scoring.catalogue import ALL
+from tracking.scoring.catalogue_entries import Score
 from tracking.scoring.rows import numbered
 from tracking.stats import DRAWS, Scale, block_intervals
 

@@ -6,121 +6,66 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from types import MappingProxyType
-from typing import Literal
 
+from tracking.scoring.catalogue_entries import Score, count, from_source, in_family, length, share
 from tracking.scoring.events import HEADLINE, KINDS
 
-Better = Literal["higher", "lower", "neither"]
 CORE = "groups, core"
 
-
-@dataclass(frozen=True)
-class Score:
-    """One score of the catalogue.
-
-    - key: its name in the results, such as "HOTA".
-    - family: name of the group of scores that are shown together, such as "people".
-    - unit: "1" for a share; "m | px" for a length in m on the ground or in px in the image ("m² | px²" squared); "m/s",
-      "count", "s", "people".
-    - low, high: range of possible values; may be infinite.
-    - better: whether "higher" or "lower" values are better, or "neither".
-    - meaning: definition in words.
-    - source: the paper that defines it, "" if flockscope does.
-    """
-
-    key: str
-    family: str
-    unit: str
-    low: float
-    high: float
-    better: Better
-    meaning: str
-    source: str = ""
-
-    @property
-    def best(self) -> float:
-        """The value of a perfect tracker: `high` if higher is better, 0 if lower is better.
-
-        nan if the range has no upper end (numbers of hits) or if neither direction is better.
-        """
-        value = {"higher": self.high, "lower": 0.0, "neither": inf}[self.better]
-        return value if value < inf else float("nan")
-
-
-def _share(key: str, meaning: str, low: float = 0.0) -> Score:
-    return Score(key, "", "1", low, 1.0, "higher", meaning)
-
-
-def _count(key: str, meaning: str, better: Better = "lower") -> Score:
-    return Score(key, "", "count", 0.0, inf, better, meaning)
-
-
-def _length(key: str, meaning: str, unit: str = "m | px") -> Score:
-    return Score(key, "", unit, 0.0, inf, "lower", meaning)
-
-
-def _family(family: str, *scores: Score) -> tuple[Score, ...]:
-    return tuple(replace(score, family=family) for score in scores)
-
-
-def _from(source: str, *scores: Score) -> tuple[Score, ...]:
-    return tuple(replace(score, source=source) for score in scores)
-
-
-OBJECTIVE = _family(
+OBJECTIVE = in_family(
     "objective",
-    _share(
+    share(
         "objective",
         "mean of HOTA and group_F1_hull, or the one of the two that is known; used for tuning and as reward",
     ),
 )
 
-HOTA = _family(
+HOTA = in_family(
     "people",
-    *_from(
+    *from_source(
         "Luiten et al. 2021",
-        _share("HOTA", "geometric mean of DetA and AssA, mean over 19 thresholds of similarity"),
-        _share("DetA", "TP / (TP + FN + FP), mean over thresholds"),
-        _share("AssA", "mean over matches of: matches of the two ids / frames of either id, mean over thresholds"),
-        _share("DetRe", "matched / true people, mean over thresholds"),
-        _share("DetPr", "matched / estimated people, mean over thresholds"),
-        _share("AssRe", "mean over matches of: matches of the two ids / frames of the true id, mean over thresholds"),
-        _share("AssPr", "mean over matches of: matches of the two ids / frames of the track, mean over thresholds"),
-        _share(
+        share("HOTA", "geometric mean of DetA and AssA, mean over 19 thresholds of similarity"),
+        share("DetA", "TP / (TP + FN + FP), mean over thresholds"),
+        share("AssA", "mean over matches of: matches of the two ids / frames of either id, mean over thresholds"),
+        share("DetRe", "matched / true people, mean over thresholds"),
+        share("DetPr", "matched / estimated people, mean over thresholds"),
+        share("AssRe", "mean over matches of: matches of the two ids / frames of the true id, mean over thresholds"),
+        share("AssPr", "mean over matches of: matches of the two ids / frames of the track, mean over thresholds"),
+        share(
             "LocA",
             "mean similarity of matches, mean over thresholds; 1 at a threshold without matches, as in TrackEval",
         ),
     ),
 )
 
-CLEAR = _family(
+CLEAR = in_family(
     "people",
-    *_from(
+    *from_source(
         "Bernardin & Stiefelhagen 2008",
-        _share("MOTA", "1 - (FN + FP + IDSW) / true people, at similarity 0.5", -inf),
-        _share("MOTP", "mean similarity of the matches of CLEAR (similarity 0.5 or more)"),
-        _count("TP", "people matched at similarity 0.5, summed over frames", "higher"),
-        _count("FN", "true people without a match, summed over frames"),
-        _count("FP", "estimated people without a match, summed over frames"),
-        _count("IDSW", "identity switches: a true person is matched with another track than in its previous match"),
-        _count("MT", "mostly tracked: true people matched in more than 80 % of their frames", "higher"),
-        _count("PT", "partly tracked: true people matched in 20 to 80 % of their frames", "neither"),
-        _count("ML", "mostly lost: true people matched in less than 20 % of their frames"),
-        _count("Frag", "fragments: a true person is matched again after frames without a match"),
+        share("MOTA", "1 - (FN + FP + IDSW) / true people, at similarity 0.5", -inf),
+        share("MOTP", "mean similarity of the matches of CLEAR (similarity 0.5 or more)"),
+        count("TP", "people matched at similarity 0.5, summed over frames", "higher"),
+        count("FN", "true people without a match, summed over frames"),
+        count("FP", "estimated people without a match, summed over frames"),
+        count("IDSW", "identity switches: a true person is matched with another track than in its previous match"),
+        count("MT", "mostly tracked: true people matched in more than 80 % of their frames", "higher"),
+        count("PT", "partly tracked: true people matched in 20 to 80 % of their frames", "neither"),
+        count("ML", "mostly lost: true people matched in less than 20 % of their frames"),
+        count("Frag", "fragments: a true person is matched again after frames without a match"),
     ),
 )
 
-IDENTITY = _family(
+IDENTITY = in_family(
     "people",
-    *_from(
+    *from_source(
         "Ristani et al. 2016",
-        _share("IDF1", "2 IDTP / (true + estimated people)"),
-        _share("IDP", "IDTP / estimated people"),
-        _share("IDR", "IDTP / true people"),
-        _count(
+        share("IDF1", "2 IDTP / (true + estimated people)"),
+        share("IDP", "IDTP / estimated people"),
+        share("IDR", "IDTP / true people"),
+        count(
             "IDTP",
             "matches of the best one-to-one assignment of true ids to tracks for the whole sequence, at similarity 0.5",
             "higher",
@@ -128,51 +73,51 @@ IDENTITY = _family(
     ),
 )
 
-ERRORS = _family(
+ERRORS = in_family(
     "errors",
-    _length("RMSE_pos", "root mean square error of positions, of people mapped at similarity 0.5 or more"),
-    _length("RMSE_vel", "root mean square error of velocities on the ground, of the same people", "m/s"),
-    *_from(
+    length("RMSE_pos", "root mean square error of positions, of people mapped at similarity 0.5 or more"),
+    length("RMSE_vel", "root mean square error of velocities on the ground, of the same people", "m/s"),
+    *from_source(
         "Rahmathullah et al. 2017",
-        _length(
+        length(
             "GOSPA",
             "root mean square over frames of GOSPA with a cut-off of 2 m: localisation errors, missed and false people",
         ),
-        _length(
+        length(
             "GOSPA_localisation", "the part of localisation errors; GOSPA² is the sum of the squares of the three parts"
         ),
-        _length("GOSPA_missed", "the part of missed people"),
-        _length("GOSPA_false", "the part of false people"),
+        length("GOSPA_missed", "the part of missed people"),
+        length("GOSPA_false", "the part of false people"),
     ),
 )
 
-GROUPS = _family(
+GROUPS = in_family(
     "groups",
-    *_from(
+    *from_source(
         "Bazzani et al. 2012",
-        _share("group_1-FP", "1 - false / true groups, both summed over frames", -inf),
-        _share("group_1-FN", "1 - missed / true groups, both summed over frames"),
-        _share("group_1-FP_frames", "1 - mean over frames of false / max(true groups, 1)", -inf),
-        _share("group_1-FN_frames", "1 - mean over frames of missed / max(true groups, 1)"),
-        _share("group_GDSR", "share of true groups whose matched group contains at least 60 % of their members"),
+        share("group_1-FP", "1 - false / true groups, both summed over frames", -inf),
+        share("group_1-FN", "1 - missed / true groups, both summed over frames"),
+        share("group_1-FP_frames", "1 - mean over frames of false / max(true groups, 1)", -inf),
+        share("group_1-FN_frames", "1 - mean over frames of missed / max(true groups, 1)"),
+        share("group_GDSR", "share of true groups whose matched group contains at least 60 % of their members"),
     ),
-    _share(
+    share(
         "group_GDSR2", "the same, if also at least 60 % of the estimated members are right; one giant group fails this"
     ),
-    *_from(
+    *from_source(
         "Bernardin & Stiefelhagen 2008",
-        _length("group_MOTP", "mean distance between the centres of matched groups"),
-        _length("group_MSE", "mean square of that distance", "m² | px²"),
-        _length("group_MOTP_ungated", "mean distance if groups are matched by distance alone, however far apart"),
-        _share("group_MOTA", "1 - (FN + FP + IDSW) / true groups", -inf),
-        _count("group_IDSW", "a true group is matched with another estimated id than in its previous match"),
-        _count("group_TP", "matched groups, summed over frames", "higher"),
-        _count("group_FP", "estimated groups without a match, summed over frames"),
-        _count("group_FN", "true groups without a match, summed over frames"),
+        length("group_MOTP", "mean distance between the centres of matched groups"),
+        length("group_MSE", "mean square of that distance", "m² | px²"),
+        length("group_MOTP_ungated", "mean distance if groups are matched by distance alone, however far apart"),
+        share("group_MOTA", "1 - (FN + FP + IDSW) / true groups", -inf),
+        count("group_IDSW", "a true group is matched with another estimated id than in its previous match"),
+        count("group_TP", "matched groups, summed over frames", "higher"),
+        count("group_FP", "estimated groups without a match, summed over frames"),
+        count("group_FN", "true groups without a match, summed over frames"),
     ),
-    _share("group_F1", "2 found / (true + estimated groups); found: matched at similarity 0.5 or more"),
-    _share("group_precision", "found / estimated groups"),
-    _share("group_recall", "found / true groups"),
+    share("group_F1", "2 found / (true + estimated groups); found: matched at similarity 0.5 or more"),
+    share("group_precision", "found / estimated groups"),
+    share("group_recall", "found / true groups"),
     *(
         replace(
             score,
@@ -181,33 +126,55 @@ GROUPS = _family(
         )
         for score in HOTA
     ),
-    _length(
+    length(
         "group_size_error",
         "mean absolute difference between estimated and true number of people, of matched groups",
         "people",
     ),
-    *_from(
+    *from_source(
         "Givens & Shortt 1984",
-        _length(
+        length(
             "group_extent_error",
             "mean 2-Wasserstein distance of matched groups, taken as Gaussians with centre and extent",
         ),
     ),
 )
 
-MEMBERS = _family(
+
+def _groups_right(name: str, right: str) -> tuple[Score, ...]:
+    """Returns F1, precision and recall of groups, without family and source; right: when a true group is right."""
+    p, r = f"{name}_precision", f"{name}_recall"
+    return (
+        share(f"{name}_F1", f"2 P R / (P + R) of P = {p} and R = {r}"),
+        share(p, f"mean over frames of right / estimated groups; right: {right}"),
+        share(r, "mean over frames of right / true groups"),
+    )
+
+
+MEMBERS = in_family(
     "members",
-    _share("group_F1_hull", "group_F1 by IoU of hulls, also if groups are matched by members; part of the objective"),
-    _share("pairwise_F1", "2 right / (true + estimated pairs); a pair is two people of one frame in one group"),
-    _share("pairwise_precision", "right / estimated pairs; a pair with a track mapped to nobody is false"),
-    _share("pairwise_recall", "right / true pairs; a pair with a person no track is mapped to is missed"),
+    share("group_F1_hull", "group_F1 by IoU of hulls, also if groups are matched by members; part of the objective"),
+    share("pairwise_F1", "2 right / (true + estimated pairs); a pair is two people of one frame in one group"),
+    share("pairwise_precision", "right / estimated pairs; a pair with a track mapped to nobody is false"),
+    share("pairwise_recall", "right / true pairs; a pair with a person no track is mapped to is missed"),
+    *from_source(
+        "Solera et al. 2016",
+        share("GMITRE_F1", "G-MITRE: mean over frames of 2 right / (true + estimated links)"),
+        share("GMITRE_precision", "mean over frames of right / estimated links"),
+        share("GMITRE_recall", "mean over frames of right / true links"),
+    ),
+    *from_source(
+        "Setti et al. 2015",
+        *_groups_right("right_groups", "at least 2/3 of the n members are found, at most ⌈n / 3⌉ others (T = 2/3)"),
+        *_groups_right("exact_groups", "all members are found, and nobody else (T = 1)"),
+    ),
 )
 
 LINEAGE = (
-    _share(
+    share(
         "lineage_accuracy", "share of true merges and splits that are matched and have the right parents and children"
     ),
-    _share("lineage_accuracy_found", "share of the matched merges and splits that have the right parents and children"),
+    share("lineage_accuracy_found", "share of the matched merges and splits that have the right parents and children"),
 )
 
 
@@ -217,15 +184,15 @@ def _of_events(name: str, what: str) -> Iterable[Score]:
     name: the kind, which begins the keys ("merge" gives merge_F1); "event" yields no TP, FP and FN. what: the events as
     a plural noun for the meanings. The scores have no family yet.
     """
-    yield _share(f"{name}_F1", f"2 matched / (true + reported) {what}")
-    yield _share(f"{name}_precision", f"matched / reported {what}")
-    yield _share(f"{name}_recall", f"matched / true {what}")
+    yield share(f"{name}_F1", f"2 matched / (true + reported) {what}")
+    yield share(f"{name}_precision", f"matched / reported {what}")
+    yield share(f"{name}_recall", f"matched / true {what}")
     if name != "event":
-        yield _count(f"{name}_TP", f"matched {what}", "higher")
-        yield _count(f"{name}_FP", f"reported {what} without a match")
-        yield _count(f"{name}_FN", f"true {what} without a match")
+        yield count(f"{name}_TP", f"matched {what}", "higher")
+        yield count(f"{name}_FP", f"reported {what} without a match")
+        yield count(f"{name}_FN", f"true {what} without a match")
     latency = f"mean time from the true start to the report, of matched {what}"
-    yield replace(_length(f"{name}_latency", latency, "s"), low=-1.0)
+    yield replace(length(f"{name}_latency", latency, "s"), low=-1.0)
 
 
 def _headline(score: Score) -> Score:
@@ -260,7 +227,7 @@ ALL = (
     *GROUPS,
     *map(_core, GROUPS),
     *MEMBERS,
-    *_family(
+    *in_family(
         "events",
         *map(_headline, _of_events("event", " and ".join(map(_plural, HEADLINE)))),
         *(score for kind in KINDS for score in _of_events(kind, _plural(kind))),

@@ -17,8 +17,8 @@ from tracking.scoring.events_by_true_people import events_of_hulls, tracked_even
 from tracking.scoring.group_scores import (
     GroupComparison,
     GroupMatch,
+    SharedMembers,
     compare_groups,
-    shared_members,
 )
 from tracking.scoring.people_and_groups import (
     GroupRows,
@@ -78,22 +78,24 @@ class TrackedGroups:
     - counted: the groups that are scored. Members are rows of the tracked people if the tracker names members, else
       rows of the true people inside the hull.
     - person (K,): for each of the K memberships of `counted`, the row of the true person, -1 none.
+    - named: True if the tracker names members, or follows people and has no groups.
     """
 
     every: GroupRows
     counted: GroupRows
     person: Ints
+    named: bool
 
 
 def group_comparisons(
-    sides: ComparedSides, true: TrueGroups, tracked: TrackedGroups, by: GroupMatch
+    true: TrueGroups, tracked: TrackedGroups, shared: SharedMembers, by: GroupMatch
 ) -> tuple[GroupComparison | None, GroupComparison | None]:
     """Returns both sides' groups with their matchings twice: by hull, and as `by` says. The two are one if `by` is
     "hull".
 
-    A matching by hull is None if `true` is not comparable (has no shapes on the surface).
+    shared: numbers of common people, from `shared_members`. A matching by hull is None if `true` is not comparable (has
+    no shapes on the surface).
     """
-    shared = shared_members(true.groups, tracked.counted, tracked.person, len(sides.true.rows))
     by_hull = compare_groups(true.groups, tracked.counted, shared, "hull") if true.comparable else None
     return by_hull, by_hull if by == "hull" else compare_groups(true.groups, tracked.counted, shared, by)
 
@@ -110,16 +112,17 @@ def tracked_groups(sides: ComparedSides) -> TrackedGroups:
     tracks = [t for t in sides.tracks if sides.frames[t.index]]
     frames = np.array([t.index for t in tracks], np.int64)
     every = group_rows(frames, [t.groups or Groups.none() for t in tracks], sides.est.rows)
-    if any(t.unit == "group" for t in tracks) or not len(every.of):
+    wholes = any(t.unit == "group" for t in tracks)
+    if wholes or not len(every.of):
         positions = sides.true.positions_on(sides.surface, "ground")
         if positions is not None:
             every = people_inside(every, sides.true.rows, positions, sides.scale)
         counted = every.keep(every.count != 1)
-        return TrackedGroups(every, counted, counted.member)
+        return TrackedGroups(every, counted, counted.member, not (wholes or len(every)))
     counted = every.keep(every.count > 1)
     person = _true_rows(every, sides.mapping)
     mapped = replace(every, of=every.of[person >= 0], member=person[person >= 0])
-    return TrackedGroups(mapped, counted, _true_rows(counted, sides.mapping))
+    return TrackedGroups(mapped, counted, _true_rows(counted, sides.mapping), named=True)
 
 
 def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:

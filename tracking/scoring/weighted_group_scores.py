@@ -1,7 +1,7 @@
 """Scores of groups, pairwise membership, events and lineage, from their matchings, under weights of the frames.
 
 `evaluate` gives every frame the weight 1, intervals by resampling give it others. A score whose denominator is 0 is
-nan. `group_scores.py`, `pairwise_membership.py` and `events.py` match both sides and count.
+nan. `group_scores.py`, `pairwise_membership.py`, `group_detection.py` and `events.py` match both sides and count.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from tracking.scoring.group_and_event_scores import (
     tracked_groups,
     unknown_kinds,
 )
-from tracking.scoring.group_scores import GroupComparison, GroupMatch, correct, sizes, switch_frames
+from tracking.scoring.group_detection import weighted_detection
+from tracking.scoring.group_scores import GroupComparison, GroupMatch, correct, shared_members, sizes, switch_frames
 from tracking.scoring.pairwise_membership import pair_counts
 from tracking.scoring.people_and_groups import TrueGroups
 from tracking.scoring.position_errors import gaussian_wasserstein
@@ -31,8 +32,8 @@ from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, mean
 
 def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> WeightedScores:
     """Returns a function from weights (D, size) by frame number to all scores of groups ("group_…", "group_…_core"),
-    pairwise membership ("pairwise_…"), events ("merge_F1" …, "event_…") and lineage ("lineage_…"), (D,) by the keys of
-    the catalogue.
+    pairwise membership ("pairwise_…"), group detection ("GMITRE_…", "right_groups_…", "exact_groups_…"), events
+    ("merge_F1" …, "event_…") and lineage ("lineage_…"), (D,) by the keys of the catalogue.
 
     sides: both sides in the scored frames, people mapped. true: the true groups in these frames. by: matches groups by
     "hull" (IoU) or by "members" (Jaccard index). Core frames are the labelled frames more than 1 s away from the start
@@ -40,12 +41,14 @@ def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: Group
 
     Keys are missing if the truth lacks data. group_F1_hull, and with by = "hull" all group scores, are missing if
     `true` is not comparable (has no shapes on the surface). Scores of events and lineage are missing if the truth has
-    no events, those of crossings and queues if the tracker says nothing of them (`unknown_kinds`).
+    no events, those of crossings and queues if the tracker says nothing of them (`unknown_kinds`), and G-MITRE if the
+    tracker names no members.
     """
     size = len(sides.frames)
     tracked = tracked_groups(sides)
-    by_hull, chosen = group_comparisons(sides, true, tracked, by)
-    parts = [_pairwise(true, tracked, size)]
+    shared = shared_members(true.groups, tracked.counted, tracked.person, len(sides.true.rows))
+    by_hull, chosen = group_comparisons(true, tracked, shared, by)
+    parts = [_pairwise(true, tracked, size), *weighted_detection(sides, true.groups, tracked, shared)]
     if by_hull is not None:
         parts.append(_renamed(_detection(by_hull, sides.frames), {"F1": "group_F1_hull"}))
     if chosen is not None:

@@ -19,14 +19,14 @@ PEOPLE = ("objective", "HOTA", "DetA", "AssA", "MOTA", "MOTP", "IDF1", "FP", "FN
 GROUPS = tuple(
     f"group_{name}" for name in ("1-FP", "1-FN", "GDSR", "GDSR2", "MOTP", "MOTA", "IDSW", "F1", "HOTA", "AssA")
 )
-EVENTS = (
-    "pairwise_F1", "event_F1", "event_latency", "merge_F1", "split_F1", "cross_F1", "queue_F1", "lineage_accuracy",
-)  # fmt: skip
+MEMBERS = ("pairwise_F1", "GMITRE_F1", "right_groups_F1", "exact_groups_F1")
+EVENTS = ("event_F1", "event_latency", "merge_F1", "split_F1", "cross_F1", "queue_F1", "lineage_accuracy")
 TABLES = {
     "people": PEOPLE,
     "groups, strict": GROUPS,
     "groups, core (without 1 s before and after each true merge and split)": tuple(f"{key}_core" for key in GROUPS),
-    "members and events": EVENTS,
+    "members": MEMBERS,
+    "events": EVENTS,
 }
 """Title and keys of each table. Only keys of groups have a core score. --json holds every key of the catalogue."""
 
