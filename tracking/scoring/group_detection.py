@@ -81,8 +81,8 @@ def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, toleran
     """Returns which true groups are right, (G,): an estimated group holds at least ceil(T n) of the n members and at
     most ceil((1 - T) n) others.
 
-    shared: numbers of common people of `true` and `est`. tolerance: numerator and denominator of T, which must be above
-    1/2: then no estimated group fits two true ones, and the pairs are one to one.
+    shared: numbers of common people of `true` and `est`, which have two or more members. tolerance: numerator and
+    denominator of T, 2/3 or more: then no estimated group fits two true ones, and the pairs are one to one.
     """
     part, whole = tolerance
     i, j = np.divmod(shared.key, max(shared.width, 1))
