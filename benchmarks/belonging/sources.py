@@ -1,0 +1,141 @@
+"""Streets, real and simulated, sampled at 2.5 frames/s: who was where when, and the features of pairs.
+
+A source is a recording, or all entries and seeds of a scenario or suite. `write` stores a source as FOLDER/NAME.npz,
+which benchmarks/peers/classify_pairs.py reads without flockscope; `read` reads it back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.belonging.pair_features import NAMES, pair_features
+from scenarios.loading.resolve import Entry, resolve
+from sim.io.source import open_source
+from sim.sequence import simulate
+from sim.types import Array, Bools, Ints, Truth
+from tracking.tuning.grouping_episodes import SURVEYED, with_label_errors
+
+FPS = 2.5
+BLOCKS = 10  # of a recording
+
+
+@dataclass(frozen=True)
+class Source:
+    """All scenes of a source: rows of people, then rows of pairs (see `Pairs`).
+
+    length (S,): frames of each scene. scene, frame (from 1), id, group (-1: alone) (R,), pos (R, 2) in m: one row per
+    person and frame. pair_scene, pair_frame, a, b (K,): of each row of a pair; features (K, 21): columns
+    `pair_features.NAMES`; mates (K,): True if the two have one group label in this frame. part (K,): number of the
+    simulation, which all its cuts share; in a recording the tenth of its frames in which the pair is first seen
+    together. Rows of one pair have one part.
+    """
+
+    length: Ints
+    scene: Ints
+    frame: Ints
+    id: Ints
+    group: Ints
+    pos: Array
+    pair_scene: Ints
+    pair_frame: Ints
+    a: Ints
+    b: Ints
+    features: Array
+    mates: Bools
+    part: Ints
+
+
+def sample(truth: Truth) -> Truth:
+    """Returns every n-th frame of a truth, so that it has 2.5 frames/s: frames, ids, groups and positions.
+
+    People more than half outside the image are left out.
+    """
+    assert truth.pos is not None
+    every = round(truth.fps / FPS)
+    rows = (truth.frame - 1) % every == 0
+    if truth.truncation is not None:
+        rows &= truth.truncation <= 0.5
+    return Truth(
+        name=truth.name, fps=FPS, length=(truth.length - 1) // every + 1, px_per_m=truth.px_per_m,
+        frame=(truth.frame[rows] - 1) // every + 1, id=truth.id[rows], group=truth.group[rows], pos=truth.pos[rows],
+        vel=None, box=None, visibility=truth.visibility[rows],
+    )  # fmt: skip
+
+
+def source_of(truths: Iterable[Truth], *, recording: bool, cuts: int = 1) -> Source:
+    """Returns the rows of people and pairs of truths at 2.5 frames/s; cuts: so many successive ones are of one part."""
+    scenes = [_rows(number, truth, None if recording else number // cuts) for number, truth in enumerate(truths)]
+    return Source(**{name: np.concatenate([rows[name] for rows in scenes]) for name in scenes[0]})
+
+
+def _rows(number: int, truth: Truth, part: int | None) -> dict[str, np.ndarray]:
+    """Returns the fields of `Source` for one scene; part: None stands for the tenths of a recording."""
+    assert truth.pos is not None
+    pairs = pair_features(truth.frame, truth.id, truth.pos, FPS)
+    ids, column = np.unique(truth.id, return_inverse=True)
+    label = np.full((truth.length + 1, len(ids)), -1, np.int64)
+    label[truth.frame, column] = truth.group
+    a, b = (np.searchsorted(ids, person) for person in (pairs.a, pairs.b))
+    first, second = label[pairs.frame, a], label[pairs.frame, b]
+    _, met, pair = np.unique(a * len(ids) + b, return_index=True, return_inverse=True)
+    tenth = (pairs.frame[met][pair] - 1) * BLOCKS // truth.length
+    return {
+        "length": np.array([truth.length]), "scene": np.full(len(truth.frame), number), "frame": truth.frame,
+        "id": truth.id, "group": truth.group, "pos": truth.pos, "pair_scene": np.full(len(a), number),
+        "pair_frame": pairs.frame, "a": pairs.a, "b": pairs.b, "features": pairs.features,
+        "mates": (first >= 0) & (first == second), "part": tenth if part is None else np.full(len(a), part),
+    }  # fmt: skip
+
+
+def recorded(folder: Path) -> Source:
+    """Returns a recording with labelled groups. Raises InputError if it cannot be read."""
+    truth = open_source(folder)[0].truth
+    assert truth is not None, f"{folder} has labels"
+    return source_of([sample(truth)], recording=True)
+
+
+def since(truth: Truth, begin: float) -> Truth:
+    """Returns a sampled truth as if the recording began at `begin`, in s; it must be shorter than the recording."""
+    first = round(begin * truth.fps)
+    r = truth.frame > first
+    return truth.replace(
+        length=truth.length - first, frame=truth.frame[r] - first, id=truth.id[r], group=truth.group[r],
+        pos=None if truth.pos is None else truth.pos[r], visibility=truth.visibility[r],
+    )  # fmt: skip
+
+
+def simulated(name: str, seeds: range, begins: Sequence[float], label_errors: bool) -> Source:
+    """Returns all entries and seeds of a scenario, suite or *.toml file.
+
+    begins: times, s; each scene is taken once from each of them on. label_errors: the positions get the errors of a
+    labeller (`SURVEYED`, 0.02 m).
+    """
+    truths = (_sampled(entry, seed, label_errors) for entry in resolve(name) for seed in seeds)
+    return source_of((since(truth, begin) for truth in truths for begin in begins), recording=False, cuts=len(begins))
+
+
+def _sampled(entry: Entry, seed: int, label_errors: bool) -> Truth:
+    truth = simulate(entry.scenario, seed, entry.repeat, streams=()).truth
+    assert truth is not None
+    return sample(with_label_errors(truth, SURVEYED, seed, entry.repeat) if label_errors else truth)
+
+
+def write(folder: Path, name: str, source: Source) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = {field.name: getattr(source, field.name) for field in fields(Source)}
+    np.savez_compressed(folder / f"{name}.npz", **rows, names=np.array(NAMES))
+
+
+def read(folder: Path, name: str) -> Source:
+    """Returns a source that was written. Raises SystemExit if it was not, or has other features."""
+    path = folder / f"{name}.npz"
+    if not path.is_file():
+        raise SystemExit(f"{path}: no such file; write it with: python -m benchmarks.belonging pairs --out {folder}")
+    with np.load(path) as file:
+        if tuple(file["names"]) != NAMES:
+            raise SystemExit(f"{path}: other features than these; write it again: python -m benchmarks.belonging pairs")
+        return Source(**{field.name: file[field.name] for field in fields(Source)})
