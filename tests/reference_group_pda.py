@@ -28,7 +28,7 @@ class Rules:
     count_share: float
     detect: float
     miss: float  # probability of the miss before any measurement
-    freeze: float  # share of N from which on shared points let extent and size rest
+    freeze: float  # share of N in others' points from which on extent and size rest
     keep_extent: float
     keep_size: float
     correct: bool  # what the gate cuts off is put back
@@ -53,16 +53,34 @@ def truncation(gate, dims=2):
     return gammainc(dims / 2 + 1, gate / 2) / gammainc(dims / 2, gate / 2)
 
 
-def search(points, x, P, extent, noise, wider, gate):
-    """(G, M) squared Mahalanobis distances by Sigma + H P H' + (noise + wider) I, inf outside the region."""
+def search_region(P, extent, noise, wider):
+    """Sigma + H P H' + (noise + wider) I of one group."""
+    return extent + H @ P @ H.T + (noise + wider) * np.eye(2)
+
+
+def search(points, x, region, gate):
+    """(G, M) squared Mahalanobis distances, inf outside the region."""
     d2 = np.full((len(x), len(points)), np.inf)
-    for g in range(len(x)):
-        S = extent[g] + H @ P[g] @ H.T + (noise + wider[g]) * np.eye(2)
+    for g, S in enumerate(region):
         for k, y in enumerate(points):
             d = y - x[g, :2]
             if d @ np.linalg.solve(S, d) < gate:
                 d2[g, k] = d @ np.linalg.solve(S, d)
     return d2
+
+
+def shares(points, x, region, size, owner, may):
+    """(G, M) probability of each group to have made a point, by N_g N(y; xi_g, S_g); 1 for its owner."""
+    found = np.zeros((len(x), len(points)))
+    for k, y in enumerate(points):
+        if owner[k] >= 0:
+            found[owner[k], k] = may[owner[k], k]
+            continue
+        those = np.flatnonzero(may[:, k])
+        for g in those:
+            found[g, k] = size[g] * multivariate_normal(x[g, :2], region[g]).pdf(y) if len(those) > 1 else 1.0
+        found[:, k] /= found[:, k].sum() or 1.0
+    return found
 
 
 def claims(d2, own, hits, g):
@@ -97,9 +115,9 @@ def moments(points, weights):
     return n, mean, (weights * (points - mean).T) @ (points - mean) / n
 
 
-def associations(mine, shared, points, weights, d2, g, rules):
+def associations(mine, shared, points, weights, share, g, rules):
     """The feasible sets of points, largest last; rows of `points`."""
-    nearest = [k for k in shared if g == d2[:, k].argmin()]
+    nearest = [k for k in shared if g == share[:, k].argmax()]
     sets = {
         "pda": [mine + shared[:j] for j in range(len(shared) + 1)],
         "nearest": [mine + nearest],
@@ -110,7 +128,7 @@ def associations(mine, shared, points, weights, d2, g, rules):
     return [s for s in sets if free or reference_components.is_group(points[s], weights[s], rules.constraint)]
 
 
-def masses(sets, mine, shared, points, weights, x, P, extent, size, rules):
+def masses(sets, mine, shared, points, weights, region, x, P, extent, size, rules):
     """Masses of the associations, m_d m_N (4.2), and of the miss, all normalised; each one's R.
 
     m_N is a mass of numbers of people, which differ by those of a point: Gaussian, with tails. The miss has the same
@@ -124,45 +142,44 @@ def masses(sets, mine, shared, points, weights, x, P, extent, size, rules):
         n, mean, cov = moments(points[s], weights[s])
         R.append(centroid_noise(n, cov, extent, size, rules))
         close = multivariate_normal(x[:2], H @ P @ H.T + R[-1]).logpdf(mean)
-        many = (1 - NEWCOMERS) * norm(size, sigma).pdf(n) + NEWCOMERS / (size + n + 1)
+        many = (1 - NEWCOMERS) * norm(size, sigma).pdf(n) + NEWCOMERS * (size + 1) / (size + 1 + n) ** 2
         log.append(close + np.log(step * many))
     miss = -np.inf
     if rules.miss > 0:
-        area = np.pi * rules.constraint.gate * np.sqrt(np.linalg.det(extent + H @ P @ H.T))
+        area = np.pi * rules.constraint.gate * np.sqrt(np.linalg.det(region))
         number = step / (2 * size + 1) if mine else 1.0
         miss = np.log(rules.miss / (1 - rules.miss) / area * number)
     total = logsumexp([*log, miss])
     return np.exp(np.array(log) - total), np.exp(miss - total), R
 
 
-def update(g, points, weights, d2, own, hits, x, P, extent, size, hold, rules):
+def update(g, points, weights, d2, own, hits, share, region, x, P, extent, size, hold, rules):
     """One group after its points: state, rows chosen, innovation, its S, mass of the miss, x, P, extent, size."""
     mine, shared = claims(d2, own, hits, g)
     same = x, P, extent, size
     if not mine + shared:
         return "nothing", [], None, None, 0.0, *same
-    sets = associations(mine, shared, points, weights, d2, g, rules)
+    sets = associations(mine, shared, points, weights, share, g, rules)
     if not sets:
         some = mine + shared
         if reference_components.partition(points[some], weights[some], rules.constraint).max() < 0:
             return "nothing", [], None, None, 0.0, *same  # noise
         return "null", some, None, None, 0.0, *same
-    beta, miss, R = masses(sets, mine, shared, points, weights, x, P, extent, size, rules)
+    beta, miss, R = masses(sets, mine, shared, points, weights, region, x, P, extent, size, rules)
     states, covariances = [x], [P]
     for s, r in zip(sets, R, strict=True):
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + r)
         states.append(x + K @ (moments(points[s], weights[s])[1] - x[:2]))
         covariances.append(P - K @ H @ P)
-    share = np.array([miss, *beta])
-    new_x = share @ np.array(states)
-    new_P = sum(b * (C + np.outer(y - new_x, y - new_x)) for b, y, C in zip(share, states, covariances, strict=True))
+    mass = np.array([miss, *beta])
+    new_x = mass @ np.array(states)
+    new_P = sum(b * (C + np.outer(y - new_x, y - new_x)) for b, y, C in zip(mass, states, covariances, strict=True))
     best = int(np.argmax(beta))
     middle = moments(points[sets[best]], weights[sets[best]])[1]
     new_extent, new_size = extent, size
-    all_shared = rules.association != "none" and weights[shared].sum() > rules.freeze * size
-    frozen = hold or all_shared
-    if not frozen:
-        new_extent, new_size = adapted(sets, share, points, weights, extent, size, rules)
+    others = weights[mine + shared] @ (1 - share[g][mine + shared]) > rules.freeze * size
+    if not hold and not others:
+        new_extent, new_size = adapted(sets, mass, points, weights, extent, size, rules)
     found = beta.sum() > miss
     return (
         "measured" if found else "nothing", sets[best] if found else [], middle - x[:2], H @ P @ H.T + R[best], miss,

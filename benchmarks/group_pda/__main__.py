@@ -4,6 +4,7 @@
 
 scenarios    merging, splitting, crossing, queueing, side by side: lineage, ids, group scores; beside the paper's
              ablation and the baseline rule over `blob`
+earlier      the tracker less itself at an earlier commit (--commit), paired
 decisions    each decision of the tracker switched off: paired differences
 events       merges and splits of the suites standard and friends-meet
 difference   groups that pass and cross: ids kept against the difference of their velocities; a chart
@@ -25,11 +26,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.group_pda import consistency, cost, recordings, scenes, velocity_difference
+from benchmarks.group_pda import consistency, cost, earlier, recordings, scenes, velocity_difference
 from benchmarks.support.options import add_data, add_seeds, new_parser, one_thread, seeds_text
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "scenarios": scenes.scenarios,
+    "earlier": earlier.earlier,
     "decisions": scenes.decisions,
     "events": scenes.events,
     "difference": velocity_difference.difference,
@@ -46,6 +48,7 @@ def main() -> None:
     add_seeds(parser, "20000:20025", option="--image-seeds", what="difference, curves from pixels: ")
     parser.add_argument("--detections", choices=("file", "truth", "image"), default="file")
     parser.add_argument("--only", help="scenes, suites, parts, kinds or differences, separated by commas")
+    parser.add_argument("--commit", default="5fd5840", help="earlier: the commit that today is compared with")
     parser.add_argument("--each", action="store_true", help="decisions: scene by scene, too")
     parser.add_argument("--alone", action="store_true", help="scenarios, events: without the ablation and the baseline")
     parser.add_argument("--workers", type=int, default=2)

@@ -44,28 +44,36 @@ class PointClaims:
 class Associated:
     """The result of `associate` for G groups and M points.
 
-    chosen (G, M) bool: points of each group's likeliest association, which groups may share; exclusive (G, M) bool: the
-    same with each point at one group only. innovation: (id, y (2,), S (2, 2)) of each confirmed group that was
+    exclusive (G, M) bool: points of each group's likeliest association; a point that several groups have is the most
+    probable one's. innovation: (id, y (2,), S (2, 2)) of each confirmed group that was
     measured: the innovation of its likeliest association, in the unit of the points, and its covariance.
     """
 
-    chosen: Bools
     exclusive: Bools
     innovation: list[tuple[int, Array, Array]]
 
 
-def gated_distances(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
+def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:
+    """Return the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2).
+
+    Departure: the paper's is Sigma alone. H P H' is the part of P for the centroid, r the standard deviation of a
+    point, I the unit matrix. w grows at `split_speed` while a group has no feasible association. bank: of the G
+    groups. In the squared unit of the points.
+    """
+    wider = np.square(scaled.scale * scaled.config.split_speed * bank.null_time)
+    return np.asarray(bank.extent + bank.P[:, :2, :2] + (scaled.point_sd**2 + wider)[:, None, None] * np.eye(2))
+
+
+def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: ScaledParameters, t: float) -> Array:
     """Return squared Mahalanobis distances (G, M) of the points (M, 2) from the groups, inf outside a search region
     (eq. 2.2).
 
-    bank: of the G groups, predicted; t: time of the frame, s. Lost groups (not measured for `coast_time`) have no
-    region. Tentative groups have no points that lie in a confirmed group's region. The region of a group without
-    feasible associations widens at `split_speed`.
+    bank: of the G groups, predicted; region (G, 2, 2): from `search_regions`; t: time of the frame, s. Lost groups (not
+    measured for `coast_time`) have no region. Tentative groups have no points that lie in a confirmed group's region.
     """
     config = scaled.config
     lost = bank.confirmed & (t - bank.last_seen > max(config.coast_time, scaled.dt) + 1e-9)
-    wider = np.square(scaled.scale * config.split_speed * bank.null_time)
-    d2 = kernels.search(points, bank.x, bank.P, bank.extent, scaled.point_sd**2, wider, config.gate)
+    d2 = kernels.search(points, bank.x, region, config.gate)
     d2[lost] = np.inf
     tentative = ~bank.confirmed
     if tentative.any():
@@ -126,20 +134,22 @@ def claimed(points: Array, weights: Array, d2: Array, owner: Ints, t: float) -> 
     return PointClaims(points, weights, np.full(len(points), t), d2, owner, claimants)
 
 
-def associate(bank: GroupBank, claims: PointClaims, log_ratio: Array, scaled: ScaledParameters, t: float) -> Associated:
+def associate(
+    bank: GroupBank, claims: PointClaims, region: Array, log_ratio: Array, scaled: ScaledParameters, t: float
+) -> Associated:
     """Update the groups of the bank in place by their associations (sec. 4.1 to 4.3) and return the points that they
     have.
 
-    claims: which points each group may have. log_ratio (G, M): log p(colour | group) - log p(colour | other groups) of
-    each point, or (G, 0) without colours. t: time of the frame, s. A group counts as measured if its association has a
-    point of this frame. `null_time` grows by a frame for a group without feasible associations (points that form one
-    group), and shrinks by a frame, down to 0, for a measured one. last_seen, measured_time and own_people are updated,
-    too.
+    claims: which points each group may have; region (G, 2, 2): from `search_regions`. log_ratio (G, M): log
+    p(colour | group) - log p(colour | other groups) of each point, or (G, 0) without colours. t: time of the frame, s.
+    `null_time` grows by a frame for a group without feasible associations (points that form one group), and shrinks by
+    a frame, down to 0, for a measured one. last_seen, measured_time and own_people are updated, too.
     """
     weighted = scaled.config.appearance * log_ratio
+    log_density = point_log_density(bank.size, region, claims, weighted)
     state, chosen, report = kernels.associate(
         claims.points, claims.weights, claims.d2, weighted, claims.owner, claims.claimants,
-        claims.d2.argmin(0) if len(bank) else claims.owner,
+        shares(log_density, np.isfinite(log_density)), region,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
     )  # fmt: skip
     has_new_point = (chosen & (claims.last_seen >= t)).any(1)  # more than missed members
@@ -153,21 +163,34 @@ def associate(bank: GroupBank, claims: PointClaims, log_ratio: Array, scaled: Sc
     innovation = [
         (int(bank.id[g]), mean[g].copy(), S[g].copy()) for g in np.flatnonzero(measured & bank.confirmed).tolist()
     ]
-    exclusive = chosen & nearest_claims(chosen, claims.d2, log_ratio)
-    bank.own_people = exclusive @ claims.weights
-    return Associated(chosen, exclusive, innovation)
+    share = shares(log_density, chosen)
+    bank.own_people = share @ claims.weights
+    exclusive = chosen & (np.arange(len(bank))[:, None] == share.argmax(0)) if len(bank) else chosen
+    return Associated(exclusive, innovation)
 
 
-def nearest_claims(claimed: Bools, d2: Array, log_ratio: Array) -> Bools:
-    """Return a copy of the claims (G, M) bool with each point at one group only: the nearest of those that claim it.
+def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio: Array) -> Array:
+    """Return the log of N_g N(y; xi_g, S_g) times the colour ratio (G, M) of each point y and group g, without its
+    constant; -inf where a group may not have the point.
 
-    claimed: True where a group claims a point. d2 (G, M): squared Mahalanobis distances from the centroids. log_ratio
-    (G, M) of the points' colours, or (G, 0): twice its value is subtracted from d2. Of equal distances the first row
-    wins. A point that no group claims stays so.
+    size (G,): N; region (G, 2, 2): S; log_ratio (G, M) of the points' colours, or (G, 0). 0 for a point that its owner
+    alone may have.
     """
-    one, shared = claimed.copy(), np.flatnonzero(claimed.sum(0) > 1)
-    if len(shared):
-        distance = d2[:, shared] - 2 * log_ratio[:, shared] if log_ratio.shape[1] else d2[:, shared]
-        nearest = np.where(claimed[:, shared], distance, np.inf).argmin(0)
-        one[:, shared] = np.arange(len(claimed))[:, None] == nearest
-    return one
+    log_weight = np.log(np.maximum(size, 1e-300)) - np.log(np.linalg.det(region)) / 2
+    found = log_weight[:, None] - claims.d2 / 2 + (log_ratio if log_ratio.shape[1] else 0.0)
+    owned = np.flatnonzero(claims.owner >= 0)
+    found[claims.owner[owned], owned] = 0.0
+    return np.asarray(found)
+
+
+def shares(log_density: Array, may: Bools) -> Array:
+    """Return the probability (G, M) that each point is each group's: proportional to the density, among the groups that
+    `may` have it.
+
+    log_density (G, M): log of N_g N(y; xi_g, S_g), with colours that of their product; may (G, M): True where a group
+    may have the point and the density is above 0. A point that no group may have has probability 0 for all.
+    """
+    some = may.any(0)
+    top = np.max(log_density, axis=0, where=may, initial=-np.inf)
+    density = np.where(may, np.exp(log_density - np.where(some, top, 0.0)), 0.0)
+    return np.asarray(density / np.where(some, density.sum(0), 1.0))

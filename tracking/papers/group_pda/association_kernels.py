@@ -47,20 +47,16 @@ INNOVATION_X, INNOVATION_Y, S_XX, S_XY, S_YY, MISS_MASS = range(6)
 
 
 @njit(cache=True)
-def search(points: Array, x: Array, P: Array, extent: Array, noise: float, wider: Array, gate: float) -> Array:
+def search(points: Array, x: Array, region: Array, gate: float) -> Array:
     """Return squared Mahalanobis distances (G, M) of points (M, 2) from groups, inf outside the search region (eq.
     2.2).
 
-    x (G, 4): centroid x, y, velocity; P (G, 4, 4): its covariance; extent (G, 2, 2): Sigma, covariance of the members.
-    The region is d^2 < gate. Departure: the covariance is Sigma + (H P H' + (noise + wider) I), because the centroid is
-    uncertain; H P H' is the part of P for the centroid, I the unit matrix. noise: variance of a point; wider (G,):
-    further variance of each group. All are in the (squared) unit of the points.
+    x (G, 4): centroid x, y, velocity; region (G, 2, 2): covariance of each group's search region, in the squared unit
+    of the points. The region is d^2 < gate.
     """
     d2 = np.full((len(x), len(points)), np.inf)
     for g in range(len(x)):
-        xx = extent[g, 0, 0] + P[g, 0, 0] + noise + wider[g]
-        yy = extent[g, 1, 1] + P[g, 1, 1] + noise + wider[g]
-        xy = extent[g, 0, 1] + P[g, 0, 1]
+        xx, xy, yy = region[g, 0, 0], region[g, 0, 1], region[g, 1, 1]
         area = xx * yy - xy * xy
         reach_x, reach_y = np.sqrt(gate * xx), np.sqrt(gate * yy)
         for k in range(len(points)):
@@ -101,16 +97,16 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 
 @njit(cache=True)
 def associate(
-    points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, nearest: Ints,
-    x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
+    points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints,
+    share: Array, region: Array, x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
 ) -> tuple[Ints, Bools, Array]:  # fmt: skip
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
-    x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M): from
-    `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour, or (G, 0) without colours.
-    owner (M,): the row of the only group that may have the point outside its region, or -1. claimants (M,): number of
-    groups that may have the point. nearest (M,): the group that a shared point is nearest to. rest (G,): True for
-    groups whose extent and size must not change. rules: see association_mass_kernels.
+    x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M) and
+    region (G, 2, 2): of `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour, or (G,
+    0) without colours. owner (M,): the row of the only group that may have the point outside its region, or -1.
+    claimants (M,): number of groups that may have the point. share (G, M): probability that a point is the group's.
+    rest (G,): True for groups whose extent and size must not change. rules: see association_mass_kernels.
 
     Returns the state (G,) of each group, the points (G, M) bool of its likeliest association, and the report (G, 6):
     innovation x, y, its covariance xx, xy, yy, normalised mass (weight) of the miss; 0 without a feasible association.
@@ -124,7 +120,7 @@ def associate(
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
     report = np.zeros((groups, 6))
     for g in range(groups):
-        order, start, own = _ordered_points(d2[g], log_ratio[g], owner, claimants, nearest, g, rules[ASSOCIATION])
+        order, start, own = _ordered_points(d2[g], log_ratio[g], owner, claimants, share, g, rules[ASSOCIATION])
         if len(order) == 0:
             continue
         mine, people = points[order], weights[order]
@@ -145,9 +141,11 @@ def associate(
                 state[g], chosen[g, order] = NULL, True
             continue
         colour = log_ratio[g][order] * people if log_ratio.shape[1] else np.zeros(len(order))
+        others = (people * (1 - share[g][order])).sum()  # people of other groups, expected
         best = _estimate(
-            mine, people, colour, start, feasible, x[g], P[g], extent[g], size[g : g + 1], rest[g], rules, report[g]
-        )
+            mine, people, colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
+            rest[g] or others > rules[FREEZE_SHARE] * size[g], rules, report[g],
+        )  # fmt: skip
         state[g] = MEASURED if best >= 0 else NOTHING
         if best >= 0:
             chosen[g, order[: start + best]] = True
@@ -156,15 +154,15 @@ def associate(
 
 @njit(cache=True)
 def _ordered_points(
-    d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, nearest: Ints, g: int, association: float
+    d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, share: Array, g: int, association: float
 ) -> tuple[Ints, int, int]:
     """Returns the indices of the points of group g, the number of unshared ones, which come first (sec. 4.1), and the
     number of shared ones in the association that is the only one unless `association` is PREFIXES.
 
     The shared points, which other groups may have, too, follow by distance less twice the colour evidence; with
-    `association` NEAREST those nearest to g precede the others. d2, log_ratio (M,): of this group, d2 inf outside its
-    region (log_ratio may be empty); owner (M,): group that alone may have a point in no region, -1 none; claimants
-    (M,): number of groups that may have the point; nearest (M,): the group that a shared point is nearest to.
+    `association` NEAREST those that are most probably of g precede the others. d2, log_ratio (M,): of this group, d2
+    inf outside its region (log_ratio may be empty); owner (M,): group that alone may have a point in no region, -1
+    none; claimants (M,): number of groups that may have the point; share (G, M): probability that it is a group's.
     """
     inside = np.flatnonzero((d2 < np.inf) | (owner == g))
     shared = claimants[inside] > 1
@@ -175,7 +173,7 @@ def _ordered_points(
     others = others[np.argsort(distance, kind="mergesort")]
     own = len(others)
     if association == NEAREST:
-        here = nearest[others] == g
+        here = np.array([share[:, k].argmax() == g for k in others])
         own = int(here.sum())
         others = np.concatenate((others[here], others[~here]))
     order[len(mine) :] = others
@@ -184,17 +182,17 @@ def _ordered_points(
 
 @njit(cache=True)
 def _estimate(
-    points: Array, weights: Array, colour: Array, start: int, feasible: Bools,
+    points: Array, weights: Array, colour: Array, start: int, feasible: Bools, region: Array,
     x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array, report: Array,
 ) -> int:  # fmt: skip
     """Update one group (x, P, extent, size, report) in place by its associations: the first start, start + 1, … of its
     points.
 
     points (M, 2), weights (people each stands for), colour (what each adds to the log mass) (M,): ordered; the first
-    `start` are unshared. x (4,), P (4, 4), extent (2, 2), size (1,), report (6,). feasible (J,): which associations
-    satisfy the group constraint (m_g, eq. 4.1), at least one. rest: extent and size must not change; nor do they if the
-    shared points stand for more than the share FREEZE_SHARE (in `rules`) of the size. Returns the number of shared
-    points in the likeliest association, or -1 if the miss has at least the mass of all associations together.
+    `start` are unshared. feasible (J,): which associations satisfy the group constraint (m_g, eq. 4.1), at least one.
+    region (2, 2): covariance of the search region. x (4,), P (4, 4), extent (2, 2), size (1,), report (6,). rest:
+    extent and size must not change. Returns the number of shared points in the likeliest association, or -1 if the miss
+    has at least the mass of all associations together.
     """
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     S = np.empty((len(people), 3))
@@ -208,7 +206,7 @@ def _estimate(
             S[j, 0], S[j, 1], S[j, 2] = P[0, 0] + R[0], P[0, 1] + R[1], P[1, 1] + R[2]
             m_d = log_density(mean[j, 0], mean[j, 1], S[j])
             log_mass[j] = m_d + log_count(people[j], size[0], width) + np.log(unit) + evidence[j]  # eq. 4.2, m_g = 1
-    log_m_miss = log_miss(points, weights, start, extent, P, size[0], rules)
+    log_m_miss = log_miss(weights, start, region, size[0], rules)
     top = max(log_mass.max(), log_m_miss)
     beta, miss = np.exp(log_mass - top), np.exp(log_m_miss - top)
     total = beta.sum() + miss
@@ -216,9 +214,8 @@ def _estimate(
     best = int(np.argmax(beta))
     report[INNOVATION_X], report[INNOVATION_Y] = mean[best, 0], mean[best, 1]
     report[S_XX : S_YY + 1], report[MISS_MASS] = S[best], miss
-    few_shared = weights[start:].sum() <= rules[FREEZE_SHARE] * size[0]
     _mix(beta, miss, mean, S, x, P)
-    if few_shared and not rest:
+    if not rest:
         _adapt(beta, people, cov, extent, size, rules)
     return best if beta.sum() > miss else -1
 

@@ -26,10 +26,10 @@ GATE: squared Mahalanobis radius in the group constraint. LINK: 2 r of R_0. PRIO
 are shrunk to, with the weight PRIOR_WEIGHT in people. LEAST_WEIGHT: people below which a component is noise. POINT_SD:
 standard deviation of one person's measured position. COUNT_SD (people), COUNT_SHARE: sigma_n^2 = COUNT_SD^2 +
 (COUNT_SHARE N)^2. DETECT_PROB: probability that a member is among the points. MISS_PROB: prior probability of the miss
-hypothesis, 0 without it. FREEZE_SHARE: share of N in shared points above which extent and size rest. KEEP_EXTENT,
-KEEP_SIZE: alpha_s, alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that a Gaussian keeps inside the
-gate. REDRAWN: 1 if members are drawn anew in each frame. ASSOCIATION: one of PREFIXES, NEAREST, ALL, UNCONSTRAINED.
-LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
+hypothesis, 0 without it. FREEZE_SHARE: share of N in points of other groups above which extent and size rest.
+KEEP_EXTENT, KEEP_SIZE: alpha_s, alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that a Gaussian
+keeps inside the gate. REDRAWN: 1 if members are drawn anew in each frame. ASSOCIATION: one of PREFIXES, NEAREST, ALL,
+UNCONSTRAINED. LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
 """
 
 PREFIXES, NEAREST, ALL, UNCONSTRAINED = range(4)
@@ -69,11 +69,12 @@ def running_moments(points: Array, weights: Array, x: float, y: float, start: in
 def log_count(people: float, size: float, width: float) -> float:
     """Return log m_N (sec. 4.2), the log density, per person, of seeing `people` people in a group of `size` people.
 
-    It is a Gaussian about `size` with variance `width`, people^2. Departure: a small uniform part gives it tails,
-    because people who join a group come all at once.
+    It is a Gaussian about `size` with variance `width`, people^2. Departure: a small part with the density
+    (size + 1) / (size + 1 + people)^2, which does not depend on the width, gives it tails, because people who join a
+    group come all at once.
     """
     gauss = np.exp(-0.5 * (people - size) ** 2 / width) / np.sqrt(2 * np.pi * width)
-    return float(np.log((1 - NEWCOMERS) * gauss + NEWCOMERS / (size + people + 1)))
+    return float(np.log((1 - NEWCOMERS) * gauss + NEWCOMERS * (size + 1) / (size + people + 1) ** 2))
 
 
 @njit(cache=True)
@@ -115,18 +116,17 @@ def log_density(dx: float, dy: float, S: Array) -> float:
 
 
 @njit(cache=True)
-def log_miss(points: Array, weights: Array, start: int, extent: Array, P: Array, size: float, rules: Array) -> float:
+def log_miss(weights: Array, start: int, region: Array, size: float, rules: Array) -> float:
     """Return the log mass of the miss hypothesis (ours): no point is the group's; -inf if MISS_PROB is 0 (no
     hypothesis).
 
-    The mass is the hypothesis' relative weight. points (M, 2); weights (M,): people each stands for; start: number of
-    unshared points; extent (2, 2), P (4, 4), size: of the group: covariance of the members, of the state, and people.
-    The points' centroid is uniform over the search region. The number of the unshared points, if there are any, is
-    uniform up to twice the size.
+    The mass is the hypothesis' relative weight. weights (M,): people that each point stands for; start: number of
+    unshared points; region (2, 2): covariance of the group's search region; size: its people. The points' centroid is
+    uniform over the search region. The number of the unshared points, if there are any, is uniform up to twice the
+    size.
     """
     if rules[MISS_PROB] <= 0:
         return -np.inf
-    xx, yy, xy = extent[0, 0] + P[0, 0], extent[1, 1] + P[1, 1], extent[0, 1] + P[0, 1]
-    area = np.pi * rules[GATE] * np.sqrt(max(xx * yy - xy * xy, 1e-300))
+    area = np.pi * rules[GATE] * np.sqrt(max(region[0, 0] * region[1, 1] - region[0, 1] ** 2, 1e-300))
     strangers = np.log(weights.mean() / (2 * size + 1)) if start > 0 else 0.0
     return float(np.log(rules[MISS_PROB] / (1 - rules[MISS_PROB])) - np.log(area) + strangers)

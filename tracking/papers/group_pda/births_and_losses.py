@@ -16,7 +16,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition
 from tracking.papers.group_pda.association import walking_reach
-from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, GroupIds, newborn
+from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, GroupIds, alike_velocities, newborn
 from tracking.papers.group_pda.report import BankEvent
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
@@ -130,9 +130,7 @@ def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters)
     S = bank.P[new][:, None] + bank.P[old]
     S[..., :2, :2] += bank.extent[old]
     d2 = np.einsum("nki,nki->nk", d, np.linalg.solve(S, d[..., None])[..., 0])
-    metres = scaled.metres_per_unit
-    speed_sd = np.sqrt(np.einsum("nkaa,a->nk", S[..., 2:, 2:], np.square(metres)) / 2)
-    alike = np.hypot(*np.moveaxis(d[..., 2:] * metres, 2, 0)) <= scaled.config.merge_velocity + speed_sd
+    alike = alike_velocities(d[..., 2:], S[..., 2:, 2:], 1.0, scaled)
     gone = bank.last_seen[old] < bank.first_seen[new][:, None]
     d2 = np.where(alike & gone & (d2 <= RECAPTURE_GATE), d2, np.inf)
     while np.isfinite(d2).any():

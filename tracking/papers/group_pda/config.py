@@ -60,7 +60,7 @@ class GroupPdaConfig(BackgroundSettings):
         0.95,
         (0.3, 1.0),
         "probability",
-        "from points: that a member is measured in a frame",
+        "from points: that a member is measured in a frame; without carry_time it tells how many members are unseen",
         sees="points",
     )
     miss_prob: float = param(0.02, (0.0, 0.5), "probability", "prior probability of the miss hypothesis (ours)")
@@ -75,10 +75,18 @@ class GroupPdaConfig(BackgroundSettings):
     )
     miss: bool = param(True, (True, False), "", "use a hypothesis that no point is the group's (ours)", "categorical")
     freeze: bool = param(
-        True, (True, False), "", "extent and size do not change while many points are shared (ours)", "categorical"
+        True,
+        (True, False),
+        "",
+        "extent and size do not change while many points may be another group's (ours)",
+        "categorical",
     )
     freeze_share: float = param(
-        0.1, (0.0, 1.0), "share", "shared points per group size above which extent and size do not change (ours)"
+        0.1,
+        (0.0, 1.0),
+        "share",
+        "people among a group's points who are another group's, per group size, above which extent and size do not "
+        "change (ours)",
     )
     gate_correction: bool = param(
         True,

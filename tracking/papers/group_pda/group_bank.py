@@ -18,8 +18,6 @@ from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 NO_ID = -1
 """Id of a tentative group."""
-LISTS = ("members", "recent_points")
-"""Fields of GroupBank that are lists, not arrays."""
 
 
 class MemberPlaces(NamedTuple):
@@ -57,7 +55,7 @@ class GroupBank:
     null_time (G,): time without a feasible association, less measured frames in it. own_people (G,): people measured in
     this frame who are nearer to no other group. parent (G,): id of the group that a tentative group has left, or NO_ID;
     origin (G, 2): where it left it. colour_hist (G, C): people by colour; C = 0 without colours. members: a
-    MemberPlaces of each group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
+    MemberPlaces of each group.
     """
 
     x: Array
@@ -74,7 +72,6 @@ class GroupBank:
     origin: Array
     colour_hist: Array
     members: list[MemberPlaces]
-    recent_points: list[list[tuple[float, Array]]]
 
     @classmethod
     def empty(cls, colour_bins: int = 0) -> GroupBank:
@@ -83,7 +80,7 @@ class GroupBank:
         four = np.zeros((0, 4))
         return cls(
             four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, none, ids, two,
-            np.zeros((0, colour_bins)), [], [],
+            np.zeros((0, colour_bins)), [],
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -106,7 +103,7 @@ class GroupBank:
         """Remove the rows that are False in kept (G,) bool, in place."""
         for f in fields(self):
             value = getattr(self, f.name)
-            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name in LISTS else value[kept]
+            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name == "members" else value[kept]
             setattr(self, f.name, new)
 
     def remove(self, row: int) -> None:
@@ -117,12 +114,25 @@ class GroupBank:
         """Append the rows of another bank with as many colour bins (else ValueError), in place."""
         for f in fields(self):
             a, b = getattr(self, f.name), getattr(other, f.name)
-            setattr(self, f.name, a + b if f.name in LISTS else np.concatenate([a, b]))
+            setattr(self, f.name, a + b if f.name == "members" else np.concatenate([a, b]))
 
     def predict(self, scaled: ScaledParameters) -> None:
         """Predict all groups to the next frame, in place: x = F x, P = F P F' + Q (eq. 2.3), F and Q from `scaled`."""
         self.x = self.x @ scaled.F.T
         self.P = scaled.F @ self.P @ scaled.F.T + scaled.Q
+
+
+def alike_velocities(difference: Array, covariance: Array, doubt: float, scaled: ScaledParameters) -> Bools:
+    """Return flags (...): True where two velocities differ by at most `merge_velocity` and `doubt` standard deviations
+    of the difference (ours, in place of SR_v of sec. 3.1).
+
+    difference (..., 2): of the velocities; covariance (..., 2, 2): its covariance; in the unit of the points and s. In
+    an image depth is stretched to metres on the ground. The standard deviation is that along the mean direction.
+    """
+    metres = scaled.metres_per_unit
+    sd = np.sqrt(np.einsum("...aa,a->...", covariance, np.square(metres)) / 2)
+    most = scaled.config.merge_velocity + doubt * sd
+    return np.asarray(np.sqrt(np.square(difference * metres).sum(-1)) <= most)
 
 
 def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float) -> GroupBank:
@@ -154,5 +164,5 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     return GroupBank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, NO_ID),
         now, now.copy(), zero + scaled.dt, zero, people.copy(), np.full(count, NO_ID), mean.copy(),
-        np.zeros((count, scaled.colour_bins)), members, [[] for _ in range(count)],
+        np.zeros((count, scaled.colour_bins)), members,
     )  # fmt: skip

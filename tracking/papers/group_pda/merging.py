@@ -13,17 +13,16 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from sim.geometry.polygons import polygon_gap
 from sim.truth.merge_split_rules import SPLIT_DISTANCE
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
-from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
-from tracking.papers.group_pda.duplicate_groups import may_be_one
-from tracking.papers.group_pda.event_onsets import REACH, PairHistory, PairMoment
-from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, MemberPlaces
+from tracking.papers.group_pda.event_onsets import PairHistory, PairMoment
+from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, MemberPlaces, alike_velocities
 from tracking.papers.group_pda.report import BankEvent
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
@@ -31,8 +30,8 @@ HISTORY_TIME = 5.0
 """s of a pair's past that are kept."""
 GATE_MARGIN = 0.9
 """Factor on gamma for merging: groups merge at a smaller distance than they split, as their extents are noisy."""
-LEAST_OWN = 0.2
-"""Share of a group's people that must be nearer to no other group for its velocity to count as its own."""
+REACH = 1.1
+"""Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three."""
 PATIENCE = 1.5
 """s for which the history of a pair is kept while one of the groups cannot merge."""
 
@@ -68,14 +67,12 @@ class GroupMerging:
         s.
 
         The bank holds updated states and is changed in place. A group takes part if it is confirmed, was measured in
-        this frame, has no `null_time` (time without a feasible association), and at least 20 % of its people are nearer
-        to no other group: else its velocity is unknown or another group's. An event is a merge if at least two of the
-        groups were there for more than 1 s before the onset or are children of another group. Else it is an enter. It
-        is a generator: nothing, not even the histories, changes before it is read.
+        this frame and has no `null_time` (time without a feasible association): else its velocity is unknown. An event
+        is a merge if at least two of the groups were there for more than 1 s before the onset or are children of
+        another group. Else it is an enter. It is a generator: nothing, not even the histories, changes before it is
+        read.
         """
-        able = np.flatnonzero(
-            bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0) & (bank.own_people >= LEAST_OWN * bank.size)
-        )
+        able = np.flatnonzero(bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0))
         near = {pair.ids: self._extended(pair) for pair in _near_pairs(bank, able, scaled, t)}
         unable = {int(g) for g in bank.id[bank.confirmed]} - set(bank.id[able].tolist())
         kept = {p: h for p, h in self.histories.items() if unable & set(p) and t - h.moments[-1].t <= PATIENCE}
@@ -95,29 +92,8 @@ class GroupMerging:
             bank.add(union)
             heir = int(union.id[0])
             bank.parent[np.isin(bank.parent, ids)] = heir
-            self._pass_on(ids, heir, bank, scaled)
             kind = "merge" if len(present) > 1 else "enter"
             yield BankEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
-
-    def _pass_on(self, ids: list[int], heir: int, bank: GroupBank, scaled: ScaledParameters) -> None:
-        """Give the histories of the merged groups `ids` with other groups to `heir`, the id of their union in the bank.
-
-        The differences of centroids are shifted, so that they do not jump. Of two histories with the same other group,
-        the one that has been alike for longer is kept. Histories among the merged groups are dropped.
-        """
-        histories = {p: h for p, h in self.histories.items() if not set(p) & set(ids)}
-        for p, history in self.histories.items():
-            others = set(p) - set(ids)
-            if len(others) != 1:
-                continue
-            pair = (min(heir, *others), max(heir, *others))
-            a, b = (bank.x[np.flatnonzero(bank.id == id)[0], :2] for id in pair)
-            turn = 1 if (p[0] in others) == (pair[0] in others) else -1
-            shift = (b - a) * scaled.metres_per_unit - turn * history.moments[-1].difference
-            moments = [PairMoment(m.t, turn * m.difference + shift, m.middle, m.gap) for m in history.moments]
-            if pair not in histories or history.alike_since < histories[pair].alike_since:
-                histories[pair] = PairHistory(history.alike_since, moments)
-        self.histories = histories
 
     def _extended(self, pair: NearPair) -> PairHistory:
         """Returns the pair's history with this frame's moment added and moments older than 5 s dropped; stores nothing.
@@ -135,7 +111,7 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     Centroid and velocity are means weighted by size, sizes and colours sums; the extent contains the spread of the
     centroids. P is that of a weighted mean of independent centroids, sum w^2 P_i (ours; w: shares of the size): the
     spread of the centroids is no estimation error. The group with most people (rounded), then the oldest, then the
-    least id, gives the id. Times are the earliest first and the latest last measurement; recent points are empty.
+    least id, gives the id. Times are the earliest first and the latest last measurement.
     """
     size = np.asarray(bank.size[rows].sum())
     w = bank.size[rows] / size
@@ -152,25 +128,20 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1), size[None],
         np.full(1, NO_ID), x[None, :2].copy(), bank.colour_hist[rows].sum(0, keepdims=True),
-        [MemberPlaces(offset, last_seen, known)], [[]],
+        [MemberPlaces(offset, last_seen, known)],
     )  # fmt: skip
 
 
 def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[NearPair]:
     """Yields the pairs of groups, out of the bank's `rows`, whose search regions overlap or whose points are linked.
 
-    The search regions are those of 0.9 gate, by the extents alone. From points, pairs that may be one group (too few of
-    their people are measured) are left out. From pixels they are not, as bodies hide each other. t: s.
+    The search regions are those of 0.9 gate, by the extents alone. t: s.
     """
     close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
     close |= _linked(bank, rows, scaled)
-    v = bank.x[rows, 2:] * scaled.metres_per_unit
-    var = np.einsum("gaa,a->g", bank.P[rows, 2:, 2:], np.square(scaled.metres_per_unit)) / 2
-    most = scaled.config.merge_velocity + scaled.config.merge_doubt * np.sqrt(var[:, None] + var)
-    alike = np.hypot(*(v[:, None] - v[None]).transpose(2, 0, 1)) <= most
+    v, cov = bank.x[rows, 2:], bank.P[rows, 2:, 2:]
+    alike = alike_velocities(v[:, None] - v, cov[:, None] + cov, scaled.config.merge_doubt, scaled)
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
-        if may_be_one(bank, rows[i], rows[j]) and not scaled.from_pixels:
-            continue
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
         d = (b - a) * scaled.metres_per_unit
@@ -188,9 +159,20 @@ def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) ->
     the centroids less 1.1 standard deviations of either group's people in this direction; it may be negative.
     """
     if not scaled.from_pixels:
-        here, there = (bank.positions(k) for k in (a, b))
-        return float(np.hypot(*((here[:, None] - there) * scaled.metres_per_unit).T).min())
+        return _nearest(bank.positions(a) * scaled.metres_per_unit, bank.positions(b) * scaled.metres_per_unit)
     return float(np.hypot(*d)) - REACH * sum(_people_sd(bank, k, d, scaled) for k in (a, b))
+
+
+def _nearest(here: Array, there: Array) -> float:
+    """Returns the distance of the nearest two points, one of `here` (K, 2), one of `there` (L, 2), none empty; in their
+    unit.
+
+    Every hundredth point bounds the distance first, so that the search in the k-d tree of the others ends soon:
+    (K + L) log L.
+    """
+    tree = cKDTree(there, balanced_tree=False, compact_nodes=False)
+    most = tree.query(here[::100])[0].min()
+    return float(tree.query(here, distance_upper_bound=1.001 * most + 1e-9)[0].min())
 
 
 def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) -> float:
@@ -223,7 +205,7 @@ def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
             d = polygon_gap(place[i], place[j]) if min(len(place[i]), len(place[j])) > 2 else gap[i, j]
             found[i, j] = found[j, i] = d <= link
         else:
-            found[i, j] = found[j, i] = any_within(place[i], place[j], link).any()
+            found[i, j] = found[j, i] = _nearest(place[i], place[j]) <= link
     return found
 
 

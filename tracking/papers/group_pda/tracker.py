@@ -29,7 +29,8 @@ Search region and update:
   Splitting and merging use the same extents, so that a split group is not merged at once.
 - R of the centroid assumes that members keep their places and that some are not seen. m_N has a width that grows
   with N, and tails. A miss hypothesis says that no point is the group's.
-- Sigma and N rest while many points are shared and while no association is feasible.
+- A shared point is a group's with probability proportional to N N(y; xi, S), S of the search region, times that of its
+  colour. Sigma and N rest while many points are probably another group's and while no association is feasible.
 - Attached points: a point in no region that is linked to a group's points is the group's. Missed members: from points,
   a member that is not measured stands in at its predicted place for a while.
 - Colours are a further mass, from pixels (future work of sec. 6).
@@ -40,14 +41,14 @@ Splitting and merging:
 - SR_v, the region of like velocities, is a largest difference of velocities in m/s, and R_x must hold for `merge_time`.
   Groups whose points are linked are near even if their regions do not overlap. From pixels, groups that are far apart
   on the ground are not near.
-- Tentative and coasting groups, groups without a feasible association and groups without points of their own do not
-  merge. P of a merged group is that of a weighted mean.
+- Tentative and coasting groups and groups without a feasible association do not merge. P of a merged group is that of
+  a weighted mean.
 - Of two groups that follow the same people for too long, one becomes lost.
 
 Reporting:
 - Groups are tentative at first. They coast without measurements, become lost, and take their id back from a newborn
-  group that fits. A shared point counts as the nearer group's in what is reported.
-- Onsets of merges and splits are measured afterwards. In an image seen at an angle, depth counts for more px than
+  group that fits.
+- Onsets of merges are measured afterwards. In an image seen at an angle, depth counts for more px than
   it shows.
 
 association="none" is the paper's sec. 5.2.1: a group takes all points in its region, with attached points and missed
@@ -70,7 +71,7 @@ from tracking.papers.group_pda.association import (
     attached,
     claimed,
     gated_distances,
-    nearest_claims,
+    search_regions,
 )
 from tracking.papers.group_pda.births_and_losses import add_newborns, confirm, expected_members, remove_lost
 from tracking.papers.group_pda.colour import colour_bins, colour_log_ratio, update_histograms
@@ -234,34 +235,30 @@ class GroupPda:
         event is a split, or a leave of a group that has only noise.
         """
         bank = self.bank
-        d2 = gated_distances(bank, points, scaled, t)
+        region = search_regions(bank, scaled)
+        d2 = gated_distances(bank, points, region, scaled, t)
         owner = attached(points, d2, bank, scaled) if self.config.attach else np.full(len(points), -1)
         claims = with_missed_members(claimed(points, weights, d2, owner, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         log_ratio = colour_log_ratio(bank, claims.d2, self.colours) if scaled.colour_bins else np.zeros((len(bank), 0))
-        found = associate(bank, claims, log_ratio, scaled, t)
+        found = associate(bank, claims, region, log_ratio, scaled, t)
         self.innovation = found.innovation
         remember(bank, claims, found.exclusive, scaled, t)
         if scaled.colour_bins:
             update_histograms(bank, found.exclusive, claims.claimants, self.colours, claims.weights, scaled)
-        events = self._split(claims, found.chosen, log_ratio, scaled, t)
+        events = self._split(claims, found.exclusive, scaled, t)
         free = claims.claimants[: len(points)] == 0
         add_newborns(bank, points[free], weights[free], expected, scaled, t)
         return events
 
-    def _split(
-        self, claims: PointClaims, chosen: Bools, log_ratio: Array, scaled: ScaledParameters, t: float
-    ) -> list[BankEvent]:
-        """Split the groups that had no feasible association for `split_time`, each by the points nearest to it; returns
-        events.
+    def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> list[BankEvent]:
+        """Split the groups that had no feasible association for `split_time`; returns events.
 
-        claims: which points each group may have. chosen (G, M) bool: points of each group; log_ratio (G, M) of colours,
-        or (G, 0); t: s. An event may be a split, or a leave of a group that has only noise; tentative groups give none.
+        claims: which points each group may have. mine (G, M) bool: points of each group; t: s. An event may be a split,
+        or a leave of a group that has only noise; tentative groups give none.
         """
         bank, events = self.bank, []
         due = np.flatnonzero((bank.null_time >= self.config.split_time - 1e-9) & (bank.null_time > 0))
-        nearest = nearest_claims(np.isfinite(claims.d2), claims.d2, log_ratio)
-        mine = chosen & (nearest | (claims.owner == np.arange(len(bank))[:, None]))  # owned: attached or missed
         for row in due.tolist()[::-1]:  # from the last row on, as children are appended
             event = split(bank, row, claims.points[mine[row]], claims.weights[mine[row]], scaled, t, self.ids)
             events += [] if event is None else [event]

@@ -14,6 +14,7 @@ from scipy.stats import chi2
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.papers.group_pda import association_kernels as kernels
+from tracking.papers.group_pda.association import PointClaims, point_log_density, shares
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
@@ -65,31 +66,48 @@ def random_case(seed):
     points = x[of, :2] + np.einsum("kij,kj->ki", spread, r.normal(0, 1.2, (len(of), 2)))
     weights = r.uniform(0.2, 1.8, len(of)) if r.random() < 0.5 else np.ones(len(of))
     wider = r.uniform(0, 0.3, count) * (r.random(count) < 0.3)
-    d2 = kernels.search(points, x, P, extent, rules.noise**2, wider, rules.constraint.gate)
+    region = np.array(
+        [reference.search_region(*group) for group in zip(P, extent, [rules.noise**2] * count, wider, strict=True)]
+    )
+    d2 = kernels.search(points, x, region, rules.constraint.gate)
     hits, own = np.isfinite(d2).sum(0), np.full(len(of), -1)
     free = np.flatnonzero((hits == 0) & (r.random(len(of)) < 0.7))
     own[free], hits[free] = r.integers(count, size=len(free)), 1
-    return rules, (points, weights, d2, own, hits, x, P, extent, size, r.random(count) < 0.2), wider
+    case = points, weights, d2, own, hits, x, P, extent, size, r.random(count) < 0.2
+    return rules, case, region
 
 
-def kernel(case, rules):
-    """A copy of the case after the kernel: states, rows chosen, what is told, x, P, extent, size."""
+def with_shares(case, region):
+    """The case in the order of the oracle's arguments."""
     points, weights, d2, own, hits, x, P, extent, size, hold = case
-    after = [a.copy() for a in (x, P, extent, size)]
-    found = kernels.associate(points, weights, d2, d2[:, :0], own, hits, d2.argmin(0), *after, hold, rules.numbers)
+    may = np.isfinite(d2) | (own == np.arange(len(x))[:, None])
+    share = reference.shares(points, x, region, size, own, may)
+    return points, weights, d2, own, hits, share, region, x, P, extent, size, hold
+
+
+def kernel(case, rules, region=None):
+    """A copy of the case after the kernel: states, rows chosen, what is told, x, P, extent, size.
+
+    region: of the search, by default without anything wider.
+    """
+    if region is None:
+        groups = zip(case[6], case[7], strict=True)
+        region = np.array([reference.search_region(P, S, rules.noise**2, 0.0) for P, S in groups])
+    points, weights, d2, own, hits, share, region, *groups, hold = with_shares(case, region)
+    after = [a.copy() for a in groups]
+    found = kernels.associate(points, weights, d2, d2[:, :0], own, hits, share, region, *after, hold, rules.numbers)
     return [STATES[s] for s in found[0].tolist()], *found[1:], *after
 
 
 def test_four_hundred_random_cases() -> None:
     seen = Counter()
     for seed in range(400):
-        rules, case, _ = random_case(seed)
-        points, weights, d2, own, hits, x, P, extent, size, hold = case
-        state, chosen, told, *after = kernel(case, rules)
+        rules, case, region = random_case(seed)
+        *points, share, _, x, P, extent, size, hold = with_shares(case, region)
+        d2, hits = case[2], case[4]
+        state, chosen, told, *after = kernel(case, rules, region)
         for g in range(len(x)):
-            expected = reference.update(
-                g, points, weights, d2, own, hits, x[g], P[g], extent[g], size[g], hold[g], rules
-            )
+            expected = reference.update(g, *points, share, region[g], x[g], P[g], extent[g], size[g], hold[g], rules)
             assert state[g] == expected[0], (seed, g)
             assert sorted(np.flatnonzero(chosen[g])) == sorted(expected[1]), (seed, g)
             if expected[2] is not None:
@@ -108,17 +126,35 @@ def test_four_hundred_random_cases() -> None:
     assert min(seen[k] for k in ("nothing", "null", "measured", "missed", "moved", "shared")) > 5, seen
 
 
+def test_whose_a_shared_point_is() -> None:
+    """By N_g N(y; xi_g, S_g), so that a large diffuse group has no claim on all that lies near a compact one."""
+    for seed in range(100):
+        _, case, region = random_case(seed)
+        points, weights, d2, own, hits, x, _, _, size, _ = case
+        claims = PointClaims(points, weights, np.zeros(len(points)), d2, own, hits)
+        log_density = point_log_density(size, region, claims, d2[:, :0])
+        may = np.isfinite(log_density) & (np.random.default_rng(seed).random(d2.shape) < 0.8)
+        found = shares(log_density, may)
+        np.testing.assert_allclose(found, reference.shares(points, x, region, size, own, may), rtol=1e-9, atol=1e-12)
+    region, d2 = np.array([4.0, 0.25])[:, None, None] * np.eye(2), np.array([[1.0], [1.2]])
+    claims = PointClaims(np.zeros((1, 2)), np.ones(1), np.zeros(1), d2, np.full(1, -1), np.full(1, 2))
+    log_density = point_log_density(np.full(2, 2.0), region, claims, d2[:, :0])
+    assert shares(log_density, d2 > 0)[1] > 0.9  # the nearer by d2 is the diffuse one
+    colours = point_log_density(np.full(2, 2.0), region, claims, np.array([[2.0], [-2.0]]))
+    assert shares(colours, d2 > 0)[0] > 0.7
+
+
 def test_search_regions() -> None:
     for seed in range(50):
-        rules, (points, _, d2, _, _, x, P, extent, _, _), wider = random_case(seed)
-        expected = reference.search(points, x, P, extent, rules.noise**2, wider, rules.constraint.gate)
-        np.testing.assert_allclose(d2, expected, rtol=1e-9)
+        rules, (points, _, _, _, _, x, *_), region = random_case(seed)
+        found = kernels.search(points, x, region, rules.constraint.gate)
+        np.testing.assert_allclose(found, reference.search(points, x, region, rules.constraint.gate), rtol=1e-9)
 
 
 def test_covariances_stay_covariances() -> None:
     for seed in range(200):
-        rules, case, _ = random_case(seed)
-        *_, P, extent, size = kernel(case, rules)
+        rules, case, region = random_case(seed)
+        *_, P, extent, size = kernel(case, rules, region)
         assert np.array_equal(P, P.transpose(0, 2, 1))
         assert (np.linalg.eigvalsh(P) > 0).all()
         assert (np.linalg.eigvalsh(extent) > 0).all()
@@ -128,13 +164,13 @@ def test_covariances_stay_covariances() -> None:
 def test_groups_are_updated_each_by_itself() -> None:
     """There is no mutual exclusion (4.1): the order of groups and of points does not matter."""
     for seed in range(60):
-        rules, case, _ = random_case(seed)
+        rules, case, region = random_case(seed)
         points, weights, d2, own, hits, *groups = case
         r = np.random.default_rng(seed)
         to, by = r.permutation(len(groups[0])), r.permutation(len(points))
         names = np.where(own >= 0, np.argsort(to)[own], -1)
         turned = points[by], weights[by], d2[np.ix_(to, by)], names[by], hits[by], *(a[to] for a in groups)
-        before, after = kernel(case, rules), kernel(turned, rules)
+        before, after = kernel(case, rules, region), kernel(turned, rules, region[to])
         assert [before[0][k] for k in to] == after[0]
         assert np.array_equal(before[1][np.ix_(to, by)], after[1])
         for a, b in zip(before[2:], after[2:], strict=True):
@@ -230,7 +266,8 @@ def settled(gate, correct, frames=200, start=1.0, count=4_000):
     rules = replace(PLAIN, constraint=constraint, noise=1e-3, correct=correct)
     x, P, extent, size = np.zeros((1, 4)), 1e-6 * np.eye(4)[None], start * np.eye(2)[None], np.array([float(count)])
     for _ in range(frames):
-        d2 = kernels.search(points, x, P, extent, rules.noise**2, np.zeros(1), gate)
+        region = reference.search_region(P[0], extent[0], rules.noise**2, 0.0)
+        d2 = kernels.search(points, x, region[None], gate)
         case = points, weights, d2, np.full(count, -1), np.ones(count, np.int64), x, P, extent, size, np.zeros(1, bool)
         state, *_, x, P, extent, size = kernel(case, rules)
         assert state == ["measured"]

@@ -7,13 +7,14 @@ import pytest
 
 from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.merging import GroupMerging
+from tracking.papers.group_pda.group_bank import MemberPlaces
+from tracking.papers.group_pda.merging import GroupMerging, _gap
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 
 FPS = 10.0
 
 
-@pytest.mark.parametrize("why", ["unmeasured", "infeasible", "no own people"])
+@pytest.mark.parametrize("why", ["unmeasured", "infeasible"])
 def test_a_moment_without_velocity_does_not_restart_the_time_to_merge(why: str) -> None:
     scaled, when = scale_parameters(GroupPdaConfig(merge_time=0.8), FPS, 1.0), []
     for pause in (range(0), range(4, 6)):
@@ -22,8 +23,27 @@ def test_a_moment_without_velocity_does_not_restart_the_time_to_merge(why: str) 
             here = k not in pause
             two.last_seen[:] = k / FPS if here or why != "unmeasured" else [k / FPS, (k - 1) / FPS]
             two.null_time[:] = [0.0, 0.1 * (not here and why == "infeasible")]
-            two.own_people[:] = [1.0, 1.0 * (here or why != "no own people")]
             if list(merging.step(two, scaled, k / FPS)):
                 when.append(k)
                 break
     assert when == [8, 8]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_gap_is_the_least_of_all_pairs(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    scaled = scale_parameters(GroupPdaConfig(), FPS, 40.0, sine_tilt=0.5)
+    here, there = (r.normal(0, 1, (int(r.integers(1, 400)), 2)) * r.choice([0.1, 1, 30], 2) for _ in range(2))
+    there = np.concatenate([there, here[: int(r.random() < 0.2)]]) + r.choice([0.0, 5, 1e4], 2)
+    members = [MemberPlaces(p, np.zeros(len(p)), np.ones(len(p), bool)) for p in (here, there)]
+    two = bank(size=np.ones(2), members=members)
+    expected = np.hypot(*((here[:, None] - there) * scaled.metres_per_unit).T).min()
+    assert _gap(two, 0, 1, np.ones(2), scaled) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_gap_of_many_points_does_not_look_at_all_pairs() -> None:
+    """All pairs of these points would need 24 GB."""
+    points = np.random.default_rng(0).normal(0, 1, (40_000, 2))
+    members = [MemberPlaces(p, np.zeros(len(p)), np.ones(len(p), bool)) for p in (points, points + 20.0)]
+    two = bank(size=np.ones(2), members=members)
+    assert 15 < _gap(two, 0, 1, np.ones(2), scale_parameters(GroupPdaConfig(), FPS, 1.0)) < 25

@@ -8,7 +8,6 @@ import pytest
 from sim.types import Tracks
 from tests import painted
 from tests.painted import TALL, Person
-from tracking.papers.group_pda.association import nearest_claims
 from tracking.papers.group_pda.tracker import GroupPda
 
 SCALE = TALL / 1.7
@@ -46,10 +45,3 @@ def test_who_joins_a_group_behind_its_backs_has_merged_with_it() -> None:
     assert len(made[15].id) == 2
     assert merges(made) == 1
     assert len(made[-1].id) == 1
-
-
-def test_a_shared_point_is_the_nearer_groups_unless_its_colour_speaks_for_the_other() -> None:
-    chosen, d2 = np.ones((2, 3), bool), np.array([[1.0, 4.0, 2.0], [3.0, 1.0, 2.0]])
-    assert nearest_claims(chosen, d2, np.zeros((2, 0))).tolist() == [[True, False, True], [False, True, False]]
-    looks = np.array([[-0.9, 1.6, 0.0], [0.9, -1.6, 0.1]])
-    assert nearest_claims(chosen, d2, looks).tolist() == [[False, True, False], [True, False, True]]
