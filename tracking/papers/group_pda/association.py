@@ -45,8 +45,8 @@ class Associated:
     """The result of `associate` for G groups and M points.
 
     exclusive (G, M) bool: points of each group's likeliest association; a point that several groups have is the most
-    probable one's. innovation: (id, y (2,), S (2, 2)) of each confirmed group that was
-    measured: the innovation of its likeliest association, in the unit of the points, and its covariance.
+    probable one's. innovation: (id, y (2,), S (2, 2)) of each confirmed group that was measured: the innovation of its
+    likeliest association, in the unit of the points, and its covariance.
     """
 
     exclusive: Bools
@@ -140,10 +140,11 @@ def associate(
     """Update the groups of the bank in place by their associations (sec. 4.1 to 4.3) and return the points that they
     have.
 
-    claims: which points each group may have; region (G, 2, 2): from `search_regions`. log_ratio (G, M): log
-    p(colour | group) - log p(colour | other groups) of each point, or (G, 0) without colours. t: time of the frame, s.
-    `null_time` grows by a frame for a group without feasible associations (points that form one group), and shrinks by
-    a frame, down to 0, for a measured one. last_seen, measured_time and own_people are updated, too.
+    claims: which points each group may have; region (G, 2, 2): from `search_regions`. log_ratio (G, M): log p(colour |
+    group) - log p(colour | other groups) of each point, or (G, 0) without colours. t: time of the frame, s. A group
+    counts as measured if its association has a point of this frame. `null_time` grows by a frame for a group without
+    feasible associations (points that form one group), and shrinks by a frame, down to 0, for a measured one.
+    last_seen, measured_time and own_people are updated, too.
     """
     weighted = scaled.config.appearance * log_ratio
     log_density = point_log_density(bank.size, region, claims, weighted)
