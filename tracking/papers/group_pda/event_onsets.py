@@ -1,8 +1,9 @@
-"""Onsets of merges of `group-pda`: when a merge that is known now began (ours).
+"""Onsets of merges and splits of `group-pda`: when an event that is known now began (ours).
 
-A merge is known when the filters' velocities have settled. Afterwards the onset can be measured better: from chords
-through earlier and later centroids, which do not lag. Distances are metres on the ground (in an image depth is
-stretched to it). The distance of the truth's rule comes from sim.truth.merge_split_rules.
+A split is known when its parts have long been apart, a merge when the filters' velocities have settled. Afterwards the
+onset can be measured better: from chords through earlier and later centroids, which do not lag, and from the group's
+earlier points, divided among the parts. Distances are metres on the ground (in an image depth is stretched to it).
+The distances and velocities of the truth's rules come from sim.truth.merge_split_rules.
 """
 
 from __future__ import annotations
@@ -12,13 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.truth.merge_split_rules import MERGE_DISTANCE
+from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
 from sim.types import Array
 
-MERGE_CHORD = 0.7
-"""s before and after a moment over which a velocity is a chord."""
+MERGE_CHORD, SPLIT_CHORD = 0.7, 0.4
+"""s before and after a moment over which a velocity is a chord. For a merge it is longer, as whole groups turn slowly
+and bodies hide each other; a part leaves at once."""
 MERGE_CHORD_MARGIN = 1.2
 """Factor on the velocity at which groups merge: a chord across the onset still contains motion from before it."""
+REACH = 1.1
+"""Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three."""
 
 
 class PairMoment(NamedTuple):
@@ -62,14 +66,56 @@ class PairHistory:
         return float(t[k]), self.moments[k].middle
 
 
-def chords(t: Array, d: Array, half: float) -> Array:
+def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Array:
     """Return speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords from `half` s before to
     after.
 
     Unit: that of d per s. A chord spans at least one frame to each side if there is one. At both ends of the series
-    chords are shorter. A single position has speed 0. None give an empty array.
+    chords are shorter. With full_length they are as long there as elsewhere, but not centred on their times. A single
+    position has speed 0. None give an empty array, or IndexError with full_length.
     """
-    k = np.arange(len(t))
-    first = np.minimum(np.searchsorted(t, t - half - 1e-9), np.maximum(k - 1, 0))
-    last = np.maximum(np.searchsorted(t, t + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
+    k, middle = np.arange(len(t)), t
+    if full_length:
+        middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
+    first = np.minimum(np.searchsorted(t, middle - half - 1e-9), np.maximum(k - 1, 0))
+    last = np.maximum(np.searchsorted(t, middle + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
+
+
+def split_onset(
+    recent: list[tuple[float, Array]], parts: list[Array], metres_per_unit: Array, body_cov: Array, known: float
+) -> tuple[float, Array]:
+    """Return when, in s, a group began to divide into two parts, and its centroid (2,) at that time, in the unit of the
+    points.
+
+    recent: (time in s, points (K, 2)) of the group, oldest first. parts: the points (K, 2) of both parts, now.
+    metres_per_unit (2,): metres on the ground per unit along x and y. body_cov (2, 2): covariance of one person's
+    points. known: time in s at which the split is known; later moments of `recent` are ignored.
+
+    Going back from `known`, each moment's points are divided between the two centroids, which follow them. The nearest
+    people of the parts are taken to be nearer than the centroids by the same distance as now. The onset is the moment
+    after the last one in which the parts were together by the split rule (at most 1.5 m apart; 2.5 m if slower than 0.7
+    m/s); the first moment if there is none. With fewer than two moments the onset is `known`, and the place that
+    moment's centroid, or that of the first part.
+    """
+    before = [(t, y * metres_per_unit) for t, y in recent if t <= known + 1e-9]
+    if len(before) < 2:
+        t, y = before[0] if before else (known, parts[0] * metres_per_unit)
+        return known, y.mean(0) / metres_per_unit
+    middle = np.array([p.mean(0) for p in parts]) * metres_per_unit
+    way = middle[1] - middle[0]
+    way = metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
+    spread = [max(float(way @ (np.cov(p.T, bias=True) - body_cov) @ way), 0.0) if len(p) > 1 else 0.0 for p in parts]
+    reach = REACH * float(np.sqrt(spread).sum())
+    times, apart = [], []
+    for t, y in reversed(before):
+        side = np.square(y[:, None] - middle).sum(2).argmin(1)
+        middle = np.array([y[side == k].mean(0) if (side == k).any() else middle[k] for k in range(2)])
+        times.append(t)
+        apart.append(middle[1] - middle[0])
+    when, d = np.array(times[::-1]), np.array(apart[::-1])
+    gap = np.hypot(*d.T) - reach
+    slow = chords(when, d, SPLIT_CHORD, full_length=True) < SPLIT_VELOCITY
+    together = (gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow)
+    k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
+    return float(when[k]), before[k][1].mean(0) / metres_per_unit

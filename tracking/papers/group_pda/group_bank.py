@@ -18,6 +18,8 @@ from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 NO_ID = -1
 """Id of a tentative group."""
+LISTS = ("members", "recent_points")
+"""Fields of GroupBank that are lists, not arrays."""
 
 
 class MemberPlaces(NamedTuple):
@@ -55,7 +57,7 @@ class GroupBank:
     null_time (G,): time without a feasible association, less measured frames in it. own_people (G,): people measured in
     this frame who are nearer to no other group. parent (G,): id of the group that a tentative group has left, or NO_ID;
     origin (G, 2): where it left it. colour_hist (G, C): people by colour; C = 0 without colours. members: a
-    MemberPlaces of each group.
+    MemberPlaces of each group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
     """
 
     x: Array
@@ -72,6 +74,7 @@ class GroupBank:
     origin: Array
     colour_hist: Array
     members: list[MemberPlaces]
+    recent_points: list[list[tuple[float, Array]]]
 
     @classmethod
     def empty(cls, colour_bins: int = 0) -> GroupBank:
@@ -80,7 +83,7 @@ class GroupBank:
         four = np.zeros((0, 4))
         return cls(
             four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, none, ids, two,
-            np.zeros((0, colour_bins)), [],
+            np.zeros((0, colour_bins)), [], [],
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -103,7 +106,7 @@ class GroupBank:
         """Remove the rows that are False in kept (G,) bool, in place."""
         for f in fields(self):
             value = getattr(self, f.name)
-            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name == "members" else value[kept]
+            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name in LISTS else value[kept]
             setattr(self, f.name, new)
 
     def remove(self, row: int) -> None:
@@ -114,7 +117,7 @@ class GroupBank:
         """Append the rows of another bank with as many colour bins (else ValueError), in place."""
         for f in fields(self):
             a, b = getattr(self, f.name), getattr(other, f.name)
-            setattr(self, f.name, a + b if f.name == "members" else np.concatenate([a, b]))
+            setattr(self, f.name, a + b if f.name in LISTS else np.concatenate([a, b]))
 
     def predict(self, scaled: ScaledParameters) -> None:
         """Predict all groups to the next frame, in place: x = F x, P = F P F' + Q (eq. 2.3), F and Q from `scaled`."""
@@ -164,5 +167,5 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     return GroupBank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, NO_ID),
         now, now.copy(), zero + scaled.dt, zero, people.copy(), np.full(count, NO_ID), mean.copy(),
-        np.zeros((count, scaled.colour_bins)), members,
+        np.zeros((count, scaled.colour_bins)), members, [[] for _ in range(count)],
     )  # fmt: skip

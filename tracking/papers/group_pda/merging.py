@@ -21,7 +21,7 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.components import regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
 from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
-from tracking.papers.group_pda.event_onsets import PairHistory, PairMoment
+from tracking.papers.group_pda.event_onsets import REACH, PairHistory, PairMoment
 from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, MemberPlaces, alike_velocities
 from tracking.papers.group_pda.report import BankEvent
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
@@ -30,8 +30,6 @@ HISTORY_TIME = 5.0
 """s of a pair's past that are kept."""
 GATE_MARGIN = 0.9
 """Factor on gamma for merging: groups merge at a smaller distance than they split, as their extents are noisy."""
-REACH = 1.1
-"""Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three."""
 PATIENCE = 1.5
 """s for which the history of a pair is kept while one of the groups cannot merge."""
 
@@ -111,7 +109,7 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     Centroid and velocity are means weighted by size, sizes and colours sums; the extent contains the spread of the
     centroids. P is that of a weighted mean of independent centroids, sum w^2 P_i (ours; w: shares of the size): the
     spread of the centroids is no estimation error. The group with most people (rounded), then the oldest, then the
-    least id, gives the id. Times are the earliest first and the latest last measurement.
+    least id, gives the id. Times are the earliest first and the latest last measurement; recent points are empty.
     """
     size = np.asarray(bank.size[rows].sum())
     w = bank.size[rows] / size
@@ -128,7 +126,7 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1), size[None],
         np.full(1, NO_ID), x[None, :2].copy(), bank.colour_hist[rows].sum(0, keepdims=True),
-        [MemberPlaces(offset, last_seen, known)],
+        [MemberPlaces(offset, last_seen, known)], [[]],
     )  # fmt: skip
 
 

@@ -18,6 +18,11 @@ from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
+RECENT_TIME = 3.0
+"""s for which a group's points are kept, to date the onset of a split."""
+RECENT_POINTS = 64
+"""At most so many points of a group are kept of each frame."""
+
 
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:
     """Return new claims with the members missed at time t (s) appended as points that only their own group may have.
@@ -64,15 +69,17 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
 
 
 def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: ScaledParameters, t: float) -> None:
-    """Store each group's points of this frame as its members, in the bank, in place.
+    """Store each group's points of this frame as its members and recent points, in the bank, in place.
 
     exclusive (G, M) bool: each group's points, a point at one group only; claims: the points with their times; t: s. A
-    group without points keeps its old ones. A member is `known` if, relative to the centroid, one of the group's
-    previous members was within `carry_reach` of it. From pixels only the vertices of the points' convex hull are kept
-    as members, all known.
+    group without points keeps its old ones. Else recent points of 3 s and older are dropped, and at most 64 of this
+    frame are added. A member is `known` if, relative to the centroid, one of the group's previous members was within
+    `carry_reach` of it. From pixels only the vertices of the points' convex hull are kept as members, all known.
     """
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
+        kept = [p for p in bank.recent_points[row] if p[0] > t - RECENT_TIME]
+        bank.recent_points[row] = [*kept, (t, thinned(mine))]
         offset = mine - bank.x[row, :2]
         if not scaled.from_pixels:
             known = any_within(offset, bank.members[row].offset, scaled.scale * scaled.config.carry_reach)
@@ -80,3 +87,15 @@ def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: Sca
             continue
         (offset,) = convex_hulls([offset])
         bank.members[row] = MemberPlaces(offset, np.full(len(offset), t), np.ones(len(offset), bool))
+
+
+def thinned(points: Array) -> Array:
+    """Return at most RECENT_POINTS = 64 of the points (M, 2), selected by a hash of their coordinates.
+
+    The choice does not depend on the points' order, and a grid of points leaves no pattern. 64 or fewer are returned as
+    they are.
+    """
+    if len(points) <= RECENT_POINTS:
+        return points
+    scattered = np.sin(points @ np.array([12.9898, 78.233])) * 43758.5453
+    return points[np.argsort(scattered - np.floor(scattered), kind="stable")[:RECENT_POINTS]]

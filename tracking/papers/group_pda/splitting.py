@@ -13,7 +13,9 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.filters.components import partition
+from tracking.papers.group_pda.event_onsets import split_onset
 from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, GroupIds, newborn
+from tracking.papers.group_pda.missed_members import thinned
 from tracking.papers.group_pda.report import BankEvent
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
@@ -26,8 +28,7 @@ def split(
     G_y: linked points are one group, and such components whose regions overlap. weights (M,): people each point stands
     for; t: s; ids: gives fresh ids. The bank is changed in place.
     - Several groups: they are appended to the bank and the old row is removed. The largest (then the one nearest to the
-      old centroid) keeps the id, the others get fresh ids. The event is a split; its onset is the first frame without
-      a feasible association, its position the centroid moved back to that time.
+      old centroid) keeps the id, the others get fresh ids. The event is a split, from its measured onset.
     - One group: it stays, and its `null_time` becomes 0. None is returned.
     - No group, only noise or no point: it is removed. The event is a leave.
 
@@ -44,12 +45,12 @@ def split(
         return leave if confirmed else None
     parts = children(bank, row, points, weights, group, scaled, t)
     away = np.hypot(*(parts.x[:, :2] - bank.x[row, :2]).T)
-    largest = int(np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[0])
+    largest, other = np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[:2].tolist()
     if confirmed:
         parts.id[:] = [bank.id[row] if k == largest else ids.new() for k in range(len(parts))]
-    since = float(bank.null_time[row])
-    place = bank.x[row, :2] - since * bank.x[row, 2:]
-    event = BankEvent("split", t - since, (int(bank.id[row]),), tuple(sorted(parts.id.tolist())), tuple(place.tolist()))
+    two = [thinned(points[group == k]) for k in (largest, other)]
+    onset, place = split_onset(bank.recent_points[row], two, scaled.metres_per_unit, scaled.body_cov, t)
+    event = BankEvent("split", onset, (int(bank.id[row]),), tuple(sorted(parts.id.tolist())), tuple(place.tolist()))
     bank.remove(row)
     bank.add(parts)
     return event if confirmed else None

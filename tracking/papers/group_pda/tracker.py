@@ -48,7 +48,8 @@ Splitting and merging:
 Reporting:
 - Groups are tentative at first. They coast without measurements, become lost, and take their id back from a newborn
   group that fits.
-- Onsets of merges are measured afterwards. In an image seen at an angle, depth counts for more px than it shows.
+- Onsets of merges and splits are measured afterwards. In an image seen at an angle, depth counts for more px than
+  it shows.
 
 association="none" is the paper's sec. 5.2.1: a group takes all points in its region, with attached points and missed
 members. There are no masses, no miss hypothesis and no time without feasible associations, so that a group only splits
