@@ -146,7 +146,8 @@ def masses(sets, mine, shared, points, weights, region, x, P, extent, size, rule
         log.append(close + np.log(step * many))
     miss = -np.inf
     if rules.miss > 0:
-        area = np.pi * rules.constraint.gate * np.sqrt(np.linalg.det(region))
+        gate = rules.constraint.gate * (truncation(rules.constraint.gate) if rules.correct else 1.0)
+        area = np.pi * gate * np.sqrt(np.linalg.det(region))
         number = step / (2 * size + 1) if mine else 1.0
         miss = np.log(rules.miss / (1 - rules.miss) / area * number)
     total = logsumexp([*log, miss])

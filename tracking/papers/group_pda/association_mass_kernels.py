@@ -22,14 +22,14 @@ from sim.types import Array
 RULES = LEAST_OTHERS + 1
 """Slots of the array `rules`, RULES in all; tracking.papers.group_pda.scaled_parameters fills them.
 
-GATE: squared Mahalanobis radius in the group constraint. LINK: 2 r of R_0. PRIOR_XX, _XY, _YY: covariance that extents
-are shrunk to, with the weight PRIOR_WEIGHT in people. LEAST_WEIGHT: people below which a component is noise. POINT_SD:
-standard deviation of one person's measured position. COUNT_SD (people), COUNT_SHARE: sigma_n^2 = COUNT_SD^2 +
-(COUNT_SHARE N)^2. DETECT_PROB: probability that a member is among the points. MISS_PROB: prior probability of the miss
-hypothesis, 0 without it. FREEZE_SHARE: share of N in points of other groups above which extent and size rest.
-KEEP_EXTENT, KEEP_SIZE: alpha_s, alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that a Gaussian
-keeps inside the gate. REDRAWN: 1 if members are drawn anew in each frame. ASSOCIATION: one of PREFIXES, NEAREST, ALL,
-UNCONSTRAINED. LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
+GATE: squared Mahalanobis radius in the group constraint, gamma / GATE_FACTOR. LINK: 2 r of R_0. PRIOR_XX, _XY, _YY:
+covariance that extents are shrunk to, with the weight PRIOR_WEIGHT in people. LEAST_WEIGHT: people below which a
+component is noise. POINT_SD: standard deviation of one person's measured position. COUNT_SD (people), COUNT_SHARE:
+sigma_n^2 = COUNT_SD^2 + (COUNT_SHARE N)^2. DETECT_PROB: probability that a member is among the points. MISS_PROB: prior
+probability of the miss hypothesis, 0 without it. FREEZE_SHARE: share of N in points of other groups above which extent
+and size rest. KEEP_EXTENT, KEEP_SIZE: alpha_s, alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that
+a Gaussian keeps inside the gate. REDRAWN: 1 if members are drawn anew in each frame. ASSOCIATION: one of PREFIXES,
+NEAREST, ALL, UNCONSTRAINED. LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
 """
 
 PREFIXES, NEAREST, ALL, UNCONSTRAINED = range(4)
@@ -127,6 +127,7 @@ def log_miss(weights: Array, start: int, region: Array, size: float, rules: Arra
     """
     if rules[MISS_PROB] <= 0:
         return -np.inf
-    area = np.pi * rules[GATE] * np.sqrt(max(region[0, 0] * region[1, 1] - region[0, 1] ** 2, 1e-300))
+    gate = rules[GATE] * rules[GATE_FACTOR]  # gamma; GATE is that of extents before their correction
+    area = np.pi * gate * np.sqrt(max(region[0, 0] * region[1, 1] - region[0, 1] ** 2, 1e-300))
     strangers = np.log(weights.mean() / (2 * size + 1)) if start > 0 else 0.0
     return float(np.log(rules[MISS_PROB] / (1 - rules[MISS_PROB])) - np.log(area) + strangers)

@@ -23,7 +23,8 @@ def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
     """Return True if so few people of the groups in rows i and j of the bank are measured that the two may be one
     group.
 
-    Few are less than LEAST_MEASURED = 55 % of the sum of their sizes. Measured people count at the nearer group only.
+    Few are less than LEAST_MEASURED = 55 % of the sum of their sizes. Measured people are shared out by the probability
+    that they are a group's.
     """
     return bool(LEAST_MEASURED * (bank.size[i] + bank.size[j]) > bank.own_people[i] + bank.own_people[j])
 
@@ -44,8 +45,8 @@ class DuplicateGroups:
         `coast_time`.
 
         Only confirmed groups measured in this frame take part; other pairs lose their clock. Lost is the group with the
-        smaller share of people of its own (nearer to no other group); if equal, the younger one. A lost group claims no
-        points until it is recaptured; `last_seen` is set back in the bank.
+        smaller share of people of its own; if equal, the younger one. A lost group claims no points until it is
+        recaptured; `last_seen` is set back in the bank.
         """
         rows = np.flatnonzero(bank.confirmed & (bank.last_seen >= t))
         rows = rows[np.argsort(bank.id[rows])]
@@ -55,6 +56,8 @@ class DuplicateGroups:
             clock[ids] = self.clock.get(ids, 0.0) + (scaled.dt if may_be_one(bank, i, j) else -scaled.dt)
         self.clock = {ids: s for ids, s in clock.items() if s > 0}
         for ids in [ids for ids, s in self.clock.items() if s > scaled.config.coast_time + 1e-9]:
+            if ids not in self.clock:
+                continue  # one of them has just become lost
             row = _with_fewer_own(bank, *pairs[ids])
             lost_at = t - max(scaled.config.coast_time, scaled.dt) - 1e-6
             bank.last_seen[row] = min(bank.last_seen[row], lost_at)
@@ -72,7 +75,7 @@ def _overlapping(bank: GroupBank, rows: Ints, gate: float) -> Iterator[tuple[int
 
 
 def _with_fewer_own(bank: GroupBank, i: int, j: int) -> int:
-    """Returns the row, i or j, with the smaller share of people of its own (measured and nearer to no other group).
+    """Returns the row, i or j, with the smaller share of people of its own (expected among its points).
 
     If equal, the younger group (later first_seen), then the larger id.
     """

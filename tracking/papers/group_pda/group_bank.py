@@ -54,9 +54,9 @@ class GroupBank:
     x (G, 4): centroid xi and velocity v, in order x, y, vx, vy; P (G, 4, 4) their covariance. extent (G, 2, 2): Sigma,
     covariance of the members' positions about the centroid; size (G,): N, people. id (G,): NO_ID = -1 for a tentative
     group. first_seen, last_seen (G,): times of first and last measurement. measured_time (G,): total time measured.
-    null_time (G,): time without a feasible association, less measured frames in it. own_people (G,): people measured in
-    this frame who are nearer to no other group. parent (G,): id of the group that a tentative group has left, or NO_ID;
-    origin (G, 2): where it left it. colour_hist (G, C): people by colour; C = 0 without colours. members: a
+    null_time (G,): time without a feasible association, less measured frames in it. own_people (G,): people of the
+    group expected among its points of this frame. parent (G,): id of the group that a tentative group has left, or
+    NO_ID; origin (G, 2): where it left it. colour_hist (G, C): people by colour; C = 0 without colours. members: a
     MemberPlaces of each group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
     """
 

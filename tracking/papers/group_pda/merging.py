@@ -3,7 +3,7 @@
 Input: the bank of groups after the update of a frame; output: the bank with merged groups, and the events. The relation
 R_x holds for two groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x
 are the connected components of groups under R_x; each becomes one group. Departures: the velocity test is a physical
-difference (`merge_velocity`), R_x must hold for `merge_time`, and only groups whose velocity is known well take part
+difference (`merge_velocity`), R_x must hold for `merge_time`, and only groups that are measured well take part
 (see `GroupMerging.step`).
 """
 
