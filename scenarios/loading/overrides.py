@@ -15,7 +15,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import Table, did_you_mean
-from scenarios.parsing import parse_toml
+from scenarios.parsing import DEPTH, parse_toml
 from scenarios.printable import shortened
 
 KeyPath = tuple[str | int, ...]
@@ -49,7 +49,7 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
     """Returns the steps of the key (`a.b` gives ["a", "b"]) and the TOML value of a setting `a.b=value`.
 
     The key ends at the first `=` and is cut at every dot, also inside quotes. A word without quotes is a string. Raises
-    InputError for any other form, an empty step, or a value that is not TOML.
+    InputError for any other form, an empty step, a key of more than 32 steps, or a value that is not TOML.
     """
     key, equals, value = text.partition("=")
     steps = key.strip().split(".")
@@ -57,6 +57,9 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
         raise InputError(
             place=place_of(text), got=repr(text), expected="key=value", remedy="write for example --set group.a.size=3"
         )
+    if len(steps) > DEPTH:
+        expected = f"at most {DEPTH} tables and lists inside each other"
+        raise InputError(place=place_of(text), got=f"{len(steps)} steps", expected=expected, remedy="shorten the key")
     return steps, parse_value(value.strip(), text)
 
 
