@@ -14,8 +14,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from scenarios.errors import InputError
+from scenarios.limits import DEPTH
 from scenarios.loading.toml_files import Table, did_you_mean
-from scenarios.parsing import DEPTH, parse_toml
+from scenarios.parsing import parse_toml
 from scenarios.printable import shortened
 
 KeyPath = tuple[str | int, ...]
