@@ -20,6 +20,8 @@ XML_BYTES = 64 * 2**20
 """Bytes of an XML file."""
 DEPTH = 32
 """Tables and lists inside each other in a TOML or JSON file."""
+NESTING = f"at most {DEPTH} tables and lists inside each other"
+"""Words for what DEPTH allows."""
 INTEGER = 2**63 - 1
 """Largest whole number in a TOML or JSON file, also with a minus sign."""
 

@@ -11,7 +11,7 @@ import tomllib
 from typing import Any, NoReturn
 
 from scenarios.errors import InputError
-from scenarios.limits import DEPTH, INTEGER
+from scenarios.limits import DEPTH, INTEGER, NESTING
 
 FAR = "whole numbers within 64 bits"
 
@@ -69,8 +69,7 @@ def _reason(error: Exception) -> str:
 
 
 def _too_deep(file: object) -> InputError:
-    expected = f"at most {DEPTH} tables and lists inside each other"
-    return InputError(file=file, got="deeper nesting", expected=expected, remedy="check that this is the right file")
+    return InputError(file=file, got="deeper nesting", expected=NESTING, remedy="check that this is the right file")
 
 
 def _require_plain(value: Any, file: object) -> None:

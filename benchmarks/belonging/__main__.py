@@ -3,15 +3,15 @@
     python -m benchmarks.belonging pairs [--scenes street crowd party] [--seeds 0:10] [--begin 0 16 28] [--out FOLDER]
     python -m benchmarks.belonging likeness [--chart FILE.svg]
     python -m benchmarks.belonging people
-    python -m venv /tmp/sk && /tmp/sk/bin/pip install scikit-learn numpy
-    python -m benchmarks.belonging transfer --peer-python /tmp/sk/bin/python [--train street+crowd+party …]
-    python -m benchmarks.belonging giveaway --peer-python /tmp/sk/bin/python
+    python -m benchmarks.belonging transfer --peer-python PYTHON [--train street+crowd+party …]
+    python -m benchmarks.belonging giveaway --peer-python PYTHON
 
-All modes but `pairs` read what `pairs` wrote to --out. --scenes names scenarios, suites or *.toml files, by default
-street, crowd, party and benchmarks/belonging/window.toml, in which people come into view across the edges of a window.
-The recordings are seq_hotel and zara01. Everything is sampled at 2.5 frames/s; people more than half outside the image
-are left out. A source is called by its file name without folder and ending; A+B stands for both.
-waiting.toml has strangers who wait beside each other.
+PYTHON is the interpreter of an environment of its own, with scikit-learn and numpy: python -m venv FOLDER, then
+FOLDER/bin/pip install scikit-learn numpy. All modes but `pairs` read what `pairs` wrote to --out. --scenes names
+scenarios, suites or *.toml files, by default street, crowd, party and benchmarks/belonging/window.toml, in which people
+come into view across the edges of a window. The recordings are seq_hotel and zara01. Everything is sampled at 2.5
+frames/s; people more than half outside the image are left out. A source is called by its file name without folder and
+ending; A+B stands for both. waiting.toml has strangers who wait beside each other.
 pairs: writes the people, and the features of all pairs of people who are less than 5 m apart in some frame
 (benchmarks/belonging/pair_features.py), one row per pair and frame. --begin takes each scene once
 from each of these times on, as if a recording began there.

@@ -48,7 +48,7 @@ def main() -> None:
     add_seeds(parser, "20000:20025", option="--image-seeds", what="difference, curves from pixels: ")
     parser.add_argument("--detections", choices=("file", "truth", "image"), default="file")
     parser.add_argument("--only", help="scenes, suites, parts, kinds or differences, separated by commas")
-    parser.add_argument("--commit", default="5fd5840", help="earlier: the commit that today is compared with")
+    parser.add_argument("--commit", default="HEAD", help="earlier: the commit that today is compared with")
     parser.add_argument("--each", action="store_true", help="decisions: scene by scene, too")
     parser.add_argument("--alone", action="store_true", help="scenarios, events: without the ablation and the baseline")
     parser.add_argument("--workers", type=int, default=2)

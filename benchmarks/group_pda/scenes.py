@@ -31,7 +31,7 @@ WITHOUT: Mapping[str, Mapping[str, object]] = {
     'centroid_noise "people"': {"centroid_noise": "redrawn"},
     "inherit_velocity": {"inherit_velocity": False},
     "recapture": {"recapture": False},
-    "association by masses: the nearest group": {"association": "nearest"},
+    "association by masses: the most probable group": {"association": "nearest"},
     "association by masses: all points": {"association": "all"},
     "association and group constraint": {"association": "none"},
     "all that is ours: preset paper": GroupPdaConfig.preset("paper").as_dict(),

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.limits import DEPTH
+from scenarios.limits import DEPTH, NESTING
 from scenarios.loading.toml_files import Table, did_you_mean
 from scenarios.parsing import parse_toml
 from scenarios.printable import shortened
@@ -59,8 +59,7 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
             place=place_of(text), got=repr(text), expected="key=value", remedy="write for example --set group.a.size=3"
         )
     if len(steps) > DEPTH:
-        expected = f"at most {DEPTH} tables and lists inside each other"
-        raise InputError(place=place_of(text), got=f"{len(steps)} steps", expected=expected, remedy="shorten the key")
+        raise InputError(place=place_of(text), got=f"{len(steps)} steps", expected=NESTING, remedy="shorten the key")
     return steps, parse_value(value.strip(), text)
 
 

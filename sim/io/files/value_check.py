@@ -63,9 +63,9 @@ def check_values(path: Path, values: Any, rules: Rules, remedy: str, *, inside: 
     without a rule. remedy: for the error.
     """
     if not isinstance(values, dict):
-        raise InputError(file=path, place=inside, got=repr(values)[:40], expected=TABLE.words, remedy=remedy)
+        raise InputError(file=path, place=inside, got=repr(values), expected=TABLE.words, remedy=remedy)
     for key, rule in rules.items():
         if (inside or key in values) and not rule.accepts(values.get(key)):
-            got = repr(values[key])[:40] if key in values else "nothing"
+            got = repr(values[key]) if key in values else "nothing"
             place = f"{inside}.{key}" if inside else key
             raise InputError(file=path, place=place, got=got, expected=rule.words, remedy=remedy)

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -439,38 +439,37 @@ def test_ctrl_c_in_a_real_process(place, workers):
     assert all(run(["validate", str(p)]) == 0 for p in sequences)
 
 
-@pytest.mark.slow
-def test_a_full_disk_of_its_own(place, tmp_path):
-    """A file system of 200 kB: exit code 1, one line, and every sequence there is whole."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
+@contextmanager
+def small_disk(folder, size):
+    """A file system of this size, as mount wants it; the test is skipped where mounting is not allowed."""
+    folder.mkdir(parents=True)
     mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", disk], capture_output=True, check=False
+        ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], capture_output=True, check=False
     )
     if mounted.returncode:
         pytest.skip("no right to mount a small disk")
     try:
+        yield folder
+    finally:
+        subprocess.run(["umount", folder], check=True)
+
+
+@pytest.mark.slow
+def test_a_full_disk_of_its_own(place, tmp_path):
+    """A file system of 200 kB: exit code 1, one line, and every sequence there is whole."""
+    with small_disk(tmp_path / "disk", "200k") as disk:
         assert run(words(f"generate {{scene}} --seeds 0:10 --out {disk}/out", place)) == 1
         assert not list(disk.rglob(".partial-*"))
         sequences = list(disk.glob("out/flockscope-train/*"))
         assert len(sequences) < 10
         assert all(run(["validate", str(p)]) == 0 for p in sequences)
-    finally:
-        subprocess.run(["umount", disk], check=True)
 
 
 @pytest.fixture
 def tiny_disk(tmp_path):
     """A file system of 12 kB, less than any command writes; for commands with a folder, their first file fits."""
-    disk = tmp_path / "tiny"
-    disk.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=12k", "tmpfs", disk], capture_output=True, check=False
-    )
-    if mounted.returncode:
-        pytest.skip("no right to mount a small disk")
-    yield disk
-    subprocess.run(["umount", disk], check=True)
+    with small_disk(tmp_path / "tiny", "12k") as disk:
+        yield disk
 
 
 @pytest.mark.slow

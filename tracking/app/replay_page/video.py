@@ -56,8 +56,7 @@ def page_video(
     beside the page, else left. step: called with the sequence's name after each frame.
 
     Raises InputError if FILE.view.mp4 is the file that the sequence is read from or one that flockscope did not write,
-    a picture cannot be read or the
-    folder cannot be written; WorkError if the disk is full.
+    a picture cannot be read or the folder cannot be written; WorkError if the disk is full.
     """
     if placement == "none" or not sequence.has_images:
         return None

@@ -191,7 +191,8 @@ def shares(log_density: Array, may: Bools) -> Array:
     log_density (G, M): log of N_g N(y; xi_g, S_g), with colours that of their product; may (G, M): True where a group
     may have the point and the density is above 0. A point that no group may have has probability 0 for all.
     """
-    some = may.any(0)
-    top = np.max(log_density, axis=0, where=may, initial=-np.inf)
-    density = np.where(may, np.exp(log_density - np.where(some, top, 0.0)), 0.0)
-    return np.asarray(density / np.where(some, density.sum(0), 1.0))
+    share, shared = may.astype(float), np.flatnonzero(may.sum(0) > 1)
+    log = np.where(may[:, shared], log_density[:, shared], -np.inf)
+    density = np.exp(log - log.max(0, initial=-np.inf))
+    share[:, shared] = density / density.sum(0)
+    return share

@@ -173,7 +173,9 @@ def _ordered_points(
     others = others[np.argsort(distance, kind="mergesort")]
     own = len(others)
     if association == NEAREST:
-        here = np.array([share[:, k].argmax() == g for k in others])
+        here = np.empty(len(others), np.bool_)
+        for n in range(len(others)):
+            here[n] = share[:, others[n]].argmax() == g
         own = int(here.sum())
         others = np.concatenate((others[here], others[~here]))
     order[len(mine) :] = others

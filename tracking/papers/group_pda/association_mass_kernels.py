@@ -34,8 +34,8 @@ NEAREST, ALL, UNCONSTRAINED. LEAST_OTHERS: lower bound of n - 1 in the variance 
 
 PREFIXES, NEAREST, ALL, UNCONSTRAINED = range(4)
 """Which associations a group has: the unshared points with the j nearest shared ones, for every j (sec. 4.1); with the
-shared points nearest to this group, alone; with all shared points, alone; as ALL, without the group constraint (sec.
-5.2.1)."""
+shared points that are most probably of this group, alone; with all shared points, alone; as ALL, without the group
+constraint (sec. 5.2.1)."""
 NEWCOMERS = 0.02
 """Probability that a group's number of people does not depend on its number before."""
 

@@ -69,8 +69,8 @@ class GroupPdaConfig(BackgroundSettings):
         "pda",
         ("pda", "nearest", "all", "none"),
         "",
-        "pda: associations by their masses (sec. 4.2); nearest: shared points go to the nearest group; all: all points "
-        "in the region; none: all points, without group constraint (sec. 5.2.1)",
+        "pda: associations by their masses (sec. 4.2); nearest: shared points go to the most probable group; all: all "
+        "points in the region; none: all points, without group constraint (sec. 5.2.1)",
         "categorical",
     )
     miss: bool = param(True, (True, False), "", "use a hypothesis that no point is the group's (ours)", "categorical")
