@@ -1,7 +1,8 @@
 """From frames to scores: detectors, trackers, grouping, scoring, tuning, the commands.
 
-`tracking.track(tracker, sequence)` returns a run's tracks, `tracking.evaluate(truth, tracks)` their scores, and
-`tracking.tune(tracker, suite)` searches parameters over both. Each is imported when it is first used.
+`tracking.track(tracker, sequence)` returns a run's tracks, `tracking.group(sequence)` the groups of labelled people,
+`tracking.evaluate(truth, tracks)` the scores of either, and `tracking.tune(tracker, suite)` searches parameters. Each
+is imported when it is first used.
 `import tracking` also registers the Gymnasium environment (tracking.gymnasium_registration).
 """
 
@@ -12,15 +13,20 @@ from typing import TYPE_CHECKING, Any
 from tracking.gymnasium_registration import register_when_imported
 
 if TYPE_CHECKING:
-    from tracking.run import track
+    from tracking.run import group, track
     from tracking.scoring import evaluate
     from tracking.tuning import tune
 
-__all__ = ["evaluate", "track", "tune"]
+__all__ = ["evaluate", "group", "track", "tune"]
 
 register_when_imported()
 
-_HOME = {"evaluate": "tracking.scoring", "track": "tracking.run", "tune": "tracking.tuning"}
+_HOME = {
+    "evaluate": "tracking.scoring",
+    "group": "tracking.run",
+    "track": "tracking.run",
+    "tune": "tracking.tuning",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -15,12 +15,16 @@ from typing import Any, overload
 
 import numpy as np
 
+from scenarios.errors import InputError
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
 from tracking import image_scale
 from tracking.grouping.link_rule import LinkRule
 from tracking.prepare import Params, prepare
-from tracking.run_info import Speed, run_info
+from tracking.run_info import Speed, known_people_info, run_info
 from tracking.time_limit import TimeLimited
+
+OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "frames")
+"""Keys of run.json that follow from tracks and sequence, whoever made the tracks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +114,46 @@ def track(
             warnings.warn(fault, UserWarning, stacklevel=2)
     speed = Speed(len(reported) / spent, len(reported) / whole) if reported else Speed()
     info = run_info(prepared, tracks, seed, sensor or {}, scale, speed)
+    return TrackingRun(tracks, info if rule is None else {**info, "grouping": rule.as_dict()})
+
+
+def group(
+    sequence: Sequence, run: TrackingRun | None = None, *, grouping: LinkRule | str | Path | None = None
+) -> TrackingRun:
+    """Return the people of a sequence, whose ids are known, with groups and events that follow from their motion.
+
+    run: tracks of people; groups and events in them are replaced. None: the labelled people of the sequence, as
+    tracking.grouping.known_people gives them; their group labels are not used. grouping: the rule, or its TOML file;
+    None: the default rule. `info` of the result is what run.json tells: that of the run with the new grouping, or of a
+    tracker "group".
+
+    Raises InputError if there are no people with ids, the tracks are of whole groups, people lie in the image and its
+    scale is unknown or not above 0, or labels or the file of the rule cannot be read. Raises WorkError if an order of a
+    simulated script was not fulfilled. Warns if velocities are too far from the motion to derive groups.
+    """
+    from tracking.grouping.grouped_tracks import with_groups, without_groups
+    from tracking.grouping.known_people import known_people
+    from tracking.grouping.velocity_check import velocity_warning
+
+    rule = LinkRule.from_toml(grouping) if isinstance(grouping, str | Path) else grouping
+    people = known_people(sequence) if run is None else without_groups(run)
+    file = sequence.source.get("path", sequence.name)
+    if any(t.unit == "group" for t in people):
+        got, remedy = "tracks of whole groups", "give tracks of people: --tracker blob, or labelled people"
+        raise InputError(file=file, got=got, expected="people with ids", remedy=remedy)
+    learned = None if run is None else run.info.get("px_per_m")
+    scale = image_scale.from_tracks(image_scale.before_frames(sequence), learned or float("nan"), people)
+    if any(t.plane == "image" and len(t.id) for t in people) and not np.isfinite(scale.px_per_m):
+        got, remedy = "people in the image, without its scale", "give --px-per-m, pixels per metre"
+        raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
+    tracks = with_groups(people, sequence.fps, scale.px_per_m, rule)
+    fault = velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule)
+    if fault is not None:
+        warnings.warn(fault, UserWarning, stacklevel=2)
+    info = known_people_info(sequence, tracks, scale)
+    if run is not None:
+        told = {key: value for key, value in run.info.items() if key != "grouping"}
+        info = {**told, **{key: info[key] for key in OF_TRACKS}}
     return TrackingRun(tracks, info if rule is None else {**info, "grouping": rule.as_dict()})
 
 

@@ -52,29 +52,56 @@ def run_info(
     frame, from 1, or None); frames (number); frames_per_second (the tracker's steps alone);
     whole_frames_per_second (with reading); versions (of packages, by name).
     """
-    from sim.io.store.track_boxes import box_source
-
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
-    begins = None if begins is None else max(begins, scale.frames)
     return {
         "tracker": prepared.name,
         "config": prepared.config.as_dict() if prepared.config else {},
         "seed": seed,
-        "sequence": prepared.sequence.name,
         "detections": prepared.mode,
         "sensor": dict(sensor),
+        "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
+        **_facts(prepared.sequence, tracks, scale, begins),
+        "frames_per_second": speed.tracker,
+        "whole_frames_per_second": speed.whole,
+    }
+
+
+def known_people_info(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale) -> dict[str, Any]:
+    """Return what run.json tells of the groups of a sequence's labelled people: the keys of `run_info` without speeds.
+
+    The tracker is "group", without parameters and seed. tracks: of all frames, possibly none. scale: of the image, by
+    which groups were derived.
+    """
+    given: dict[str, Any] = {
+        "tracker": "group",
+        "config": {},
+        "seed": None,
+        "detections": "truth",
+        "sensor": {},
+        "background": None,
+    }
+    return {**given, **_facts(sequence, tracks, scale, 1)}
+
+
+def _facts(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, begins: int | None) -> dict[str, Any]:
+    """Returns what run.json tells of tracks, whoever made them: of the sequence, plane, boxes, scale and causality.
+
+    begins: the first frame, from 1, from which on only the scale may depend on later frames; None if there is none.
+    """
+    from sim.io.store.track_boxes import box_source
+
+    begins = None if begins is None else max(begins, scale.frames)
+    return {
+        "sequence": sequence.name,
         "plane": tracks[0].plane if len(tracks) else None,
-        "boxes": box_source(tracks, prepared.context.camera),
-        "fps": prepared.context.fps,
+        "boxes": box_source(tracks, sequence.camera),
+        "fps": sequence.fps,
         "px_per_m": None if np.isnan(scale.px_per_m) else scale.px_per_m,
         "px_per_m_frames": scale.frames,
-        "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
         "causal": begins is not None,
         "causal_from": begins,
         "frames": len(tracks),
-        "frames_per_second": speed.tracker,
-        "whole_frames_per_second": speed.whole,
         "versions": _versions(),
     }
 

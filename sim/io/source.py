@@ -72,6 +72,12 @@ def open_source(
     return [_open_folder(p, options) for p in found]
 
 
+def holds_sequences(folder: Path) -> bool:
+    """Return True if there is a sequence or recording in a folder or at most 3 levels below it, as `open_source` finds
+    them."""
+    return bool(_find(folder, DEPTH))
+
+
 def sequence_folders(path: Path, kind: str) -> list[Path]:
     """Return the sequence folders at a path or at most 3 levels below it, sorted by path.
 

@@ -14,6 +14,7 @@ import typer
 from tracking.app.command_options import (
     FitSensorOptions,
     GenerateOptions,
+    GroupOptions,
     OverlayOptions,
     ReplayCommandOptions,
     ScenariosOptions,
@@ -101,6 +102,15 @@ def track(options: TrackOptions) -> CommandResult:
     from tracking.app.commands.track import track
 
     return track(options)
+
+
+@app.command()
+@options_from(GroupOptions)
+def group(options: GroupOptions) -> CommandResult:
+    """Find who belongs together, and what happened, for people whose ids are known."""
+    from tracking.app.commands.group import group
+
+    return group(options)
 
 
 @app.command()

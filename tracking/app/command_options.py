@@ -13,6 +13,7 @@ from typing import Annotated, Literal
 import typer
 
 from tracking.app.shared_options import (
+    Background,
     Calibration,
     Cluster,
     Detections,
@@ -20,6 +21,9 @@ from tracking.app.shared_options import (
     Fps,
     Images,
     Out,
+    Params,
+    People,
+    Probabilities,
     Rule,
     Scale,
     Set,
@@ -85,10 +89,7 @@ class TrackOptions:
     tracker: Tracker
     source: Source
     out: Out
-    params: Annotated[
-        str | None,
-        typer.Option("--params", metavar="FILE.toml|PRESET", help="The tracker's parameters: a file, or paper."),
-    ] = None
+    params: Params = None
     settings: Set = field(default_factory=list)
     detections: Detections = None
     sensor: Detector = None
@@ -97,11 +98,26 @@ class TrackOptions:
     fps: Fps = None
     px_per_m: Scale = None
     camera: Calibration = None
-    background: Annotated[
-        str | None,
-        typer.Option("--background", metavar="first:N|spread:N", help="Frames a background model is trained on."),
-    ] = None
+    background: Background = None
     step_timeout: StepTimeout = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class GroupOptions:
+    """Options of the command `group`, which finds the groups of people whose ids are known.
+
+    source: path of labelled people, a text with ids, or stored tracks. out: folder to write. grouping: file of the
+    parameters that decide who belongs together; None: the defaults. probabilities: store those of all pairs. fps:
+    frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration; None if not given.
+    """
+
+    source: People
+    out: Out
+    grouping: Rule = None
+    probabilities: Probabilities = False
+    fps: Fps = None
+    px_per_m: Scale = None
+    camera: Calibration = None
 
 
 @dataclass(frozen=True, kw_only=True)

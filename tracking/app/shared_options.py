@@ -1,4 +1,4 @@
-"""Options and arguments that several commands have in common: name, value's form and help text of each, for Typer."""
+"""Options and arguments, most of them of several commands: name, value's form and help text of each, for Typer."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ Set = Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a valu
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
 Source = Annotated[
     Path, typer.Argument(metavar="SOURCE", help="Sequence or dataset: generated, MOT, video, BIWI, CAVIAR.")
+]
+People = Annotated[
+    Path, typer.Argument(metavar="SOURCE|TRACKS", help="Labelled people, MOT text with ids, or output of `track`.")
 ]
 Tracker = Annotated[
     str, typer.Argument(metavar="TRACKER", help="Name of a tracker, or file.py:Class, or module:Class.")
@@ -63,4 +66,15 @@ Images = Annotated[
 Rule = Annotated[
     Path | None,
     typer.Option("--grouping", metavar="FILE.toml", help="Rule that derives groups, as `tune grouping` writes it."),
+]
+Probabilities = Annotated[
+    bool, typer.Option("--probabilities", help="Store the probability that two people belong together.")
+]
+Params = Annotated[
+    str | None,
+    typer.Option("--params", metavar="FILE.toml|PRESET", help="The tracker's parameters: a file, or paper."),
+]
+Background = Annotated[
+    str | None,
+    typer.Option("--background", metavar="first:N|spread:N", help="Frames a background model is trained on."),
 ]

@@ -83,6 +83,17 @@ def names_groups(tracks: Sequence[Tracks]) -> bool:
     return any(t.unit == "group" or t.groups is not None or bool((t.group >= 0).any()) for t in tracks)
 
 
+def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
+    """Return the tracks of people without the groups and events that are in them, one `Tracks` per frame, in order.
+
+    Tracks of whole groups are returned as they are.
+    """
+    return [
+        t if t.unit == "group" else t.replace(group=np.full(len(t.id), -1), groups=None, events=(), derived=False)
+        for t in tracks
+    ]
+
+
 def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: LinkRule | None = None) -> list[Tracks]:
     """Return the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
 

@@ -14,9 +14,10 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sim.rng import rng
-from sim.types import FrameTruth, Plane, Tracks, Truth
+from sim.types import Truth
 from tracking.environment.episodes import Episode, Source, SourceCache
 from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 
 
@@ -92,26 +93,3 @@ def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int 
         return truth.replace(pos=truth.pos + error)
     moved = np.concatenate([truth.px_per_m * error, np.zeros_like(error)], axis=1)
     return truth.replace(pos=None, vel=None, box=truth.box + moved)
-
-
-def people_as_tracks(truth: Truth) -> list[Tracks]:
-    """Returns the labelled people of every frame as tracks of persons without groups, one `Tracks` per frame from 1.
-
-    The tracks lie on the ground in m, or at box centres in the image in px if the truth has no positions. Ids and boxes
-    are the labelled ones, scores 1. Velocities are nan if the truth has none; covariances are 0. A frame without people
-    has no rows. Fails an assertion if the truth has neither positions nor boxes.
-    """
-    plane: Plane = "image" if truth.pos is None else "ground"
-    return [_tracks(truth.at(index), plane) for index in range(1, truth.length + 1)]
-
-
-def _tracks(frame: FrameTruth, plane: Plane) -> Tracks:
-    count = len(frame.id)
-    if frame.pos is not None:
-        pos = frame.pos
-    else:
-        assert frame.box is not None, "labels have positions or boxes"
-        pos = frame.box[:, :2] + frame.box[:, 2:] / 2
-    vel = frame.vel if frame.vel is not None else np.full((count, 2), np.nan)
-    no_group, cov = np.full(count, -1), np.zeros((count, 4, 4))
-    return Tracks(frame.index, frame.t, plane, "person", frame.id, no_group, pos, vel, cov, frame.box, np.ones(count))

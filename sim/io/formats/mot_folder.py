@@ -185,8 +185,7 @@ def open_text(
     in the file; the name is the file's, without suffix.
 
     Raises InputError if `fps` is not above 0, or if the file is unreadable, invalid or has no row, or a row has neither
-    box nor ground position. Reading the truth raises InputError for an id twice in a frame, a row without box, or an
-    invalid visibility.
+    box nor ground position. Reading the truth raises InputError for an id twice in a frame, or an invalid visibility.
     """
     rate = frame_rate(fps, None)
     scale = float("nan") if px_per_m is None else px_per_m

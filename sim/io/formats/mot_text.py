@@ -124,15 +124,22 @@ def read_detections(path: Path, length: int | None) -> DetectionTable:
     Raises InputError as read_table, and for a row without box (-1,-1,-1,-1) if any row lacks a ground point.
     """
     table = read_table(path, length=length, boxless=True)
-    ground, boxless = table.ground(), table.without_box()
+    ground, boxless = table.ground(), _reject_placeless(table)
     score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
     plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
-    if plane == "image":
-        table.rows.reject(boxless, "a box, or x, y, z in every line", "give each detection a box or a ground position")
     pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
     order = np.argsort(table.frame, kind="stable")
     box = None if boxless.any() else table.box[order]
     return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
+
+
+def _reject_placeless(table: MotTable) -> Bools:
+    """Return flags (N,), True for rows without box. Raise InputError for the first of them if any row lacks a ground
+    position."""
+    ground, boxless = table.ground(), table.without_box()
+    if ground is None or np.isnan(ground).any():
+        table.rows.reject(boxless, "a box, or x, y, z in every line", "give each line a box or a ground position")
+    return boxless
 
 
 def ground_cells(xyz: Sequence[float]) -> str:
@@ -162,13 +169,15 @@ def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_
     Rows with flag 0 or (in 8 or 9 columns) a class other than 1 are left out, as in MOTChallenge's own scoring; so are
     negative ids. They must be valid all the same. The rest is sorted by (frame, id). name, fps (frames/s): of the
     sequence. length: number of frames; None: up to the last frame kept. px_per_m: image scale; nan: the median height
-    of the boxes / 1.7 m. Positions and velocities are None without ground positions, nan in rows where they are
-    unknown; velocities are differences over 0.5 s. Visibility is 1 where the file has none or -1.
+    of the boxes / 1.7 m, nan without boxes. Boxes are None if a row has none (-1,-1,-1,-1). Positions and velocities
+    are None without ground positions, nan in rows where they are unknown; velocities are differences over 0.5 s.
+    Visibility is 1 where the file has none or -1.
 
-    Raises InputError as read_table (unreadable file, invalid line, frame beyond `length`, row without box), for an id
-    twice in a frame, and for a visibility outside [0, 1] other than -1.
+    Raises InputError as read_table (unreadable file, invalid line, frame beyond `length`), for a row without box if any
+    row lacks a ground position, for an id twice in a frame, and for a visibility outside [0, 1] other than -1.
     """
-    table = read_table(path, length=length)
+    table = read_table(path, length=length, boxless=True)
+    boxed = not _reject_placeless(table).any()
     keep = table.id >= 0
     nine = table.rest.shape[1] in (2, 3)
     if table.rest.shape[1]:
@@ -186,7 +195,7 @@ def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_
         visibility = np.where(v[order] < 0, 1.0, v[order])
     ground = table.ground()
     place = None if ground is None else ground[order]
-    if not np.isfinite(px_per_m):
+    if not np.isfinite(px_per_m) and boxed:
         px_per_m = scale_of_all_boxes(box[:, 3])
     frames = length if length is not None else int(frame.max(initial=0))
     return Truth(
@@ -194,7 +203,7 @@ def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_
         group=np.full(len(order), -1, np.int64),
         pos=None if place is None else place[:, :2],
         vel=None if place is None else differentiate(frame, id, place[:, :2], fps),
-        box=box, visibility=visibility,
+        box=box if boxed else None, visibility=visibility,
         z=None if place is None else place[:, 2],
         labelled=np.zeros(frames, bool),
     )  # fmt: skip

@@ -93,7 +93,7 @@ def detections_words(given: Sequence[str]) -> str:
 
 
 def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> Any:
-    table = _empty_table()
+    table = empty_table()
     table.add_column("sequence", overflow="fold")
     for key in keys:
         table.add_column(key.removeprefix("group_").removesuffix("_core"), justify="right", no_wrap=True)
@@ -103,16 +103,17 @@ def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means:
         for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high"))[len(rows) == 1 :]:
             cells = (number(key, means[key][part], mean=True) for key in keys)
             table.add_row(name, *cells, style="bold" if part == "mean" else None)
-    return _with_title(title, table)
+    return with_title(title, table)
 
 
-def _empty_table() -> Any:
+def empty_table() -> Any:
+    """Returns a table of rich without columns and frame."""
     from rich.table import Table
 
     return Table(box=None, pad_edge=False, header_style="bold")
 
 
-def _with_title(title: str, table: Any, foot: str = "") -> Any:
+def with_title(title: str, table: Any, foot: str = "") -> Any:
     """Returns, for rich to print, the title above the table, not wrapped to the table's width, and below it the foot,
     if any, and an empty line."""
     from rich.console import Group
@@ -148,7 +149,7 @@ def difference_table(differences: Means, sequences: int) -> Any:
     over = "the same frames" if sequences == 1 else f"{sequences} sequences"
     title = f"these tracks minus --against, in pairs over {over}"
     title += "" if sequences >= ENOUGH or sequences == 1 else f" (fewer than {ENOUGH}: an indication)"
-    table, few = _empty_table(), False
+    table, few = empty_table(), False
     for name in ("score", "difference", "95 % low", "95 % high", ""):
         table.add_column(name, justify="left" if name == "score" else "right")
     for key in (key for keys in TABLES.values() for key in keys):
@@ -158,7 +159,7 @@ def difference_table(differences: Means, sequences: int) -> Any:
             table.add_row(key, *cells, "*" if is_sure(d) else "")
             few = few or d.get("pairs", FEWEST) < FEWEST
     foot = f"no star below {FEWEST} pairs: so few cannot show a sure difference" if few and sequences > 1 else ""
-    return _with_title(title, table, foot)
+    return with_title(title, table, foot)
 
 
 def is_sure(difference: Mapping[str, float]) -> bool:

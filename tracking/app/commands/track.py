@@ -10,12 +10,12 @@ from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.printable import counted, printable
-from sim.io.files.output_paths import output_paths
 from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
+from tracking.app.run_folders import run_folders
 from tracking.config import Config
 from tracking.grouping.link_rule import LinkRule
 from tracking.run import TrackingRun
@@ -88,7 +88,7 @@ def track(options: TrackOptions) -> CommandResult:
         options.source, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=pictures,
         background=options.background,
     )  # fmt: skip
-    folders = _output_folders(sequences, options.source, options.out)
+    folders = run_folders(sequences, options.source, options.out)
     for folder in folders:
         reject_foreign(folder)
     _check_modes(setup, needs, sequences, options.background)
@@ -163,19 +163,6 @@ def _total_frames(sequences: list[Sequence]) -> int | None:
     0 for none."""
     lengths = [sequence.length for sequence in sequences]
     return None if None in lengths else sum(length or 0 for length in lengths)
-
-
-def _output_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
-    """Returns the folder for each sequence's tracks: `out` itself if the source is one sequence, else out/<sequence
-    name>, as a file name.
-
-    A dataset that holds a single sequence folder is no single sequence. Raises InputError if two sequences would share
-    a folder.
-    """
-    own = Path(sequences[0].source.get("path", source))
-    if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
-        return [out]
-    return output_paths(out, [sequence.name for sequence in sequences], source=source)
 
 
 def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:

@@ -200,6 +200,20 @@ def test_too_many_lines_of_a_frame(tmp_path):
         mot_text.read_table(path)
 
 
+def test_people_without_boxes(tmp_path):
+    """Trajectories on the ground, as a text of one's own."""
+    path = tmp_path / "walk.txt"
+    path.write_text("1,1,-1,-1,-1,-1,1,3,4,0\n2,1,-1,-1,-1,-1,1,3.5,4,0\n2,2,10,10,20,50,1,6,4,0\n")
+    truth = mot_text.read_truth(path, "x", 2.0)
+    assert truth.box is None
+    assert np.isnan(truth.px_per_m)
+    assert truth.pos.tolist() == [[3, 4], [3.5, 4], [6, 4]]
+    path.write_text("1,1,-1,-1,-1,-1,1,3,4,0\n1,2,10,10,20,50,1,-1,-1,-1\n")
+    with pytest.raises(InputError, match="a box, or x, y, z in every line") as error:
+        mot_text.read_truth(path, "x", 2.0)
+    assert error.value.place == "line 1"
+
+
 def test_a_row_that_does_not_count_hides_no_duplicate(tmp_path):
     """The neighbours of the sorted table are not enough: a row of flag 0 may lie between two rows of one id."""
     path = tmp_path / "gt.txt"

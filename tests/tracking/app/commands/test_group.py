@@ -1,0 +1,343 @@
+"""`flockscope group`: from people with ids to a sealed run with groups and events; labels of groups are never read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.loading.resolve import load
+from sim.io.source import open_source
+from sim.io.store.event_files import event_dict
+from sim.io.store.run_seal import NAMES, check_run
+from sim.io.store.track_files import read_tracks, write_tracks
+from sim.sequence import simulate
+from sim.types import Tracks
+from tests.sealing import seal_again
+from tests.short_scene import write_short_scene
+from tracking import group
+from tracking.app.cli import run
+
+FPS = 10.0
+Place = Callable[[float], tuple[float, float]]
+
+WALK: dict[int, Place] = {
+    1: lambda t: (1 + 1.2 * t, 2.0),
+    2: lambda t: (1 + 1.2 * t, 2.8),
+    3: lambda t: (1 + 1.2 * t, 3.6 + 0.8 * max(0.0, 6 - t)),
+    4: lambda t: (26 - 1.1 * t, 2.4),
+    5: lambda t: (1 + 1.2 * t, 9.0),
+    6: lambda t: (26 - 1.1 * t, 3.2),
+}
+"""Two people walk together, a third joins them, two others walk through them, one stays away."""
+
+
+def text(frames: int = 200, box: str = "-1,-1,-1,-1") -> str:
+    """The walk as MOTChallenge text on the ground."""
+    rows = [(k, p, *at((k - 1) / FPS)) for k in range(1, frames + 1) for p, at in WALK.items()]
+    return "".join(f"{k},{p},{box},1,{x:.3f},{y:.3f},0\n" for k, p, x, y in rows)
+
+
+def boxes(frames: int = 200, scale: float = 40.0) -> str:
+    """The walk as MOTChallenge text of boxes in the image, 40 px per m."""
+    rows = [(k, p, *at((k - 1) / FPS)) for k in range(1, frames + 1) for p, at in WALK.items()]
+    return "".join(
+        f"{k},{p},{scale * x:.2f},{scale * y:.2f},{0.5 * scale:g},{1.7 * scale:g},1,-1,-1,-1\n" for k, p, x, y in rows
+    )
+
+
+def biwi(folder: Path, groups: str | None = "1 2 3\n") -> Path:
+    """The walk as a BIWI folder, each fourth frame."""
+    folder.mkdir(parents=True)
+    rows = [
+        (6 * k, p, *at(0.4 * k), *(np.subtract(at(0.4 * k), at(0.4 * k - 0.4)) / 0.4))
+        for k in range(50)
+        for p, at in WALK.items()
+    ]
+    (folder / "obsmat.txt").write_text("".join(f"{k} {p} {x} 0 {y} {u} 0 {v}\n" for k, p, x, y, u, v in rows))
+    if groups is not None:
+        (folder / "groups.txt").write_text(groups)
+    return folder
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Path:
+    path = tmp_path / "walk.txt"
+    path.write_text(text())
+    return path
+
+
+def done(capsys, *words: object) -> dict:
+    capsys.readouterr()
+    code = run([*map(str, words), "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert code == 0, found
+    return found
+
+
+def refused(capsys, *words: object) -> str:
+    capsys.readouterr()
+    assert run([str(word) for word in words]) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    return line
+
+
+def told(tracks: Tracks) -> list[dict]:
+    return [event_dict(e) for e in tracks.events]
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """The files of a run, without what run.json tells of the labels."""
+    found = {name: (folder / name).read_bytes() for name in NAMES if (folder / name).exists()}
+    told = json.loads(found.pop("run.json"))
+    return {**found, "run.json": json.dumps({**told, "truth_hash": "", "sha256": ""}).encode()}
+
+
+def test_a_text(walk, tmp_path, capsys):
+    found = done(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
+    (row,) = found["runs"]
+    assert (row["sequence"], row["people"], row["people_in_groups"], row["plane"]) == ("walk", 6, 5, "ground")
+    one, other = row["groups"]
+    assert (other["members"], other["size"]) == ([4, 6], 2)
+    assert (one["members"], one["size"], one["end"]) == ([1, 2, 3], 3, 200)
+    assert one["seconds"] == (200 - one["start"] + 1) / FPS
+    assert {kind: n for kind, n in row["events"].items() if n} == {"merge": 1, "cross": 1}
+    told = check_run(tmp_path / "g")
+    assert told["truth_hash"] is None, "the rows of a text are no labels"
+    tracks = read_tracks(tmp_path / "g")
+    assert [t.group[:2].tolist() for t in tracks[20:]] == [[1, 1]] * 180
+    (merge,) = (e for t in tracks for e in t.events if e.kind == "merge")
+    assert merge.members == (1, 2, 3)
+
+
+def test_other_commands_take_the_run(walk, tmp_path, capsys):
+    """The text is a source, too; and the run may be scored with labels of that name."""
+    assert run(["group", str(walk), "--fps", "10", "--out", str(tmp_path / "g")]) == 0
+    out = capsys.readouterr().out
+    assert "positions in metres" in out
+    assert "1 2 3" in out
+    assert run(["validate", str(tmp_path / "g")]) == 0
+    assert run(["view", str(walk), str(tmp_path / "g"), "--fps", "10", "--out", str(tmp_path / "page.html")]) == 0
+    labels = biwi(tmp_path / "biwi" / "walk")
+    (tmp_path / "slow" / "walk.txt").parent.mkdir()
+    rows = [(k + 1, p, *at(0.4 * k)) for k in range(50) for p, at in WALK.items()]
+    (tmp_path / "slow" / "walk.txt").write_text("".join(f"{k},{p},-1,-1,-1,-1,1,{x},{y},0\n" for k, p, x, y in rows))
+    assert run(["group", str(tmp_path / "slow" / "walk.txt"), "--fps", "2.5", "--out", str(tmp_path / "h")]) == 0
+    (row,) = done(capsys, "score", labels, tmp_path / "h")["sequences"]
+    assert row["pairwise_F1"] > 0.7
+    assert row["HOTA"] == 1
+
+
+@pytest.mark.parametrize("groups", [None, "", "1 4\n2 5\n", "1 2 3 4 5\n"])
+def test_labels_of_groups_are_never_read(tmp_path, capsys, groups):
+    labelled = [biwi(tmp_path / k / "walk", labels) for k, labels in (("a", "1 2 3\n"), ("b", groups))]
+    for folder in labelled:
+        done(capsys, "group", folder, "--out", folder.parent / "g")
+        assert "error" not in done(capsys, "view", folder, folder.parent / "g", "--out", folder.parent / "g.html")
+    first, second = (content(folder.parent / "g") for folder in labelled)
+    assert first == second
+    (row,) = done(capsys, "score", labelled[0], tmp_path / "a" / "g")["sequences"]
+    assert row["pairwise_F1"] > 0.7
+    assert "tracks of another walk" in refused(capsys, "score", labelled[0], tmp_path / "b" / "g") or groups is None
+
+
+def test_truth_of_groups_is_not_used():
+    sequence = simulate(load("merge", ["camera.fps=5"]), seed=0, streams=())
+    truth = sequence.truth
+    blind = truth.replace(group=np.full(len(truth.id), -1), groups=None, groups_px=None, events=None, near=None)
+    one, other = (group(replace(sequence, load_truth=lambda t=t: t)) for t in (truth, blind))
+    assert any((t.group >= 0).any() for t in one)
+    assert any(t.events for t in one)
+    assert all(np.array_equal(a.group, b.group) and told(a) == told(b) for a, b in zip(one, other, strict=True))
+    assert one.info == other.info
+
+
+@pytest.mark.parametrize("form", ["ground text", "folder of boxes", "biwi"])
+def test_nothing_later_is_used(tmp_path, capsys, form):
+    """The first part of a recording alone has the same groups, and the events that were known by then."""
+    cut = 120
+    found = []
+    for name, frames in (("whole", 200), ("part", cut)):
+        folder, options = tmp_path / name, ["--fps", "10", "--px-per-m", "40"]
+        if form == "biwi":
+            source, options, cut = biwi(folder / "walk"), [], 30
+            rows = (source / "obsmat.txt").read_text().splitlines(keepends=True)
+            (source / "obsmat.txt").write_text("".join(rows[: len(WALK) * (50 if name == "whole" else cut)]))
+        else:
+            source = folder / "walk" / "gt" / "gt.txt"
+            source.parent.mkdir(parents=True)
+            source.write_text(text(frames) if form == "ground text" else boxes(frames))
+            source = source if form == "ground text" else folder / "walk"
+        done(capsys, "group", source, *options, "--out", folder / "g")
+        found.append(read_tracks(folder / "g")[: cut - 1])
+    for a, b in zip(*found, strict=True):
+        assert np.array_equal(a.group, b.group)
+        assert told(a) == told(b)
+        assert np.array_equal(a.vel, b.vel, equal_nan=True)
+    assert any(t.events for t in found[0])
+
+
+def test_a_run(walk, tmp_path, capsys):
+    """Its tracker and what it got stay; its groups and their rule are replaced; its labels still are its own."""
+    write_short_scene(tmp_path, "40000:40002")
+    data, first = tmp_path / "data", tmp_path / "blob"
+    (tmp_path / "far.toml").write_text("[params]\nnear = 0.5\n")
+    (tmp_path / "soon.toml").write_text("[params]\nacquaintance = 0.2\n")
+    line = ["blob", data, "--detections", "truth", "--grouping", tmp_path / "far.toml"]
+    done(capsys, "track", *line, "--out", first)
+    found = done(capsys, "group", first, "--grouping", tmp_path / "soon.toml", "--out", tmp_path / "again")
+    assert [row["sequence"] for row in found["runs"]] == ["scene-s40000", "scene-s40001"]
+    assert [len(row["groups"]) for row in found["runs"]] == [1, 1]
+    before, after = (check_run(folder / "scene-s40001") for folder in (first, tmp_path / "again"))
+    assert (before["grouping"]["near"], after["grouping"]["near"], after["grouping"]["acquaintance"]) == (0.5, 1.5, 0.2)
+    assert all(before[key] == after[key] for key in ("tracker", "config", "truth_hash", "detections", "px_per_m"))
+    scored = done(capsys, "score", data, tmp_path / "again", "--against", first)
+    assert all(d["what"].startswith("grouping") for d in scored["differences"])
+    done(capsys, "group", tmp_path / "again" / "scene-s40000" / "tracks.parquet", "--out", tmp_path / "third")
+    assert "grouping" not in check_run(tmp_path / "third")
+    for folder in (first, first / "scene-s40000"):
+        assert "the folder of the tracks themselves" in refused(capsys, "group", folder, "--out", folder)
+
+
+def test_a_dataset(tmp_path, capsys):
+    write_short_scene(tmp_path, "40000:40002")
+    assert run(["group", str(tmp_path / "data"), "--out", str(tmp_path / "g")]) == 0
+    assert "all" in capsys.readouterr().out
+    found = done(capsys, "score", tmp_path / "data", tmp_path / "g")
+    assert found["mean"]["HOTA"]["mean"] == 1
+    assert {check_run(tmp_path / "g" / f"scene-s4000{k}")["tracker"] for k in (0, 1)} == {"group"}
+
+
+def test_texts_of_a_folder(tmp_path, capsys):
+    """As trackers write them: one text for each sequence."""
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.txt").write_text(text(30))
+    found = done(capsys, "group", tmp_path, "--fps", 10, "--out", tmp_path / "out" / "g")
+    assert [row["sequence"] for row in found["runs"]] == ["a", "b"]
+
+
+def test_boxes(tmp_path, capsys):
+    """In the image by the scale that is given, or that of the first boxes; on the ground by a camera."""
+    (tmp_path / "walk.txt").write_text(boxes())
+    (row,) = done(capsys, "group", tmp_path / "walk.txt", "--fps", 10, "--out", tmp_path / "a")["runs"]
+    assert (row["plane"], row["px_per_m"], row["px_per_m_frames"]) == ("image", 40, 17)
+    assert [g["members"] for g in row["groups"]] == [[1, 2, 3], [4, 6]]
+    assert check_run(tmp_path / "a")["causal_from"] == 17
+    options = ["--fps", 10, "--px-per-m", 400]
+    (row,) = done(capsys, "group", tmp_path / "walk.txt", *options, "--out", tmp_path / "b")["runs"]
+    assert (row["px_per_m"], row["px_per_m_frames"], row["people_in_groups"]) == (400, 0, 6)
+    camera = {
+        "kind": "top", "image": [1600, 800], "focal_px": [40, 40], "centre_px": [800, 400], "position": [20, 10, 10],
+        "rotation": [[1, 0, 0], [0, -1, 0], [0, 0, -1]], "baseline": 0, "px_per_m": 40,
+    }  # fmt: skip
+    (tmp_path / "camera.json").write_text(json.dumps(camera))
+    options = ["--fps", 10, "--camera", tmp_path / "camera.json"]
+    (row,) = done(capsys, "group", tmp_path / "walk.txt", *options, "--out", tmp_path / "c")["runs"]
+    assert row["plane"] == "ground"
+    assert [g["members"] for g in row["groups"]] == [[1, 2, 3], [4, 6]]
+
+
+def test_without_people(tmp_path, capsys):
+    """Nobody labelled, and a person alone: tables without groups."""
+    (tmp_path / "walk" / "gt").mkdir(parents=True)
+    (tmp_path / "walk" / "gt" / "gt.txt").write_text("3,1,5,5,10,20,0,1,1\n")
+    found = done(capsys, "group", tmp_path / "walk", "--fps", 10, "--out", tmp_path / "g")
+    assert (found["runs"][0]["people"], found["runs"][0]["groups"]) == (0, [])
+    assert run(["group", str(tmp_path / "walk"), "--fps", "10", "--out", str(tmp_path / "g")]) == 0
+
+
+BAD = {
+    "no ids": ("1,-1,5,5,10,20,1\n2,-1,5,5,10,20,1\n", "no people with ids"),
+    "no place": ("1,1,-1,-1,-1,-1,1,-1,-1,-1\n", "line 1"),
+    "some places": ("1,1,5,5,10,20,1,3,4,0\n1,2,5,5,10,20,1,-1,-1,-1\n", "frame 1, id 2: got no position"),
+    "an id twice": ("1,1,5,5,10,20,1\n1,1,6,5,10,20,1\n", "each id once in a frame"),
+    "words": ("frame,id,x,y\n1,1,2,3\n", "line 1"),
+    "four columns": ("1,1,2,3\n", "line 1"),
+    "nothing": ("", "no row"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_text_that_tells_no_people(tmp_path, capsys, name):
+    rows, expected = BAD[name]
+    (tmp_path / "walk.txt").write_text(rows)
+    line = refused(capsys, "group", tmp_path / "walk.txt", "--fps", "10", "--out", tmp_path / "g")
+    assert expected in line
+    assert "walk.txt" in line
+    assert not (tmp_path / "g").exists()
+
+
+def test_wrong_sources(walk, tmp_path, capsys):
+    assert "nothing there" in refused(capsys, "group", tmp_path / "none", "--out", tmp_path / "g")
+    (tmp_path / "empty").mkdir()
+    assert "no tracks" in refused(capsys, "group", tmp_path / "empty", "--out", tmp_path / "g")
+    (tmp_path / "m" / "det").mkdir(parents=True)
+    (tmp_path / "m" / "det" / "det.txt").write_text("1,-1,5,5,10,20,1\n")
+    found = refused(capsys, "group", tmp_path / "m", "--fps", "10", "--out", tmp_path / "g")
+    assert "no people with ids" in found
+    assert "track the people first" in found
+
+
+def test_wrong_options(walk, tmp_path, capsys):
+    here = ["group", walk, "--fps", "10", "--out", tmp_path / "g"]
+    (tmp_path / "blob.toml").write_text('tracker = "blob"\n[params]\ngate = 0.9\n')
+    assert "blob.toml" in refused(capsys, *here, "--grouping", tmp_path / "blob.toml")
+    (tmp_path / "wrong.toml").write_text("[params]\nnaer = 1.0\n")
+    assert "naer" in refused(capsys, *here, "--grouping", tmp_path / "wrong.toml")
+    assert "none.toml" in refused(capsys, *here, "--grouping", tmp_path / "none.toml")
+    assert "--probabilities" in refused(capsys, *here, "--probabilities")
+    folder = biwi(tmp_path / "biwi")
+    assert "--px-per-m" in refused(capsys, "group", folder, "--px-per-m", "40", "--out", tmp_path / "g")
+    assert not (tmp_path / "g").exists()
+    (tmp_path / "g").mkdir()
+    (tmp_path / "g" / "groups.csv").write_text("mine")
+    assert "groups.csv: got a file of another program" in refused(capsys, *here)
+    assert (tmp_path / "g" / "groups.csv").read_text() == "mine"
+
+
+def test_wrong_runs(walk, tmp_path, capsys):
+    done(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
+    line = ["group", tmp_path / "g", "--out", tmp_path / "h"]
+    for option in (["--fps", "10"], ["--px-per-m", "40"]):
+        assert f"got {option[0]}; expected none for a run" in refused(capsys, *line, *option)
+    done(capsys, "track", "group-pda", walk, "--fps", 10, "--out", tmp_path / "wholes")
+    assert "tracks of whole groups" in refused(capsys, "group", tmp_path / "wholes", "--out", tmp_path / "h")
+    (tmp_path / "g" / "events.json").unlink()
+    assert "events.json: got missing" in refused(capsys, *line)
+
+
+def test_a_run_in_the_image_without_scale(tmp_path, capsys):
+    (tmp_path / "walk.txt").write_text(boxes(30))
+    done(capsys, "group", tmp_path / "walk.txt", "--fps", 10, "--out", tmp_path / "g")
+    tracks = [t.replace(box=None) for t in read_tracks(tmp_path / "g")]
+    write_tracks(tmp_path / "mine", tracks, fps=FPS, info={"tracker": "mine.py:Mine", "plane": "image"})
+    line = ["group", tmp_path / "mine", "--fps", 10, "--out", tmp_path / "h"]
+    assert "give --px-per-m" in refused(capsys, *line)
+    (row,) = done(capsys, *line, "--px-per-m", 40)["runs"]
+    assert row["px_per_m"] == 40
+    seal_again(tmp_path / "mine", px_per_m=40.0)
+    (row,) = done(capsys, *line)["runs"]
+    assert row["px_per_m"] == 40
+
+
+def test_keys_of_run_json(walk, tmp_path, capsys):
+    """Those of a tracker's run, but its speeds."""
+    done(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
+    done(capsys, "track", "group-pda", walk, "--fps", 10, "--out", tmp_path / "t")
+    mine, theirs = (check_run(tmp_path / name).keys() for name in "gt")
+    assert theirs - mine == {"frames_per_second", "whole_frames_per_second"}
+    assert mine <= theirs
+
+
+def test_recorded_people(shared_data, tmp_path, capsys):
+    """The street that all figures are about, by one line each."""
+    folder = shared_data / "biwi" / "seq_hotel"
+    done(capsys, "group", folder, "--out", tmp_path / "g")
+    (row,) = done(capsys, "score", folder, tmp_path / "g")["sequences"]
+    assert row["pairwise_F1"] > 0.6
+    assert open_source(folder)[0].name == row["name"]

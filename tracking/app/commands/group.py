@@ -1,0 +1,112 @@
+"""`flockscope group`: groups and events of people whose ids are known, stored as a run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from scenarios.errors import InputError
+from sim.io.formats.mot_folder import frame_rate
+from sim.io.source import RecordingOptions, holds_sequences, open_source
+from sim.io.store.run_seal import WHOLE, reject_foreign, run_folder
+from sim.types import Sequence
+from tracking import run as runs
+from tracking.app import option_parsing
+from tracking.app.command_options import GroupOptions
+from tracking.app.command_result import CommandResult
+from tracking.app.commands.group_tables import group_row, group_tables
+from tracking.app.progress import ProgressMeter
+from tracking.app.run_folders import run_folders
+from tracking.app.stored_tracks import StoredTracks, find_tracks
+from tracking.grouping.link_rule import LinkRule
+
+TEXT = "mot text"
+"""Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence."""
+
+
+def group(options: GroupOptions) -> CommandResult:
+    """Groups the people of every sequence, or of every stored run, and stores each as a run; returns tables of groups
+    and events.
+
+    The run of a single sequence goes to --out, those of several to --out/<sequence name>. The result's data: "runs", a
+    dictionary for each (tracking.app.commands.group_tables.group_row).
+
+    Raises InputError if an option is wrong or has no effect, the source or the tracks cannot be read, there are no
+    people with ids, people lie in the image and its scale is unknown, or a folder is the source itself or holds files
+    of another program with names of a run. Raises WorkError if the disk is full. Runs stored before an error stay.
+    """
+    option_parsing.output_folder(options.out)
+    rule = None if options.grouping is None else LinkRule.from_toml(options.grouping)
+    if options.probabilities:
+        raise InputError(
+            place="--probabilities", got="a grouping by thresholds", expected="one that computes probabilities",
+            remedy="leave it out",
+        )  # fmt: skip
+    sequences, stored = _opened(options)
+    folders = run_folders(sequences, options.source, options.out)
+    for folder, tracks in zip(folders, stored, strict=True):
+        _refuse(folder, tracks)
+    rows = []
+    with ProgressMeter("group", len(sequences)) as meter:
+        for sequence, tracks, folder in zip(sequences, stored, folders, strict=True):
+            run = runs.group(sequence, None if tracks is None else tracks.read(sequence), grouping=rule)
+            run.write(folder, replace(sequence, load_truth=None) if sequence.source["kind"] == TEXT else sequence)
+            rows.append(group_row(run, folder))
+            meter.step(sequence.name)
+    return CommandResult({"runs": rows}, group_tables(rows))
+
+
+def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | None]]:
+    """Returns the sequences of the source, and for each its run if the source is stored tracks of ours, else None.
+
+    Raises InputError if there are neither sequences nor tracks, one cannot be read, or an option has no effect.
+    """
+    path = options.source
+    own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
+    if not own and (not path.is_dir() or holds_sequences(path)):
+        sequences = _open(path, options)
+        return sequences, [None] * len(sequences)
+    sequences, found = [], find_tracks(path)
+    for tracks in found:
+        if tracks.info:
+            sequences.append(_of_run(tracks, options))
+        else:
+            text = tracks.path / "tracks.txt" if tracks.path.is_dir() else tracks.path
+            sequences.append(replace(_open(text, options)[0], name=tracks.name or text.stem))
+    return sequences, [tracks if tracks.info else None for tracks in found]
+
+
+def _open(path: Path, options: GroupOptions) -> list[Sequence]:
+    return open_source(path, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=False)
+
+
+def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
+    """Returns a run's sequence without frames: its name, frame rate, length and image scale, and the hash of what was
+    tracked.
+
+    Raises InputError if the run is not whole, or for an option that has no effect on it.
+    """
+    tracks.check()
+    info, folder = tracks.info, tracks.path if tracks.path.is_dir() else tracks.path.parent
+    recording = RecordingOptions(options.fps, options.px_per_m, options.camera, True, None)  # type: ignore[arg-type]
+    stated = [name for name, known in (("fps", "fps" in info), ("px_per_m", info.get("plane") != "image")) if known]
+    recording.reject(folder, "a run", "run.json states it", "camera", *stated)
+    scale, frames = info.get("px_per_m"), int(info.get("px_per_m_frames") or 0)
+    if options.px_per_m is not None:
+        scale, frames = options.px_per_m, 0
+    return Sequence(
+        name=info.get("sequence", folder.name), fps=frame_rate(options.fps, info.get("fps")), length=info.get("frames"),
+        frames=lambda: iter(()), px_per_m=float("nan") if scale is None else scale,
+        source={"kind": "run", "path": str(folder), "truth_hash": info.get("truth_hash"), "px_per_m_frames": frames},
+    )  # fmt: skip
+
+
+def _refuse(folder: Path, tracks: StoredTracks | None) -> None:
+    """Raises InputError if the folder is that of the tracks to be grouped, or holds files of another program with names
+    of a run; else returns nothing."""
+    if tracks is not None and folder.resolve() in (tracks.path.resolve(), tracks.path.resolve().parent):
+        raise InputError(
+            file=folder, place="--out", got="the folder of the tracks themselves", expected="another folder",
+            remedy="choose another --out",
+        )  # fmt: skip
+    reject_foreign(folder)

@@ -1,0 +1,69 @@
+"""The labelled people of a sequence as tracks with known ids and without groups, for grouping without a tracker.
+
+Frames, ids, positions, boxes and stated velocities are used. Labels of groups and events are not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.dataset.replay import on_ground
+from sim.types import FrameTruth, Plane, Sequence, Tracks, Truth
+
+LOOK_AHEAD = ("mot", "mot text")
+"""Kinds of sources whose velocities are computed from earlier and later positions."""
+
+
+def known_people(sequence: Sequence) -> list[Tracks]:
+    """Return the labelled people of a sequence as causal tracks of persons without groups, one `Tracks` per frame
+    from 1.
+
+    They are those of `people_as_tracks`, with two exceptions. Velocities that the source does not state (MOTChallenge)
+    are nan. People who have boxes only are on the ground, in m, if the sequence has a camera (sim.dataset.replay).
+
+    Raises InputError if the sequence has no people with ids, its labels cannot be read, or only some people have a
+    position on the ground; a box above the horizon of the camera has none. Raises WorkError if an order of a simulated
+    script was not fulfilled.
+    """
+    truth, file = sequence.truth, sequence.source.get("path", sequence.name)
+    if truth is None:
+        raise InputError(
+            file=file, got="no people with ids", expected="labelled people, or tracks",
+            remedy="track the people first (flockscope track), or give each row an id",
+        )  # fmt: skip
+    if truth.pos is None and sequence.camera is not None:
+        truth = truth.replace(pos=on_ground(truth, sequence))
+    elif sequence.source.get("kind") in LOOK_AHEAD:
+        truth = truth.replace(vel=None)
+    unknown = np.zeros(0, bool) if truth.pos is None else ~np.isfinite(truth.pos).all(axis=1)
+    if unknown.any():
+        row = int(np.argmax(unknown))
+        raise InputError(
+            file=file, place=f"frame {truth.frame[row]}, id {truth.id[row]}", got="no position on the ground",
+            expected="one of every person, or of nobody", remedy="complete the row, or leave it out",
+        )  # fmt: skip
+    return people_as_tracks(truth)
+
+
+def people_as_tracks(truth: Truth) -> list[Tracks]:
+    """Returns the labelled people of every frame as tracks of persons without groups, one `Tracks` per frame from 1.
+
+    The tracks lie on the ground in m, or at box centres in the image in px if the truth has no positions. Ids and boxes
+    are the labelled ones, scores 1. Velocities are nan if the truth has none; covariances are 0. A frame without people
+    has no rows. Fails an assertion if the truth has neither positions nor boxes.
+    """
+    plane: Plane = "image" if truth.pos is None else "ground"
+    return [_tracks(truth.at(index), plane) for index in range(1, truth.length + 1)]
+
+
+def _tracks(frame: FrameTruth, plane: Plane) -> Tracks:
+    count = len(frame.id)
+    if frame.pos is not None:
+        pos = frame.pos
+    else:
+        assert frame.box is not None, "labels have positions or boxes"
+        pos = frame.box[:, :2] + frame.box[:, 2:] / 2
+    vel = frame.vel if frame.vel is not None else np.full((count, 2), np.nan)
+    no_group, cov = np.full(count, -1), np.zeros((count, 4, 4))
+    return Tracks(frame.index, frame.t, plane, "person", frame.id, no_group, pos, vel, cov, frame.box, np.ones(count))
