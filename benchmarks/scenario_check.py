@@ -1,7 +1,8 @@
 """Do the orders of scenarios come true, and how hard are the scenes for the baseline grouping rule?
 
     python -m benchmarks.scenario_check orders [--seeds 0:100] [scenario, suite or file …]
-    python -m benchmarks.scenario_check difficulty [--seeds 20000:20020] [scenario, suite or file …]
+    python -m benchmarks.scenario_check difficulty [--seeds 20000:20020] [--rule present] [--without queue]
+                                                   [scenario, suite or file …]
 
 orders: one line per scenario: seeds on which an order failed (with reasons beneath), orders that came true, number of
 people, pace, and number and onset (mean ± standard deviation, s) of each kind of measured event. Pace is a person's
@@ -9,6 +10,8 @@ greatest speed over any 0.8 s from the firing of an order until it has come true
 person's own speed: the greater of the speeds that their group has before and after the order. Quantiles 50, 99, 100 %;
 the aim is at most 1.15.
 difficulty: scores of the baseline rule on true positions and velocities, so that what it misses is due to the scene.
+--rule present: of a trivial rule that judges the present alone (two frames), with the distance and velocity difference
+of the baseline rule. --without: entries whose name holds this word are left out.
 `event` is the mean of the F1 of merges and of splits by the counts of all sequences together. The columns of kinds are
 hits/false/missed of all sequences; a dash means neither a true nor a reported event. The further scores are means over
 sequences, below them their 95 % intervals. An event F1 above 0.98 is marked *: events there separate no trackers.
@@ -31,13 +34,22 @@ from scenarios.schema.scenario import Scenario
 from sim.crowd.population import draw_population, walking_speed
 from sim.crowd.world import run
 from sim.sequence import observe, simulate
+from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY
 from sim.truth.order_fulfilment import PATIENCE, RULE_TIME
 from sim.types import Array, Motion, Tracks, Truth
+from tracking.grouping.grouped_tracks import with_groups
+from tracking.grouping.link_rule import LinkRule
 from tracking.scoring import evaluate
 from tracking.scoring.evaluation import Scores
 from tracking.stats import mean_interval, wilson
 
 WINDOW = 0.8  # s
+RULES = {
+    "baseline": LinkRule(),
+    "present": LinkRule(
+        window=0.2, share=1.0, acquaintance=0.0, apart=MERGE_DISTANCE, patience=0.2, diverge=MERGE_VELOCITY
+    ),
+}
 KINDS = ("merge", "split", "cross", "queue")
 COUNTS = ("TP", "FP", "FN")
 MEANS = {
@@ -97,7 +109,7 @@ def orders(entry: Entry, seeds: range) -> None:
     print("; ".join(text), *failed, sep="\n    ", flush=True)
 
 
-def people_without_groups(truth: Truth, index: int) -> Tracks:
+def true_people(truth: Truth, index: int) -> Tracks:
     """Returns the true people of a frame as tracks that name no groups."""
     now = truth.at(index)
     assert now.pos is not None
@@ -107,7 +119,7 @@ def people_without_groups(truth: Truth, index: int) -> Tracks:
     return Tracks(index, now.t, "ground", "person", now.id, no_group, now.pos, now.vel, cov, None, score)
 
 
-def baseline_scores(entry: Entry, seeds: range) -> list[Scores]:
+def rule_scores(entry: Entry, seeds: range, rule: LinkRule) -> list[Scores]:
     """Returns the scores of each sequence; a seed that cannot be simulated is printed and left out."""
     found = []
     for seed in seeds:
@@ -117,8 +129,8 @@ def baseline_scores(entry: Entry, seeds: range) -> list[Scores]:
             print(f"{entry.name}, seed {seed}: {error.line()}")
             continue
         assert truth is not None
-        tracks = [people_without_groups(truth, index) for index in range(1, truth.length + 1)]
-        found.append(evaluate(truth, tracks))
+        tracks = [true_people(truth, index) for index in range(1, truth.length + 1)]
+        found.append(evaluate(truth, with_groups(tracks, truth.fps, truth.px_per_m, rule)))
     return found
 
 
@@ -137,11 +149,11 @@ def score_means(found: Sequence[Scores]) -> tuple[np.ndarray, np.ndarray, np.nda
     return mean_interval(np.array([[s[key] for key in MEANS.values()] for s in found]))
 
 
-def difficulty(title: str, entries: Sequence[Entry], seeds: range) -> None:
+def difficulty(title: str, entries: Sequence[Entry], seeds: range, rule: LinkRule) -> None:
     """Prints the rows of some entries, and of all of them together."""
     every: list[Scores] = []
     for entry in entries:
-        found = baseline_scores(entry, seeds)
+        found = rule_scores(entry, seeds, rule)
         every += found
         if found:
             row([entry.name, *difficulty_cells(found)])
@@ -155,15 +167,19 @@ def main() -> None:
     parser.add_argument("mode", choices=["orders", "difficulty"])
     parser.add_argument("name", nargs="*", help="scenarios, suites or files; the whole catalogue by default")
     add_seeds(parser, None)
+    parser.add_argument("--rule", choices=RULES, default="baseline", help="difficulty: the rule that is scored")
+    parser.add_argument("--without", metavar="WORD", help="leaves out entries whose name holds this word")
     args: argparse.Namespace = parser.parse_intermixed_args()
     chosen = {name: resolve(name) for name in args.name} or {"catalogue": [e for n in names() for e in resolve(n)]}
+    if args.without:
+        chosen = {title: [e for e in entries if args.without not in e.name] for title, entries in chosen.items()}
     if args.mode == "orders":
         for entry in [e for entries in chosen.values() for e in entries]:
             orders(entry, args.seeds or range(100))
         return
     head(["scenario", "event", *KINDS, *MEANS])
     for title, entries in chosen.items():
-        difficulty(title, entries, args.seeds or range(20_000, 20_020))
+        difficulty(title, entries, args.seeds or range(20_000, 20_020), RULES[args.rule])
 
 
 if __name__ == "__main__":

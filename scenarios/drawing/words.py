@@ -132,7 +132,8 @@ def sensor(scenario: Scenario) -> list[str]:
     """
     s = scenario.sensor
     edges = f"{s.noise_px:g} px on the edges of boxes" if s.box_noise is None else "in proportion to boxes"
-    points = "points under their feet" if s.points == "foot" else f"{s.noise_m:g} m on points"
+    error = f"{s.noise_m:g} m on points"
+    points = {"foot": "points under their feet", "seen": f"{error}, more where feet are hidden", "own": error}[s.points]
     chance = f"visibility^{s.occlusion_power:g}" if s.by_visibility is None else "a curve of visibility"
     lasting = s.persistence or s.miss_memory
     lines = [

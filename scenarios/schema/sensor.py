@@ -147,8 +147,9 @@ class Sensor(Model):
       min_visibility the probability is 0 all the same. miss_memory: slow parts of
       the misses, for persistence. box_noise: errors in box heights, for noise_px. These three are measured and replace
       the simpler key; None: they do not.
-    - points: "foot" (below the noisy box) or "own" (true position with noise_m); None: as "own". false_alarms: life,
-      places and sizes; None: one frame, anywhere.
+    - points: "seen" (true position with noise_m, displaced by as much as the visible part's foot is from the whole
+      body's on the ground), "own" (true position with noise_m), or "foot" (below the noisy box). Without camera or
+      boxes all are "own". false_alarms: life, places and sizes; None: one frame, anywhere.
     - true_scores, false_scores: evenly spaced quantiles of the scores of true detections and false alarms; None: not
       measured.
 
@@ -183,10 +184,10 @@ class Sensor(Model):
         None, description="parts of the misses of a person that change slowly; replaces persistence"
     )
     box_noise: BoxNoise | None = Field(None, description="errors proportional to the box height; replaces noise_px")
-    points: Literal["own", "foot"] | None = Field(
-        None,
-        description="points on the ground: foot = below the lower edge of the noisy box, own = true position "
-        "with noise_m",
+    points: Literal["own", "seen", "foot"] = Field(
+        "seen",
+        description="points on the ground: seen = true position with noise_m, displaced as the foot of the visible "
+        "part is; own = true position with noise_m; foot = below the lower edge of the noisy box",
     )
     false_alarms: FalseAlarms | None = Field(None, description="life, places and sizes of false alarms")
     true_scores: Curve | None = Field(

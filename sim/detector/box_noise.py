@@ -3,7 +3,7 @@
 The four errors of a box are, in order: middle to the right, foot (lower edge) downwards, top edge downwards, all three
 divided by the box height; and the logarithm of the width over the true width. `perturb_boxes` applies them,
 `box_errors` measures them. `move_edges` adds errors in px instead; `foot_points` gives the ground points on which boxes
-stand.
+stand, `seen_shift` the error of such a point if a part of the person is hidden.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sim.detector.visible_ground import furthest_row
 from sim.types import Array, Camera
 
 if TYPE_CHECKING:
@@ -95,6 +96,22 @@ def foot_points(box: Array, z: Array, camera: Camera) -> Array:
         s = (z - origin[:, 2]) / direction[:, 2]
     s = np.where(np.isfinite(s) & (s > 0), s, np.nan)
     return np.asarray(origin[:, :2] + s[:, None] * direction[:, :2])
+
+
+def seen_shift(box: Array, whole: Array, z: Array, camera: Camera) -> Array:
+    """Return by how many m (R, 2), along x and y, a person's foot point is displaced by what hides the person.
+
+    It is the foot point of the box of the visible part, box (R, 4), less that of the box of the whole body, whole (R,
+    4), both left, top, width, height in px; see `foot_points`, also for z (R,) m. A foot of a visible part above
+    `furthest_row`, where people become small, counts as one in this row, or as that of the whole body if that is higher
+    still. For a camera of kind "top" there is no such row. A row is 0 if both boxes are equal, and where the foot of
+    the whole body shows no ground.
+    """
+    lowest = -np.inf if camera.kind == "top" else furthest_row(camera)
+    foot, true_foot = box[:, 1] + box[:, 3], whole[:, 1] + whole[:, 3]
+    lowered = box + np.outer(np.maximum(np.minimum(true_foot, lowest) - foot, 0.0), [0.0, 0.0, 0.0, 1.0])
+    shift = foot_points(lowered, z, camera) - foot_points(whole, z, camera)
+    return np.where(np.isfinite(shift), shift, 0.0)
 
 
 def standing_share(camera: Camera | None) -> float:

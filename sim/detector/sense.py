@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.detector.box_noise import foot_points, move_edges, perturb_boxes
+from sim.detector.box_noise import foot_points, move_edges, perturb_boxes, seen_shift
 from sim.detector.clutter import false_alarms
 from sim.detector.correlated_noise import correlated_normals
 from sim.detector.draws import normals, true_scores, uniforms
@@ -51,9 +51,10 @@ def sense(
     with scores and without velocities. A frame without any has empty Detections.
 
     camera, image_size (width, height in px, ignored with a camera): place and size the false alarms. The camera also
-    scales `small_px` seen from above, and turns boxes into ground points if `sensor.points` is "foot". Without both,
-    false alarms are placed by the labels. seed, repeat (number of the suite entry's copy, 0 without copies): name the
-    random streams. people: ids of the people of each group that the script names, for `sensor.hide`; None: no groups.
+    scales `small_px` seen from above, and relates boxes to ground points if `sensor.points` is "seen" or "foot".
+    Without both, false alarms are placed by the labels. seed, repeat (number of the suite entry's copy, 0 without
+    copies): name the random streams. people: ids of the people of each group that the script names, for `sensor.hide`;
+    None: no groups.
 
     Raises InputError if `sensor.hide` names a group that is not in `people`, or if `sensor.box` is "visible" and the
     truth has boxes but no visible boxes. Raises AssertionError if the truth has neither positions nor boxes, ValueError
@@ -82,8 +83,8 @@ def _true_detections(
     box = None if base is None else _with_box_noise(base[seen], truth.visibility[seen], sensor, u[:, EDGES])
     if truth.pos is not None:
         pos = truth.pos[seen] + sensor.noise_m * normals(u[:, POINT]) if sensor.noise_m else truth.pos[seen]
-        if sensor.points == "foot" and box is not None and camera is not None:
-            pos = _foot_points_or(pos, box, truth, seen, camera)
+        if base is not None and box is not None and camera is not None:
+            pos = _displaced(pos, base[seen], box, truth, seen, sensor, camera)
     else:
         assert box is not None, "labels have positions or boxes"
         pos = box[:, :2] + box[:, 2:] / 2
@@ -91,17 +92,23 @@ def _true_detections(
     return Readings(truth.frame[seen], pos, box, score, u[:, ORDER])
 
 
-def _foot_points_or(otherwise: Array, box: Array, truth: Truth, seen: Bools, camera: Camera) -> Array:
-    """Return the ground points (N, 2) in m under the boxes (N, 4), left, top, width, height in px, as `camera` sees
-    them.
+def _displaced(
+    pos: Array, sensed: Array, box: Array, truth: Truth, seen: Bools, sensor: Sensor, camera: Camera
+) -> Array:
+    """Return the points (N, 2) in m that the detector reports, by `sensor.points`, given points with errors pos (N, 2).
 
-    A point is that of the middle of the lower edge; of the box's middle for a camera of kind "top". It is taken from
-    `otherwise` (N, 2) where a box shows no ground. seen (R,): True for the N rows of the truth to which the boxes
-    belong; their ground height counts, 0 if the truth has none.
+    "own": pos itself. "seen": pos displaced as the foot of the person's sensed box is. "foot": the place on the ground
+    at the foot of the reported box, or pos where that shows no ground. sensed, box (N, 4): boxes before and after
+    errors, left, top, width, height in px. seen (R,): True for the N rows of the truth to which they belong; their
+    ground height counts, 0 if the truth has none.
     """
+    if sensor.points == "own" or truth.box is None:
+        return pos
     z = np.zeros(len(box)) if truth.z is None else truth.z[seen]
-    pos = foot_points(box, z, camera)
-    return np.where(np.isfinite(pos), pos, otherwise)
+    if sensor.points == "seen":
+        return pos + seen_shift(sensed, truth.box[seen], z, camera)
+    at = foot_points(box, z, camera)
+    return np.where(np.isfinite(at), at, pos)
 
 
 def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> Array:

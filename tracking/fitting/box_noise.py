@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from scenarios.schema.sensor import BoxNoise
-from sim.detector.box_noise import box_errors
+from sim.detector.box_noise import box_errors, foot_points, seen_shift
 from sim.types import Array
 from tracking.fitting.detection_matching import MatchedRecording
 from tracking.fitting.error_correlation import correlations, fit_memory
@@ -24,6 +24,7 @@ GROWTH = np.concatenate([[0.0], np.geomspace(0.1, 6.0, 40)])  # values of `occlu
 TAILS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 20.0)  # excess kurtoses to choose from
 HALF = (0.3, 0.9)  # a row counts as half hidden if its visibility is between these
 BARELY = 0.25  # visibility: rows below it are left out, as their nearest box often belongs to someone else
+POINTS: tuple[Literal["own", "seen", "foot"], ...] = ("own", "seen", "foot")  # in order of preference
 FEW = 20  # with fewer half hidden rows, boxes are taken as amodal and errors as independent of visibility
 
 
@@ -171,15 +172,39 @@ def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
     return ErrorSpread(mean, sd, k, likelihood)
 
 
-def fit_point_noise(recordings: Sequence[MatchedRecording]) -> float | None:
-    """Returns the standard deviation (root mean square error) per axis, in m, of the detections' positions on the
-    ground.
+def fit_points(
+    recordings: Sequence[MatchedRecording], kind: str
+) -> tuple[Literal["own", "seen", "foot"], float | None]:
+    """Returns the setting `points` that explains the detections' ground positions best, and their standard deviation,
+    m.
 
-    Errors are taken against the labelled positions of the detected rows of all recordings; a recording whose detections
-    or labels have no ground positions is left out. None if nothing is left, or nobody is detected.
+    Compared are the mean absolute errors of the detected rows of all recordings. "own": against the labelled positions.
+    "seen": against these, displaced as the foot of the visible part is (`sim.detector.box_noise.seen_shift`). "foot":
+    against the ground points at the feet of the detected boxes. Without a camera all are alike, and "own" is returned.
+    The standard deviation is the root mean square error per axis, None of "foot". Recordings whose detections or labels
+    have no ground positions are left out; ("foot", None) if nothing is left, or nobody is detected. kind: "visible" or
+    "amodal", what the detected boxes enclose. Raises AssertionError without labelled boxes.
     """
-    errors = [
-        m.pos[m.match[m.hit]] - m.truth.pos[m.hit] for m in recordings if m.pos is not None and m.truth.pos is not None
-    ]
-    e = np.concatenate([np.zeros((0, 2)), *errors])
-    return float(np.sqrt(np.mean(e**2))) if len(e) else None
+    found = [_point_errors(m, kind) for m in recordings if m.pos is not None and m.truth.pos is not None]
+    e = np.concatenate([np.zeros((3, 0, 2)), *found], axis=1)
+    best = int(np.abs(e).sum(axis=(1, 2)).argmin())
+    if best == POINTS.index("foot") or not e.shape[1]:
+        return "foot", None
+    return POINTS[best], float(np.sqrt(np.mean(e[best] ** 2)))
+
+
+def _point_errors(m: MatchedRecording, kind: str) -> Array:
+    """Returns the errors (3, H, 2) in m of the positions of the H detected rows under each of POINTS.
+
+    Raises AssertionError if the detections or labels have no ground positions, or the labels no boxes.
+    """
+    assert m.pos is not None
+    assert m.truth.pos is not None
+    pos = m.pos[m.match[m.hit]]
+    own = pos - m.truth.pos[m.hit]
+    if m.camera is None:
+        return np.stack([own, own, own])
+    z = np.zeros(len(own)) if m.truth.z is None else m.truth.z[m.hit]
+    seen = own - seen_shift(_true(m, kind), _true(m, "amodal"), z, m.camera)
+    foot = pos - foot_points(m.box[m.match[m.hit]], z, m.camera)
+    return np.stack([own, seen, np.where(np.isfinite(foot), foot, own)])

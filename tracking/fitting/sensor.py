@@ -10,7 +10,7 @@ from scenarios.errors import InputError
 from scenarios.schema.sensor import Sensor
 from sim.types import Array
 from sim.types import Sequence as Recording
-from tracking.fitting.box_noise import fit_box_noise, fit_point_noise
+from tracking.fitting.box_noise import fit_box_noise, fit_points
 from tracking.fitting.detection_matching import MatchedRecording, match_sequence
 from tracking.fitting.false_alarms import fit_false_alarms
 from tracking.fitting.misses import fit_misses
@@ -35,8 +35,8 @@ def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
     """Returns the sensor whose errors are like those of the detector on matched recordings, pooled.
 
     `noise_px` is the median height of the labelled boxes times the root mean square of three standard deviations: of
-    foot, top and middle. `min_visibility` is 0. `noise_m` keeps its default, and `points` is "foot" instead of "own",
-    without ground positions of labels and detections. `true_scores` and `false_scores` are None with fewer than 20
+    foot, top and middle. `min_visibility` is 0. Without ground positions of labels and detections `points` is
+    "foot", and `noise_m` keeps its default. `true_scores` and `false_scores` are None with fewer than 20
     scores, `miss_memory` and `false_alarms` if nothing was found. Raises InputError if there are fewer than 50 labelled
     rows (people in frames) or fewer than 25 of them are detected. Raises AssertionError without labelled boxes.
     """
@@ -51,7 +51,7 @@ def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
     detection, miss_memory = fit_misses(recordings)
     kind, noise = fit_box_noise(recordings)
     rate, alarms = fit_false_alarms(recordings)
-    own = fit_point_noise(recordings)
+    points, noise_m = fit_points(recordings, kind)
     height = float(np.median(np.concatenate([m.truth.box[:, 3] for m in recordings if m.truth.box is not None])))
     edges = height * float(np.sqrt(np.mean(np.square([noise.foot[1], noise.top[1], noise.across[1]]))))
     true = np.concatenate([m.score[m.match[m.hit]] for m in recordings])
@@ -60,14 +60,14 @@ def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
         detect_prob=_digits(detection.best),
         clutter_rate=_digits(rate),
         noise_px=_digits(edges),
-        noise_m=Sensor().noise_m if own is None else _digits(own),
+        noise_m=Sensor().noise_m if noise_m is None else _digits(noise_m),
         box=kind,
         min_visibility=0.0,
         small_px=detection.small,
         by_visibility=tuple(_digits(c) for c in detection.curve),
         miss_memory=miss_memory or None,
         box_noise=noise,
-        points="foot" if own is None else "own",
+        points=points,
         false_alarms=alarms,
         true_scores=_quantiles(true),
         false_scores=_quantiles(false),

@@ -5,6 +5,7 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.schema.sensor import Hide, Sensor
+from sim.detector.box_noise import foot_points
 from sim.detector.clutter import false_alarm_counts
 from sim.detector.sense import detection_probability, sense
 from sim.truth.label import bodies
@@ -123,7 +124,7 @@ def test_a_person_or_a_frame_more_moves_nobody_else() -> None:
     sensor = Sensor(detect_prob=0.8, clutter_rate=1.0, persistence=0.5)
     truth = seen(people=8, frames=60)
     fewer = truth.id != 3
-    fields = ("frame", "id", "group", "pos", "vel", "box", "visibility", "visible_box")
+    fields = ("frame", "id", "group", "pos", "vel", "box", "visibility", "visible_box", "z")
     without = truth.replace(**{f: getattr(truth, f)[fewer] for f in fields})
     early = truth.frame <= 30
     shorter = truth.replace(length=30, **{f: getattr(truth, f)[early] for f in fields})
@@ -138,7 +139,7 @@ def test_a_person_or_a_frame_more_moves_nobody_else() -> None:
 def test_who_enters_later_draws_the_same() -> None:
     truth = seen(people=4, frames=60)
     late = truth.frame > 20
-    fields = ("frame", "id", "group", "pos", "vel", "box", "visibility", "visible_box")
+    fields = ("frame", "id", "group", "pos", "vel", "box", "visibility", "visible_box", "z")
     entered = truth.replace(**{f: getattr(truth, f)[late] for f in fields})
     sensor = perfect(detect_prob=0.7, noise_m=0.1)
     for a, b in list(zip(sense(truth, sensor, 5), sense(entered, sensor, 5), strict=True))[20:]:
@@ -192,6 +193,50 @@ def test_visible_boxes_follow_the_visible_part() -> None:
     assert np.sort(everything(sense(cut, perfect(), 1), "box")[:, 3]) == pytest.approx(np.sort(truth.box[:, 3]))
     gone = truth.replace(visible_box=np.full_like(truth.box, np.nan))
     assert np.isfinite(everything(sense(gone, perfect(box="visible"), 1), "box")).all()
+
+
+def hidden_from_below(truth: Truth, share: float) -> Truth:
+    """The same people, of each of whom the lower `share` of the box is hidden."""
+    assert truth.box is not None
+    part = truth.box * np.array([1, 1, 1, 1 - share])
+    return truth.replace(visible_box=part if share else truth.box, visibility=np.full(len(truth.id), 1 - share))
+
+
+@pytest.mark.parametrize("camera", [pinhole(at=(8.0, -8.0, 9.0)), above()])
+def test_points_of_people_in_full_view_are_their_own(camera: Any) -> None:
+    truth = hidden_from_below(seen(people=4, frames=5), 0.0)
+    own, default = (sense(truth, perfect(noise_m=0.1, box="visible", **k), 1, camera) for k in ({"points": "own"}, {}))
+    assert np.array_equal(everything(own, "pos"), everything(default, "pos"))
+
+
+@pytest.mark.parametrize("z", [0.0, 0.8])
+def test_points_follow_the_foot_of_the_visible_part(z: float) -> None:
+    camera = pinhole(at=(8.0, -8.0, 9.0))
+    truth = seen(people=6, frames=3)
+    truth = hidden_from_below(truth.replace(z=np.full(len(truth.id), z)), 0.4)
+    assert truth.box is not None
+    rays_end = foot_points(truth.visible_box, truth.z, camera), foot_points(truth.box, truth.z, camera)  # type: ignore[arg-type]
+    wanted = truth.pos + rays_end[0] - rays_end[1]
+    found = everything(sense(truth, perfect(box="visible"), 1, camera), "pos")
+    assert np.sort(found, axis=0) == pytest.approx(np.sort(wanted, axis=0))
+    whole = everything(sense(truth, perfect(), 1, camera), "pos")  # amodal boxes: nothing is hidden from the detector
+    assert {tuple(r) for r in whole} == {tuple(r) for r in truth.pos}  # type: ignore[union-attr]
+
+
+def test_displacements_grow_with_what_is_hidden_without_jumps() -> None:
+    """Before a camera as low as a head the foot of a head alone shows no ground; the point stays on visible ground."""
+    camera = pinhole(5.0, at=(8.0, -8.0, 1.6))
+    truth = bodies(crowd(0, 8, 1), camera)
+    assert truth.pos is not None
+    away = []
+    for share in np.linspace(0.0, 0.95, 96):
+        d = sense(hidden_from_below(truth, share), perfect(box="visible", points="seen"), 1, camera)[0]
+        away.append(np.sort(np.linalg.norm(d.pos - camera.position[:2], axis=1)))
+    steps = np.diff(away, axis=0)
+    assert np.isfinite(away).all()
+    assert steps.min() > -1e-9
+    assert away[-1].min() > away[0].max()
+    assert steps.max() < 0.35 * np.max(away)
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])

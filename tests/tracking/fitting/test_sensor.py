@@ -152,6 +152,13 @@ def test_small_people_and_tails_and_visible_parts_are_told() -> None:
     assert found.false_alarms is None or found.clutter_rate < 0.1
 
 
+@pytest.mark.parametrize(("points", "box"), [("own", "visible"), ("seen", "visible"), ("foot", "amodal")])
+def test_points_are_told(points: Any, box: Any) -> None:
+    found = fit_matched(seen(Sensor(points=points, box=box, noise_m=0.1, min_visibility=0.0))[:1])
+    assert found.points == points
+    near(found.noise_m, Sensor().noise_m if points == "foot" else 0.1, 0.01)
+
+
 def test_who_never_errs_has_a_clean_profile() -> None:
     perfect = Sensor(detect_prob=1.0, clutter_rate=0.0, noise_px=0.0, noise_m=0.0, box="amodal", occlusion_power=0.0,
                      min_visibility=0.0, small_px=0.0)  # fmt: skip
