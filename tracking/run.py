@@ -5,6 +5,7 @@ Input: a tracker (name, class or instance) and a sequence. Output: a `TrackingRu
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -129,7 +130,8 @@ def group(
 
     Raises InputError if there are no people with ids, the tracks are of whole groups, people lie in the image and its
     scale is unknown or not above 0, or labels or the file of the rule cannot be read. Raises WorkError if an order of a
-    simulated script was not fulfilled. Warns if velocities are too far from the motion to derive groups.
+    simulated script was not fulfilled. Warns if people are only in every second, third … frame, or velocities are too
+    far from the motion to derive groups.
     """
     from tracking.grouping.grouped_tracks import with_groups, without_groups
     from tracking.grouping.known_people import known_people
@@ -146,6 +148,10 @@ def group(
     if any(t.plane == "image" and len(t.id) for t in people) and not np.isfinite(scale.px_per_m):
         got, remedy = "people in the image, without its scale", "give --px-per-m, pixels per metre"
         raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
+    step = math.gcd(*np.diff([t.index for t in people if len(t.id)]).astype(int).tolist())
+    if step > 1:
+        text = f"{sequence.name}: people only in every {step}th frame. If these are all frames there are, number them"
+        warnings.warn(f"{text} 1, 2, 3, … and give their rate, here --fps {sequence.fps / step:g}", stacklevel=2)
     tracks = with_groups(people, sequence.fps, scale.px_per_m, rule)
     fault = velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule)
     if fault is not None:

@@ -87,15 +87,15 @@ def whole_number(text: str) -> int:
     return int(text)
 
 
-def read_numbers(path: Path, columns: tuple[int, int]) -> NumericTable:
+def read_numbers(path: Path, columns: tuple[int, int], also: int | None = None) -> NumericTable:
     """Read all non-empty lines of a text file as rows of numbers, separated by commas if the first has one, else by
     blanks.
 
-    columns: (least, greatest) number of columns. A file without lines gives a table of shape (0, columns[0]). Comments
-    and headers are not allowed.
+    columns: (least, greatest) number of columns. also: another number that is allowed; None: none. A file without lines
+    gives a table of shape (0, columns[0]). Comments and headers are not allowed.
 
     Raises InputError if the file is unreadable or not UTF-8. Raises InputError with the line if a cell is not a finite
-    number, the lines differ in their number of columns, or that number is outside `columns`.
+    number, the lines differ in their number of columns, or that number is not allowed.
     """
     numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
     if not numbered:
@@ -109,8 +109,8 @@ def read_numbers(path: Path, columns: tuple[int, int]) -> NumericTable:
         raise _first_bad_line(path, numbered, separator) from None
     rows = NumericTable(path, values, lines)
     low, high = columns
-    if not low <= values.shape[1] <= high:
-        span = str(low) if low == high else f"{low} to {high}"
+    if not low <= values.shape[1] <= high and values.shape[1] != also:
+        span = (str(low) if low == high else f"{low} to {high}") + ("" if also is None else f" or {also}")
         rows.reject(np.ones(len(lines), bool), f"{span} columns", "check that this is the right file")
     rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", "remove or correct the line")
     return rows

@@ -2,7 +2,8 @@
 
 Lines have 6 to 10 columns, the first of which are frame (from 1), id, and the box's left, top, width, height in px.
 Column 7 is a confidence or flag. 8 or 9 columns go on with class and visibility (from MOT16 on), 10 columns with the
-ground position x, y, z in m, unknown where z is -1 (MOT15). A wrong line raises InputError that names it.
+ground position x, y, z in m, unknown where z is -1 (MOT15). Lines of 4 columns are no MOTChallenge text: they are
+frame, id and the ground position x, y in m. A wrong line raises InputError that names it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ from sim.scene.box_scale import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
 
 PEDESTRIAN = 1
+
+GROUND_COLUMNS = 4
+"""Columns of a text of ground positions alone: frame, id, x, y."""
 
 
 @dataclass(frozen=True)
@@ -46,26 +50,32 @@ class MotTable:
     def ground(self) -> Array | None:
         """Return the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1).
 
-        Returns None if the file has fewer than 10 columns, or if the position is unknown in all rows.
+        Returns None if the file has fewer than 10 columns, or if the position is unknown in all rows. That is the case
+        if z = -1 in all, or if all have the same position though a frame has several rows: zeros stand for unknown.
         """
         if self.rest.shape[1] < 4:
             return None
         known = self.rest[:, 3] != -1
+        if len(known) > len(np.unique(self.frame)) and (self.rest[:, 1:4] == self.rest[0, 1:4]).all():
+            return None
         return np.where(known[:, None], self.rest[:, 1:4], np.nan) if known.any() else None
 
 
 def read_table(path: Path, *, length: int | None = None, boxless: bool = False) -> MotTable:
     """Read the MOTChallenge text file `path` of 6 to 10 columns: frame, id, left, top, width, height, and up to four
-    more.
+    more; or of 4 columns: frame, id, x, y in m, which are read as rows without box, of confidence 1 and z = 0.
 
     length: the last frame allowed; None: 1,000,000. boxless: True allows -1,-1,-1,-1 for "no box". A file without
     lines gives a table without rows. Rows stay in the order of the file. Raises InputError if the file is unreadable,
     and, with the line, if a cell is no finite number, the number of columns is wrong, a frame is outside 1 to `length`,
     a frame or id is no integer, a number is beyond 1e6, a frame has more than 5000 lines, or a box has no area.
     """
-    rows = read_numbers(path, (6, 10))
-    frame, id = rows.integers(0, "frame"), rows.integers(1, "id")
-    table = MotTable(rows, frame, id, rows.values[:, 2:6], rows.values[:, 6:])
+    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS)
+    frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
+    box, rest = rows.values[:, 2:6], rows.values[:, 6:]
+    if rows.values.shape[1] == GROUND_COLUMNS:
+        box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
+    table = MotTable(rows, frame, id, box, rest)
     last = FRAMES if length is None else length
     rows.reject((frame < 1) | (frame > last), f"frames from 1 to {last}", "correct the frame, or seqLength")
     rows.reject(crowded(frame), f"at most {DETECTIONS} lines of one frame", "check that this is the right file")

@@ -214,6 +214,29 @@ def test_people_without_boxes(tmp_path):
     assert error.value.place == "line 1"
 
 
+def test_ground_positions_alone(tmp_path):
+    """The shortest text of trajectories: frame, id, x, y."""
+    path = tmp_path / "walk.csv"
+    path.write_text("1 1 3 4\n2 1 3.5 -1\n2 2 -1 -1\n")
+    truth = mot_text.read_truth(path, "x", 2.0)
+    assert truth.box is None
+    assert truth.pos.tolist() == [[3, 4], [3.5, -1], [-1, -1]]
+    assert truth.z.tolist() == [0, 0, 0]
+    for line in ("1,1,3\n", "1,1,3,4,5\n"):
+        path.write_text(line)
+        with pytest.raises(InputError, match="6 to 10 or 4 columns"):
+            mot_text.read_table(path)
+
+
+def test_one_position_for_all_is_none(tmp_path):
+    """Zeros in the columns of ground positions, as AVG-TownCentre has them."""
+    path = tmp_path / "gt.txt"
+    path.write_text("1,1,5,5,10,20,1,0,0,0\n1,2,25,5,10,20,1,0,0,0\n")
+    assert mot_text.read_truth(path, "x", 2.0).pos is None
+    path.write_text("1,1,5,5,10,20,1,0,0,0\n2,1,25,5,10,20,1,0,0,0\n")
+    assert mot_text.read_truth(path, "x", 2.0).pos is not None, "one person may stand"
+
+
 def test_a_row_that_does_not_count_hides_no_duplicate(tmp_path):
     """The neighbours of the sorted table are not enough: a row of flag 0 may lie between two rows of one id."""
     path = tmp_path / "gt.txt"
