@@ -83,29 +83,35 @@ def shares(points, x, region, size, owner, may):
     return found
 
 
-def claims(d2, own, hits, g):
-    """Unshared points of group g, and the shared ones in the order of their distance (4.1)."""
+def claims(d2, own, hits, share, g, rules):
+    """Unshared points of group g, and the shared ones in the order of their distance (4.1); of these the likeliest
+    group's alone with "nearest"."""
     inside = [k for k in range(len(own)) if np.isfinite(d2[g, k]) or own[k] == g]
+    if rules.association == "nearest":
+        inside = [k for k in inside if hits[k] < 2 or g == share[:, k].argmax()]
     return [k for k in inside if hits[k] < 2], sorted((k for k in inside if hits[k] > 1), key=lambda k: d2[g, k])
 
 
-def centroid_noise(seen, cov, extent, size, rules):
+def centroid_noise(seen, cov, extent, size, rules, fresh=None):
     """R of the centroid of `seen` people of a group of `size`; cov: their own covariance.
 
     The extent is that of measured places. Members redrawn in each frame: as many of those, extent / m. Members who keep
     their places: r^2 I / m and the variance of the mean of m out of n true places drawn without replacement, (n - m) /
     (n - 1) Sigma / m, Sigma being the extent without r^2 I; at least one (or all) is seen. If more are seen than there
-    are, the n members are drawn out of the m seen.
+    are, the n members are drawn out of the m seen. fresh: of the seen, those of this frame; the errors of the others
+    are used again.
     """
     noise = rules.noise**2 * np.eye(2)
     if rules.redrawn:
         return extent / seen
+    true = extent - noise
+    np.fill_diagonal(true, np.maximum(np.diag(true), 0.0))
+    if fresh is not None:
+        noise = noise * (2 * seen - fresh) / fresh
     n = size / rules.detect
     if seen > n:
         return noise / max(n, 1.0) + cov * (seen - n) / max(seen - 1, 1.0) / max(n, 1.0)
     m = max(seen, min(1.0, n))
-    true = extent - noise
-    np.fill_diagonal(true, np.maximum(np.diag(true), 0.0))
     return noise / m + (true * (n - m) / max(n - 1, rules.others) / m if n > 1 else 0.0)
 
 
@@ -115,20 +121,20 @@ def moments(points, weights):
     return n, mean, (weights * (points - mean).T) @ (points - mean) / n
 
 
-def associations(mine, shared, points, weights, share, g, rules):
+def associations(mine, shared, points, weights, rules):
     """The feasible sets of points, largest last; rows of `points`."""
-    nearest = [k for k in shared if g == share[:, k].argmax()]
-    sets = {
-        "pda": [mine + shared[:j] for j in range(len(shared) + 1)],
-        "nearest": [mine + nearest],
-        "all": [mine + shared],
-        "none": [mine + shared],
-    }[rules.association]
+    sets = [mine + shared[:j] for j in range(len(shared) + 1)]
+    sets = sets if rules.association == "pda" else sets[-1:]
     free = rules.association == "none"
     return [s for s in sets if free or reference_components.is_group(points[s], weights[s], rules.constraint)]
 
 
-def masses(sets, mine, shared, points, weights, region, x, P, extent, size, rules):
+def measures(s, weights, age):
+    """H of the centroid of these points: it lies behind by their mean age."""
+    return np.hstack([np.eye(2), -(weights[s] @ age[s]) / weights[s].sum() * np.eye(2)])
+
+
+def masses(sets, mine, shared, points, weights, age, region, x, P, extent, size, rules):
     """Masses of the associations, m_d m_N (4.2), and of the miss, all normalised; each one's R.
 
     m_N is a mass of numbers of people, which differ by those of a point: Gaussian, with tails. The miss has the same
@@ -140,8 +146,9 @@ def masses(sets, mine, shared, points, weights, region, x, P, extent, size, rule
     log, R = [], []
     for s in sets:
         n, mean, cov = moments(points[s], weights[s])
-        R.append(centroid_noise(n, cov, extent, size, rules))
-        close = multivariate_normal(x[:2], H @ P @ H.T + R[-1]).logpdf(mean)
+        R.append(centroid_noise(n, cov, extent, size, rules, weights[s] @ (age[s] == 0)))
+        now = measures(s, weights, age)
+        close = multivariate_normal(x[:2], now @ P @ now.T + R[-1]).logpdf(mean)
         many = (1 - NEWCOMERS) * norm(size, sigma).pdf(n) + NEWCOMERS * (size + 1) / (size + 1 + n) ** 2
         log.append(close + np.log(step * many))
     miss = -np.inf
@@ -154,37 +161,41 @@ def masses(sets, mine, shared, points, weights, region, x, P, extent, size, rule
     return np.exp(np.array(log) - total), np.exp(miss - total), R
 
 
-def update(g, points, weights, d2, own, hits, share, region, x, P, extent, size, hold, rules):
+def update(g, points, weights, d2, own, hits, share, age, region, x, P, extent, size, hold, rules):
     """One group after its points: state, rows chosen, innovation, its S, mass of the miss, x, P, extent, size."""
-    mine, shared = claims(d2, own, hits, g)
+    mine, shared = claims(d2, own, hits, share, g, rules)
     same = x, P, extent, size
     if not mine + shared:
         return "nothing", [], None, None, 0.0, *same
-    sets = associations(mine, shared, points, weights, share, g, rules)
+    sets = associations(mine, shared, points, weights, rules)
     if not sets:
         some = mine + shared
         if reference_components.partition(points[some], weights[some], rules.constraint).max() < 0:
             return "nothing", [], None, None, 0.0, *same  # noise
         return "null", some, None, None, 0.0, *same
-    beta, miss, R = masses(sets, mine, shared, points, weights, region, x, P, extent, size, rules)
+    sets = [s for s in sets if (age[s] == 0).any()]
+    if not sets:
+        return "nothing", [], None, None, 0.0, *same
+    beta, miss, R = masses(sets, mine, shared, points, weights, age, region, x, P, extent, size, rules)
     states, covariances = [x], [P]
     for s, r in zip(sets, R, strict=True):
-        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + r)
+        now = measures(s, weights, age)
+        K = P @ now.T @ np.linalg.inv(now @ P @ now.T + r)
         states.append(x + K @ (moments(points[s], weights[s])[1] - x[:2]))
-        covariances.append(P - K @ H @ P)
+        covariances.append(P - K @ now @ P)
     mass = np.array([miss, *beta])
     new_x = mass @ np.array(states)
     new_P = sum(b * (C + np.outer(y - new_x, y - new_x)) for b, y, C in zip(mass, states, covariances, strict=True))
     best = int(np.argmax(beta))
-    middle = moments(points[sets[best]], weights[sets[best]])[1]
+    middle, now = moments(points[sets[best]], weights[sets[best]])[1], measures(sets[best], weights, age)
     new_extent, new_size = extent, size
     others = weights[mine + shared] @ (1 - share[g][mine + shared]) > rules.freeze * size
     if not hold and not others:
         new_extent, new_size = adapted(sets, mass, points, weights, extent, size, rules)
     found = beta.sum() > miss
     return (
-        "measured" if found else "nothing", sets[best] if found else [], middle - x[:2], H @ P @ H.T + R[best], miss,
-        new_x, new_P, new_extent, new_size,
+        "measured" if found else "nothing", sets[best] if found else [],
+        middle - x[:2], now @ P @ now.T + R[best], miss, new_x, new_P, new_extent, new_size,
     )  # fmt: skip
 
 

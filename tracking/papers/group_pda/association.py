@@ -150,7 +150,7 @@ def associate(
     log_density = point_log_density(bank.size, region, claims, weighted)
     state, chosen, report = kernels.associate(
         claims.points, claims.weights, claims.d2, weighted, claims.owner, claims.claimants,
-        shares(log_density, np.isfinite(log_density)), region,
+        shares(log_density, np.isfinite(log_density)), t - claims.last_seen, region,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
     )  # fmt: skip
     has_new_point = (chosen & (claims.last_seen >= t)).any(1)  # more than missed members

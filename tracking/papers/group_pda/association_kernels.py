@@ -36,6 +36,7 @@ from tracking.papers.group_pda.association_mass_kernels import (
     log_count,
     log_density,
     log_miss,
+    running_ages,
     running_moments,
 )  # fmt: skip
 
@@ -98,20 +99,22 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 @njit(cache=True)
 def associate(
     points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints,
-    share: Array, region: Array, x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
+    share: Array, age: Array, region: Array, x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
 ) -> tuple[Ints, Bools, Array]:  # fmt: skip
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
     x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M) and
     region (G, 2, 2): of `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour, or (G,
     0) without colours. owner (M,): the row of the only group that may have the point outside its region, or -1.
-    claimants (M,): number of groups that may have the point. share (G, M): probability that a point is the group's.
+    claimants (M,): number of groups that may have the point. share (G, M): probability that a point is the group's. age
+    (M,): time, s, since a missed member that stands in was measured, 0 for a point of this frame.
     rest (G,): True for groups whose extent and size must not change. rules: see association_mass_kernels.
 
     Returns the state (G,) of each group, the points (G, M) bool of its likeliest association, and the report (G, 6):
     innovation x, y, its covariance xx, xy, yy, normalised mass (weight) of the miss; 0 without a feasible association.
-    - NOTHING = 0: the group has no points, only noise, or the miss has at least the mass of all associations. No points
-      are chosen. The group is updated by the mixture if it has a feasible association.
+    - NOTHING = 0: the group has no points, only noise or missed members, or the miss has at least the mass of all
+      associations. No points are chosen. The group is updated by the mixture if it has a feasible association with a
+      point of this frame.
     - NULL = 1: it has points, more than noise, but no feasible association (points that form one group). All its points
       are chosen; it is not updated.
     - MEASURED = 2: else.
@@ -120,7 +123,7 @@ def associate(
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
     report = np.zeros((groups, 6))
     for g in range(groups):
-        order, start, own = _ordered_points(d2[g], log_ratio[g], owner, claimants, share, g, rules[ASSOCIATION])
+        order, start = _ordered_points(d2[g], log_ratio[g], owner, claimants, share, g, rules[ASSOCIATION])
         if len(order) == 0:
             continue
         mine, people = points[order], weights[order]
@@ -133,9 +136,7 @@ def associate(
                 mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
             )[0]
             if rules[ASSOCIATION] != PREFIXES:
-                only = feasible[own]
-                feasible[:] = False
-                feasible[own] = only
+                feasible[:-1] = False
         if not feasible.any():
             if components(mine, people, rules[LINK])[1][:, WEIGHT].max() >= rules[LEAST_WEIGHT]:
                 state[g], chosen[g, order] = NULL, True
@@ -143,7 +144,7 @@ def associate(
         colour = log_ratio[g][order] * people if log_ratio.shape[1] else np.zeros(len(order))
         others = (people * (1 - share[g][order])).sum()  # people of other groups, expected
         best = _estimate(
-            mine, people, colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
+            mine, people, age[order], colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
             rest[g] or others > rules[FREEZE_SHARE] * size[g], rules, report[g],
         )  # fmt: skip
         state[g] = MEASURED if best >= 0 else NOTHING
@@ -155,59 +156,61 @@ def associate(
 @njit(cache=True)
 def _ordered_points(
     d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, share: Array, g: int, association: float
-) -> tuple[Ints, int, int]:
-    """Returns the indices of the points of group g, the number of unshared ones, which come first (sec. 4.1), and the
-    number of shared ones in the association that is the only one unless `association` is PREFIXES.
+) -> tuple[Ints, int]:
+    """Returns the indices of the points of group g, and the number of unshared ones, which come first (sec. 4.1).
 
     The shared points, which other groups may have, too, follow by distance less twice the colour evidence; with
-    `association` NEAREST those that are most probably of g precede the others. d2, log_ratio (M,): of this group, d2
+    `association` NEAREST only those that are most probably of g. d2, log_ratio (M,): of this group, d2
     inf outside its region (log_ratio may be empty); owner (M,): group that alone may have a point in no region, -1
     none; claimants (M,): number of groups that may have the point; share (G, M): probability that it is a group's.
     """
     inside = np.flatnonzero((d2 < np.inf) | (owner == g))
+    if association == NEAREST:
+        kept = np.empty(len(inside), np.bool_)
+        for n in range(len(inside)):
+            kept[n] = claimants[inside[n]] < 2 or share[:, inside[n]].argmax() == g
+        inside = inside[kept]
     shared = claimants[inside] > 1
     mine, others = inside[~shared], inside[shared]
-    order = np.empty(len(inside), np.int64)
-    order[: len(mine)] = mine
     distance = d2[others] - 2 * log_ratio[others] if len(log_ratio) else d2[others]
-    others = others[np.argsort(distance, kind="mergesort")]
-    own = len(others)
-    if association == NEAREST:
-        here = np.empty(len(others), np.bool_)
-        for n in range(len(others)):
-            here[n] = share[:, others[n]].argmax() == g
-        own = int(here.sum())
-        others = np.concatenate((others[here], others[~here]))
-    order[len(mine) :] = others
-    return order, len(mine), own
+    return np.concatenate((mine, others[np.argsort(distance, kind="mergesort")])), len(mine)
 
 
 @njit(cache=True)
 def _estimate(
-    points: Array, weights: Array, colour: Array, start: int, feasible: Bools, region: Array,
+    points: Array, weights: Array, age: Array, colour: Array, start: int, feasible: Bools, region: Array,
     x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array, report: Array,
 ) -> int:  # fmt: skip
     """Update one group (x, P, extent, size, report) in place by its associations: the first start, start + 1, … of its
     points.
 
-    points (M, 2), weights (people each stands for), colour (what each adds to the log mass) (M,): ordered; the first
-    `start` are unshared. feasible (J,): which associations satisfy the group constraint (m_g, eq. 4.1), at least one.
-    region (2, 2): covariance of the search region. x (4,), P (4, 4), extent (2, 2), size (1,), report (6,). rest:
-    extent and size must not change. Returns the number of shared points in the likeliest association, or -1 if the miss
-    has at least the mass of all associations together.
+    points (M, 2), weights (people each stands for), age (s since it was measured), colour (what each adds to the log
+    mass) (M,): ordered; the first `start` are unshared. feasible (J,): which associations satisfy the group constraint
+    (m_g, eq. 4.1), at least one. region (2, 2): covariance of the search region. x (4,), P (4, 4), extent (2, 2), size
+    (1,), report (6,). rest: extent and size must not change. Returns the number of shared points in the likeliest
+    association, or -1 if the miss has at least the mass of all associations together, or none has a point of this
+    frame.
+
+    A place carried for a seconds is a measurement of a seconds ago, moved with the estimated velocity. So the centroid
+    of points whose mean age is a measures xi - a v (ours): H = [I, -a I] and S = H P H' + R.
     """
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
+    seen, mean_age = running_ages(weights, age, start)
     S = np.empty((len(people), 3))
     log_mass = np.full(len(people), -np.inf)
     unit = weights.mean()  # people that one point stands for: makes m_N a mass of numbers of points
     evidence = np.concatenate((np.zeros(1), np.cumsum(colour[start:])))
     width = rules[COUNT_SD] ** 2 + (rules[COUNT_SHARE] * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
-        if feasible[j] and people[j] > 0:
-            R = centroid_noise(people[j], cov[j], extent, size[0], rules)
-            S[j, 0], S[j, 1], S[j, 2] = P[0, 0] + R[0], P[0, 1] + R[1], P[1, 1] + R[2]
+        if feasible[j] and seen[j] > 0:
+            R, a = centroid_noise(people[j], seen[j], cov[j], extent, size[0], rules), mean_age[j]
+            S[j, 0] = P[0, 0] - 2 * a * P[0, 2] + a * a * P[2, 2] + R[0]
+            S[j, 1] = P[0, 1] - a * (P[0, 3] + P[1, 2]) + a * a * P[2, 3] + R[1]
+            S[j, 2] = P[1, 1] - 2 * a * P[1, 3] + a * a * P[3, 3] + R[2]
             m_d = log_density(mean[j, 0], mean[j, 1], S[j])
             log_mass[j] = m_d + log_count(people[j], size[0], width) + np.log(unit) + evidence[j]  # eq. 4.2, m_g = 1
+    if log_mass.max() == -np.inf:
+        return -1
     log_m_miss = log_miss(weights, start, region, size[0], rules)
     top = max(log_mass.max(), log_m_miss)
     beta, miss = np.exp(log_mass - top), np.exp(log_m_miss - top)
@@ -216,36 +219,36 @@ def _estimate(
     best = int(np.argmax(beta))
     report[INNOVATION_X], report[INNOVATION_Y] = mean[best, 0], mean[best, 1]
     report[S_XX : S_YY + 1], report[MISS_MASS] = S[best], miss
-    _mix(beta, miss, mean, S, x, P)
+    _mix(beta, miss, mean, mean_age, S, x, P)
     if not rest:
         _adapt(beta, people, cov, extent, size, rules)
     return best if beta.sum() > miss else -1
 
 
 @njit(cache=True)
-def _mix(beta: Array, miss: float, mean: Array, S: Array, x: Array, P: Array) -> None:
+def _mix(beta: Array, miss: float, mean: Array, age: Array, S: Array, x: Array, P: Array) -> None:
     """Mix the conditional estimates (sec. 4.3) into x (4,) and P (4, 4), in place: means over the J associations.
 
     x = sum beta_j x_j, P = sum beta_j (P_j + spread of x_j). beta (J,) and miss: normalised masses; mean (J, 2):
-    innovations; S (J, 3): their covariances xx, xy, yy. Each association has its own gain; the miss leaves the
-    prediction.
+    innovations; age (J,): a of H = [I, -a I], s; S (J, 3): covariances xx, xy, yy of the innovations. Each association
+    has its own gain P H' / S; the miss leaves the prediction.
     """
     shift, spread, less = np.zeros(4), np.zeros((4, 4)), np.zeros((4, 4))
-    step = np.empty(4)
-    gain = np.empty((4, 2))
+    step, PH, gain = np.empty(4), np.empty((4, 2)), np.empty((4, 2))
     for j in range(len(beta)):
         if beta[j] <= 0:
             continue
         area = S[j, 0] * S[j, 2] - S[j, 1] * S[j, 1]
         ixx, ixy, iyy = S[j, 2] / area, -S[j, 1] / area, S[j, 0] / area
         for a in range(4):
-            gain[a, 0] = P[a, 0] * ixx + P[a, 1] * ixy
-            gain[a, 1] = P[a, 0] * ixy + P[a, 1] * iyy
+            PH[a, 0], PH[a, 1] = P[a, 0] - age[j] * P[a, 2], P[a, 1] - age[j] * P[a, 3]
+            gain[a, 0] = PH[a, 0] * ixx + PH[a, 1] * ixy
+            gain[a, 1] = PH[a, 0] * ixy + PH[a, 1] * iyy
             step[a] = gain[a, 0] * mean[j, 0] + gain[a, 1] * mean[j, 1]
             shift[a] += beta[j] * step[a]
         for a in range(4):
             for b in range(4):
-                less[a, b] += beta[j] * (gain[a, 0] * P[0, b] + gain[a, 1] * P[1, b])
+                less[a, b] += beta[j] * (gain[a, 0] * PH[b, 0] + gain[a, 1] * PH[b, 1])
                 spread[a, b] += beta[j] * step[a] * step[b]
     for a in range(4):
         for b in range(4):

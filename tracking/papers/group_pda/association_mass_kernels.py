@@ -2,11 +2,11 @@
 
 An association is a set of points that may be one group's; its mass, a relative weight, is m_d m_N m_g. m_d is the
 density of the points' centroid about the predicted one: `log_density`, with covariance S = H P H' + R. P is the
-covariance of the group's state, H picks its position, and R (`centroid_noise`) is the covariance of the measured
-centroid. m_N is the density of the number of people in the points, given that of the group: `log_count`. m_g is 1 for
-a feasible association (its points form one group), else 0. `log_miss` is the log mass of the miss hypothesis, that no
-point is the group's. The module association_kernels puts them
-together. Symmetric 2 x 2 matrices are stored as (3,) = xx, xy, yy. The slots of the array `rules` are named here.
+covariance of the group's state, H picks its position (without missed members), and R (`centroid_noise`) is the
+covariance of the measured centroid. m_N is the density of the number of people in the points, given that of the group:
+`log_count`. m_g is 1 for a feasible association (its points form one group), else 0. `log_miss` is the log mass of the
+miss hypothesis, that no point is the group's. The module association_kernels puts them together. Symmetric 2 x 2
+matrices are stored as (3,) = xx, xy, yy. The slots of the array `rules` are named here.
 """
 
 from __future__ import annotations
@@ -66,6 +66,24 @@ def running_moments(points: Array, weights: Array, x: float, y: float, start: in
 
 
 @njit(cache=True)
+def running_ages(weights: Array, age: Array, start: int) -> tuple[Array, Array]:
+    """Return the people (J,) measured in this frame and the mean age (J,) in s of each association's points.
+
+    weights (M,): people that each point stands for; age (M,): time since it was measured, 0 in this frame. Association
+    j = 0, 1, … M - start has the first start + j points. Both are 0 for an association without points.
+    """
+    seen, mean = np.zeros(len(weights) - start + 1), np.zeros(len(weights) - start + 1)
+    people = now = total = 0.0
+    for k in range(len(weights) + 1):
+        if k >= start and people > 0:
+            seen[k - start], mean[k - start] = now, total / people
+        if k < len(weights):
+            people, total = people + weights[k], total + weights[k] * age[k]
+            now += weights[k] if age[k] <= 0 else 0.0
+    return seen, mean
+
+
+@njit(cache=True)
 def log_count(people: float, size: float, width: float) -> float:
     """Return log m_N (sec. 4.2), the log density, per person, of seeing `people` people in a group of `size` people.
 
@@ -78,30 +96,37 @@ def log_count(people: float, size: float, width: float) -> float:
 
 
 @njit(cache=True)
-def centroid_noise(seen: float, cov: Array, extent: Array, size: float, rules: Array) -> tuple[float, float, float]:
-    """Return R (xx, xy, yy), the covariance of the centroid of m = `seen` people about that of all n people there.
+def centroid_noise(
+    counted: float, seen: float, cov: Array, extent: Array, size: float, rules: Array
+) -> tuple[float, float, float]:
+    """Return R (xx, xy, yy), the covariance of the centroid of m = `counted` people about that of all n people there.
 
-    n = size / DETECT_PROB, size: people of the group that are measured on average. cov (3,): covariance xx, xy, yy of
-    the seen people; extent (2, 2): Sigma, covariance of the members; rules: parameters; r: its POINT_SD.
-    - REDRAWN, eq. 2.1 read literally: Sigma / m.
+    Of the people counted, `seen` > 0 were measured in this frame; the others are missed members. n = size /
+    DETECT_PROB, size: people of the group that are counted on average. cov (3,): covariance xx, xy, yy of the people
+    counted; extent (2, 2): Sigma, covariance of the members; rules: parameters; r: its POINT_SD.
+    - REDRAWN, n_y of eq. 2.3 if eq. 2.1 is read literally: Sigma / m.
     - Members keep their places (ours): r^2 / m + (1 - m / n) n / (n - 1) Sigma / m, the variance of a mean of m drawn
       out of n without replacement, with Sigma less r^2 (at least 0). m is at least 1, or n if that is less.
-    - More are seen than are there: the same with the roles exchanged and `cov` for Sigma.
+    - More are counted than are there: the members are n drawn out of the m, r^2 / n + (m - n) / (m - 1) cov / n.
+    - Missed members (ours): r^2 is multiplied by 1 + 2 k / s, of k = m - s missed and s seen. The error of a place is
+      used again in each frame in which the member is missed: if members are seen with probability p, its sum over many
+      frames has 1 + 2 (1 - p) / p times the variance of that of fresh errors.
 
     n - 1 is at least LEAST_OTHERS: 1 from points, where a size between one and two means doubt about which of the two.
     """
     noise = rules[POINT_SD] ** 2  # Sigma is the covariance of measured positions, so it contains this variance
+    xx, xy, yy = max(extent[0, 0] - noise, 0.0), extent[0, 1], max(extent[1, 1] - noise, 0.0)
     if rules[REDRAWN] > 0:
-        return extent[0, 0] / seen, extent[0, 1] / seen, extent[1, 1] / seen
+        return extent[0, 0] / counted, xy / counted, extent[1, 1] / counted
+    noise *= 1 + 2 * (counted - seen) / seen
     there = size / rules[DETECT_PROB]
-    if seen > there:  # some seen people are strangers: the members are drawn out of the seen
-        strange = (seen - there) / max(seen - 1, 1.0) / max(there, 1.0)
+    if counted > there:  # some of them are strangers
+        strange = (counted - there) / max(counted - 1, 1.0) / max(there, 1.0)
         own = noise / max(there, 1.0)
         return own + strange * cov[0], strange * cov[1], own + strange * cov[2]
-    m = max(seen, min(1.0, there))
+    m = max(counted, min(1.0, there))
     unseen = (there - m) / max(there - 1, rules[LEAST_OTHERS]) / m if there > 1 else 0.0
-    xx, yy = max(extent[0, 0] - noise, 0.0), max(extent[1, 1] - noise, 0.0)
-    return noise / m + unseen * xx, unseen * extent[0, 1], noise / m + unseen * yy
+    return noise / m + unseen * xx, unseen * xy, noise / m + unseen * yy
 
 
 @njit(cache=True)

@@ -170,7 +170,8 @@ class GroupPdaConfig(BackgroundSettings):
         0.9,
         (0.0, 3.0),
         "s",
-        "from points: time for which a missed member stands in at its predicted place (ours)",
+        "from points: time for which a missed member stands in at its predicted place; from both: a new group near a "
+        "member measured so lately is its group's child (ours)",
         before=0.0,
         sees="points",
     )
