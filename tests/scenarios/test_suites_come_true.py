@@ -10,6 +10,7 @@ from sim.crowd.population import draw_population
 from sim.sequence import simulate
 
 FRIENDS = resolve("suite:friends-meet")
+HARD = resolve("suite:friends-meet-hard")
 
 
 def people(entry: Entry, seed: int) -> int:
@@ -29,7 +30,20 @@ def test_friends_meet_has_18_simple_and_10_hard_entries() -> None:
         assert (camera.kind, camera.image, camera.px_per_m, camera.fps) == ("top", (640, 480), 40, 10)
 
 
-@pytest.mark.parametrize("entry", FRIENDS, ids=lambda e: e.name)
+def test_harder_entries_stand_beside_the_others() -> None:
+    assert len(HARD) == 21
+    assert not {e.name for e in HARD} & {e.name for e in FRIENDS}
+    assert all(e.scenario.camera == FRIENDS[0].scenario.camera for e in HARD)
+
+
+def test_strangers_of_the_hard_suite_are_near_and_alike_for_seconds() -> None:
+    for name in ("abreast", "beside", "converge", "brush", "door", "lag"):
+        entries = [e for e in HARD if e.name.startswith(f"friends-{name}-")]
+        truths = [simulate(e.scenario, 90_001, e.repeat, streams=()).truth for e in entries]
+        assert max((t.near.end - t.near.start).max(initial=0) for t in truths if t and t.near) > 30, name
+
+
+@pytest.mark.parametrize("entry", [*FRIENDS, *HARD], ids=lambda e: e.name)
 def test_friends_meet_as_ordered(entry: Entry) -> None:
     sequence = simulate(entry.scenario, 90_001, entry.repeat)
     assert sequence.truth is not None  # a WorkError where an order has not come true
