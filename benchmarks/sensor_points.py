@@ -20,14 +20,13 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.group_pda import columns
-from benchmarks.group_pda.runs import Row, TrackingJob, Variant, measure
+from benchmarks.group_pda.runs import Row, TrackingJob, Variant, measure, with_points
 from benchmarks.support.options import CAMPUS, PETS, add_data, add_seeds, new_parser, one_thread, seeds_text
 from benchmarks.support.tables import head, interval, row, signed, table
 from scenarios.loading.resolve import Entry, resolve
@@ -99,9 +98,8 @@ def scores(given: argparse.Namespace, entries: Sequence[Entry]) -> dict[str, dic
     for entry in entries:
         rows = found.setdefault(entry.name, {})
         for points in POINTS:
-            sensor = entry.scenario.sensor.model_copy(update={"points": points})
-            same = replace(entry, scenario=entry.scenario.model_copy(update={"sensor": sensor}))
-            made = measure([TrackingJob(same, seed, "file", variants) for seed in seeds], given.workers)
+            jobs = [TrackingJob(with_points(entry, points), seed, "file", variants) for seed in seeds]
+            made = measure(jobs, given.workers)
             for job, by_tracker in sorted(made, key=lambda done: done[0].seed):
                 for name, one in by_tracker.items():
                     rows.setdefault(f"{name}, {points}", []).append({**one, "seed": job.seed})

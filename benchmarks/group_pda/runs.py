@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from unittest import mock
 
 from benchmarks.group_pda.encounters import outcomes
@@ -66,6 +66,14 @@ def trackers(name: str, mode: DetectionMode) -> tuple[Variant, ...]:
         Variant('association="none"', name, {"association": "none"}),
     )
     return (*ours, *blob, Variant(on_ground, "blob"))
+
+
+def with_points(entry: Entry, points: str | None) -> Entry:
+    """Returns the entry with another `sensor.points` ("own", "seen", "foot"); None keeps the scenario's."""
+    if points is None:
+        return entry
+    sensor = entry.scenario.sensor.model_copy(update={"points": points})
+    return replace(entry, scenario=entry.scenario.model_copy(update={"sensor": sensor}))
 
 
 def measure(jobs: Iterable[TrackingJob], processes: int) -> Iterator[tuple[TrackingJob, dict[str, Row]]]:

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks.group_pda import columns
-from benchmarks.group_pda.runs import Row, TrackingJob, Variant, measure, trackers
+from benchmarks.group_pda.runs import Row, TrackingJob, Variant, measure, trackers, with_points
 from benchmarks.support.options import seeds_text
 from benchmarks.support.tables import signed, table
 from scenarios.loading.resolve import Entry, resolve
@@ -169,7 +169,8 @@ def gathered(
     entries: Sequence[Entry], given: argparse.Namespace, variants: tuple[Variant, ...]
 ) -> dict[str, dict[str, list[Row]]]:
     """Returns the rows by scene and variant, in the order of seeds."""
-    jobs = [TrackingJob(entry, seed, given.detections, variants) for entry in entries for seed in given.seeds]
+    made_with = [with_points(entry, given.points) for entry in entries]
+    jobs = [TrackingJob(entry, seed, given.detections, variants) for entry in made_with for seed in given.seeds]
     made = {(job.entry.name, job.seed): rows for job, rows in measure(jobs, given.workers)}
     found: dict[str, dict[str, list[Row]]] = {}
     for job in jobs:
