@@ -8,7 +8,7 @@ from html import escape
 
 from scenarios.drawing.routes import XY, GroupRoute, OrderMark
 from scenarios.schema.geometry import walls_without_doors
-from scenarios.schema.scenario import StairsSpec, WorldSpec
+from scenarios.schema.world import StairsSpec, WorldSpec
 
 WIDTH, MARGIN = 900.0, 26.0
 STYLE = """

@@ -105,7 +105,7 @@ def group_routes(scenario: Scenario) -> list[GroupRoute]:
     """
     made = []
     for group in scenario.group:
-        points = (group.start, *group.via, group.goal)
+        points = (group.start, *(stop.at for stop in group.stops), *group.via, group.goal)
         spreads = tuple((spread(x), spread(y)) for x, y in points)
         made.append(GroupRoute(group.id, tuple(map(_at, points)), spreads, middle(group.size), group.repeat))
     return made

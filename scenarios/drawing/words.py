@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, When
+from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, Stop, When
 from scenarios.schema.values import Distribution, Point, Value
 
 AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
@@ -84,12 +84,22 @@ def people(group: GroupSpec) -> str:
     words = [count(group.size, "person", "people")]
     words[0] = f"{group.repeat} groups of {words[0]}" if group.repeat > 1 else words[0]
     words.append(f"from {place(group.start)}")
+    words += [f"stopping at {', '.join(map(_stop, group.stops))}"] if group.stops else []
     words += [f"past {', '.join(map(place, group.via))}"] if group.via else []
     words.append(f"to {place(group.goal)}")
     text = " ".join(words)
     text += f", at {number(group.speed, 'm/s')}" if group.speed is not None else ""
+    text += f", scattered by {number(group.scatter, 'm')}" if group.scatter != 0.0 else ""
     text += f", entering at {number(group.enter, 's')}" if group.enter != 0.0 else ""
     return f"{text}; then they {AT_GOAL[group.at_goal]}"
+
+
+def _stop(stop: Stop) -> str:
+    """Returns a stop in words: its place, in brackets how long, and how many members stop unless all do."""
+    words = [f"until {', '.join(f'{t:g}' for t in stop.until)} s"] if stop.until else []
+    words += [f"for {number(stop.stay, 's')}"] if stop.stay != 0.0 else []
+    words += [] if stop.members is None else [f"only {count(stop.members, 'member', 'members')}"]
+    return f"{place(stop.at)} [{', '.join(words)}]"
 
 
 def trigger(when: When) -> str:

@@ -62,7 +62,8 @@ def _check_world(scenario: Scenario) -> None:
 def _check_groups(scenario: Scenario) -> None:
     """Raises InputError for a group whose name is taken, or whose size or time of entry cannot be.
 
-    The size must be at least 0.5 in every draw, the entry before the end in some draw.
+    The size must be at least 0.5 in every draw. The entry must be before the end in some draw, and a finite lower bound
+    of it not before the warm-up.
     """
     seen: set[str] = set()
     for group in scenario.group:
@@ -74,9 +75,13 @@ def _check_groups(scenario: Scenario) -> None:
         if low < 0.5:
             got = f"a size that can be {'any number' if math.isinf(low) else f'{low:g}'}"
             fail(f"group.{group.id}.size", got, "at least 1 person", "raise it, or add clip = [1, 6]")
-        if bounds(group.enter)[0] >= scenario.duration:
-            got = f"{bounds(group.enter)[0]:g} s at the earliest"
+        earliest = bounds(group.enter)[0]
+        got = f"{earliest:g} s at the earliest"
+        if earliest >= scenario.duration:
             fail(f"group.{group.id}.enter", got, f"before the end, {scenario.duration:g} s", "enter earlier")
+        if math.isfinite(earliest) and earliest < -scenario.warmup:
+            expected = f"not before the warm-up, {-scenario.warmup:g} s"
+            fail(f"group.{group.id}.enter", got, expected, "enter later, or make `warmup` longer")
 
 
 def _check_sensor(scenario: Scenario) -> None:
@@ -125,14 +130,15 @@ def _check_points(scenario: Scenario) -> None:
 def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
     """Yields (key, point in m) for every place in the script: where people start, pass, are sent, or trigger an order.
 
-    Groups come first: start, goal, via. Then orders: the place `reach.at` of the trigger, if given; goal and via of
-    each part of a split; via and goal of a merge; of a queue the first 3 places, all with the key `event.ID.at`, and
+    Groups come first: start, goal, stops, via. Then orders: the place `reach.at` of the trigger, if given; goal and via
+    of each part of a split; via and goal of a merge; of a queue the first 3 places, all with the key `event.ID.at`, and
     its goal. A missing goal and "meet" are left out. Coordinates are numbers or distributions. Keys are as
     "group.ID.via.0".
     """
     for group in scenario.group:
         yield f"group.{group.id}.start", group.start
         yield f"group.{group.id}.goal", group.goal
+        yield from ((f"group.{group.id}.stops.{k}.at", stop.at) for k, stop in enumerate(group.stops))
         yield from ((f"group.{group.id}.via.{k}", point) for k, point in enumerate(group.via))
     for event in scenario.event:
         key = f"event.{event.id}"

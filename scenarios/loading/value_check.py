@@ -87,6 +87,11 @@ def _crowd(scenario: Scenario) -> Iterator[_Range]:
         yield _Range(f"world.size.{'xy'.index(axis)}", size, 0.1, 10_000.0, " m")
     for group in scenario.group:
         yield _Range(f"group.{group.id}.size", group.size, 0.5, PEOPLE, " people")
+        yield _Range(f"group.{group.id}.scatter", group.scatter, 0.0, 10.0, " m")
+        for k, stop in enumerate(group.stops):
+            yield _Range(f"group.{group.id}.stops.{k}.stay", stop.stay, 0.0, 3600.0, " s")
+            if stop.members is not None:
+                yield _Range(f"group.{group.id}.stops.{k}.members", stop.members, -0.5, PEOPLE, " people")
         if group.speed is not None:
             yield _Range(f"group.{group.id}.speed", group.speed, 0.05, FASTEST, " m/s")
     for order in scenario.event:

@@ -24,55 +24,11 @@ from scenarios.schema.values import (
     Side,
     Value,
 )
+from scenarios.schema.world import WorldSpec
 
 FREE_SPEED = Distribution(normal=(1.34, 0.26), clip=(0.5, 2.2))
 GROUP_SIZE = Distribution(poisson=1.1, clip=(1, 12))
 SPACING = Distribution(normal=(0.75, 0.12), clip=(0.5, 1.2))
-
-
-class DoorSpec(Model):
-    """A door: an opening in a wall. at: x, y of its middle, m, on a wall. width: m."""
-
-    at: FixedPoint = Field(description="middle of the opening, m; must lie on a wall")
-    width: Positive = Field(1.2, description="m")
-
-
-class StairsSpec(Model):
-    """A flight of stairs; its height rises from 0 at `foot` to `rise` at `head`, the middles of its ends (x, y in m).
-
-    width, rise, landing (length of the level ground behind the head): m. steps: number. slowdown: share of the walking
-    speed kept on the stairs."""
-
-    foot: FixedPoint = Field(description="middle of the lowest edge, m")
-    head: FixedPoint = Field(description="middle of the highest edge, m")
-    width: Positive = Field(3.0, description="width across, m")
-    rise: float = Field(1.5, description="height of the head above the foot, m")
-    steps: Annotated[int, Field(ge=1)] = Field(10, description="number of steps")
-    landing: NonNegative = Field(4.0, description="length of the level ground behind the head, m")
-    slowdown: Annotated[float, Field(gt=0, le=1)] = Field(
-        0.6, description="share of the walking speed kept on the stairs"
-    )
-
-
-class WorldSpec(Model):
-    """The immobile parts of the scene, in m; by default an empty world of 16 × 10 m.
-
-    size: extent in x and y, from the origin. walls: x1, y1, x2, y2 of their ends. pillars: x, y, radius. stairs:
-    flights. doors: openings in walls. service: x, y of counters. wall_height, pillar_height: heights of walls and
-    pillars."""
-
-    size: tuple[Positive, Positive] = Field((16.0, 10.0), description="extent in x and y, m")
-    walls: tuple[tuple[float, float, float, float], ...] = Field(
-        (), description="each wall: x1, y1, x2, y2 of its ends, m"
-    )
-    pillars: tuple[tuple[float, float, Positive], ...] = Field(
-        (), description="each pillar: x, y of its middle and radius, m"
-    )
-    stairs: tuple[StairsSpec, ...] = Field((), description="flights of stairs")
-    doors: tuple[DoorSpec, ...] = Field((), description="openings in walls")
-    service: tuple[FixedPoint, ...] = Field((), description="service points (counters), m")
-    wall_height: Positive = Field(2.5, description="height of the walls, m")
-    pillar_height: Positive = Field(2.5, description="height of the pillars, m")
 
 
 class CameraSpec(Model):
@@ -119,23 +75,49 @@ class CrowdSpec(Model):
     )
 
 
+class Stop(Model):
+    """A place on the way, `at` (x, y in m), where a group stands for a while.
+
+    stay: s; 0 without `until` leaves the stop out. until: times, s from the first recorded frame; people wait for the
+    next of them, then for `stay`. members: number of people who stop, None: all; the others walk on."""
+
+    at: Point = Field(description="place, m; a group stands at the free place nearest to it")
+    stay: Value = Field(0.0, description="time for which people stand there, s; 0 without `until` leaves the stop out")
+    until: tuple[float, ...] = Field(
+        (),
+        description="times, s from the first recorded frame: people wait until the first of them after their arrival, "
+        "then for `stay`; after the last they wait to the end",
+    )
+    members: Value | None = Field(
+        None, description="number of members who stop, rounded, while the others walk on; absent: all"
+    )
+
+
 class GroupSpec(Model):
     """A group of people who belong together from the start; a person alone is a group of one.
 
     id: its name; repeat = n above 1 makes n such groups, id-1 … id-n. size: number of people, rounded, at least 1.
-    start, goal, via (points to pass): in m. speed: m/s, None: by `crowd`. enter: time of entry, s, 0 =
-    there from the first frame. at_goal: "stand" there, "leave" the scene or "walk" straight on. Numbers except `repeat`
-    may be distributions."""
+    start, goal, via (points to pass): in m. stops: before `via`. scatter: m, of members from their places at the start.
+    speed: m/s, None: by `crowd`. enter: time of entry, s, 0 = there from the first frame. at_goal: "stand" there,
+    "leave" the scene or "walk" straight on. Numbers except `repeat` may be distributions."""
 
     id: Name = Field(description="name in the script; repeat = n makes the groups id-1 … id-n")
     size: Value = Field(GROUP_SIZE, description="number of people; rounded, at least 1")
     start: Point = Field(description="middle of the group when it enters, m")
     goal: Point = Field(description="point to which the group walks, m")
+    stops: tuple[Stop, ...] = Field((), description="places to stop at, in order, before `via`")
     via: tuple[Point, ...] = Field((), description="points to pass on the way")
+    scatter: Value = Field(
+        0.0,
+        description="distance of each member from its place in the group when the group enters, m; drawn for each "
+        "member, in any direction",
+    )
     speed: Value | None = Field(
         None, description="speed of the whole group, m/s; absent: follows from its members' speeds"
     )
-    enter: Value = Field(0.0, description="time of entry, s; 0 = present from the first frame")
+    enter: Value = Field(
+        0.0, description="time of entry, s; 0 = present from the first frame; negative = during the warm-up"
+    )
     at_goal: Literal["stand", "leave", "walk"] = Field(
         "stand",
         description="at the goal: stand = stay in conversation, leave = leave the scene, walk = walk straight on",

@@ -43,8 +43,8 @@ class GroupState:
       "walk").
     - settled: indices of groups that stand in a circle. next_group: index of the next group that an order makes.
     - by column: group_of (group index), queue_of (order index, -1 in no queue), present, free_speed (m/s), places (P,
-      2) in the formation (forward, left, m), targets (P, 2) in a queue (x, y, m), waypoint (index of the first not
-      passed).
+      2) in the formation (forward, left, m), targets (P, 2) in a queue or of people held (x, y, m), held (True: stays
+      behind, at the target), waypoint (index of the first not passed).
     - slowdown: m/s by which a group is slower for each member after the first. navigator: finds ways round walls.
     """
 
@@ -70,6 +70,7 @@ class GroupState:
         self.places = np.zeros((len(people), 2))
         self.targets = np.zeros((len(people), 2))
         self.queue_of = np.full(len(people), -1)
+        self.held = np.zeros(len(people), np.bool_)
         self.waypoint = np.zeros(len(people), np.int64)
         self.present = np.zeros(len(people), np.bool_)
         self.settled: set[int] = set()
@@ -81,11 +82,11 @@ class GroupState:
     def enter(self, group: EnteringGroup) -> None:
         """Marks the group's members as present, starts the group's way and sets the members' places in the formation.
 
-        group: as drawn, with start, goal and members. A group whose goal is at most 0.3 m from its start stands in a
-        circle and counts as settled; any other group gets the walking formation.
+        group: as drawn, with start, stops, goal and members. A group whose first stop, or goal, is at most 0.3 m from
+        its start stands in a circle and counts as settled; any other group gets the walking formation.
         """
         g = group.index
-        self.go(g, group.start, group.via, group.goal, group.finish, group.speed)
+        self.go(g, group.start, *group.leg(group.stops), group.speed)
         columns = self.members[g]
         self.present[columns] = True
         places = walking(len(columns), group.spacing)
@@ -212,14 +213,14 @@ class GroupState:
     def fill(self, people: PeopleArrays, columns: Ints) -> None:
         """Overwrites place, target, pace and tag of `people` (N rows) with the state of the people in columns (N,).
 
-        `people.wander` is left as it is. The mode in the tag is TO_TARGET for people in a queue, else IN_GROUP. The
-        pace to a place in a queue is the group's speed, at most 1.4 m/s.
+        `people.wander` is left as it is. The mode in the tag is TO_TARGET for people in a queue or held, else IN_GROUP.
+        The pace to a place in a queue is the group's speed, at most 1.4 m/s.
         """
         queue = self.queue_of[columns]
         people.place[:] = self.places[columns]
         people.target[:] = self.targets[columns]
         people.pace[:] = np.minimum(self.arrays.speed[self.group_of[columns]], MAX_QUEUE_SPEED)
         people.tag[:, GROUP] = self.group_of[columns]
-        people.tag[:, MODE] = np.where(queue >= 0, TO_TARGET, IN_GROUP)
+        people.tag[:, MODE] = np.where((queue >= 0) | self.held[columns], TO_TARGET, IN_GROUP)
         people.tag[:, QUEUE] = queue
         people.tag[:, WAYPOINT] = self.waypoint[columns]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.schema.scenario import WorldSpec
+from scenarios.schema.world import WorldSpec
 from sim.types import Array, Bools, Scene, Stairs
 
 BEHIND = 0.7  # m behind a door, where nobody touches the wall any more

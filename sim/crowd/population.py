@@ -14,8 +14,9 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.schema.scenario import GroupSpec, Scenario, group_names
-from scenarios.schema.values import Distribution, Point, draw
+from scenarios.schema.values import Distribution, Point, Value, draw
 from sim.crowd.formation import to_world, walking
+from sim.crowd.stops import PlannedStop, draw_stops
 from sim.rng import rng
 from sim.types import Array, Scene
 
@@ -83,8 +84,8 @@ class EnteringGroup:
     - start: the group's middle as it enters; goal (2,), via (each (2,)): points in the world, m. pos (n, 2): where the
       members start, m.
     - speed: of the group, m/s. spacing: between neighbours, m. enter: time of entry, s after the first recorded frame
-      (0: there from the start of the warm-up).
-    - finish: at the goal "stand", "leave" the scene or "walk" on.
+      (0: there from the start of the warm-up; negative: in the warm-up).
+    - finish: at the goal "stand", "leave" the scene or "walk" on. stops: before `via`.
     """
 
     name: str
@@ -97,12 +98,18 @@ class EnteringGroup:
     spacing: float
     enter: float
     finish: str
+    stops: list[PlannedStop] = field(default_factory=list)
     pos: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     @property
     def walks(self) -> bool:
-        """True if the goal is more than STANDING_DISTANCE (0.3 m) from the start."""
-        return bool(np.linalg.norm(self.goal - self.start) > STANDING_DISTANCE)
+        """True if the first stop, without stops the goal, is more than STANDING_DISTANCE (0.3 m) from the start."""
+        return bool(np.linalg.norm(self.leg(self.stops)[1] - self.start) > STANDING_DISTANCE)
+
+    def leg(self, stops: Sequence[PlannedStop]) -> tuple[list[Array], Array, str]:
+        """Returns points to pass (each (2,), m), end (2,), m, and finish of the way to the first of the stops that are
+        left; without stops, of the way to the goal."""
+        return ([], stops[0].at, "stand") if stops else (self.via, self.goal, self.finish)
 
 
 def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacement:
@@ -169,14 +176,14 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
     """Draws a group and its members, without its start, its `pos` and its index.
 
     draws: gives the random streams. spec: its entry in the scenario. name: of the group. key: index of the entry and of
-    the copy, from 0. column: of the first member. The size is rounded, at least 1 person; the entry time is at least 0
-    s. An absent speed follows from the members' free speeds.
+    the copy, from 0. column: of the first member. The size is rounded, at least 1 person; the entry time is not before
+    the warm-up. An absent speed follows from the members' free speeds.
     """
     r = draws.rng("group", *key, 0)
     crowd = draws.scenario.crowd
     size = max(1, round(draw(spec.size, r)))
     spacing = draw(crowd.spacing, r)
-    enter = max(0.0, draw(spec.enter, r))
+    enter = max(-draws.scenario.warmup, draw(spec.enter, r))
     own = draw(spec.speed, r) if spec.speed is not None else None
     goal = draw_point(spec.goal, draws.placement, r)
     via = [draw_point(p, draws.placement, r) for p in spec.via]
@@ -185,7 +192,9 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
         p = draws.rng("person", *key, m)
         members.append(Person(column + m, (*key, m), draw(crowd.free_speed, p), draw(crowd.height, p)))
     speed = own if own is not None else walking_speed([m.free_speed for m in members], crowd.slowdown_per_member)
-    return EnteringGroup(name, -1, members, np.zeros(2), goal, via, speed, spacing, enter, spec.at_goal)
+    q = draws.rng("group", *key, 2)
+    stops = draw_stops(spec.stops, size, lambda point: draw_point(point, draws.placement, q), q)
+    return EnteringGroup(name, -1, members, np.zeros(2), goal, via, speed, spacing, enter, spec.at_goal, stops)
 
 
 def walking_speed(free: list[float], slowdown: float) -> float:
@@ -200,24 +209,30 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
     """Sets group.start and group.pos so that the members stand clear of walls, pillars and, at entry time 0, of
     `taken`.
 
-    The group faces its first via point, else its goal; the script's +x if it starts there. The script's `lead` (s)
+    The group faces its first stop, via point or goal; the script's +x if it starts there. `scatter` (m) moves each
+    member off its place in the formation, in any direction, at least 0.4 m from all mates. The script's `lead` (s)
     moves the start of a group that walks by lead × speed in that direction, at most half-way; a negative lead moves it
     back without limit. key: index of the entry `spec` and of its copy. taken: positions (n, 2), m, of the people of
-    each earlier group with entry time 0. draws: random streams. A drawn start is drawn up to TRIES (400) times, a fixed
-    one tried once. Raises InputError if no try finds room.
+    each earlier group with entry time 0. draws: random streams. A drawn or scattered start is drawn up to TRIES (400)
+    times, a fixed one tried once. Raises InputError if no try finds room.
     """
-    placement, drawn = draws.placement, any(isinstance(v, Distribution) for v in spec.start)
+    placement = draws.placement
+    drawn = spec.scatter != 0.0 or any(isinstance(v, Distribution) for v in spec.start)
     r = draws.rng("group", *key, 1)
     for _ in range(TRIES if drawn else 1):
         group.start = draw_point(spec.start, placement, r)
-        first = group.via[0] if group.via else group.goal
+        via, end, _ = group.leg(group.stops)
+        first = via[0] if via else end
         way = first - group.start
         length = float(np.linalg.norm(way))
         heading = way / length if length > 1e-6 else placement.vector(np.array([1.0, 0.0]))
         lead = min(placement.lead * group.speed, length / 2)
         group.start = group.start + lead * heading * (length > STANDING_DISTANCE)
         group.pos = to_world(walking(len(group.members), group.spacing), group.start, heading)
-        if _is_free(group.pos, draws.scene, taken if group.enter == 0 else []):
+        if spec.scatter != 0.0:
+            group.pos += scattered(len(group.members), spec.scatter, r)
+        together = spec.scatter == 0.0 or _apart(group.pos)
+        if together and is_free(group.pos, draws.scene, taken if group.enter == 0 else []):
             return
     raise InputError(
         file=f"scenario {draws.scenario.name}",
@@ -228,7 +243,19 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
     )
 
 
-def _is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
+def scattered(n: int, scatter: Value, r: np.random.Generator) -> Array:
+    """Returns how far n people start from their places, (n, 2): x, y in m; lengths drawn, directions uniform."""
+    length, angle = np.array([draw(scatter, r) for _ in range(n)]), r.uniform(0, 2 * np.pi, n)
+    return np.asarray(length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+
+
+def _apart(pos: Array) -> bool:
+    """Returns True if no two of the places pos (n, 2), m, are nearer than two body radii."""
+    gap = np.linalg.norm(pos[:, None] - pos[None], axis=2) + 10 * np.eye(len(pos))
+    return bool((gap >= 2 * BODY_RADIUS).all())
+
+
+def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
     """Returns True if all of pos (n, 2), m, n ≥ 1, are 0.55 m clear of the taken places and 0.2 m clear of walls and
     pillars.
 

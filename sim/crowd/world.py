@@ -17,6 +17,7 @@ import pymunk.batch
 
 from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
+from sim.crowd.errands import Errands
 from sim.crowd.forces import WAYPOINT, GroupArrays, Obstacles, PeopleArrays, Steering
 from sim.crowd.group_state import GroupState
 from sim.crowd.heading import headings
@@ -42,8 +43,7 @@ def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | Non
 
 
 def steps_per_frame(fps: float) -> int:
-    """Returns the least number (≥ 1) of physics steps per frame that keeps a step within MAX_STEP (0.02 s); fps above
-    0."""
+    """Returns the least number (≥ 1) of physics steps per frame whose steps are at most MAX_STEP; fps above 0."""
     return max(1, math.ceil(1 / (fps * MAX_STEP) - 1e-9))
 
 
@@ -75,7 +75,7 @@ class World:
 
     - scenario, seed, repeat; scene; fps; substeps: physics steps per frame, of dt s; rules: steering parameters;
       obstacles; push: scratch; members: all people by column; entering: all groups; waiting: those not entered yet;
-      groups, orders: the script.
+      groups, orders, errands: the script.
     - `space`, `bodies` (by column): of the physics. state (N, 4): x, y, vx, vy, m, m/s, and `people`: of the N people
       present, whose columns are `columns`. force: x, y, m/s², of the N people, then zeros for static bodies. states (P,
       4), group_of (P,): frame being recorded, by column, nan and -1 while absent.
@@ -95,8 +95,8 @@ class World:
         self.rules = steering.array()
         slowdown = scenario.crowd.slowdown_per_member
         self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
-        placement = script_placement(scenario, seed, repeat)
-        self.orders = OrderExecution(scenario, self.groups, placement, seed, repeat)
+        self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
+        self.errands = Errands(self.entering, self.groups, self.scene)
         self.push = np.zeros((len(self.groups.arrays.speed), 2))
         self.obstacles = _obstacles(self.scene, scenario)
         self.space = _space(self.scene)
@@ -130,13 +130,15 @@ class World:
                 self._advance(noise[f + warm])
             t = f / self.fps
             self._come_and_go(t, f == -warm)
-            if f < 0:
-                continue
             self.states[self.columns] = self.state
-            self.group_of[self.columns] = self.groups.group_of[self.columns]
-            if self.orders.advance(f, t, self.states):
+            changed = self.errands.advance(t, self.states)
+            if f >= 0:
+                self.group_of[self.columns] = self.groups.group_of[self.columns]
+                changed |= self.orders.advance(f, t, self.states)
+            if changed:
                 self._fill_people()
-            yield self.states, self.group_of
+            if f >= 0:
+                yield self.states, self.group_of
 
     def _advance(self, noise: Array) -> None:
         """Simulates one frame; noise (P, 2): wandering, x, y in m/s, by column. Does nothing while nobody is present.
@@ -176,12 +178,12 @@ class World:
 
     def _come_and_go(self, t: float, first: bool) -> None:
         """Removes people who leave at time t (s, negative in the warm-up) and adds groups whose entry time has come;
-        `first`: first frame of the warm-up. In that frame only groups with entry time 0 come, even without room. A
-        walking one starts back on its way by speed × warm-up time, if `_way_back_is_free`. A group that enters later
+        `first`: first frame of the warm-up. In that frame groups with entry time 0 come, even without room. A walking
+        one starts back on its way by speed × warm-up time, if `_way_back_is_free`. A group that enters at another time
         waits while people stand at its place; groups that enter in one frame are not checked against each other.
         Walking groups enter at their speed, others at rest."""
         gone = self.groups.remove_leaving(self.columns)
-        coming = [group for group in self.waiting if (group.enter <= 0 if first else group.enter <= t)]
+        coming = [g for g in self.waiting if g.enter <= t or (first and g.enter == 0)]
         coming = [group for group in coming if first or self._has_room(group)]
         if not gone and not coming:
             return
@@ -192,7 +194,7 @@ class World:
             self.waiting.remove(group)
             self.groups.enter(group)
             heading = self.groups.arrays.heading[group.index]
-            start_back = first and self._way_back_is_free(group, heading)
+            start_back = first and group.enter == 0 and self._way_back_is_free(group, heading)
             back = self.scenario.warmup * group.speed * heading if start_back else 0.0
             velocity = group.speed * heading if group.walks else heading * 0
             for member, pos in zip(group.members, group.pos - back, strict=True):

@@ -72,6 +72,7 @@ LOW = "camera={ height = 3, position = [12, -3] }"
 OTHERS = "[{ id = 'c', goal = [4, 12] }, { id = 'd', goal = [16, 11] }]"
 SPLIT = f"event.p={{ type = 'split', group = 's', when = {{ time = 7 }}, parts = {OTHERS} }}"
 NEAR = "event.p.parts.c.goal=[8, 10]"
+STOP = "group.s.stops=[{ at = [13, 13], stay = 2 }]"
 SERVED = "event.l.goal=[21, 8]"
 
 # key: what is set, then what is set instead ("" for nothing; several apart by ";"): the two outputs must differ.
@@ -127,6 +128,11 @@ KEYS = {
     "group[].size": ("", "group.s.size=3"),
     "group[].start": ("", "group.s.start=[11, 14]"),
     "group[].goal": ("", FAR),
+    "group[].stops[].at": (STOP, STOP.replace("13]", "12]")),
+    "group[].stops[].stay": (STOP, STOP.replace("2 }", "3 }")),
+    "group[].stops[].until": (STOP, STOP.replace("2 }", "2, until = [6] }")),
+    "group[].stops[].members": (STOP, STOP.replace("2 }", "2, members = 1 }")),
+    "group[].scatter": ("", "group.s.scatter=0.3"),
     "group[].via": ("", "group.s.via=[[13, 12]]"),
     "group[].speed": ("", "group.s.speed=1.7"),
     "group[].enter": ("", "group.s.enter=2"),

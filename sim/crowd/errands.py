@@ -1,0 +1,148 @@
+"""Leads groups from stop to stop while the simulation runs: where they stand, how long, and who stays behind.
+
+Errands change ways, places and targets (GroupState). They never touch a position, a velocity or a force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sim.crowd.forces import END
+from sim.crowd.formation import standing, to_world, walking
+from sim.crowd.group_state import GroupState
+from sim.crowd.population import EnteringGroup, is_free
+from sim.crowd.stops import PlannedStop
+from sim.types import Array, Scene
+
+LOOK_AHEAD = 3.0  # m from the stop: the group looks for a free place
+PATIENCE = 8.0  # s after that: a group that has not reached its place stands where it is
+STRAY = 1.5  # m from the stop: the members who stop stay behind
+STANDING = 0.5  # m/s: slower people hold their place
+RING, RINGS, ANGLES = 0.6, 5, 8  # m between the rings of places round a stop; rings; places on a ring
+
+
+@dataclass
+class _Errand:
+    """What one group has before it: its stops, in order, the first one being walked to or stood at.
+
+    - looked: time at which it looked for a place at this stop, s; None: not yet. leaves: time at which it walks on from
+      this stop; None while it walks to it. places (n, 2): where its members stand or will stand, m.
+    """
+
+    group: EnteringGroup
+    stops: list[PlannedStop]
+    looked: float | None = None
+    leaves: float | None = None
+    places: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+
+class Errands:
+    """The stops of the groups of one running simulation; an order of the script ends the stops of its groups.
+
+    - groups: the groups whose ways and places change. scene: its walls and pillars.
+    - errands: by group index, of groups with stops left. stray: time at which each member who stays behind walks on, s,
+      by column.
+    """
+
+    def __init__(self, entering: Sequence[EnteringGroup], groups: GroupState, scene: Scene) -> None:
+        self.groups, self.scene = groups, scene
+        self.errands = {g.index: _Errand(g, list(g.stops)) for g in entering if g.stops}
+        self.stray: dict[int, float] = {}
+
+    def advance(self, t: float, state: Array) -> bool:
+        """Lets groups stop and walk on at time t, s; returns True if something changed that `GroupState.fill` writes.
+
+        state (P, 4): x, y, vx, vy by column, m, m/s, nan while absent. A group that comes near a stop takes the free
+        place nearest to it. It stands in a circle until its time is over; then it walks on in formation. If only some
+        members stop, these stand where they are, and the others walk on.
+        """
+        if not self.errands and not self.stray:
+            return False
+        changed = self._release(t)
+        for g, errand in list(self.errands.items()):
+            columns = self.groups.members[g]
+            if not self._concerns(errand, g, columns):
+                del self.errands[g]
+            elif self.groups.present[columns].all():
+                changed |= self._advance(g, errand, columns, t, state)
+        return changed
+
+    def _concerns(self, errand: _Errand, g: int, columns: list[int]) -> bool:
+        """Returns False once the group has no stop left, has ended, or has joined a queue."""
+        exists = self.groups.alive.get(errand.group.name) == g
+        return bool(errand.stops) and exists and bool((self.groups.queue_of[columns] < 0).all())
+
+    def _release(self, t: float) -> bool:
+        over = [column for column, end in self.stray.items() if end <= t]
+        for column in over:
+            del self.stray[column]
+            self.groups.held[column] = False
+        return bool(over)
+
+    def _advance(self, g: int, errand: _Errand, columns: list[int], t: float, state: Array) -> bool:
+        stop, pos = errand.stops[0], state[columns, :2]
+        middle = pos.mean(axis=0)
+        far = float(np.linalg.norm(middle - stop.at))
+        if errand.leaves is not None:
+            if t < errand.leaves:
+                return False
+            self._walk_on(g, errand, middle)
+            self.groups.take_places(columns, walking(len(columns), self.groups.spacing[g]), middle, g, pos)
+            return True
+        if not stop.whole:
+            if far > STRAY:
+                return False
+            for column in (columns[m] for m in stop.members):
+                self.groups.held[column], self.groups.targets[column] = True, state[column, :2]
+                self.stray[column] = stop.end(t)
+            self._walk_on(g, errand, middle)
+            return True
+        if errand.looked is None and far < LOOK_AHEAD:
+            errand.looked = t
+            place = self._free_place(g, stop.at, columns, state)
+            errand.places = self._circle(g, place)
+            self.groups.go(g, middle, [], place, "stand", float(self.groups.arrays.speed[g]))
+        arrived = bool(self.groups.arrays.arrived[g])
+        if errand.looked is None or not (arrived or t >= errand.looked + PATIENCE):
+            return False
+        if not arrived:
+            self.groups.write_way(g, [(middle, END)], "stand", float(self.groups.arrays.speed[g]), middle)
+            errand.places = self._circle(g, middle)
+        self.groups.settled.add(g)
+        self.groups.take_places(columns, standing(len(columns), self.groups.spacing[g]), middle, g, pos)
+        errand.leaves = stop.end(t)
+        return True
+
+    def _walk_on(self, g: int, errand: _Errand, middle: Array) -> None:
+        """Sends a group from its first stop, which it forgets, to the next one or to its goal. middle (2,): m."""
+        errand.stops = errand.stops[1:]
+        errand.looked, errand.leaves, errand.places = None, None, np.zeros((0, 2))
+        via, target, finish = errand.group.leg(errand.stops)
+        self.groups.settled.discard(g)
+        self.groups.go(g, middle, via, target, finish, float(self.groups.arrays.speed[g]))
+
+    def _circle(self, g: int, middle: Array) -> Array:
+        places = standing(len(self.groups.members[g]), self.groups.spacing[g])
+        return to_world(places, middle, self.groups.arrays.heading[g])
+
+    def _free_place(self, g: int, at: Array, columns: list[int], state: Array) -> Array:
+        """Returns the middle (2,), m, nearest to `at` of a free place for a group to stand; `at` if there is none.
+
+        Free: clear of walls, pillars, people of other groups who stand, and places that other groups stop at. state (P,
+        4): x, y, vx, vy, m, m/s. columns: the group's members.
+        """
+        others = np.ones(len(state), np.bool_)
+        others[columns] = False
+        slow = others & (np.hypot(state[:, 2], state[:, 3]) < STANDING)
+        taken = [state[slow, :2], *(e.places for other, e in self.errands.items() if other != g)]
+        taken = [places for places in taken if len(places)]
+        turn = 2 * np.pi * np.arange(ANGLES) / ANGLES
+        ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        rings = [at + k * RING * ring for k in range(1, RINGS + 1)]
+        for middle in np.concatenate([at[None], *rings]):
+            if is_free(self._circle(g, middle), self.scene, taken):
+                return np.asarray(middle)
+        return at

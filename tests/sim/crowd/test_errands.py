@@ -1,0 +1,129 @@
+"""Stops, scattered starts and entries in the warm-up: who stands where and how long, and who stays behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.loading.resolve import load
+from scenarios.schema.scenario import Stop
+from scenarios.schema.values import Distribution
+from sim.crowd.stops import PlannedStop, draw_stops
+from sim.crowd.world import run
+from sim.sequence import simulate
+from sim.types import Array, Motion
+
+SCENE = """
+schema = 1
+duration = 30.0
+world = { size = [30, 20] }
+crowd = { free_speed = 1.3, spacing = 0.8 }
+camera = { kind = "top", crop = true, px_per_m = 20, position = [15, 10] }
+group = [{ id = "a", size = 2, start = [5, 10], goal = [27, 10], at_goal = "leave" }]
+"""
+STOP = "group.a.stops=[{ at = [14, 10], stay = 6 }]"
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "errand.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def speeds(motion: Motion) -> Array:
+    """Returns the speeds, m/s, (frames, people); absent people have -1."""
+    return np.nan_to_num(np.linalg.norm(motion.vel, axis=2), nan=-1.0)
+
+
+def test_a_group_stands_at_its_stop_for_its_time_and_then_leaves(path: Path) -> None:
+    motion = run(load(path, [STOP]), 1)
+    stands = (speeds(motion) >= 0) & (speeds(motion) < 0.3)
+    assert 5.0 < stands[:, 0].sum() / motion.fps < 8.0
+    assert np.abs(np.nanmedian(motion.pos[stands[:, 0], 0], axis=0) - (14, 10)).max() < 0.6
+    assert not motion.present[-1].any()
+
+
+def test_people_wait_until_a_time(path: Path) -> None:
+    other = "group.b={ size = 1, start = [10, 14], goal = [27, 14], at_goal = 'leave' }"
+    stops = [f"group.{g}.stops=[{{ at = [14, {y}], until = [2, 15], stay = 1 }}]" for g, y in (("a", 10), ("b", 13))]
+    motion = run(load(path, [other, *stops]), 1)
+    v, t = speeds(motion), np.arange(300) / motion.fps
+    assert (v[(t > 13) & (t < 15.9)] < 0.3).all(), "the first arrives after 2 s, both wait for 15 s and 1 s more"
+    assert (v[(t > 17.5) & (t < 20)] > 0.8).all()
+
+
+def test_a_member_stays_behind_and_catches_up_and_is_one_of_the_group(path: Path) -> None:
+    motion = run(load(path, [STOP.replace("}]", ", members = 1 }]")]), 1)
+    gap = np.linalg.norm(motion.pos[:, 0] - motion.pos[:, 1], axis=1)
+    apart = np.flatnonzero(gap > 2.5)
+    assert len(apart) > 10
+    assert gap[apart[-1] :][~np.isnan(gap[apart[-1] :])][20:].max() < 1.6
+    truth = simulate(load(path, [STOP.replace("}]", ", members = 1 }]")]), 1, streams=()).truth
+    assert truth is not None
+    assert set(truth.group.tolist()) == {int(truth.group[0])} != {-1}
+
+
+def test_strangers_who_stop_at_one_place_stand_beside_each_other(path: Path) -> None:
+    stop = "stops = [{ at = [14, 10], stay = 30 }]"
+    more = [f"group.g{k}={{ size = 1, start = [3, {4 + 2 * k}], goal = [27, 5], {stop} }}" for k in range(6)]
+    motion = run(load(path, [*more, "group.a.stops=[{ at = [14, 10], stay = 30 }]"]), 2)
+    last = motion.pos[-1]
+    gap = np.linalg.norm(last[:, None] - last[None], axis=2) + 9 * np.eye(len(last))
+    assert gap.min() > 0.45
+    assert np.linalg.norm(last - (14, 10), axis=1).max() < 3.0
+    assert (speeds(motion)[-50:] < 0.3).all()
+
+
+def test_an_order_ends_the_stops_of_its_group(path: Path) -> None:
+    far = "group.a.stops=[{ at = [14, 2], stay = 60 }]"
+    parts = "[{ id = 'c', goal = [25, 4] }, { id = 'd', goal = [25, 16] }]"
+    split = f"event=[{{ id = 's', type = 'split', group = 'a', when = {{ time = 3 }}, parts = {parts} }}]"
+    motion = run(load(path, [far, split]), 1)
+    assert motion.pos[-1, :, 0].min() > 23
+
+
+def test_ends_and_stops_left_out() -> None:
+    def stop(stay: float, *until: float) -> PlannedStop:
+        return PlannedStop(np.zeros(2), stay, until, (0,), True)
+
+    assert stop(3.0).end(-2.0) == 1.0
+    assert stop(3.0, 4.0, 9.0).end(4.5) == 12.0
+    assert stop(0.0, 4.0).end(4.5) == np.inf
+    r = np.random.default_rng(0)
+    here = (1.0, 2.0)
+    given = (
+        Stop(at=here),
+        Stop(at=here, until=(5.0, 1.0)),
+        Stop(at=here, stay=2.0, members=0),
+        Stop(at=here, stay=1.0),
+    )
+    planned = draw_stops(given, 3, lambda point: np.array(point), r)
+    assert [(s.until, s.stay, s.members, s.whole) for s in planned] == [
+        ((1.0, 5.0), 0.0, (0, 1, 2), True),
+        ((), 1.0, (0, 1, 2), True),
+    ]
+    some = Stop(at=here, stay=1.0, members=Distribution(uniform=(1.6, 2.4)))
+    (drawn,) = draw_stops((some,), 3, lambda point: np.array(point), r)
+    assert len(set(drawn.members)) == 2
+    assert not drawn.whole
+
+
+def test_members_start_scattered_and_come_together(path: Path) -> None:
+    close = run(load(path, ["warmup=0"]), 1)
+    motion = run(load(path, ["warmup=0", "group.a.scatter=1.5"]), 1)
+    off = np.linalg.norm(motion.pos[0] - close.pos[0], axis=1)
+    np.testing.assert_allclose(off, 1.5, atol=0.2)  # the first frame is a step after the start
+    np.testing.assert_array_equal(motion.height, close.height)
+    gap = np.linalg.norm(motion.pos[:, 0] - motion.pos[:, 1], axis=1)
+    assert gap[100] == pytest.approx(0.8, abs=0.3)
+
+
+def test_people_enter_during_the_warm_up(path: Path) -> None:
+    motion = run(load(path, ["warmup=10", "group.a.enter=-4"]), 1)
+    assert motion.pos[0, :, 0].mean() == pytest.approx(5 + 4 * 1.25, abs=0.6)
+    late = run(load(path, ["warmup=10", "group.a.enter=4"]), 1)
+    assert not late.present[39].any()
+    assert late.present[42].all()
