@@ -5,7 +5,6 @@ Input: a tracker (name, class or instance) and a sequence. Output: a `TrackingRu
 
 from __future__ import annotations
 
-import math
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -130,32 +129,30 @@ def group(
 
     Raises InputError if there are no people with ids, the tracks are of whole groups, people lie in the image and its
     scale is unknown or not above 0, or labels or the file of the rule cannot be read. Raises WorkError if an order of a
-    simulated script was not fulfilled. Warns if people are only in every second, third … frame, or velocities are too
-    far from the motion to derive groups.
+    simulated script was not fulfilled. Warns if frame numbers or speeds are hardly right
+    (tracking.grouping.plausibility), or velocities are too far from the motion to derive groups.
     """
     from tracking.grouping.grouped_tracks import with_groups, without_groups
     from tracking.grouping.known_people import known_people
+    from tracking.grouping.plausibility import implausible
     from tracking.grouping.velocity_check import velocity_warning
 
     rule = LinkRule.from_toml(grouping) if isinstance(grouping, str | Path) else grouping
     people = known_people(sequence) if run is None else without_groups(run)
     file = sequence.source.get("path", sequence.name)
     if any(t.unit == "group" for t in people):
-        got, remedy = "tracks of whole groups", "give tracks of people: --tracker blob, or labelled people"
+        got, remedy = "tracks of whole groups", "track with a tracker of people (blob), or give labelled people"
         raise InputError(file=file, got=got, expected="people with ids", remedy=remedy)
     learned = None if run is None else run.info.get("px_per_m")
     scale = image_scale.from_tracks(image_scale.before_frames(sequence), learned or float("nan"), people)
     if any(t.plane == "image" and len(t.id) for t in people) and not np.isfinite(scale.px_per_m):
         got, remedy = "people in the image, without its scale", "give --px-per-m, pixels per metre"
         raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
-    step = math.gcd(*np.diff([t.index for t in people if len(t.id)]).astype(int).tolist())
-    if step > 1:
-        text = f"{sequence.name}: people only in every {step}th frame. If these are all frames there are, number them"
-        warnings.warn(f"{text} 1, 2, 3, … and give their rate, here --fps {sequence.fps / step:g}", stacklevel=2)
     tracks = with_groups(people, sequence.fps, scale.px_per_m, rule)
     fault = velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule)
-    if fault is not None:
-        warnings.warn(fault, UserWarning, stacklevel=2)
+    odd = implausible(sequence.name, people, sequence.fps, scale.px_per_m)
+    for text in (*odd, *([] if fault is None else [fault])):
+        warnings.warn(text, UserWarning, stacklevel=2)
     info = known_people_info(sequence, tracks, scale)
     if run is not None:
         told = {key: value for key, value in run.info.items() if key != "grouping"}

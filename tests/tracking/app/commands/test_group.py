@@ -255,6 +255,22 @@ def test_frames_that_nobody_labelled(tmp_path, capsys):
     assert "1 2 3" in found.out
 
 
+@pytest.mark.parametrize(
+    ("rows", "options", "expected"),
+    [
+        (text, ["--fps", "100"], "Check --fps, here 100, and that positions are in metres"),
+        (boxes, ["--fps", "10", "--px-per-m", "4"], "--px-per-m, here 4"),
+        (boxes, ["--fps", "10"], ""),
+    ],
+)
+def test_speeds_that_nobody_has(tmp_path, capsys, rows, options, expected):
+    (tmp_path / "walk.txt").write_text(rows())
+    assert run(["group", str(tmp_path / "walk.txt"), *options, "--out", str(tmp_path / "g")]) == 0
+    warned = capsys.readouterr().err
+    assert expected in warned
+    assert bool(warned) == bool(expected)
+
+
 def test_without_people(tmp_path, capsys):
     """Nobody labelled, and a person alone: tables without groups."""
     (tmp_path / "walk" / "gt").mkdir(parents=True)

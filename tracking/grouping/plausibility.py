@@ -1,0 +1,45 @@
+"""Warnings for people with ids whose frame numbers, frame rate or unit of length cannot be right.
+
+A wrong rate or unit gives no error, only other groups or none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from sim.io.formats.velocity import chords
+from sim.types import Tracks
+
+FAST = 3.0
+"""m/s: a median speed above it is no crowd's. It is 0.6 to 1.4 in seq_hotel, zara01, mwt1gt, PETS09, TownCentre and
+TUD-Campus."""
+
+
+def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float) -> Iterator[str]:
+    """Yield a warning for each thing that is hardly right: frames without anybody at a fixed step, and speeds.
+
+    name: of the sequence. people: one `Tracks` per frame. fps: frames per second. px_per_m: px per m, used only if the
+    people are in the image; nan if unknown, then speeds are not checked. Speeds are those of the motion over the last
+    0.5 s.
+    """
+    present = [t for t in people if len(t.id)]
+    step = math.gcd(*np.diff([t.index for t in present]).astype(int).tolist())
+    if step > 1:
+        yield (
+            f"{name}: people only in every {step}th frame. If these are all frames there are, number them 1, 2, 3, … "
+            f"and give their rate, here --fps {fps / step:g}"
+        )
+    if not present:
+        return
+    frame = np.repeat([t.index for t in present], [len(t.id) for t in present])
+    id, pos = np.concatenate([t.id for t in present]), np.concatenate([t.pos[:, :2] for t in present])
+    in_image = present[0].plane == "image"
+    scale = px_per_m if in_image else 1.0
+    speed = np.hypot(*chords(frame, id, pos, fps).T) / scale
+    median = float(np.median(speed[np.isfinite(speed)])) if np.isfinite(speed).any() else 0.0
+    if median > FAST:
+        unit = "that positions are in metres" if not in_image else f"--px-per-m, here {scale:.4g}"
+        yield f"{name}: half of the people are faster than {median:.3g} m/s. Check --fps, here {fps:g}, and {unit}"
