@@ -1,7 +1,7 @@
 """Do the orders of scenarios come true, and how hard are the scenes for the baseline grouping rule?
 
     python -m benchmarks.scenario_check orders [--seeds 0:100] [scenario, suite or file …]
-    python -m benchmarks.scenario_check difficulty [--seeds 20000:20020] [--rule present] [--without queue]
+    python -m benchmarks.scenario_check difficulty [--seeds 20000:20020] [--rule baseline,present] [--without queue]
                                                    [scenario, suite or file …]
 
 orders: one line per scenario: seeds on which an order failed (with reasons beneath), orders that came true, number of
@@ -10,8 +10,8 @@ greatest speed over any 0.8 s from the firing of an order until it has come true
 person's own speed: the greater of the speeds that their group has before and after the order. Quantiles 50, 99, 100 %;
 the aim is at most 1.15.
 difficulty: scores of the baseline rule on true positions and velocities, so that what it misses is due to the scene.
---rule present: of a trivial rule that judges the present alone (two frames), with the distance and velocity difference
-of the baseline rule. --without: entries whose name holds this word are left out.
+The rule `present` is trivial: it judges the present alone (two frames), with the distance and velocity difference of
+the baseline rule. --without: entries whose name holds this word are left out.
 `event` is the mean of the F1 of merges and of splits by the counts of all sequences together. The columns of kinds are
 hits/false/missed of all sequences; a dash means neither a true nor a reported event. The further scores are means over
 sequences, below them their 95 % intervals. An event F1 above 0.98 is marked *: events there separate no trackers.
@@ -119,9 +119,9 @@ def true_people(truth: Truth, index: int) -> Tracks:
     return Tracks(index, now.t, "ground", "person", now.id, no_group, now.pos, now.vel, cov, None, score)
 
 
-def rule_scores(entry: Entry, seeds: range, rule: LinkRule) -> list[Scores]:
-    """Returns the scores of each sequence; a seed that cannot be simulated is printed and left out."""
-    found = []
+def rule_scores(entry: Entry, seeds: range, rules: Sequence[str]) -> dict[str, list[Scores]]:
+    """Returns the scores of each sequence by rule; a seed that cannot be simulated is printed and left out."""
+    found: dict[str, list[Scores]] = {rule: [] for rule in rules}
     for seed in seeds:
         try:
             truth = simulate(entry.scenario, seed, entry.repeat, streams=()).truth
@@ -130,7 +130,8 @@ def rule_scores(entry: Entry, seeds: range, rule: LinkRule) -> list[Scores]:
             continue
         assert truth is not None
         tracks = [true_people(truth, index) for index in range(1, truth.length + 1)]
-        found.append(evaluate(truth, with_groups(tracks, truth.fps, truth.px_per_m, rule)))
+        for rule in rules:
+            found[rule].append(evaluate(truth, with_groups(tracks, truth.fps, truth.px_per_m, RULES[rule])))
     return found
 
 
@@ -149,17 +150,18 @@ def score_means(found: Sequence[Scores]) -> tuple[np.ndarray, np.ndarray, np.nda
     return mean_interval(np.array([[s[key] for key in MEANS.values()] for s in found]))
 
 
-def difficulty(title: str, entries: Sequence[Entry], seeds: range, rule: LinkRule) -> None:
-    """Prints the rows of some entries, and of all of them together."""
-    every: list[Scores] = []
+def difficulty(title: str, entries: Sequence[Entry], seeds: range, rules: Sequence[str]) -> None:
+    """Prints the rows of some entries, and of all of them together, for each rule."""
+    every: dict[str, list[Scores]] = {rule: [] for rule in rules}
     for entry in entries:
-        found = rule_scores(entry, seeds, rule)
-        every += found
-        if found:
-            row([entry.name, *difficulty_cells(found)])
-    row([f"{title}: {len(every)} sequences", *difficulty_cells(every)])
-    for end, values in zip(("95 % low", "95 % high"), score_means(every)[1:], strict=True):
-        row([end, *[""] * (1 + len(KINDS)), *(number(v) for v in values)])
+        for rule, found in rule_scores(entry, seeds, rules).items():
+            every[rule] += found
+            if found:
+                row([entry.name, rule, *difficulty_cells(found)])
+    for rule, found in every.items():
+        row([f"{title}: {len(found)} sequences", rule, *difficulty_cells(found)])
+        for end, values in zip(("95 % low", "95 % high"), score_means(found)[1:], strict=True):
+            row([end, rule, *[""] * (1 + len(KINDS)), *(number(v) for v in values)])
 
 
 def main() -> None:
@@ -167,7 +169,7 @@ def main() -> None:
     parser.add_argument("mode", choices=["orders", "difficulty"])
     parser.add_argument("name", nargs="*", help="scenarios, suites or files; the whole catalogue by default")
     add_seeds(parser, None)
-    parser.add_argument("--rule", choices=RULES, default="baseline", help="difficulty: the rule that is scored")
+    parser.add_argument("--rule", default="baseline", help=f"difficulty: of {', '.join(RULES)}, separated by commas")
     parser.add_argument("--without", metavar="WORD", help="leaves out entries whose name holds this word")
     args: argparse.Namespace = parser.parse_intermixed_args()
     chosen = {name: resolve(name) for name in args.name} or {"catalogue": [e for n in names() for e in resolve(n)]}
@@ -177,9 +179,12 @@ def main() -> None:
         for entry in [e for entries in chosen.values() for e in entries]:
             orders(entry, args.seeds or range(100))
         return
-    head(["scenario", "event", *KINDS, *MEANS])
+    rules = args.rule.split(",")
+    if not set(rules) <= RULES.keys():
+        parser.error(f"--rule: expected some of {', '.join(RULES)}, got {args.rule}")
+    head(["scenario", "rule", "event", *KINDS, *MEANS])
     for title, entries in chosen.items():
-        difficulty(title, entries, args.seeds or range(20_000, 20_020), RULES[args.rule])
+        difficulty(title, entries, args.seeds or range(20_000, 20_020), rules)
 
 
 if __name__ == "__main__":

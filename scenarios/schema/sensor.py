@@ -143,13 +143,14 @@ class Sensor(Model):
     - persistence: correlation of misses from frame to frame. clutter_rate: mean number of false alarms per frame.
     - noise_px: standard deviation of each box edge, px. noise_m: of points along each axis, m.
     - box: "visible" (boxes of the visible parts) or "amodal" (of whole people). hide: artificial occlusions.
+    - points: "seen" (true position with noise_m, displaced by as much as the visible part's foot is from the whole
+      body's on the ground), "own" (true position with noise_m), or "foot" (below the noisy box). Without camera or
+      boxes all are "own".
     - by_visibility: factors at evenly spaced visibilities from 0 to 1, linear between them, for occlusion_power; below
       min_visibility the probability is 0 all the same. miss_memory: slow parts of
       the misses, for persistence. box_noise: errors in box heights, for noise_px. These three are measured and replace
       the simpler key; None: they do not.
-    - points: "seen" (true position with noise_m, displaced by as much as the visible part's foot is from the whole
-      body's on the ground), "own" (true position with noise_m), or "foot" (below the noisy box). Without camera or
-      boxes all are "own". false_alarms: life, places and sizes; None: one frame, anywhere.
+    - false_alarms: life, places and sizes; None: one frame, anywhere.
     - true_scores, false_scores: evenly spaced quantiles of the scores of true detections and false alarms; None: not
       measured.
 
@@ -165,6 +166,11 @@ class Sensor(Model):
         "visible",
         description="visible: boxes of the visible parts, so that occlusion moves foot points; amodal: boxes "
         "of whole people",
+    )
+    points: Literal["own", "seen", "foot"] = Field(
+        "seen",
+        description="points on the ground: seen = true position with noise_m, displaced as the foot of the visible "
+        "part is; own = true position with noise_m; foot = below the lower edge of the noisy box",
     )
     occlusion_power: NonNegative = Field(
         1.0, description="the probability of detection is multiplied by the visibility to this power"
@@ -184,11 +190,6 @@ class Sensor(Model):
         None, description="parts of the misses of a person that change slowly; replaces persistence"
     )
     box_noise: BoxNoise | None = Field(None, description="errors proportional to the box height; replaces noise_px")
-    points: Literal["own", "seen", "foot"] = Field(
-        "seen",
-        description="points on the ground: seen = true position with noise_m, displaced as the foot of the visible "
-        "part is; own = true position with noise_m; foot = below the lower edge of the noisy box",
-    )
     false_alarms: FalseAlarms | None = Field(None, description="life, places and sizes of false alarms")
     true_scores: Curve | None = Field(
         None, description="evenly spaced quantiles of the scores of true detections, 0 to 1"

@@ -114,6 +114,7 @@ KEYS = {
     "sensor.noise_px": ("", "sensor.noise_px=3"),
     "sensor.noise_m": ("", "sensor.noise_m=0.2"),
     "sensor.box": ("", "sensor.box=amodal"),
+    "sensor.points": ("", "sensor.points=own"),
     "sensor.occlusion_power": ("", "sensor.occlusion_power=4"),
     "sensor.min_visibility": ("", "sensor.min_visibility=0.9"),
     "sensor.small_px": ("", "sensor.small_px=80"),
@@ -199,7 +200,7 @@ TEXT_ONLY = {"schema", "about", "group[].id", "event[](merge).into", "event[](sp
 """Keys that name things within the file, or say what it is."""
 
 
-PROFILE = ("box_noise.", "false_alarms.", "miss_memory[].", "by_visibility", "points", "true_scores", "false_scores")
+PROFILE = ("box_noise.", "false_alarms.", "miss_memory[].", "by_visibility", "true_scores", "false_scores")
 """Of `sensor`: a detector's measured errors. What each does: tests/sim/detector."""
 
 
