@@ -18,7 +18,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
 from tracking import image_scale
-from tracking.grouping.link_rule import LinkRule
+from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.prepare import Params, prepare
 from tracking.run_info import Speed, known_people_info, run_info
 from tracking.time_limit import TimeLimited
@@ -71,7 +71,7 @@ def track(
     detections: DetectionMode | None = None,
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
-    grouping: LinkRule | str | Path | None = None,
+    grouping: Grouping | str | Path | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> TrackingRun:
     """Return the tracker's tracks of every frame of the sequence, completed with groups and events.
@@ -93,7 +93,7 @@ def track(
     from tracking.grouping.grouped_tracks import names_groups, with_groups
     from tracking.grouping.velocity_check import velocity_warning
 
-    rule = LinkRule.from_toml(grouping) if isinstance(grouping, str | Path) else grouping
+    rule = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
     prepared.reset(seed)
     reported, spent, begun = [], 0.0, time.perf_counter()
@@ -118,7 +118,7 @@ def track(
 
 
 def group(
-    sequence: Sequence, run: TrackingRun | None = None, *, grouping: LinkRule | str | Path | None = None
+    sequence: Sequence, run: TrackingRun | None = None, *, grouping: Grouping | str | Path | None = None
 ) -> TrackingRun:
     """Return the people of a sequence, whose ids are known, with groups and events that follow from their motion.
 
@@ -137,7 +137,7 @@ def group(
     from tracking.grouping.plausibility import implausible
     from tracking.grouping.velocity_check import velocity_warning
 
-    rule = LinkRule.from_toml(grouping) if isinstance(grouping, str | Path) else grouping
+    rule = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     people = known_people(sequence) if run is None else without_groups(run)
     file = sequence.source.get("path", sequence.name)
     if any(t.unit == "group" for t in people):

@@ -65,7 +65,11 @@ Images = Annotated[
 ]
 Rule = Annotated[
     Path | None,
-    typer.Option("--grouping", metavar="FILE.toml", help="Rule that derives groups, as `tune grouping` writes it."),
+    typer.Option(
+        "--grouping",
+        metavar="rule|belief|FILE.toml",
+        help="What derives groups, or a file of `tune grouping` or `fit grouping`.",
+    ),
 ]
 Probabilities = Annotated[
     bool, typer.Option("--probabilities", help="Store the probability that two people belong together.")

@@ -18,6 +18,7 @@ from sim.truth.identity import Identities, PersonSet
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.proximity import stretches
 from sim.types import Array, GroupEvent, Ints
+from tracking.grouping.belief import Belief
 from tracking.grouping.link_rule import LinkRule, Links
 from tracking.grouping.merge_split_events import LinkSwitch, event_of_change
 
@@ -61,7 +62,7 @@ class _LinkedPeople:
 
 
 def label_people(
-    frame: Ints, column: Ints, pos: Array, links: Links, fps: float, rule: LinkRule
+    frame: Ints, column: Ints, pos: Array, links: Links, fps: float, rule: LinkRule | Belief
 ) -> tuple[Ints, list[GroupEvent]]:
     """Return the group id of each row (R,), -1 for a person alone, and the membership events in order of `emitted`.
 

@@ -28,7 +28,7 @@ from sim.truth.merge_split_rules import frames_of
 from sim.truth.queue_detection import ADVANCE_TIME, QUEUE_TIME, queues
 from sim.types import EVENT_KINDS, Bools, GroupEvent, Groups, Tracks
 from tracking.grouping.group_labels import label_people
-from tracking.grouping.link_rule import LinkRule, find_links
+from tracking.grouping.grouping_choice import Grouping, default_grouping, links_of
 from tracking.grouping.merge_split_events import events_of_labels
 from tracking.grouping.tracks_table import TracksTable, boxes_of_rows, tabulate
 
@@ -37,7 +37,7 @@ MEMBERSHIP_KINDS = frozenset(EVENT_KINDS) - {"cross", "queue"}
 
 
 def with_groups(
-    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRule | None = None
+    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None
 ) -> tuple[Tracks, ...]:
     """Return the tracks of a sequence with groups and events filled in by `derive`; in order, one `Tracks` per frame.
 
@@ -94,7 +94,7 @@ def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
     ]
 
 
-def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: LinkRule | None = None) -> list[Tracks]:
+def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None) -> list[Tracks]:
     """Return the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
 
     tracks: one tracker's, of a whole sequence, in order, one per frame from frame 1; the result has as many, marked as
@@ -110,8 +110,8 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Li
     given = list(tracks)
     if not given or any(t.unit == "group" for t in given):
         return given
-    rule = rule or LinkRule()
-    table = tabulate(given, fps, px_per_m, rule)
+    rule = rule or default_grouping()
+    table = tabulate(given, fps, px_per_m, rule.smooth)
     named = names_groups(given)
     reported = {e.kind for t in given for e in t.events}
     events: list[GroupEvent] = []
@@ -121,7 +121,7 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Li
     return _filled(given, table, events + [e for e in _crossings_and_queues(table, fps) if e.kind not in reported])
 
 
-def _grouped(table: TracksTable, named: bool, fps: float, rule: LinkRule) -> tuple[TracksTable, list[GroupEvent]]:
+def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tuple[TracksTable, list[GroupEvent]]:
     """Returns the table with group ids filled in, and the membership events (people are columns + 1, frames count from
     1).
 
@@ -131,7 +131,7 @@ def _grouped(table: TracksTable, named: bool, fps: float, rule: LinkRule) -> tup
     """
     if named and (table.group < 0).all():
         return table, []
-    links = find_links(table.frame, table.column, table.pos, table.vel, table.length, fps, rule)
+    links = links_of(table, fps, rule)
     group, events = label_people(table.frame, table.column, table.positions(), links, fps, rule)
     if named and not np.array_equal(group, table.group):
         return table, events_of_labels(table.labels(), table.positions())

@@ -11,7 +11,6 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.formats.velocity import WINDOW, chords
 from sim.types import Array, Bools, Ints, Tracks
-from tracking.grouping.link_rule import LinkRule
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,13 +54,13 @@ class TracksTable:
         return out
 
 
-def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRule) -> TracksTable:
+def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, smooth: float = 0.0) -> TracksTable:
     """Return the table of a sequence's person tracks, one `Tracks` per frame; there must be at least one (else
     IndexError).
 
     fps: frames per second. px_per_m: px per m, used only if the tracks are in the image. Of positions in space z is
     dropped. Velocities are the tracker's own. Unknown ones (nan) are replaced by chords (mean velocities) over the last
-    0.5 s. If `rule.smooth` (s) is above 0, all are replaced by chords over that time. A chord is nan in a person's
+    0.5 s. If `smooth` (s) is above 0, all are replaced by chords over that time. A chord is nan in a person's
     first frame, and where the person was not seen within that time before.
 
     Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
@@ -80,9 +79,9 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRu
     ids, column = np.unique(id, return_inverse=True)
     length = int(max(t.index for t in tracks))
     unknown: Bools = np.asarray(np.isnan(vel).any(axis=1))
-    if rule.smooth > 0 or unknown.any():
-        chord = chords(frame, id, pos, fps, rule.smooth or WINDOW)
-        vel = chord if rule.smooth > 0 else np.where(unknown[:, None], chord, vel)
+    if smooth > 0 or unknown.any():
+        chord = chords(frame, id, pos, fps, smooth or WINDOW)
+        vel = chord if smooth > 0 else np.where(unknown[:, None], chord, vel)
     return TracksTable(frame, id, column, ids, pos, vel, group, length, scale)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from sim.io.formats.velocity import WINDOW, chords
 from sim.types import Tracks
+from tracking.grouping.grouping_choice import Grouping, default_grouping
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.tracks_table import tabulate
 
@@ -30,7 +31,7 @@ def velocity_error(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: 
     per frame, at least one, of people. fps: frames per second. px_per_m: px per m, used only in the image. Known
     velocities count only where there is a chord; fewer than 50 give nan.
     """
-    table = tabulate(tracks, fps, px_per_m, rule)
+    table = tabulate(tracks, fps, px_per_m, rule.smooth)
     chord = chords(table.frame, table.id, table.pos, fps)
     apart = np.hypot(*(table.vel - chord).T)
     apart = apart[np.isfinite(apart)]
@@ -38,15 +39,15 @@ def velocity_error(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: 
 
 
 def velocity_warning(
-    name: str, tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRule | None
+    name: str, tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None
 ) -> str | None:
     """Return a warning if groups cannot be derived from the velocities of these tracks, else None.
 
-    name: of the tracker. The other arguments are those of `velocity_error`; None stands for the default rule. There is
-    no warning if the rule does not use the velocities, for tracks of groups, and in the image without a scale.
+    name: of the tracker. The other arguments are those of `velocity_error`; None stands for the default grouping. There
+    is no warning if the grouping does not use the velocities, for tracks of groups, and in the image without a scale.
     """
-    rule = rule or LinkRule()
-    if not tracks or tracks[0].unit == "group" or rule.smooth > 0:
+    rule = rule or default_grouping()
+    if not tracks or not isinstance(rule, LinkRule) or tracks[0].unit == "group" or rule.smooth > 0:
         return None
     if tracks[0].plane == "image" and not (math.isfinite(px_per_m) and px_per_m > 0):
         return None

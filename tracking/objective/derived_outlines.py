@@ -13,7 +13,7 @@ import numpy as np
 from sim.geometry.footprints import FOOTPRINT
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, Bools, Ints, Tracks
-from tracking.grouping.link_rule import LinkRule, find_links
+from tracking.grouping.grouping_choice import default_grouping, links_of
 from tracking.grouping.tracks_table import TracksTable, boxes_of_rows, tabulate
 from tracking.objective.hull_overlaps import GroupOutlines
 from tracking.scoring.rows import FrameRows
@@ -34,7 +34,7 @@ def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labe
 
     Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
     """
-    table = tabulate(tracks, fps, px_per_m, LinkRule())
+    table = tabulate(tracks, fps, px_per_m, default_grouping().smooth)
     order, first = _grouped_rows(table, _group_of_rows(table, fps), labelled)
     pos = table.pos[order] * table.scale
     ends = np.append(first[1:], len(order)) if len(first) else first
@@ -56,8 +56,8 @@ def _group_of_rows(table: TracksTable, fps: float) -> Ints:
 
     if (table.group >= 0).any():
         return table.group
-    rule = LinkRule()
-    links = find_links(table.frame, table.column, table.pos, table.vel, table.length, fps, rule)
+    rule = default_grouping()
+    links = links_of(table, fps, rule)
     label: Ints = kernels.connected_people(
         table.frame, table.column, table.length, len(table.ids), frames_of(rule.memory, fps),
         links.frame, links.a, links.b, links.on,

@@ -18,7 +18,7 @@ from tracking.app.commands.group_tables import group_row, group_tables
 from tracking.app.progress import ProgressMeter
 from tracking.app.run_folders import run_folders
 from tracking.app.stored_tracks import StoredTracks, find_tracks
-from tracking.grouping.link_rule import LinkRule
+from tracking.grouping.grouping_choice import grouping_of
 
 TEXT = "mot text"
 """Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence."""
@@ -36,7 +36,7 @@ def group(options: GroupOptions) -> CommandResult:
     of another program with names of a run. Raises WorkError if the disk is full. Runs stored before an error stay.
     """
     option_parsing.output_folder(options.out)
-    rule = None if options.grouping is None else LinkRule.from_toml(options.grouping)
+    rule = None if options.grouping is None else grouping_of(options.grouping)
     if options.probabilities:
         raise InputError(
             place="--probabilities", got="a grouping by thresholds", expected="one that computes probabilities",

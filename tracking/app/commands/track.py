@@ -17,7 +17,7 @@ from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.run_folders import run_folders
 from tracking.config import Config
-from tracking.grouping.link_rule import LinkRule
+from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
 from tracking.time_limit import TimeLimited
@@ -44,7 +44,7 @@ class TrackerSetup:
     detections: DetectionMode | None = None
     sensor: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
-    grouping: LinkRule | None = None
+    grouping: Grouping | None = None
     limited: TimeLimited | None = None
 
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
@@ -112,7 +112,7 @@ def _setup(options: TrackOptions) -> TrackerSetup:
     found = option_parsing.settings(texts, "tracker", ("tracker", "sensor"))
     own = [text for subject, text in found if subject == "tracker"]
     sensor = option_parsing.toml_values(text for subject, text in found if subject == "sensor")
-    rule = None if options.grouping is None else LinkRule.from_toml(options.grouping)
+    rule = None if options.grouping is None else grouping_of(options.grouping)
     config = _config(options.tracker, options.params, own)
     limited = None if options.step_timeout is None else TimeLimited(options.tracker, options.step_timeout)
     return TrackerSetup(options.tracker, config, options.detections, sensor, options.seed, rule, limited)

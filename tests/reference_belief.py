@@ -1,0 +1,105 @@
+"""Slow, obvious twins of the belief: evidence of pairs, beliefs over time, and average linkage."""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+
+import numpy as np
+
+TIMES = (0.8, 2.0, 5.0, 15.0)
+
+
+def evidence(pos, seconds):
+    """dict from (step, a, b) to the dict of quantities; pos (S, P, 2), nan where not seen."""
+    steps, people = pos.shape[:2]
+    seen = [[p for p in range(people) if np.isfinite(pos[t, p, 0])] for t in range(steps)]
+    first = {p: next(t for t in range(steps) if p in seen[t]) for p in range(people) if any(p in s for s in seen)}
+    past, found = {}, {}
+    for t in range(steps):
+        vel = {p: chord(pos, t, p, seconds) for p in seen[t]}
+        for a, b in combinations(seen[t], 2):
+            if np.hypot(*(pos[t, b] - pos[t, a])) < 6.0:
+                past.setdefault((a, b), []).append((t, instant(pos[t], vel, a, b, seen[t])))
+                row = {
+                    f"{name}, {time:g} s": mean(past[a, b], name, t, time, seconds)
+                    for name in past[a, b][0][1]
+                    for time in TIMES
+                }
+                late = max(first[a], first[b])
+                row["distance"] = np.hypot(*(pos[t, b] - pos[t, a]))
+                row["arrival gap"] = abs(first[a] - first[b]) * seconds if min(first[a], first[b]) > 0 else math.nan
+                row["first distance"] = np.hypot(*(pos[late, b] - pos[late, a])) if late > 0 else math.nan
+                found[t, a, b] = row
+    return found
+
+
+def chord(pos, t, p, seconds):
+    for steps in range(max(1, round(0.8 / seconds)), 0, -1):
+        if t - steps >= 0 and np.isfinite(pos[t - steps, p, 0]):
+            return (pos[t, p] - pos[t - steps, p]) / (steps * seconds)
+    return np.full(2, math.nan)
+
+
+def instant(pos, vel, a, b, seen):
+    apart, m = pos[b] - pos[a], (vel[a] + vel[b]) / 2
+    distance, pace = np.hypot(*apart), np.hypot(*m)
+    side, along = distance, math.nan
+    if pace >= 0.3:
+        side, along = abs(apart[0] * m[1] - apart[1] * m[0]) / pace, abs(apart @ m) / pace
+    around = [sum(np.hypot(*(pos[q] - pos[p])) < 3.0 for q in seen if q not in (a, b)) for p in (a, b)]
+    within = [q_p for p in (a, b) for q in seen if q not in (a, b) and np.hypot(*(pos[q] - pos[p])) < 6.0
+              for q_p in [np.hypot(*(vel[q] - vel[p])) < 0.5]]  # fmt: skip
+    return {
+        "distance": distance, "velocity difference": np.hypot(*(vel[b] - vel[a])), "share near": float(distance < 1.2),
+        "sideways": side, "lengthwise": along, "others": sum(around) / 2,
+        "stream": sum(within) / len(within) if within else math.nan,
+        "speed": (np.hypot(*vel[a]) + np.hypot(*vel[b])) / 2,
+    }  # fmt: skip
+
+
+def mean(rows, name, t, time, seconds):
+    known = [(math.exp(-(t - s) * seconds / time), row[name]) for s, row in rows if not math.isnan(row[name])]
+    return sum(w * x for w, x in known) / sum(w for w, _ in known) if known else math.nan
+
+
+def beliefs(pos, seconds, belief):
+    """dict from (step, a, b) to (log-odds, decision)."""
+    found, state = {}, {}
+    for (t, a, b), row in evidence(pos, seconds).items():
+        speed = row["speed, 2 s"]
+        stands = 0.0 if math.isnan(speed) else min(max((0.6 - speed) / 0.4, 0.0), 1.0)
+        target = belief.bias
+        for table in belief.tables:
+            x = row[table.name]
+            if not math.isnan(x):
+                walk, stand = (np.interp(x, table.at, y) for y in (table.walking, table.standing))
+                target += (1 - stands) * walk + stands * stand
+        log_odds = decision = target
+        if (a, b) in state:
+            s, old, before = state[a, b]
+            gap = (t - s) * seconds
+            time = belief.walking_time ** (1 - stands) * belief.standing_time**stands
+            stay = math.exp(-gap / time)
+            log_odds = stay * old + (1 - stay) * target
+            usual = belief.join / (belief.join + belief.part)
+            share = usual + (1 / (1 + math.exp(-before)) - usual) * math.exp(-(belief.join + belief.part) * gap)
+            decision = math.log(share / (1 - share)) + seconds * log_odds
+        state[a, b] = t, log_odds, decision
+        found[t, a, b] = log_odds, decision
+    return found
+
+
+def groups(people, log_odds, unseen):
+    """Average linkage of one step, one join at a time; log_odds: dict from (a, b), a < b."""
+    parts = [frozenset([p]) for p in people]
+    while True:
+        best = None
+        for x, y in combinations(parts, 2):
+            linked = [log_odds.get((min(p, q), max(p, q)), unseen) for p in x for q in y]
+            mean = sum(linked) / len(linked)
+            if mean > 0 and (best is None or mean > best[0]):
+                best = mean, x, y
+        if best is None:
+            return {p for p in parts if len(p) > 1}
+        parts = [p for p in parts if p not in best[1:]] + [best[1] | best[2]]

@@ -1,0 +1,119 @@
+"""The belief: equal to a slow twin, causal, and its file."""
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from tests import reference_belief as slow
+from tests.test_belonging import walk
+from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
+from tracking.grouping.belief_partition import partition
+from tracking.grouping.pair_evidence import NAMES, evidence, frames_per_step, step_positions
+
+
+def places(seed, frames=30, people=7, seconds=0.2):
+    frame, id, pos = walk(seed, frames, people)
+    ids, column = np.unique(id, return_inverse=True)
+    out = np.full((frames, len(ids), 2), np.nan)
+    out[frame - 1, column] = pos
+    return out
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seconds", [0.2, 0.4])
+def test_evidence_equals_the_slow_twin(seed, seconds):
+    pos = places(seed)
+    expected = slow.evidence(pos, seconds)
+    rows = [
+        (key, values)
+        for r in evidence(pos, seconds)
+        for *key, values in zip(r.step.tolist(), r.a.tolist(), r.b.tolist(), r.values, strict=True)
+    ]
+    assert sorted(tuple(key) for key, _ in rows) == sorted(expected)
+    for key, values in rows:
+        np.testing.assert_allclose(values, [expected[tuple(key)][name] for name in NAMES], atol=1e-9, err_msg=str(key))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_beliefs_equal_the_slow_twin(seed):
+    pos, belief = places(seed), default_belief()
+    found, expected = pair_beliefs(pos, 0.2, belief), slow.beliefs(pos, 0.2, belief)
+    keys = zip(found.step.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
+    both = np.column_stack([found.log_odds, found.decision])
+    np.testing.assert_allclose(both, [expected[key] for key in keys], atol=1e-9)
+    assert len(both) == len(expected)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_partition_equals_average_linkage_one_join_at_a_time(seed):
+    r = np.random.default_rng(seed)
+    steps, people = 4, 8
+    step, a, b = (x.ravel() for x in np.meshgrid(range(steps), range(people), range(people), indexing="ij"))
+    kept = (a < b) & (r.random(len(a)) < 0.7)
+    step, a, b = step[kept], a[kept], b[kept]
+    log_odds = r.normal(0, 3, len(a))
+    t, person, group = partition(step, a, b, log_odds, -4.0)
+    for s in range(steps):
+        table = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
+        found = {frozenset(person[(t == s) & (group == g)].tolist()) for g in set(group[t == s].tolist())}
+        assert found == slow.groups(range(people), table, -4.0)
+
+
+def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
+    pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+    a, b = np.array(pairs).T
+    chain, stretched = np.array([1.0, -5, -6, 1, -5, 1]), np.array([4.0, 1, -1, 4, 1, 4])
+    for log_odds, size in ((chain, 2), (stretched, 4)):
+        _, _, group = partition(np.zeros(6, np.int64), a, b, log_odds, -4.0)
+        assert np.bincount(group).max() == size
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_looks_ahead(seed):
+    pos, belief = places(seed), default_belief()
+    whole, part = pair_beliefs(pos, 0.2, belief), pair_beliefs(pos[:8], 0.2, belief)
+    count = len(part.step)
+    assert (whole.step[:count] == part.step).all()
+    assert whole.step[count:].min() == 8
+    np.testing.assert_array_equal(whole.log_odds[:count], part.log_odds)
+    np.testing.assert_array_equal(whole.decision[:count], part.decision)
+
+
+def test_steps_hold_means_of_whole_steps():
+    frame, column = np.array([0, 1, 2, 3, 4, 0, 3]), np.array([0, 0, 0, 0, 0, 1, 1])
+    pos = np.column_stack([np.array([0.0, 1, 2, 3, 4, 7, 9]), np.zeros(7)])
+    assert [frames_per_step(fps) for fps in (2.5, 10, 25, 30)] == [1, 2, 5, 6]
+    found = step_positions(frame, column, pos, 5, 2, 10.0)[..., 0]
+    np.testing.assert_array_equal(found, [[0.5, 7], [2.5, 9]])
+
+
+def test_the_file_is_read_as_written(tmp_path):
+    belief = default_belief()
+    (tmp_path / "b.toml").write_text(belief.toml_text("two\nlines"))
+    again = Belief.from_toml(tmp_path / "b.toml")
+    assert again.toml_text() == belief.toml_text()
+    assert FROZEN.read_text().endswith(belief.toml_text())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ('grouping = "belief"', 'grouping = "rule"', "grouping"),
+        ("bias = ", "bias = nan # ", "bias"),
+        ("memory = ", "memory = -", "memory"),
+        ("unseen", "unknown", "unknown"),
+        ('name = "distance, 2 s"', 'name = "distance, 3 s"', "table 2: name"),
+        ("walking = [", "walking = [1, ", "table 1: at"),
+        ("at = [", "at = [9, ", "table 1: at"),
+        ("standing = [", 'standing = ["x", ', "table 1: standing"),
+        ("standing = [", "sitting = [", "table 1"),
+        ("[[table]]", "[[row]]", "grouping"),
+    ],
+)
+def test_bad_files_are_refused(tmp_path, old, new, named):
+    text = FROZEN.read_text()
+    assert old in text
+    (tmp_path / "b.toml").write_text(text.replace(old, new) if named == "grouping" else text.replace(old, new, 1))
+    with pytest.raises(InputError, match="fit grouping") as error:
+        Belief.from_toml(tmp_path / "b.toml")
+    assert error.value.place == named

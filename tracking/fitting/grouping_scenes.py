@@ -1,0 +1,120 @@
+"""Simulated scenes with true groups, as a fit of the belief sees them: rows of pairs, from exact and rough positions.
+
+Each scene is seen twice: at 2.5 frames/s with the errors of labels, and at its own frame rate with the errors of a
+detector and misses. Some scenes begin late, as if the recording had begun there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenarios.loading.resolve import Entry, resolve
+from sim.rng import rng
+from sim.sequence import simulate
+from sim.types import Array, Bools, Ints, Truth
+from tracking.grouping.pair_evidence import evidence, frames_per_step, step_positions
+from tracking.tuning.grouping_episodes import SURVEYED, LabelErrors, with_label_errors
+
+SLOW = 2.5
+"""Frames/s of the slow copy."""
+DETECTED = LabelErrors(0.1, 1e-3, filmed=False)
+MISSED = 0.05
+BEGINS = (0.0, 4.0, 8.0)
+"""s: times at which scenes of successive seeds begin, if at least LEAST s are left."""
+LEAST = 10.0
+
+
+@dataclass(frozen=True)
+class PairScene:
+    """One scene as rows of pairs, sorted by pair, then step (`pair_evidence`).
+
+    name: of the suite or scenario. seconds: length of a step, s. pair, step (R,); values (R, len(NAMES)) float32;
+    together (R,): True if the two are in one true group in the step's last frame.
+    """
+
+    name: str
+    seconds: float
+    pair: Ints
+    step: Ints
+    values: np.ndarray
+    together: Bools
+
+
+@dataclass(frozen=True)
+class Walkers:
+    """People of a scene whose positions a grouping sees, (R,) rows: frame from 0, column of the person, pos (R, 2), m.
+
+    labels (T, P): true group by frame and column, -1 alone or absent. fps: frames per second.
+    """
+
+    frame: Ints
+    column: Ints
+    pos: Array
+    labels: Ints
+    fps: float
+
+
+def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScene]:
+    """Yields two scenes for each entry of the named scenarios, suites or *.toml files and each seed; those without a
+    pair are left out.
+
+    Raises InputError if a name or file is wrong, WorkError if a script cannot be fulfilled.
+    """
+    for name in names:
+        for entry in resolve(name):
+            for seed in seeds:
+                truth = simulated(entry, seed)
+                begin = BEGINS[seed % len(BEGINS)] if truth.length / truth.fps >= LEAST + max(BEGINS) else 0.0
+                for rough in (False, True):
+                    found = rows_of(name, walkers(truth, seed, entry.repeat, rough=rough, begin=begin))
+                    if len(found.pair):
+                        yield found
+
+
+def simulated(entry: Entry, seed: int) -> Truth:
+    """Returns the truth of an entry, without pictures and detections."""
+    truth = simulate(entry.scenario, seed, entry.repeat, streams=()).truth
+    assert truth is not None
+    return truth
+
+
+def walkers(truth: Truth, seed: int, repeat: int, *, rough: bool, begin: float = 0.0, every: int = 0) -> Walkers:
+    """Returns the people of a truth from `begin` s on. They are left out where more than half outside the image.
+
+    rough: positions err by 0.1 m and 5 % are missing, at the truth's frame rate; else by the errors of labels, at 2.5
+    frames/s. every: one frame in so many is kept instead; 0: as said.
+    """
+    erring = with_label_errors(truth, DETECTED if rough else SURVEYED, seed, repeat)
+    assert erring.pos is not None
+    every = every or (1 if rough else max(1, round(truth.fps / SLOW)))
+    since = round(begin * truth.fps)
+    ids, column = np.unique(truth.id, return_inverse=True)
+    frame = truth.frame - 1 - since
+    kept = (frame >= 0) & (frame % every == 0)
+    if truth.truncation is not None:
+        kept &= truth.truncation <= 0.5
+    labels = np.full(((truth.length - since - 1) // every + 1, len(ids)), -1, np.int64)
+    labels[frame[kept] // every, column[kept]] = truth.group[kept]
+    if rough:
+        kept &= rng(seed, "label", 0, repeat=repeat).random(len(kept)) >= MISSED
+    return Walkers(frame[kept] // every, column[kept], erring.pos[kept], labels, truth.fps / every)
+
+
+def rows_of(name: str, people: Walkers) -> PairScene:
+    """Returns the rows of pairs of people, with the truth of each."""
+    size = frames_per_step(people.fps)
+    length, count = people.labels.shape
+    seconds = size / people.fps
+    places = step_positions(people.frame, people.column, people.pos, length, count, people.fps)
+    parts = [(r.pair, r.step, r.a, r.b, r.values.astype(np.float32)) for r in evidence(places, seconds)]
+    if not parts:
+        none = np.zeros(0, np.int64)
+        return PairScene(name, seconds, none, none, np.zeros((0, 0), np.float32), none.astype(bool))
+    pair, step, a, b, values = (np.concatenate(x) for x in zip(*parts, strict=True))
+    first, second = (people.labels[(step + 1) * size - 1, p] for p in (a, b))
+    order = np.lexsort((step, pair))
+    together = (first >= 0) & (first == second)
+    return PairScene(name, seconds, pair[order], step[order], values[order], together[order])

@@ -1,0 +1,40 @@
+"""Which grouping makes the groups of tracked people: the baseline rule or the belief, with its parameters.
+
+`grouping_of` reads what a user names: "rule", "belief", or a TOML file of either.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from scenarios.loading.toml_files import parse
+from tracking.grouping.belief import KIND, Belief, default_belief
+from tracking.grouping.belief_partition import belief_links
+from tracking.grouping.link_rule import LinkRule, Links, find_links
+from tracking.grouping.tracks_table import TracksTable
+
+Grouping = LinkRule | Belief
+
+
+def default_grouping() -> Grouping:
+    """Returns the grouping of trackers that report people only."""
+    return LinkRule()
+
+
+def grouping_of(source: str | Path) -> Grouping:
+    """Returns the grouping "rule" or "belief" with its default parameters, or that of a TOML file.
+
+    Raises InputError if the file cannot be read or is neither a file of `tune grouping` nor one of `fit grouping`.
+    """
+    if str(source) == "rule":
+        return LinkRule()
+    if str(source) == KIND:
+        return default_belief()
+    return Belief.from_toml(source) if "grouping" in parse(Path(source)) else LinkRule.from_toml(source)
+
+
+def links_of(table: TracksTable, fps: float, grouping: Grouping) -> Links:
+    """Returns all switches of links between the people of a table, by the rule or the belief."""
+    if isinstance(grouping, Belief):
+        return belief_links(table.frame, table.column, table.pos, table.length, fps, grouping)
+    return find_links(table.frame, table.column, table.pos, table.vel, table.length, fps, grouping)

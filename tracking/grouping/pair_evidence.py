@@ -1,0 +1,197 @@
+"""What tells whether two people belong together: distances, motion and surroundings of pairs over time, in steps.
+
+`step_positions` averages positions over steps of at most 0.2 s, and `evidence` returns one row per pair and step with
+the quantities of `QUANTITIES` averaged over the past (`TIMES`), and `ARRIVAL`. Nothing looks ahead. Only positions are
+used: velocities are chords of positions over 0.8 s. Lengths are in m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.truth.merge_split_rules import MERGE_VELOCITY
+from sim.truth.proximity import close_pairs
+from sim.types import Array, Ints
+
+STEP = 0.2
+"""s: longest step, unless one frame lasts longer."""
+CHORD = 0.8
+"""s over which velocities are measured: two frames of a recording with 2.5 frames/s."""
+REACH = 6.0
+"""m: pairs farther apart have no evidence."""
+NEAR = 1.2
+"""m."""
+AROUND = 3.0
+"""m: others nearer than this to one of the pair are counted."""
+STANDING = 0.3
+"""m/s."""
+TIMES = (0.8, 2.0, 5.0, 15.0)
+"""s: means over the past have weights exp(-age / time)."""
+QUANTITIES = (
+    "distance", "velocity difference", "share near", "sideways", "lengthwise", "others", "stream", "speed",
+)  # fmt: skip
+"""Averaged quantities: see `evidence`."""
+ARRIVAL = ("distance", "arrival gap", "first distance")
+NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *ARRIVAL)
+"""Names of the columns of `PairRows.values`."""
+PORTION = 100_000
+"""Rows worked on together: bounds memory."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairRows:
+    """Evidence about pairs of people, one row per pair and step in which both were seen less than 6 m apart.
+
+    step (R,): from 0, ascending. a, b (R,): columns of the two people, a < b. pair (R,): number of the pair, from 0.
+    values (R, len(NAMES)): columns `NAMES`; nan if unknown.
+    """
+
+    step: Ints
+    a: Ints
+    b: Ints
+    pair: Ints
+    values: Array
+
+
+def frames_per_step(fps: float) -> int:
+    """Returns the number of frames in a step: as many as last at most 0.2 s, at least one. fps: frames per second."""
+    return max(1, int(STEP * fps + 1e-9))
+
+
+def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: int, fps: float) -> Array:
+    """Returns the mean position (S, people, 2), m, of each person in each whole step; nan if not seen in it.
+
+    frame (R,): from 0; column (R,): person; pos (R, 2): x, y in m. length: frames of the sequence; fps: frames per
+    second. Step s has the frames from s to s + 1 times `frames_per_step(fps)`, the last one excluded.
+    """
+    size = frames_per_step(fps)
+    steps = length // size
+    key = (frame // size * people + column)[frame < steps * size]
+    count = np.bincount(key, minlength=steps * people)
+    total = np.stack([np.bincount(key, x[frame < steps * size], steps * people) for x in pos.T], axis=-1)
+    mean = np.full(total.shape, np.nan)
+    np.divide(total, count[:, None], out=mean, where=count[:, None] > 0)
+    return mean.reshape(steps, people, 2)
+
+
+def step_velocities(pos: Array, seconds: float) -> Array:
+    """Returns velocities (S, P, 2), m/s: chords from a person's earliest position within the last 0.8 s; else nan.
+
+    pos (S, P, 2): m by step and person, nan where not seen. seconds: length of a step, s.
+    """
+    vel = np.full_like(pos, np.nan)
+    for steps in range(1, min(max(1, round(CHORD / seconds)), len(pos) - 1) + 1):
+        chord = (pos[steps:] - pos[:-steps]) / (steps * seconds)
+        np.copyto(vel[steps:], chord, where=np.isfinite(chord))
+    return vel
+
+
+def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
+    """Yields the rows of all pairs in portions of whole steps, in order.
+
+    pos (S, P, 2): m by step and person (`step_positions`), nan where not seen. seconds: length of a step, s.
+
+    Averaged over the pair's rows, with weights exp(-age / time): distance (m); velocity difference (m/s), of vectors;
+    share near: of rows in which the distance is below 1.2 m; sideways and lengthwise (m): parts of the distance across
+    and along the mean velocity of the two, where that is at least 0.3 m/s, else the whole distance and nan; others:
+    mean of the two numbers of other people within 3 m; stream: of the people other than the pair within 6 m of one of
+    them, the share whose velocity differs from that person's by less than 0.5 m/s, nan without others; speed (m/s):
+    mean of the two.
+
+    Not averaged: distance (m) of the row; arrival gap (s): between the steps in which the two were first seen, nan if
+    one was seen in step 0; first distance (m): in the first step in which both had been seen, nan if that is step 0.
+    Unknown velocities leave nan out of the means.
+    """
+    vel = step_velocities(pos, seconds)
+    step, column = np.nonzero(np.isfinite(pos[..., 0]))
+    place, motion = pos[step, column], vel[step, column]
+    i, j = close_pairs(step, place, REACH)
+    people = pos.shape[1]
+    pair = np.unique(column[i] * people + column[j], return_inverse=True)[1]
+    count = int(pair.max(initial=-1)) + 1
+    order = np.lexsort((pair, step[i]))
+    i, j, pair = i[order], j[order], pair[order]
+    now = _instant(place, motion, i, j)
+    first = np.full(people, len(pos), np.int64)
+    np.minimum.at(first, column, step)
+    came = np.stack([first[column[i]], first[column[j]]])
+    late = came.max(axis=0)
+    apart = np.hypot(*(pos[late, column[i]] - pos[late, column[j]]).T)
+    arrival = [
+        now[:, 0],
+        np.where(came.min(axis=0) > 0, np.abs(came[0] - came[1]) * seconds, np.nan),
+        np.where(late > 0, apart, np.nan),
+    ]
+    means = ExponentialMeans(count, len(QUANTITIES), seconds)
+    for r in _portions(step[i]):
+        values = np.column_stack([means.add(step[i[r]], pair[r], now[r]), *(x[r] for x in arrival)])
+        yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values)
+
+
+def _instant(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
+    """Returns the quantities of `QUANTITIES` of each pair of rows i, j at its own step, (R, 8).
+
+    pos, vel (N, 2): m, m/s, one row per person and step. i, j (R,): all pairs within 6 m.
+    """
+    apart, mean = pos[j] - pos[i], (vel[i] + vel[j]) / 2
+    distance, differ, pace = (np.hypot(*x.T) for x in (apart, vel[j] - vel[i], mean))
+    walks = pace >= STANDING  # False where nan
+    unit = mean / np.where(walks, pace, 1.0)[:, None]
+    across = np.abs(apart[:, 0] * unit[:, 1] - apart[:, 1] * unit[:, 0])
+    along = np.abs((apart * unit).sum(axis=1))
+    around, alike = distance < AROUND, differ < MERGE_VELOCITY
+    within, near, same = (_per_row(i, j, x, len(pos)) for x in (np.ones_like(alike), around, alike))
+    others = within[i] + within[j] - 2
+    stream = np.full(len(i), np.nan)
+    np.divide(same[i] + same[j] - 2 * alike, others, out=stream, where=others > 0)
+    return np.column_stack([
+        distance, differ, distance < NEAR, np.where(walks, across, distance), np.where(walks, along, np.nan),
+        (near[i] + near[j]) / 2 - around, stream, (np.hypot(*vel[i].T) + np.hypot(*vel[j].T)) / 2,
+    ])  # fmt: skip
+
+
+def _per_row(i: Ints, j: Ints, flag: Array, rows: int) -> Array:
+    """Returns for each row the number of its pairs (i, j) (R,) whose flag (R,) is True, (rows,)."""
+    return np.asarray(np.bincount(i[flag], minlength=rows) + np.bincount(j[flag], minlength=rows))
+
+
+def _portions(step: Ints) -> Iterator[slice]:
+    """Yields slices of rows that hold whole steps, of about 100,000 rows each. step (R,): ascending."""
+    low = 0
+    while low < len(step):
+        high = int(np.searchsorted(step, step[min(low + PORTION, len(step)) - 1], side="right"))
+        yield slice(low, high)
+        low = high
+
+
+class ExponentialMeans:
+    """Means of the values of pairs over their rows so far, weighted by exp(-age / time), for each time of `TIMES`.
+
+    State, by pair: total (K, V, 4) of weighted values, weight (K, V, 4), and last (K,), the pair's last step.
+    """
+
+    def __init__(self, pairs: int, values: int, seconds: float) -> None:
+        """pairs: number of pairs; values: per row; seconds: length of a step, s."""
+        self.seconds = seconds
+        self.total = np.zeros((pairs, values, len(TIMES)))
+        self.weight, self.last = np.zeros_like(self.total), np.zeros(pairs, np.int64)
+
+    def add(self, step: Ints, pair: Ints, values: Array) -> Array:
+        """Adds rows and returns their means (R, V * 4), times varying fastest; nan before a pair's first number.
+
+        step (R,): ascending, not before the last one added; pair (R,): once in a step; values (R, V): nan is left out.
+        """
+        out = np.full((*values.shape, len(TIMES)), np.nan)
+        for rows in np.split(np.arange(len(step)), np.flatnonzero(np.diff(step)) + 1):
+            k, x = pair[rows], values[rows, :, None]
+            age = (step[rows] - self.last[k]) * self.seconds
+            fade, known = np.exp(-age[:, None] / np.array(TIMES))[:, None], np.isfinite(x)
+            weight = self.weight[k] * fade + known
+            total = self.total[k] * fade + np.where(known, x, 0.0)
+            self.weight[k], self.total[k], self.last[k] = weight, total, step[rows]
+            mean = np.full_like(total, np.nan)
+            out[rows] = np.divide(total, weight, out=mean, where=weight > 0)
+        return out.reshape(len(step), -1)
