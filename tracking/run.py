@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.prepare import Params, prepare
 from tracking.run_info import Speed, known_people_info, run_info
 from tracking.time_limit import TimeLimited
+
+if TYPE_CHECKING:
+    from tracking.grouping.pair_probabilities import PairProbabilities
 
 OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "frames")
 """Keys of run.json that follow from tracks and sequence, whoever made the tracks."""
@@ -48,19 +51,23 @@ class TrackingRun(SequenceOf[Tracks]):
     def __len__(self) -> int:
         return len(self.tracks)
 
-    def write(self, folder: str | Path, sequence: Sequence) -> Path:
+    def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
         """Store the tracks in the folder as `flockscope track` does, and return the folder.
 
         sequence: what was tracked. run.json gets its truth_hash, so that the tracks are scored with these labels only.
+        pairs: probabilities to store, too, in pairs.parquet; None: none.
         Files of an earlier run are replaced. Raises InputError if the folder holds files of another program with names
         of a run's, it cannot be written, or the labels cannot be read; WorkError if the disk is full or an order of a
         simulated script was not fulfilled.
         """
         from sim.io.store.run_seal import tracked_hash
         from sim.io.store.track_files import write_tracks
+        from sim.io.store.track_tables import pair_table
 
         info = {**self.info, "truth_hash": tracked_hash(sequence)}
-        return write_tracks(folder, self, fps=sequence.fps, camera=sequence.camera, scene=sequence.scene, info=info)
+        table = None if pairs is None else pair_table(pairs.frame, pairs.a, pairs.b, pairs.probability)
+        camera, scene = sequence.camera, sequence.scene
+        return write_tracks(folder, self, fps=sequence.fps, camera=camera, scene=scene, info=info, pairs=table)
 
 
 def track(

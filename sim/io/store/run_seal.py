@@ -22,7 +22,8 @@ from sim.types import Sequence
 
 RUN = "run.json"
 EXACT = "tracks.parquet"
-NAMES = ("tracks.txt", "tracks.mot.txt", EXACT, "groups.csv", "groups.parquet", "events.json", RUN)
+PAIRS = "pairs.parquet"
+NAMES = ("tracks.txt", "tracks.mot.txt", EXACT, "groups.csv", "groups.parquet", PAIRS, "events.json", RUN)
 """Names of the files of a run; files of other names in its folder belong to somebody else."""
 
 WHOLE = ("tracks.txt", EXACT)

@@ -18,7 +18,7 @@ from sim.io.files.atomic import replace_sealed
 from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import event_dict, read_events
 from sim.io.store.group_files import groups_bytes, groups_csv
-from sim.io.store.run_seal import EXACT, NAMES, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
+from sim.io.store.run_seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
 from sim.io.store.track_boxes import box_source, upright_boxes
 from sim.io.store.track_tables import RunRows, flatten, read_track_table, track_table
 from sim.io.store.track_text import read_track_text, with_groups
@@ -34,17 +34,20 @@ def write_tracks(
     camera: Camera | None = None,
     scene: Scene | None = None,
     info: dict[str, Any] | None = None,
+    pairs: bytes | None = None,
 ) -> Path:
     """Write the tracks of consecutive frames of one tracker into `folder`, and return the folder.
 
-    Files: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if there are groups, events.json,
-    and run.json last, which names all others with their hashes. Files of these names from an earlier run are replaced
-    or deleted, others stay. A killed run leaves the earlier run whole, or a folder that `read_tracks` refuses.
+    Files: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if there are groups, pairs.parquet
+    if `pairs` is given, events.json, and run.json last, which names all others with their hashes. Files of these names
+    from an earlier run are replaced or deleted, others stay. A killed run leaves the earlier run whole, or a folder
+    that `read_tracks` refuses.
 
     tracks: one Tracks per frame, all of one plane and unit (else AssertionError). fps: frames/s. camera: if the tracker
     gives no boxes, tracks of people on the ground or in space get the boxes of upright people in the texts; None: no
     such boxes. scene: gives the height of the ground under 2-D positions; None: 0. info: content of run.json, to which
     "format", "boxes" (where the boxes come from: "measured", "projected" or "none"), "files" and "sha256" are added.
+    pairs: the content of pairs.parquet (`pair_table`); None: no such file.
 
     Raises InputError if the tracks have wrong ids or unknown positions, a value of `info` is of the wrong kind, the
     folder holds such a file of another program, or it cannot be written. Raises WorkError if the disk is full,
@@ -52,7 +55,8 @@ def write_tracks(
     """
     folder = Path(folder)
     reject_foreign(folder)
-    replace_sealed(folder, tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info), RUN, NAMES)
+    files = tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info, pairs=pairs)
+    replace_sealed(folder, files, RUN, NAMES)
     return folder
 
 
@@ -63,13 +67,15 @@ def tracks_files(
     camera: Camera | None = None,
     scene: Scene | None = None,
     info: dict[str, Any] | None = None,
+    pairs: bytes | None = None,
 ) -> dict[str, bytes]:
     """Return the files of one tracker's tracks, as `write_tracks` writes them: content by name, run.json last.
 
-    Names: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if a frame has groups, events.json,
-    run.json. tracks: one Tracks per frame, of consecutive frames, all of one plane and unit (else AssertionError). fps:
-    frames/s. camera: gives people without boxes those of upright people; None: no such boxes. scene: gives the height
-    of the ground; None: 0. info: content of run.json, to which "format", "boxes", "files" and "sha256" are added.
+    Names: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if a frame has groups,
+    pairs.parquet with the content `pairs` if it is given, events.json, run.json. tracks: one Tracks per frame, of
+    consecutive frames, all of one plane and unit (else AssertionError). fps: frames/s. camera: gives people without
+    boxes those of upright people; None: no such boxes. scene: gives the height of the ground; None: 0. info: content of
+    run.json, to which "format", "boxes", "files" and "sha256" are added.
 
     Nothing is written. No tracks give tables without rows, in the plane "ground". Raises InputError if an id is
     negative or stands twice in a frame, a position or score is not finite, or a value of `info` is of the wrong kind.
@@ -91,6 +97,8 @@ def tracks_files(
     if any(g is not None for g in groups):
         files["groups.parquet"] = groups_bytes(groups, first, "px" if rows.plane == "image" else "m")
         files["groups.csv"] = groups_csv(groups, None, first)
+    if pairs is not None:
+        files[PAIRS] = pairs
     events = [{**event_dict(e), "frame": t.index} for t in every for e in t.events]
     files["events.json"] = tables.json_list("events", events)
     return {**files, RUN: sealed_run({**(info or {}), "boxes": boxes}, files)}

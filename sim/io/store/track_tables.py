@@ -17,7 +17,7 @@ from sim.io.files.tables import Column, StoredTable, table_bytes
 from sim.io.store.group_files import AXES, read_groups
 from sim.io.store.run_seal import EXACT
 from sim.io.store.truth_files import BOX, scores_or_ones
-from sim.types import Array, Groups, Tracks
+from sim.types import Array, Groups, Ints, Tracks
 
 UNITS = ("person", "group")
 PLANES = ("ground", "space", "image")
@@ -136,6 +136,16 @@ def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
         "derived": bool(every) and all(t.derived for t in every),
     }  # fmt: skip
     return table_bytes(columns, facts)
+
+
+def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
+    """Return pairs.parquet as bytes: how probable it is that two people belong together, a row per pair and frame.
+
+    frame (R,): from 1; a, b (R,): ids; probability (R,): 0 to 1. The columns have these names.
+    """
+    return table_bytes(
+        [Column("frame", frame), Column("a", a), Column("b", b), Column("probability", probability, "1")], {}
+    )
 
 
 def read_track_table(folder: Path) -> list[Tracks]:

@@ -18,7 +18,10 @@ from tracking.app.commands.group_tables import group_row, group_tables
 from tracking.app.progress import ProgressMeter
 from tracking.app.run_folders import run_folders
 from tracking.app.stored_tracks import StoredTracks, find_tracks
-from tracking.grouping.grouping_choice import grouping_of
+from tracking.grouping.belief import Belief
+from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
+from tracking.grouping.pair_probabilities import pair_probabilities
+from tracking.run import TrackingRun
 
 TEXT = "mot text"
 """Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence."""
@@ -36,12 +39,8 @@ def group(options: GroupOptions) -> CommandResult:
     of another program with names of a run. Raises WorkError if the disk is full. Runs stored before an error stay.
     """
     option_parsing.output_folder(options.out)
-    rule = None if options.grouping is None else grouping_of(options.grouping)
-    if options.probabilities:
-        raise InputError(
-            place="--probabilities", got="a grouping by thresholds", expected="one that computes probabilities",
-            remedy="leave it out",
-        )  # fmt: skip
+    grouping = None if options.grouping is None else grouping_of(options.grouping)
+    belief = _belief(grouping or default_grouping()) if options.probabilities else None
     sequences, stored = _opened(options)
     folders = run_folders(sequences, options.source, options.out)
     for folder, tracks in zip(folders, stored, strict=True):
@@ -49,9 +48,11 @@ def group(options: GroupOptions) -> CommandResult:
     rows = []
     with ProgressMeter("group", len(sequences)) as meter:
         for sequence, tracks, folder in zip(sequences, stored, folders, strict=True):
-            run = runs.group(sequence, None if tracks is None else tracks.read(sequence), grouping=rule)
-            run.write(folder, replace(sequence, load_truth=None) if sequence.source["kind"] == TEXT else sequence)
-            rows.append(group_row(run, folder))
+            run = runs.group(sequence, None if tracks is None else tracks.read(sequence), grouping=grouping)
+            pairs = None if belief is None else pair_probabilities(run, sequence.fps, _scale(run), belief)
+            labelled = replace(sequence, load_truth=None) if sequence.source["kind"] == TEXT else sequence
+            run.write(folder, labelled, pairs)
+            rows.append({**group_row(run, folder), "pairs": None if pairs is None else len(pairs.frame)})
             meter.step(sequence.name)
     return CommandResult({"runs": rows}, group_tables(rows))
 
@@ -99,6 +100,21 @@ def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
         frames=lambda: iter(()), px_per_m=float("nan") if scale is None else scale,
         source={"kind": "run", "path": str(folder), "truth_hash": info.get("truth_hash"), "px_per_m_frames": frames},
     )  # fmt: skip
+
+
+def _belief(grouping: Grouping) -> Belief:
+    """Returns the grouping if it is one that has probabilities. Raises InputError for the rule."""
+    if isinstance(grouping, Belief):
+        return grouping
+    raise InputError(
+        place="--probabilities", got="the grouping rule, which has none", expected="a grouping with probabilities",
+        remedy="add --grouping belief, or a file of `fit grouping`",
+    )  # fmt: skip
+
+
+def _scale(run: TrackingRun) -> float:
+    """Returns the image scale of a run, px per m; 1 if it is unknown, as on the ground and without anybody."""
+    return run.info["px_per_m"] or 1.0
 
 
 def _refuse(folder: Path, tracks: StoredTracks | None) -> None:

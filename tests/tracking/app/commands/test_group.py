@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 
 from scenarios.loading.resolve import load
@@ -204,6 +206,37 @@ def test_a_run(walk, tmp_path, capsys):
         assert "the folder of the tracks themselves" in refused(capsys, "group", folder, "--out", folder)
 
 
+def test_probabilities(walk, tmp_path, capsys):
+    """A table of pairs, sealed with the run; a run without the option has none."""
+    line = ["group", walk, "--fps", 10, "--grouping", "belief", "--out", tmp_path / "g"]
+    (row,) = done(capsys, *line, "--probabilities")["runs"]
+    table = pq.read_table(tmp_path / "g" / "pairs.parquet")
+    assert table.column_names == ["frame", "a", "b", "probability"]
+    frame, a, b, p = (table[name].to_numpy() for name in table.column_names)
+    assert row["pairs"] == len(frame)
+    assert (a < b).all()
+    assert ((p > 0) & (p < 1)).all()
+    last = {(i, j): q for k, i, j, q in zip(frame, a, b, p, strict=True) if k == 200}
+    assert min(last[1, 2], last[2, 3], last[4, 6]) > 0.5
+    assert frame.min() <= 10
+    assert run(["validate", str(tmp_path / "g")]) == 0
+    assert (tmp_path / "g" / "pairs.parquet").is_file()
+    (row,) = done(capsys, *line)["runs"]
+    assert row["pairs"] is None
+    assert not (tmp_path / "g" / "pairs.parquet").exists()
+
+
+def test_probabilities_know_nothing_later(tmp_path, capsys):
+    found = []
+    for frames in (200, 120):
+        (tmp_path / "walk.txt").write_text(text(frames))
+        line = ["group", tmp_path / "walk.txt", "--fps", 10, "--grouping", "belief", "--probabilities"]
+        done(capsys, *line, "--out", tmp_path / str(frames))
+        table = pq.read_table(tmp_path / str(frames) / "pairs.parquet")
+        found.append(table.filter(pc.less_equal(table["frame"], 120)))
+    assert found[0].equals(found[1])
+
+
 def test_a_dataset(tmp_path, capsys):
     write_short_scene(tmp_path, "40000:40002")
     assert run(["group", str(tmp_path / "data"), "--out", str(tmp_path / "g")]) == 0
@@ -319,7 +352,7 @@ def test_wrong_options(walk, tmp_path, capsys):
     (tmp_path / "wrong.toml").write_text("[params]\nnaer = 1.0\n")
     assert "naer" in refused(capsys, *here, "--grouping", tmp_path / "wrong.toml")
     assert "none.toml" in refused(capsys, *here, "--grouping", tmp_path / "none.toml")
-    assert "--probabilities" in refused(capsys, *here, "--probabilities")
+    assert "add --grouping belief" in refused(capsys, *here, "--grouping", "rule", "--probabilities")
     folder = biwi(tmp_path / "biwi")
     assert "--px-per-m" in refused(capsys, "group", folder, "--px-per-m", "40", "--out", tmp_path / "g")
     assert not (tmp_path / "g").exists()
