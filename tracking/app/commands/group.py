@@ -32,7 +32,7 @@ def group(options: GroupOptions) -> CommandResult:
     and events.
 
     The run of a single sequence goes to --out, those of several to --out/<sequence name>. The result's data: "runs", a
-    dictionary for each (tracking.app.commands.group_tables.group_row).
+    dictionary for each (tracking.app.commands.group_tables.group_row) and "pairs", the number of stored pairs or None.
 
     Raises InputError if an option is wrong or has no effect, the source or the tracks cannot be read, there are no
     people with ids, people lie in the image and its scale is unknown, or a folder is the source itself or holds files

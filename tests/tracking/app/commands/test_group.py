@@ -310,6 +310,8 @@ def test_without_people(tmp_path, capsys):
     (tmp_path / "walk" / "gt" / "gt.txt").write_text("3,1,5,5,10,20,0,1,1\n")
     found = done(capsys, "group", tmp_path / "walk", "--fps", 10, "--out", tmp_path / "g")
     assert (found["runs"][0]["people"], found["runs"][0]["groups"]) == (0, [])
+    line = ["group", tmp_path / "walk", "--fps", 10, "--grouping", "belief", "--probabilities", "--out", tmp_path / "h"]
+    assert done(capsys, *line)["runs"][0]["pairs"] == 0
     assert run(["group", str(tmp_path / "walk"), "--fps", "10", "--out", str(tmp_path / "g")]) == 0
 
 
