@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from tracking.app.command_options import (
+    FitGroupingOptions,
     FitSensorOptions,
     GenerateOptions,
     GroupOptions,
@@ -141,6 +142,15 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     from tracking.app.commands.fit import fit_sensor
 
     return fit_sensor(options)
+
+
+@fit.command("grouping")
+@options_from(FitGroupingOptions)
+def fit_grouping(options: FitGroupingOptions) -> CommandResult:
+    """Fit the belief of who belongs together to simulated scenes."""
+    from tracking.app.commands.fit import fit_grouping
+
+    return fit_grouping(options)
 
 
 @app.command()

@@ -28,7 +28,7 @@ USED = (
 """Quantities that get a table."""
 KNOTS = 10
 """Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %."""
-CURVED, LARGE = 1e-4, 1e-5
+CURVED, LARGE = 3e-4, 1e-4
 """Weights of the penalties: of curvature; of size, and of the difference of walking and standing."""
 STEPS = 200
 """Most iterations."""
