@@ -19,7 +19,7 @@ SCENE = """
 schema = 1
 duration = 30.0
 world = { size = [30, 20] }
-crowd = { free_speed = 1.3, spacing = 0.8 }
+crowd = { free_speed = 1.3, spacing = 0.8, sway = 0, velocity_noise = [0, 0], place_noise = [0, 0] }
 camera = { kind = "top", crop = true, px_per_m = 20, position = [15, 10] }
 group = [{ id = "a", size = 2, start = [5, 10], goal = [27, 10], at_goal = "leave" }]
 """
