@@ -190,7 +190,7 @@ def calibration(names: Sequence[str], seeds: range, belief: Belief) -> None:
 FAMILIES: Mapping[str, tuple[str, ...]] = {
     "distance": ("distance",), "velocity difference": ("velocity difference",), "share near": ("share near",),
     "sideways, lengthwise": ("sideways", "lengthwise"), "others, stream (chance)": ("others", "stream"),
-    "speed": ("speed",), "arrival": ("arrival gap", "first distance"), "means over 5 and 15 s": (),
+    "speed": ("speed",), "arrival": ("arrival gap", "first distance"), "means over 5 s": (),
 }  # fmt: skip
 
 
@@ -201,7 +201,7 @@ def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> No
     for family, words in {"": (), **FAMILIES}.items():
         used = [name for name in USED if name.split(",")[0] not in words]
         if family and not words:
-            used = [name for name in USED if not name.endswith((" 5 s", "15 s"))]
+            used = [name for name in USED if not name.endswith(" 5 s")]
         belief = fit_belief(train, used)
         scores = belief_scores(test, log_odds_of(belief, test))
         real = []

@@ -25,7 +25,7 @@ MISSED = 0.05
 BEGINS = (0.0, 4.0, 8.0)
 """s: times at which scenes of successive seeds begin, if at least LEAST s are left."""
 LEAST = 10.0
-MOST_PAIRS = 500
+MOST_PAIRS = 300
 """Pairs of a scene that are kept, drawn at random: bounds memory."""
 
 
@@ -65,8 +65,8 @@ def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScen
 
     Raises InputError if a name or file is wrong, WorkError if a script cannot be fulfilled.
     """
-    for name in names:
-        for entry in resolve(name):
+    for name, entries in [(name, resolve(name)) for name in names]:
+        for entry in entries:
             for seed in seeds:
                 truth = simulated(entry, seed)
                 begin = BEGINS[seed % len(BEGINS)] if truth.length / truth.fps >= LEAST + max(BEGINS) else 0.0

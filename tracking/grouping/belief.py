@@ -48,8 +48,9 @@ class Table:
 
     def evidence(self, value: Array, standing: Array) -> Array:
         """Returns the log-odds (R,) of values (R,), nan for unknown; standing (R,): how far the pair stands, 0 to 1."""
-        walk, stand = (np.interp(value, self.at, y) for y in (self.walking, self.standing))
-        return np.where(np.isnan(value), 0.0, walk + standing * (stand - walk))
+        found, some = np.interp(value, self.at, self.walking), standing > 0
+        found[some] += standing[some] * (np.interp(value[some], self.at, self.standing) - found[some])
+        return np.asarray(np.where(np.isnan(value), 0.0, found))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +129,7 @@ def stands(values: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairBeliefs:
-    """Log-odds that two people belong together, one row per pair and step in which both were seen within 6 m.
+    """Log-odds that two people belong together, one row per pair and step in which both were seen within 4 m.
 
     step (R,): from 0, ascending; a, b (R,): columns, a < b; log_odds (R,). distance (m), differ (m/s) (R,): distance,
     and difference of velocities over the last 0.8 s.
@@ -144,7 +145,7 @@ class PairBeliefs:
 
 
 def pair_beliefs(pos: Array, seconds: float, belief: Belief) -> PairBeliefs:
-    """Returns the beliefs of all pairs of people who come within 6 m of each other. Nothing looks ahead.
+    """Returns the beliefs of all pairs of people who come within 4 m of each other. Nothing looks ahead.
 
     pos (S, P, 2): m by step and person (`step_positions`), nan where not seen. seconds: length of a step, s.
     """
