@@ -29,7 +29,7 @@ KIND = "belief"
 STANDS, WALKS = 0.2, 0.6
 """m/s: a pair counts as standing below the first, as walking above the second, in between in proportion."""
 SPEED = NAMES.index("speed, 2 s")
-NUMBERS = ("bias", "walking_time", "standing_time", "join", "part", "unseen", "memory", "arrival")
+NUMBERS = ("bias", "walking_time", "standing_time", "join", "part", "unseen", "patience", "memory", "arrival")
 """Numbers of `Belief` in its file."""
 
 
@@ -60,17 +60,19 @@ class Belief:
     bias: log-odds added to the tables. walking_time, standing_time: s with which the belief follows the evidence.
     join, part: times per second that strangers become mates, and mates strangers; the decision who is in one group
     assumes them, and needs the longer to change the smaller they are. unseen: log-odds of two members of a group
-    without a row. memory (s): a missed member stays so long in the group. arrival (s): a link that began so soon after
-    a track's first frame is no merge.
+    without a row. patience (s): a link breaks after the two have been in different groups for so long. memory (s): a
+    missed member stays so long in the group. arrival (s): a link that began so soon after a track's first frame is no
+    merge.
     """
 
     tables: tuple[Table, ...]
     bias: float
     walking_time: float
     standing_time: float
-    join: float = 0.05
+    join: float = 0.01
     part: float = 0.05
     unseen: float = -4.0
+    patience: float = 2.0
     memory: float = 1.0
     arrival: float = 1.0
 
