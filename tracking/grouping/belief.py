@@ -134,7 +134,7 @@ class PairBeliefs:
     """Log-odds that two people belong together, one row per pair and step in which both were seen within 4 m.
 
     step (R,): from 0, ascending; a, b (R,): columns, a < b; log_odds (R,). distance (m), differ (m/s) (R,): distance,
-    and difference of velocities over the last 0.8 s.
+    and difference of velocities.
     """
 
     step: Ints
@@ -154,7 +154,7 @@ def pair_beliefs(pos: Array, seconds: float, belief: Belief) -> PairBeliefs:
     memory = PairMemory(belief, seconds)
     parts = []
     for rows in evidence(pos, seconds):
-        near = (rows.values[:, NAMES.index(name)] for name in ("distance", "velocity difference, 0.8 s"))
+        near = (rows.values[:, NAMES.index(name)] for name in ("distance", "velocity difference"))
         parts.append((rows.step, rows.a, rows.b, *memory.follow(rows), *near))
     if not parts:
         nobody, none = np.zeros(0, np.int64), np.zeros(0)

@@ -34,7 +34,7 @@ QUANTITIES = (
     "distance", "velocity difference", "share near", "sideways", "lengthwise", "others", "stream", "speed",
 )  # fmt: skip
 """Averaged quantities: see `evidence`."""
-ARRIVAL = ("distance", "arrival gap", "first distance")
+ARRIVAL = ("distance", "velocity difference", "arrival gap", "first distance")
 NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *ARRIVAL)
 """Names of the columns of `PairRows.values`."""
 PORTION = 100_000
@@ -101,8 +101,9 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
     them, the share whose velocity differs from that person's by less than 0.5 m/s, nan without others; speed (m/s):
     mean of the two.
 
-    Not averaged: distance (m) of the row; arrival gap (s): between the steps in which the two were first seen, nan if
-    one was seen in step 0; first distance (m): in the first step in which both had been seen, nan if that is step 0.
+    Not averaged: distance (m) and velocity difference (m/s) of the row; arrival gap (s): between the steps in which the
+    two were first seen, nan if one was seen in step 0; first distance (m): in the first step in which both had been
+    seen, nan if that is step 0.
     Unknown velocities leave nan out of the means.
     """
     vel = step_velocities(pos, seconds)
@@ -122,6 +123,7 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
     apart = np.hypot(*(pos[late, column[i]] - pos[late, column[j]]).T)
     arrival = [
         now[:, 0],
+        now[:, 1],
         np.where(came.min(axis=0) > 0, np.abs(came[0] - came[1]) * seconds, np.nan),
         np.where(late > 0, apart, np.nan),
     ]
