@@ -122,7 +122,7 @@ def test_files_are_memory_from_pixels(tmp_path: Path, capsys) -> None:
     assert run([*line, *(word for text in settings for word in ("--set", text))]) == 0
     assert run(["track", "blob", str(data), "--out", str(tracks)]) == 0
     (row,) = scored(capsys, data, tracks)["sequences"]
-    sequence = simulate(load("merge", settings), 5)
+    sequence = simulate(load("merge", settings), 3)
     answers = track("blob", sequence)
     assert answers.info["detections"] == "image"
     assert sum(len(t.id) for t in answers) > 100
