@@ -45,8 +45,8 @@ def systematic_resample(weights: Array, uniform: float) -> Ints:
 
 
 def _cumulative(weights: Array) -> Array:
-    """Returns the cumulated weights (P,), divided by their sum; from the last particle with a weight on they are 1."""
+    """Returns the cumulated weights (P,), divided by their sum; inf from the last particle with a weight on."""
     total = np.cumsum(weights)
     total /= total[-1]
-    total[np.flatnonzero(weights)[-1] :] = 1.0
+    total[np.flatnonzero(weights)[-1] :] = np.inf
     return total
