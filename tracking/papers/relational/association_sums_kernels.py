@@ -198,15 +198,35 @@ def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
 
 
 @njit(cache=True)
+def _line_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no-untyped-def]
+    """Returns what `_component_sum` returns for one row or one column, all of whose pairs have a weight above 0."""
+    total = 1.0
+    for i in rows:
+        total *= miss[i]
+    for j in columns:
+        total *= spare[j]
+    for i in rows:
+        for j in columns:
+            weight = W[i, j]
+            for other in rows:
+                weight *= miss[other] if other != i else 1.0
+            for other in columns:
+                weight *= spare[other] if other != j else 1.0
+            marginals[i, j] = weight
+            total += weight
+    for i in rows:
+        for j in columns:
+            marginals[i, j] /= total if total > 0 else 1.0
+    return math.log(total) if total > 0 else -math.inf
+
+
+@njit(cache=True)
 def _component_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no-untyped-def]
     """Returns the log of the sum over mappings of these rows (n',) and columns (m',), and writes their marginals."""
     if len(columns) == 0:
         return math.log(miss[rows[0]]) if miss[rows[0]] > 0 else -math.inf
-    if len(rows) == 1 and len(columns) == 1:
-        i, j = rows[0], columns[0]
-        total = W[i, j] + miss[i] * spare[j]
-        marginals[i, j] = W[i, j] / total  # above 0, as W is
-        return math.log(total)
+    if len(columns) == 1 or len(rows) == 1:
+        return _line_sum(W, miss, spare, marginals, rows, columns)
     block, found = np.empty((len(rows), len(columns))), np.empty((len(rows), len(columns)))
     for a in range(len(rows)):
         for b in range(len(columns)):

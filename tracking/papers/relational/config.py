@@ -52,18 +52,18 @@ class ParticleConfig(Config):
     speed_3: float = param(1.0, (0.0, 100.0), "m/s", "upper end of row 3 of the speed table", tunable=False)
     speed_4: float = param(1.4, (0.0, 100.0), "m/s", "upper end of row 4 of the speed table", tunable=False)
     drift_1: float = param(0.0, (0.0, 1000.0), "m/s^2", "row 1: mean deceleration (column B)", tunable=False)
-    drift_2: float = param(0.0, (0.0, 1000.0), "m/s^2", "row 2: mean deceleration", tunable=False)
-    drift_3: float = param(0.0, (0.0, 1000.0), "m/s^2", "row 3: mean deceleration", tunable=False)
-    drift_4: float = param(0.0, (0.0, 1000.0), "m/s^2", "row 4: mean deceleration", tunable=False)
-    drift_5: float = param(0.0, (0.0, 1000.0), "m/s^2", "row 5: mean deceleration", tunable=False)
+    drift_2: float = param(0.165, (0.0, 1000.0), "m/s^2", "row 2: mean deceleration", tunable=False)
+    drift_3: float = param(0.086, (0.0, 1000.0), "m/s^2", "row 3: mean deceleration", tunable=False)
+    drift_4: float = param(0.047, (0.0, 1000.0), "m/s^2", "row 4: mean deceleration", tunable=False)
+    drift_5: float = param(0.03, (0.0, 1000.0), "m/s^2", "row 5: mean deceleration", tunable=False)
     diffusion_1: float = param(
-        0.4, (0.0, 1000.0), "m/s^1.5", "row 1: standard deviation of the velocity per root second (column C)",
+        0.074, (0.0, 1000.0), "m/s^1.5", "row 1: standard deviation of the velocity per root second (column C)",
         tunable=False,
     )  # fmt: skip
-    diffusion_2: float = param(0.4, (0.0, 1000.0), "m/s^1.5", "row 2: the same", tunable=False)
-    diffusion_3: float = param(0.4, (0.0, 1000.0), "m/s^1.5", "row 3: the same", tunable=False)
-    diffusion_4: float = param(0.4, (0.0, 1000.0), "m/s^1.5", "row 4: the same", tunable=False)
-    diffusion_5: float = param(0.4, (0.0, 1000.0), "m/s^1.5", "row 5: the same", tunable=False)
+    diffusion_2: float = param(0.238, (0.0, 1000.0), "m/s^1.5", "row 2: the same", tunable=False)
+    diffusion_3: float = param(0.196, (0.0, 1000.0), "m/s^1.5", "row 3: the same", tunable=False)
+    diffusion_4: float = param(0.123, (0.0, 1000.0), "m/s^1.5", "row 4: the same", tunable=False)
+    diffusion_5: float = param(0.094, (0.0, 1000.0), "m/s^1.5", "row 5: the same", tunable=False)
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity, per axis", "log")
 
     point_noise: float = param(
@@ -136,11 +136,11 @@ class RelationalConfig(ParticleConfig):
     tracker: ClassVar[str] = "relational"
 
     relation_rate: float = param(
-        0.5, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
+        1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
     )
-    relation_bias: float = param(5.0, (-40.0, 40.0), "", "log odds of walking together at the same place (ours)")
-    relation_distance: float = param(3.0, (0.0, 40.0), "1/m", "loss of log odds per metre of distance (ours)")
-    relation_velocity: float = param(4.0, (0.0, 40.0), "s/m", "loss of log odds per m/s of velocity difference (ours)")
+    relation_bias: float = param(5.9, (-40.0, 40.0), "", "log odds of walking together at the same place (ours)")
+    relation_distance: float = param(3.3, (0.0, 40.0), "1/m", "loss of log odds per metre of distance (ours)")
+    relation_velocity: float = param(5.9, (0.0, 40.0), "s/m", "loss of log odds per m/s of velocity difference (ours)")
     newcomer_share: float = param(
         0.5, (0.0, 1.0), "probability", "that a new person near a group belongs to it (sec. 3.2)"
     )

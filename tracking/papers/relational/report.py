@@ -6,44 +6,36 @@ import numpy as np
 
 from sim.truth.identity import Identities
 from sim.types import Array, Groups, Ints
+from tracking.grouping.belief_partition import partition
+from tracking.papers.relational import transition_kernels
 from tracking.papers.relational.particle_set import ParticleSet
+
+SURE = 0.01
+"""Probabilities of pairs are taken at least so far from 0 and 1, as particles are few (ours)."""
 
 
 def estimates(particles: ParticleSet) -> tuple[Array, Array, Array, Array]:
     """Return places (K, 2) m, velocities (K, 2) m/s, covariances (K, 4, 4) of x, y, vx, vy and existence (K,).
 
-    They are moments over the particles, each weighted by its weight and the person's existence in it. A person who
-    exists in no particle has the moments of the weights alone.
+    They are moments over the particles, each weighted by its weight and the person's existence in it.
     """
-    weights = particles.weights
-    shares = weights[:, None] * particles.exist
-    exist = shares.sum(axis=0)
-    shares = np.where(exist > 0, shares, weights[:, None])
-    shares /= shares.sum(axis=0)
-    state = np.concatenate([particles.pos, particles.vel], axis=2)
-    mean = np.einsum("pk,pki->ki", shares, state)
-    apart = state - mean
-    cov = np.einsum("pki,pkj->kij", apart * shares[:, :, None], apart)
-    return mean[:, :2], mean[:, 2:], (cov + cov.transpose(0, 2, 1)) / 2, exist
+    count = particles.people
+    mean, cov, exist = np.zeros((count, 4)), np.zeros((count, 4, 4)), np.zeros(count)
+    transition_kernels.moments(particles.pos, particles.vel, particles.exist, particles.weights, mean, cov, exist)
+    return mean[:, :2], mean[:, 2:], cov, exist
 
 
-def linked_groups(together: Array, least: float) -> list[Ints]:
-    """Return the groups of two or more people as arrays of rows, by connected components of pairs.
+def groups_of_pairs(together: Array, least: float) -> list[Ints]:
+    """Return the groups of two or more people as arrays of rows: the consistent partition of tracking.grouping.
 
-    together (N, N): probability that each pair walks together; least: pairs below it are not linked.
+    together (N, N): probability that each pair walks together. Groups are joined while the mean over their pairs of the
+    log odds of `together`, less those of `least`, is above 0.
     """
-    linked = together >= least
-    left, found = set(range(len(together))), []
-    while left:
-        part, waiting = set[int](), [min(left)]
-        while waiting:
-            row = waiting.pop()
-            if row in left:
-                left.remove(row)
-                part.add(row)
-                waiting += np.flatnonzero(linked[row]).tolist()
-        found += [np.array(sorted(part))] if len(part) > 1 else []
-    return found
+    a, b = np.triu_indices(len(together), 1)
+    odds = np.clip(together[a, b], SURE, 1 - SURE)
+    log_odds = np.log(odds / (1 - odds)) - np.log(least / (1 - least))
+    _, person, group = partition(np.zeros_like(a), a, b, log_odds, -1.0)
+    return [person[group == g] for g in np.unique(group)]
 
 
 def group_ids(identities: Identities, frame: int, ids: Ints, groups: list[Ints]) -> Ints:

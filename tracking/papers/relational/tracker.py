@@ -26,7 +26,7 @@ Departures, all ours:
   probability, as people are hidden for a while.
 - A detection that is probably nobody's starts a person, who has no weight until the next frame.
 - Particles are resampled if they are worth few.
-- Groups are those of pairs with a probability of at least `together`; ids by the identity rule.
+- Groups are the consistent partition of the pairs' probabilities against `together`; ids by the identity rule.
 The preset `paper` switches off what has a parameter.
 """
 
@@ -233,6 +233,6 @@ class Relational(Particle):
         """Returns the group (N,) of each reported person, -1 for alone, and empty Groups if there is none."""
         p = self.particles
         self.together = transition_kernels.pairs_together(p.labels(), p.exist, p.weights)
-        found = report.linked_groups(self.together[np.ix_(rows, rows)], self.config.together)
+        found = report.groups_of_pairs(self.together[np.ix_(rows, rows)], self.config.together)
         group = report.group_ids(self.identities, frame, id, found)
         return group, report.no_groups(group)

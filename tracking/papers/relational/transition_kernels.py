@@ -104,17 +104,20 @@ def relate(pos: Array, vel: Array, related: Bools, uniforms: Array, rules: Array
     after dt with the probability g + (on before - g) exp(-rate dt).
     """
     particles, n, _ = pos.shape
+    change = rules[RATE]
     for p in range(particles):
         k = 0
         for i in range(n):
             for j in range(i + 1, n):
+                u, before = uniforms[p, k], related[p, i, j]
+                k += 1
+                if u < 1.0 - change if before else u >= change:
+                    continue  # whatever the belonging is
                 dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
                 du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
                 g = belonging(math.sqrt(dx * dx + dy * dy), math.sqrt(du * du + dv * dv), rules)
-                before = 1.0 if related[p, i, j] else 0.0
-                on = uniforms[p, k] < before + (g - before) * rules[RATE]
+                on = u < (1.0 - (1.0 - g) * change if before else g * change)
                 related[p, i, j] = related[p, j, i] = on
-                k += 1
 
 
 @njit(cache=True)
@@ -165,3 +168,35 @@ def pairs_together(label: Ints, exist: Array, weights: Array) -> Array:
             if both[i, j] > 0:
                 out[i, j] = out[j, i] = same[i, j] / both[i, j]
     return out
+
+
+@njit(cache=True)
+def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, cov: Array, total: Array) -> None:
+    """Write mean (K, 4) and covariance (K, 4, 4) of each person's x, y, vx, vy, and the probability of existence (K,).
+
+    Particles count by weight times existence, or by weight alone for a person who exists in none. pos, vel (P, K, 2), m
+    and m/s; exist (P, K); weights (P,), sum 1.
+    """
+    particles, n = exist.shape
+    state = np.empty(4)
+    for k in range(n):
+        for p in range(particles):
+            total[k] += weights[p] * exist[p, k]
+        alone = total[k] <= 0.0
+        whole = 1.0 if alone else total[k]
+        for p in range(particles):
+            w = (weights[p] if alone else weights[p] * exist[p, k]) / whole
+            mean[k, 0] += w * pos[p, k, 0]
+            mean[k, 1] += w * pos[p, k, 1]
+            mean[k, 2] += w * vel[p, k, 0]
+            mean[k, 3] += w * vel[p, k, 1]
+        for p in range(particles):
+            w = (weights[p] if alone else weights[p] * exist[p, k]) / whole
+            for d in range(2):
+                state[d], state[d + 2] = pos[p, k, d] - mean[k, d], vel[p, k, d] - mean[k, d + 2]
+            for a in range(4):
+                for b in range(a + 1):
+                    cov[k, a, b] += w * state[a] * state[b]
+        for a in range(4):
+            for b in range(a):
+                cov[k, b, a] = cov[k, a, b]
