@@ -45,7 +45,7 @@ class ParticleConfig(Config):
     )
 
     noise_scale: float = param(
-        1.0, (0.1, 10.0), "", "the standard deviations of the speed table are multiplied by this (ours)", "log"
+        3.0, (0.1, 10.0), "", "the standard deviations of the speed table are multiplied by this (ours)", "log"
     )
     speed_1: float = param(0.15, (0.0, 100.0), "m/s", "upper end of row 1 of the speed table", tunable=False)
     speed_2: float = param(0.6, (0.0, 100.0), "m/s", "upper end of row 2 of the speed table", tunable=False)
@@ -73,7 +73,7 @@ class ParticleConfig(Config):
         0.95, (0.3, 1.0), "probability", "that a person who was measured in the last frame is measured (ours)"
     )
     hidden_time: float = param(
-        1.0, (0.05, 20.0), "s", "mean time until a person who is not measured is measured again (ours)", "log"
+        0.3, (0.05, 20.0), "s", "mean time until a person who is not measured is measured again (ours)", "log"
     )
     clutter_density: float = param(
         0.002, (0.0, 1.0), "1/m^2", "false alarms per frame and square metre; 0: none (ours)"
@@ -146,4 +146,7 @@ class RelationalConfig(ParticleConfig):
     )
     together: float = param(
         0.5, (0.05, 0.95), "probability", "two people are in one group if they walk together with at least this (ours)"
+    )
+    inertia: float = param(
+        2.0, (0.0, 6.0), "", "log odds beyond `together` that are needed to join or leave a group (ours)"
     )

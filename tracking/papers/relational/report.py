@@ -25,15 +25,17 @@ def estimates(particles: ParticleSet) -> tuple[Array, Array, Array, Array]:
     return mean[:, :2], mean[:, 2:], cov, exist
 
 
-def groups_of_pairs(together: Array, least: float) -> list[Ints]:
+def groups_of_pairs(together: Array, group: Ints, least: float, inertia: float) -> list[Ints]:
     """Return the groups of two or more people as arrays of rows: the consistent partition of tracking.grouping.
 
-    together (N, N): probability that each pair walks together. Groups are joined while the mean over their pairs of the
-    log odds of `together`, less those of `least`, is above 0.
+    together (N, N): probability that each pair walks together; group (N,): of each person in the last frame, -1 for
+    alone. Groups are joined while the mean over their pairs of the log odds of `together`, less those of `least`, is
+    above 0; `inertia` is added for pairs of one group and subtracted for all others.
     """
     a, b = np.triu_indices(len(together), 1)
     odds = np.clip(together[a, b], SURE, 1 - SURE)
     log_odds = np.log(odds / (1 - odds)) - np.log(least / (1 - least))
+    log_odds += np.where((group[a] >= 0) & (group[a] == group[b]), inertia, -inertia)
     _, person, group = partition(np.zeros_like(a), a, b, log_odds, -1.0)
     return [person[group == g] for g in np.unique(group)]
 
@@ -46,6 +48,11 @@ def group_ids(identities: Identities, frame: int, ids: Ints, groups: list[Ints])
     """
     parts = [frozenset(ids[rows].tolist()) for rows in groups]
     identities.step(frame, frozenset(ids.tolist()), parts)
+    return known_groups(identities, ids)
+
+
+def known_groups(identities: Identities, ids: Ints) -> Ints:
+    """Return the id of each person's group, (N,), as `identities` has it, -1 for a person alone; ids (N,)."""
     group_of = {person: group for group, people in identities.groups.items() for person in people}
     return np.array([group_of.get(person, -1) for person in ids.tolist()], np.int64)
 

@@ -233,6 +233,7 @@ class Relational(Particle):
         """Returns the group (N,) of each reported person, -1 for alone, and empty Groups if there is none."""
         p = self.particles
         self.together = transition_kernels.pairs_together(p.labels(), p.exist, p.weights)
-        found = report.groups_of_pairs(self.together[np.ix_(rows, rows)], self.config.together)
+        c, before = self.config, report.known_groups(self.identities, id)
+        found = report.groups_of_pairs(self.together[np.ix_(rows, rows)], before, c.together, c.inertia)
         group = report.group_ids(self.identities, frame, id, found)
         return group, report.no_groups(group)
