@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from sim.compiler import njit
-from sim.types import Array
+from sim.types import Array, Bools, Ints
 
 EXACT_BITS = 12
 """Largest number of columns of an exact sum; above it sums are propagated."""
@@ -161,15 +161,15 @@ def dense_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
 
 
 @njit(cache=True)
-def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
-    """Return the log of the sum over all mappings and write the marginals (n, m), component by component.
+def sparse_sum(W: Array, miss: Array, spare: Array, cluster: Ints, log_sums: Array, marginals: Array) -> None:
+    """Write the logs of the sums over all mappings of each cluster (n,), and the marginals (n, m).
 
-    Arguments as of `exact_sum`. Rows and columns with a pair of weight above 0 are linked; the sum is the product over
-    connected components of `dense_sum`.
+    Arguments as of `exact_sum`. Rows and columns with a pair of weight above 0 are linked; a sum is the product over
+    connected components of `dense_sum`. cluster (n,): a row for each row; that of a component's first row has its log.
+    Columns without a row count in the cluster of row 0. Without rows nothing is written.
     """
     n, m = W.shape
-    marginals[:] = 0.0
-    log_sum = 0.0
+    marginals[:], log_sums[:] = 0.0, 0.0
     row_done, column_done = np.zeros(n, np.bool_), np.zeros(m, np.bool_)
     rows, columns = np.empty(n, np.int64), np.empty(m, np.int64)
     for start in range(n):
@@ -190,11 +190,10 @@ def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
                             row_done[k] = True
                             rows[count] = k
                             count += 1
-        log_sum += _component_sum(W, miss, spare, marginals, rows[:count], columns[:width])
+        log_sums[cluster[start]] += _component_sum(W, miss, spare, marginals, rows[:count], columns[:width])
     for j in range(m):
-        if not column_done[j]:
-            log_sum += math.log(spare[j]) if spare[j] > 0 else -math.inf
-    return log_sum
+        if n > 0 and not column_done[j]:
+            log_sums[cluster[0]] += math.log(spare[j]) if spare[j] > 0 else -math.inf
 
 
 @njit(cache=True)
@@ -241,13 +240,15 @@ def _component_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no
 @njit(cache=True)
 def particle_sums(
     pos: Array, exist: Array, detect: Array, points: Array, sd: float, clutter: float, reach: float,
-    log_sums: Array, marginals: Array,
+    cluster: Ints, log_sums: Array, marginals: Array,
 ) -> None:  # fmt: skip
-    """Write the log-likelihood (P,) of each particle and its marginals (P, K, M): the probability of each pair.
+    """Write log-likelihoods (P, K) of each particle's clusters and its marginals (P, K, M): the probability of each
+    pair.
 
     pos (P, K, 2), m: places of K people in each of P particles; exist (P, K): probability that each exists; detect
     (K,): probability that each is measured if they exist; points (M, 2), m; sd: standard deviation of a point, m;
     clutter: false alarms per m^2. reach: pairs with a squared distance, in sd^2, above it are impossible; inf: none.
+    cluster (K,): the least slot of each slot's cluster, whose column has the cluster's log-likelihood.
 
     W = exist detect N(z; x, sd^2) / clutter, miss = 1 - exist detect, spare = 1. Without clutter (the paper's sensor)
     W = N(z; x, sd^2) and mappings are complete: the smaller side is mapped wholly. Underflow makes W exactly 0.
@@ -268,4 +269,26 @@ def particle_sums(
         if clutter == 0.0:
             miss[:] = 0.0 if n <= m else 1.0
             spare[:] = 0.0 if n > m else 1.0
-        log_sums[p] = sparse_sum(W, miss, spare, marginals[p])
+        sparse_sum(W, miss, spare, cluster, log_sums[p], marginals[p])
+
+
+@njit(cache=True)
+def shared_detections(pos: Array, points: Array, most: float) -> Bools:
+    """Return which people (K, K) may have a detection in common: it is within reach of each, in some particle.
+
+    pos (P, K, 2), m; points (M, 2), m; most: reach, squared distance in m^2.
+    """
+    particles, n, _ = pos.shape
+    m = len(points)
+    near, linked = np.zeros((n, m), np.bool_), np.zeros((n, n), np.bool_)
+    for p in range(particles):
+        for k in range(n):
+            for j in range(m):
+                dx, dy = points[j, 0] - pos[p, k, 0], points[j, 1] - pos[p, k, 1]
+                if dx * dx + dy * dy <= most:
+                    near[k, j] = True
+    for a in range(n):
+        for b in range(n):
+            for j in range(m):
+                linked[a, b] |= near[a, j] and near[b, j]
+    return linked

@@ -44,6 +44,16 @@ class ParticleConfig(Config):
         "residual", ("residual", "systematic"), "", "residual: as in sec. 2.1; systematic: ours", "categorical"
     )
 
+    weights: str = param(
+        "factorised",
+        ("factorised", "joint"),
+        "",
+        "factorised: people who share no detection and do not walk together have weights of their own (ours); joint: a "
+        "particle has one weight (the paper)",
+        "categorical",
+        before="joint",
+    )
+
     noise_scale: float = param(
         3.0, (0.1, 10.0), "", "the standard deviations of the speed table are multiplied by this (ours)", "log"
     )
@@ -135,6 +145,13 @@ class RelationalConfig(ParticleConfig):
 
     tracker: ClassVar[str] = "relational"
 
+    coupling_time: float = param(
+        0.5,
+        (0.0, 10.0),
+        "s",
+        "time in which members of a group approach its mean velocity; 0: in every frame (the paper), above 0 ours",
+        before=0.0,
+    )
     relation_rate: float = param(
         1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
     )

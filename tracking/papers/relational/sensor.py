@@ -11,13 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.types import Array
+from sim.types import Array, Bools
 from tracking.papers.relational import association_sums_kernels
 from tracking.papers.relational.config import ParticleConfig
 from tracking.papers.relational.particle_set import ParticleSet
 
-REACH = 50.0
+REACH = 36.0
 """Squared distance, in squared standard deviations, above which a person and a detection are no pair (ours)."""
+COUPLED = 0.02
+"""Share of particles in which a pair walks together above which it is in one cluster (ours)."""
 LEAST_LOG = -745.0
 """Log of the smallest float: the paper's weights are 0 below it."""
 
@@ -40,27 +42,35 @@ class Weighing:
 def weigh(particles: ParticleSet, points: Array, detect: Array, config: ParticleConfig) -> Weighing:
     """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say.
 
-    points (M, 2): m; detect (K,): probability that each person is measured if existing. `log_weights` and `exist` are
-    changed. If all weights vanish, which only the paper's sensor can bring about, nothing is changed.
+    points (M, 2): m; detect (K,): probability that each person is measured if existing. Clusters, weights and existence
+    of the particles are changed. If all weights vanish, which only the paper's sensor can bring about, they are not.
     """
-    count, people = particles.exist.shape
-    log_sums, marginals = np.empty(count), np.empty((count, people, len(points)))
-    reach = np.inf if config.certain_sensor else REACH
+    people, certain = particles.people, config.certain_sensor
+    if not people:
+        return Weighing(False, np.zeros((0, len(points))), np.zeros(0), np.ones(len(points)))
+    particles.regroup(_linked(particles, points, config))
+    log_sums, marginals = np.empty(particles.exist.shape), np.empty((*particles.exist.shape, len(points)))
     association_sums_kernels.particle_sums(
-        particles.pos, particles.exist, detect, points, config.point_noise, config.clutter_density, reach, log_sums,
-        marginals,
+        particles.pos, particles.exist, detect, points, config.point_noise, config.clutter_density,
+        np.inf if certain else REACH, particles.cluster, log_sums, marginals,
     )  # fmt: skip
-    if config.certain_sensor and log_sums.max(initial=-np.inf) < LEAST_LOG:
+    if certain and log_sums[:, particles.heads].max(axis=0).min() < LEAST_LOG:
         return Weighing(True, np.zeros((people, len(points))), np.zeros(people), np.ones(len(points)))
-    log_weights = particles.log_weights + log_sums
-    log_weights -= log_weights.max()
-    particles.log_weights = log_weights - np.log(np.exp(log_weights).sum())
+    particles.weigh(log_sums)
     measured = marginals.sum(axis=2)
-    if not config.certain_sensor:
+    if not certain:
         unseen = particles.exist * (1 - detect) / np.maximum(1 - particles.exist * detect, np.finfo(float).tiny)
         particles.exist = np.minimum(measured + (1 - measured) * unseen, 1.0)
-    weights = particles.weights
-    pairs = np.einsum("p,pkm->km", weights, marginals)
-    exist = weights @ particles.exist
-    seen = np.divide(weights @ measured, exist, out=np.zeros(people), where=exist > 0)
+    pairs = np.einsum("pk,pkm->km", particles.weights, marginals)
+    exist = particles.existence
+    seen = np.divide((particles.weights * measured).sum(axis=0), exist, out=np.zeros(people), where=exist > 0)
     return Weighing(False, pairs, seen, 1.0 - pairs.sum(axis=0))
+
+
+def _linked(particles: ParticleSet, points: Array, config: ParticleConfig) -> Bools:
+    """Returns which people (K, K) must be in one cluster: all in joint mode and with the paper's sensor; else those who
+    may have a detection in common, or walk together in more than a share COUPLED of the particles."""
+    if config.weights == "joint" or config.certain_sensor:
+        return np.ones((particles.people, particles.people), bool)
+    shared = association_sums_kernels.shared_detections(particles.pos, points, REACH * config.point_noise**2)
+    return np.asarray(shared | (particles.related.mean(axis=0) > COUPLED))

@@ -22,10 +22,12 @@ Departures, all ours:
   connected components: this needs no labels, and gives the probability that two people walk together.
 - People have slots that are common to all particles. That a person exists is a probability in each particle, and not
   drawn: particles with and without each of many newcomers would be few.
+- Members of a group approach its mean velocity with a time constant; in the paper they have it in every frame.
 - The sensor has missed people and false alarms. A person not measured in the last frame is measured with a smaller
   probability, as people are hidden for a while.
 - A detection that is probably nobody's starts a person, who has no weight until the next frame.
-- Particles are resampled if they are worth few.
+- People who share no detection and do not walk together have weights of their own (factorised); particles are
+  resampled if they are worth few.
 - Groups are the consistent partition of the pairs' probabilities against `together`; ids by the identity rule.
 The preset `paper` switches off what has a parameter.
 """
@@ -39,7 +41,6 @@ import numpy as np
 from sim.rng import rng
 from sim.truth.identity import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Plane, Tracks
-from tracking.filters.particles import effective_number, residual_resample, systematic_resample
 from tracking.image_scale import required
 from tracking.papers.relational import report, sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
@@ -55,7 +56,7 @@ class Particle:
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
     the people; identities, the groups; plane, "ground" or "image"; context; vanished: number of frames in which all
-    weights were 0; effective: effective number of particles of the last weighed frame, before resampling. All but
+    weights were 0; effective: least effective number of particles of any person in the last measured frame. All but
     config exist after `reset` only.
     """
 
@@ -89,7 +90,7 @@ class Particle:
             self._measure(detections)
         tracks = self._report(frame)
         if detections is not None:
-            self._resample()
+            self.particles.resample(self.config.resample_share, self.config.resampling, self.draws[RESAMPLING])
         return tracks
 
     @property
@@ -106,10 +107,15 @@ class Particle:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        transition_kernels.move(p.pos, p.vel, p.exist, p.labels(), noise, c.speed_table(self.dt), self.dt)
+        table, own = c.speed_table(self.dt), self._own_velocity()
+        transition_kernels.move(p.pos, p.vel, p.exist, p.labels(), noise, table, own, self.dt)
         if not c.certain_sensor:
             p.exist *= np.exp(-self.dt / c.survival_time)
         self._relate()
+
+    def _own_velocity(self) -> float:
+        """Returns the share of the own velocity that members of a group keep in a step; `particle` has no groups."""
+        return 1.0
 
     def _relate(self) -> None:
         """Draw new relations; people of `particle` have none."""
@@ -126,7 +132,7 @@ class Particle:
         sizes = detections.box[order, 2:] if image_boxes and detections.box is not None else None
         said = sensor.weigh(self.particles, points, self._detection_probability(), self.config)
         self.vanished += said.vanished
-        self.effective = effective_number(self.particles.weights)
+        self.effective = float(self.particles.effective().min(initial=self.particles.count))
         self.slots.measure(said.seen, said.pairs, sizes, self.dt)
         self._remove()
         for j in np.flatnonzero(said.nobody > self.config.birth_doubt).tolist():
@@ -143,8 +149,8 @@ class Particle:
 
     def _remove(self) -> None:
         """Remove people who are missed for longer than the time window (sec. 2.1.1) or exist with a low probability."""
-        c, exist = self.config, self.particles.weights @ self.particles.exist
-        keep = (exist >= c.least_existence) & (self.slots.missed <= c.time_window + 1e-9)
+        c = self.config
+        keep = (self.particles.existence >= c.least_existence) & (self.slots.missed <= c.time_window + 1e-9)
         if not keep.all():
             self.particles.keep(keep)
             self.slots.keep(keep)
@@ -184,17 +190,6 @@ class Particle:
         """Returns the group (N,) of each reported person, and Groups or None; `particle` reports none."""
         return np.full(len(id), -1), None
 
-    def _resample(self) -> None:
-        """Resample the particles if their effective number is at most `resample_share` of them (sec. 2.1)."""
-        p, c, draws = self.particles, self.config, self.draws[RESAMPLING]
-        weights = p.weights
-        if effective_number(weights) > c.resample_share * p.count * (1 + 1e-9):
-            return
-        if c.resampling == "residual":
-            p.take(residual_resample(weights, draws.random(p.count)))
-        else:
-            p.take(systematic_resample(weights, float(draws.random())))
-
 
 class Relational(Particle):
     """The tracker `relational`: the particle filter of `particle` with the relation "walking together" in it.
@@ -212,6 +207,11 @@ class Relational(Particle):
         c = self.config
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
+
+    def _own_velocity(self) -> float:
+        """Returns the share of the own velocity that members of a group keep in a step: 0 in the paper."""
+        time = self.config.coupling_time
+        return float(np.exp(-self.dt / time)) if time > 0 else 0.0
 
     def _relate(self) -> None:
         p = self.particles
@@ -232,7 +232,7 @@ class Relational(Particle):
     def _groups(self, frame: int, id: Ints, rows: Ints) -> tuple[Ints, Groups | None]:
         """Returns the group (N,) of each reported person, -1 for alone, and empty Groups if there is none."""
         p = self.particles
-        self.together = transition_kernels.pairs_together(p.labels(), p.exist, p.weights)
+        self.together = transition_kernels.pairs_together(p.labels(), p.exist, p.weights, p.cluster)
         c, before = self.config, report.known_groups(self.identities, id)
         found = report.groups_of_pairs(self.together[np.ix_(rows, rows)], before, c.together, c.inertia)
         group = report.group_ids(self.identities, frame, id, found)

@@ -49,11 +49,14 @@ def group_labels(related: Bools, label: Ints) -> None:
 
 
 @njit(cache=True)
-def move(pos: Array, vel: Array, exist: Array, label: Ints, noise: Array, table: Array, dt: float) -> None:
+def move(
+    pos: Array, vel: Array, exist: Array, label: Ints, noise: Array, table: Array, own: float, dt: float
+) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; label (P, K): the groups of old
-    relations; noise (P, K, 2): standard normals; table (5, 3): the speed table of the step.
+    relations; noise (P, K, 2): standard normals; table (5, 3): the speed table of the step; own: share of
+    the own velocity in u, 0 in the paper.
 
     v_i = u - B u / |u| + C noise, with u the mean velocity of the person's group, and B, C of the table's row for |u|
     (Table 3). x_i = x_i + v_i dt. The mean weights people by their existence (ours); u of a person alone is the own
@@ -73,7 +76,8 @@ def move(pos: Array, vel: Array, exist: Array, label: Ints, noise: Array, table:
             g = label[p, i]
             x, y = vel[p, i, 0], vel[p, i, 1]
             if size[g] > 1 and weight[g] > 0:
-                x, y = sum_x[g] / weight[g], sum_y[g] / weight[g]
+                x = own * x + (1.0 - own) * sum_x[g] / weight[g]
+                y = own * y + (1.0 - own) * sum_y[g] / weight[g]
             speed = math.sqrt(x * x + y * y)
             row = 0
             while speed > table[row, SPEED]:
@@ -147,18 +151,20 @@ def join(pos: Array, exist: Array, label: Ints, place: Array, share: float, unif
 
 
 @njit(cache=True)
-def pairs_together(label: Ints, exist: Array, weights: Array) -> Array:
+def pairs_together(label: Ints, exist: Array, weights: Array, cluster: Ints) -> Array:
     """Return the probability (K, K) that i and j are in one group, given that both exist; 1 on the diagonal.
 
-    label (P, K): groups; exist (P, K): probabilities of existence; weights (P,): of the particles. 0 for a pair that
-    does not exist.
+    label (P, K): groups; exist (P, K): probabilities of existence; weights (P, K): of the particles; cluster (K,):
+    people with equal numbers have one weight, others the product of theirs. 0 for a pair that does not exist.
     """
     particles, n = label.shape
     both, same = np.zeros((n, n)), np.zeros((n, n))
     for p in range(particles):
         for i in range(n):
             for j in range(i):
-                w = weights[p] * exist[p, i] * exist[p, j]
+                w = weights[p, i] * exist[p, i] * exist[p, j]
+                if cluster[i] != cluster[j]:
+                    w *= weights[p, j]
                 both[i, j] += w
                 if label[p, i] == label[p, j]:
                     same[i, j] += w
@@ -175,23 +181,23 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
     """Write mean (K, 4) and covariance (K, 4, 4) of each person's x, y, vx, vy, and the probability of existence (K,).
 
     Particles count by weight times existence, or by weight alone for a person who exists in none. pos, vel (P, K, 2), m
-    and m/s; exist (P, K); weights (P,), sum 1.
+    and m/s; exist (P, K); weights (P, K), sum 1 for each person.
     """
     particles, n = exist.shape
     state = np.empty(4)
     for k in range(n):
         for p in range(particles):
-            total[k] += weights[p] * exist[p, k]
+            total[k] += weights[p, k] * exist[p, k]
         alone = total[k] <= 0.0
         whole = 1.0 if alone else total[k]
         for p in range(particles):
-            w = (weights[p] if alone else weights[p] * exist[p, k]) / whole
+            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
             mean[k, 0] += w * pos[p, k, 0]
             mean[k, 1] += w * pos[p, k, 1]
             mean[k, 2] += w * vel[p, k, 0]
             mean[k, 3] += w * vel[p, k, 1]
         for p in range(particles):
-            w = (weights[p] if alone else weights[p] * exist[p, k]) / whole
+            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
             for d in range(2):
                 state[d], state[d + 2] = pos[p, k, d] - mean[k, d], vel[p, k, d] - mean[k, d + 2]
             for a in range(4):

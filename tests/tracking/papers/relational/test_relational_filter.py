@@ -22,7 +22,8 @@ CERTAIN = {"detect_prob": 1.0, "clutter_density": 0.0, "resample_share": 1.0}
 
 def flat_table(diffusion):
     """A speed table without drift and with one diffusion."""
-    return {f"drift_{k}": 0.0 for k in range(1, 6)} | {f"diffusion_{k}": diffusion for k in range(1, 6)}
+    rows = range(1, 6)
+    return {f"drift_{k}": 0.0 for k in rows} | {f"diffusion_{k}": diffusion for k in rows} | {"noise_scale": 1.0}
 
 
 def detections(index, *points):
@@ -148,7 +149,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         noise = rng.standard_normal((count, 2, 2))
         label = particles.labels()
         transition_kernels.move(
-            particles.pos, particles.vel, particles.exist, label, noise, config.speed_table(1.0), 1.0
+            particles.pos, particles.vel, particles.exist, label, noise, config.speed_table(1.0), 0.0, 1.0
         )
         velocity = 0.7 * velocity + rng.standard_normal(2)
         truth = truth + velocity
@@ -156,7 +157,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         particles.pos[:, 1] = 1e6  # never near the detection
         if seen:
             sensor.weigh(particles, points, np.array([0.9, 0.0]), config)
-            particles.take(rng.choice(count, count, p=particles.weights))
+            particles.resample(1.0, "residual", rng)
         out.append(particles.vel[:, 1].var(axis=0).mean())
     return np.array(out)
 
@@ -179,8 +180,8 @@ def test_without_information_weights_stay_and_people_go_straight_on():
     tracker = Relational(RelationalConfig(**flat_table(1e-6)))
     walk = [[(0.1 * k, 0.0), (0.1 * k, 1.0)] for k in range(15)]
     before = stepped(tracker, 10.0, *walk)[-1]
-    tracker.particles.log_weights = np.log(np.random.default_rng(0).dirichlet(np.ones(tracker.particles.count)))
-    weights = tracker.particles.weights
+    tracker.particles.weights = np.random.default_rng(0).dirichlet(np.ones(tracker.particles.count), 2).T.copy()
+    weights = tracker.particles.weights.copy()
     first = tracker.step(Frame(16, 1.5), None)
     second = tracker.step(Frame(17, 1.6), None)
     assert np.array_equal(tracker.particles.weights, weights)
@@ -281,7 +282,7 @@ def test_diffusion_is_that_of_any_frame_rate(related):
         for _ in range(round(fps)):
             noise = rng.standard_normal((20_000, 2, 2))
             args = particles.pos, particles.vel, particles.exist, particles.labels(), noise
-            transition_kernels.move(*args, config.speed_table(1 / fps), 1 / fps)
+            transition_kernels.move(*args, config.speed_table(1 / fps), 0.0, 1 / fps)
         mean = particles.vel.mean(axis=1) if related else particles.vel[:, 0]
         place = particles.pos.mean(axis=1) if related else particles.pos[:, 0]
         spreads.append([mean.std(axis=0).mean(), place.std(axis=0).mean()])
