@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from tracking.app.command_options import (
+    FitRelationalOptions,
     FitSensorOptions,
     GenerateOptions,
     GroupOptions,
@@ -141,6 +142,15 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     from tracking.app.commands.fit import fit_sensor
 
     return fit_sensor(options)
+
+
+@fit.command("relational")
+@options_from(FitRelationalOptions)
+def fit_relational(options: FitRelationalOptions) -> CommandResult:
+    """Learn the speed table and the relations of the tracker relational from simulated truth."""
+    from tracking.app.commands.fit_relational import fit_relational
+
+    return fit_relational(options)
 
 
 @app.command()

@@ -68,8 +68,9 @@ def fit_relational(truths: Iterable[Truth], ends: Array) -> dict[str, float]:
     out: dict[str, float] = {}
     for k in range(len(ends) + 1):
         inside = row == k
-        loss = max(-float(np.mean(along[inside] / lag[inside])), 0.0) if inside.any() else 0.0
-        drift = 0.0 if k == 0 else loss
+        if not inside.any():
+            inside = np.ones(len(row), bool)
+        drift = 0.0 if k == 0 else max(-float(np.mean(along[inside] / lag[inside])), 0.0)
         spread = np.mean((along[inside] + drift * lag[inside]) ** 2 / lag[inside] + across[inside] ** 2 / lag[inside])
         out |= {f"drift_{k + 1}": drift, f"diffusion_{k + 1}": float(np.sqrt(spread / 2))}
     weights = logistic(np.concatenate([p.design for p in pairs]), same)

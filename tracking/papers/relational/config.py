@@ -108,8 +108,7 @@ class ParticleConfig(Config):
 
     def check(self) -> None:
         """Refuse a speed table whose rows do not follow each other, and a sensor without clutter that misses people."""
-        ends = [self.speed_1, self.speed_2, self.speed_3, self.speed_4]
-        for row, (low, high) in enumerate(pairwise(ends), 2):
+        for row, (low, high) in enumerate(pairwise(self.speed_ends.tolist()), 2):
             if high <= low:
                 raise InputError(
                     place=f"speed_{row}", got=f"{high:g}", expected=f"more than speed_{row - 1} = {low:g}",
@@ -126,13 +125,19 @@ class ParticleConfig(Config):
         """True for the paper's sensor, without missed people and false alarms: its mappings are complete."""
         return self.detect_prob == 1 and self.clutter_density == 0
 
+    @property
+    def speed_ends(self) -> Array:
+        """The upper ends of the first four rows of the speed table, (4,), m/s."""
+        return np.array([self.speed_1, self.speed_2, self.speed_3, self.speed_4])
+
     def speed_table(self, dt: float) -> Array:
         """Return the speed table (5, 3) of a step of dt s: upper end of the speed in m/s (inf in the last row), mean
         loss of speed in m/s (column B), standard deviation of the velocity per axis in m/s (column C)."""
-        ends = [self.speed_1, self.speed_2, self.speed_3, self.speed_4, np.inf]
         drift = np.array([getattr(self, f"drift_{k}") for k in range(1, ROWS + 1)])
         diffusion = np.array([getattr(self, f"diffusion_{k}") for k in range(1, ROWS + 1)])
-        return np.stack([np.array(ends), drift * dt, self.noise_scale * diffusion * np.sqrt(dt)], axis=1)
+        return np.stack(
+            [np.append(self.speed_ends, np.inf), drift * dt, self.noise_scale * diffusion * np.sqrt(dt)], axis=1
+        )
 
 
 @dataclass(frozen=True)
@@ -146,7 +151,7 @@ class RelationalConfig(ParticleConfig):
     tracker: ClassVar[str] = "relational"
 
     coupling_time: float = param(
-        0.5,
+        1.5,
         (0.0, 10.0),
         "s",
         "time in which members of a group approach its mean velocity; 0: in every frame (the paper), above 0 ours",
@@ -165,5 +170,5 @@ class RelationalConfig(ParticleConfig):
         0.5, (0.05, 0.95), "probability", "two people are in one group if they walk together with at least this (ours)"
     )
     inertia: float = param(
-        2.0, (0.0, 6.0), "", "log odds beyond `together` that are needed to join or leave a group (ours)"
+        1.0, (0.0, 6.0), "", "log odds beyond `together` that are needed to join or leave a group (ours)"
     )
