@@ -12,8 +12,6 @@ from typing import Annotated
 import typer
 
 from tracking.app.command_options import (
-    FitRelationalOptions,
-    FitSensorOptions,
     GenerateOptions,
     GroupOptions,
     OverlayOptions,
@@ -27,6 +25,7 @@ from tracking.app.command_options import (
 )
 from tracking.app.command_result import INTERRUPTED, CommandResult
 from tracking.app.commands.tune import tune
+from tracking.app.fit_options import FitRelationalOptions, FitSensorOptions
 from tracking.app.options_from_dataclass import options_from
 from tracking.app.shared_options import Json, Out
 

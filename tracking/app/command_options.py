@@ -153,35 +153,6 @@ class ScoreOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FitSensorOptions:
-    """Options of the command `fit sensor`, which measures a detector's errors.
-
-    sources: recordings with true boxes and detections, pooled. out: the TOML file to write. fps: frames per second;
-    None: the recordings' own.
-    """
-
-    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Recordings with gt and det, pooled.")]
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")]
-    fps: Fps = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitRelationalOptions:
-    """Options of the command `fit relational`, which learns the motion of people and of pairs from simulated truth.
-
-    names: scenarios, *.toml files or suites. seeds: "A:B" (A to B - 1) or one number. out: the TOML file to write.
-    """
-
-    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FILE.toml", help="File to write: parameters of relational, for --params.")
-    ]
-    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one seed.")] = (
-        "30000:30004"
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
 class ReplayCommandOptions:
     """Options of the command `replay`, which renders recorded trajectories with a simulated camera and stores a
     dataset.

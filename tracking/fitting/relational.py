@@ -32,7 +32,7 @@ STEPS = 50
 
 
 @dataclass(frozen=True)
-class PairRows:
+class TruePairs:
     """Pairs of people of a sequence, one row per pair and frame, sorted by pair, then frame.
 
     pair, frame (R,). design (R, 3): 1, minus distance in m, minus velocity difference in m/s. same (R,): True if both
@@ -101,7 +101,7 @@ def velocity_changes(truth: Truth) -> tuple[Array, Array, Array, Array]:
     return speed, along, across, np.full(len(now), frames / truth.fps)
 
 
-def pair_rows(truth: Truth) -> PairRows:
+def pair_rows(truth: Truth) -> TruePairs:
     """Return the rows of the pairs of a sequence that are at most NEAR apart."""
     assert truth.pos is not None
     assert truth.vel is not None
@@ -117,7 +117,7 @@ def pair_rows(truth: Truth) -> PairRows:
         found.append((id[a] * people + id[b], np.full(len(a), index), design, (group[a] >= 0) & (group[a] == group[b])))
     pair, frame, design, same = (np.concatenate(x) for x in zip(*found, strict=True))
     order = np.lexsort((frame, pair))
-    return PairRows(pair[order], frame[order], design[order], same[order], 1 / truth.fps)
+    return TruePairs(pair[order], frame[order], design[order], same[order], 1 / truth.fps)
 
 
 def logistic(design: Array, same: Bools) -> Array:
@@ -134,7 +134,7 @@ def logistic(design: Array, same: Bools) -> Array:
     return weights
 
 
-def _log_loss(sequences: list[PairRows], weights: Array, rate: float) -> float:
+def _log_loss(sequences: list[TruePairs], weights: Array, rate: float) -> float:
     """Returns the mean log loss of the relation's expectation, a moving average of probabilities with this rate."""
     from scipy.signal import lfilter
 

@@ -10,8 +10,8 @@ import numpy as np
 from scenarios.printable import printable
 from sim.types import Sequence as Recording
 from tracking.app import option_parsing
-from tracking.app.command_options import FitSensorOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.fit_options import FitSensorOptions
 
 CHECK_SEEDS = range(30_000, 30_008)
 """Seeds of the simulated detections whose statistics are shown beside the measured ones."""

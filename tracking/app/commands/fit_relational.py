@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tracking.app import option_parsing
-from tracking.app.command_options import FitRelationalOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.fit_options import FitRelationalOptions
 
 
 def fit_relational(options: FitRelationalOptions) -> CommandResult:
