@@ -150,13 +150,6 @@ class RelationalConfig(ParticleConfig):
 
     tracker: ClassVar[str] = "relational"
 
-    coupling_time: float = param(
-        1.5,
-        (0.0, 10.0),
-        "s",
-        "time in which members of a group approach its mean velocity; 0: in every frame (the paper), above 0 ours",
-        before=0.0,
-    )
     relation_rate: float = param(
         1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
     )

@@ -22,7 +22,6 @@ Departures, all ours:
   connected components: this needs no labels, and gives the probability that two people walk together.
 - People have slots that are common to all particles. That a person exists is a probability in each particle, and not
   drawn: particles with and without each of many newcomers would be few.
-- Members of a group approach its mean velocity with a time constant; in the paper they have it in every frame.
 - The sensor has missed people and false alarms. A person not measured in the last frame is measured with a smaller
   probability, as people are hidden for a while.
 - A detection that is probably nobody's starts a person, who has no weight until the next frame.
@@ -107,15 +106,10 @@ class Particle:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        table, own = c.speed_table(self.dt), self._own_velocity()
-        transition_kernels.move(p.pos, p.vel, p.exist, p.labels(), noise, table, own, self.dt)
+        transition_kernels.move(p.pos, p.vel, p.exist, p.labels(), noise, c.speed_table(self.dt), self.dt)
         if not c.certain_sensor:
             p.exist *= np.exp(-self.dt / c.survival_time)
         self._relate()
-
-    def _own_velocity(self) -> float:
-        """Returns the share of the own velocity that members of a group keep in a step; `particle` has no groups."""
-        return 1.0
 
     def _relate(self) -> None:
         """Draw new relations; people of `particle` have none."""
@@ -207,11 +201,6 @@ class Relational(Particle):
         c = self.config
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
-
-    def _own_velocity(self) -> float:
-        """Returns the share of the own velocity that members of a group keep in a step: 0 in the paper."""
-        time = self.config.coupling_time
-        return float(np.exp(-self.dt / time)) if time > 0 else 0.0
 
     def _relate(self) -> None:
         p = self.particles

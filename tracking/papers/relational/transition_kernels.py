@@ -49,14 +49,11 @@ def group_labels(related: Bools, label: Ints) -> None:
 
 
 @njit(cache=True)
-def move(
-    pos: Array, vel: Array, exist: Array, label: Ints, noise: Array, table: Array, own: float, dt: float
-) -> None:  # fmt: skip
+def move(pos: Array, vel: Array, exist: Array, label: Ints, noise: Array, table: Array, dt: float) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; label (P, K): the groups of old
-    relations; noise (P, K, 2): standard normals; table (5, 3): the speed table of the step; own: share of
-    the own velocity in u, 0 in the paper.
+    relations; noise (P, K, 2): standard normals; table (5, 3): the speed table of the step.
 
     v_i = u - B u / |u| + C noise, with u the mean velocity of the person's group, and B, C of the table's row for |u|
     (Table 3). x_i = x_i + v_i dt. The mean weights people by their existence (ours); u of a person alone is the own
@@ -76,8 +73,7 @@ def move(
             g = label[p, i]
             x, y = vel[p, i, 0], vel[p, i, 1]
             if size[g] > 1 and weight[g] > 0:
-                x = own * x + (1.0 - own) * sum_x[g] / weight[g]
-                y = own * y + (1.0 - own) * sum_y[g] / weight[g]
+                x, y = sum_x[g] / weight[g], sum_y[g] / weight[g]
             speed = math.sqrt(x * x + y * y)
             row = 0
             while speed > table[row, SPEED]:

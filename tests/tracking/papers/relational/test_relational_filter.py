@@ -149,7 +149,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         noise = rng.standard_normal((count, 2, 2))
         label = particles.labels()
         transition_kernels.move(
-            particles.pos, particles.vel, particles.exist, label, noise, config.speed_table(1.0), 0.0, 1.0
+            particles.pos, particles.vel, particles.exist, label, noise, config.speed_table(1.0), 1.0
         )
         velocity = 0.7 * velocity + rng.standard_normal(2)
         truth = truth + velocity
@@ -282,7 +282,7 @@ def test_diffusion_is_that_of_any_frame_rate(related):
         for _ in range(round(fps)):
             noise = rng.standard_normal((20_000, 2, 2))
             args = particles.pos, particles.vel, particles.exist, particles.labels(), noise
-            transition_kernels.move(*args, config.speed_table(1 / fps), 0.0, 1 / fps)
+            transition_kernels.move(*args, config.speed_table(1 / fps), 1 / fps)
         mean = particles.vel.mean(axis=1) if related else particles.vel[:, 0]
         place = particles.pos.mean(axis=1) if related else particles.pos[:, 0]
         spreads.append([mean.std(axis=0).mean(), place.std(axis=0).mean()])
