@@ -36,8 +36,8 @@ class Slots:
         """Remove all people but those where `rows` (K,) is True."""
         self.id, self.missed, self.size = self.id[rows], self.missed[rows], self.size[rows]
 
-    def measure(self, seen: Array, pairs: Array, sizes: Array | None, dt: float) -> None:
-        """Note who was measured in a frame of dt s: those with seen (K,) above 1/2.
+    def measure(self, seen: Array, pairs: Array, sizes: Array | None, dt: Array) -> None:
+        """Note who was measured in a frame: those with seen (K,) above 1/2; dt (K,): s by which others count as missed.
 
         pairs (K, M): probability of each person and detection; sizes (M, 2): width and height of the detected boxes,
         px, None without boxes. The size follows the most probable box if its pair is more probable than not.
@@ -48,7 +48,7 @@ class Slots:
         best = pairs.argmax(axis=1)
         sure = pairs[np.arange(len(best)), best] > 0.5
         old, new = self.size[sure], sizes[best[sure]]
-        self.size[sure] = np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt / BOX_TIME))
+        self.size[sure] = np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt[sure, None] / BOX_TIME))
 
     def name(self, rows: Bools) -> None:
         """Give new ids to the people where `rows` (K,) is True who have none."""

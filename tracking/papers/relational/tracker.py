@@ -24,6 +24,7 @@ Departures, all ours:
   drawn: particles with and without each of many newcomers would be few.
 - The sensor has missed people and false alarms. A person not measured in the last frame is measured with a smaller
   probability, as people are hidden for a while.
+- Behind the pillars and walls of a known scene people are not measured, and neither die nor count as missed.
 - A detection that is probably nobody's starts a person, who has no weight until the next frame.
 - People who share no detection and do not walk together have weights of their own (factorised); particles are
   resampled if they are worth few.
@@ -43,6 +44,7 @@ from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Pl
 from tracking.image_scale import required
 from tracking.papers.relational import report, sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
+from tracking.papers.relational.occluders import hidden_share
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.slots import Slots
 
@@ -54,9 +56,10 @@ class Particle:
     """The tracker `particle`: a joint particle filter of people who do not know of each other.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
-    the people; identities, the groups; plane, "ground" or "image"; context; vanished: number of frames in which all
-    weights were 0; effective: least effective number of particles of any person in the last measured frame. All but
-    config exist after `reset` only.
+    the people; hidden (K,): probability that each person is behind a known pillar or wall; identities, the groups;
+    plane, "ground" or "image"; context; draws, the random streams; vanished: number of frames in which all weights were
+    0; effective: least effective number of particles of any person in the last measured frame. All but config exist
+    after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("points",)
@@ -75,6 +78,7 @@ class Particle:
         self.identities = Identities()
         self.draws = [rng(seed, "tracker", key) for key in range(JOINING + 1)]
         self.plane: Plane = "image" if context.camera is None and context.px_per_m > 0 else "ground"
+        self.hidden = np.zeros(0)
         self.vanished, self.effective = 0, float(self.config.particles)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
@@ -107,8 +111,10 @@ class Particle:
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
         transition_kernels.move(p.pos, p.vel, p.exist, p.labels(), noise, c.speed_table(self.dt), self.dt)
+        ground = self.plane == "ground"
+        self.hidden = hidden_share(p.pos, p.weights, self.context.camera if ground else None, self.context.scene)
         if not c.certain_sensor:
-            p.exist *= np.exp(-self.dt / c.survival_time)
+            p.exist *= np.exp(-self.dt * (1 - self.hidden) / c.survival_time)
         self._relate()
 
     def _relate(self) -> None:
@@ -127,7 +133,7 @@ class Particle:
         said = sensor.weigh(self.particles, points, self._detection_probability(), self.config)
         self.vanished += said.vanished
         self.effective = float(self.particles.effective().min(initial=self.particles.count))
-        self.slots.measure(said.seen, said.pairs, sizes, self.dt)
+        self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
         for j in np.flatnonzero(said.nobody > self.config.birth_doubt).tolist():
             self._start(points[j], np.full(2, np.nan) if sizes is None else sizes[j])
@@ -135,11 +141,13 @@ class Particle:
     def _detection_probability(self) -> Array:
         """Returns the probability (K,) that each person is measured if existing (ours).
 
-        A person who was missed in the last frame is measured again at the rate 1 / hidden_time.
+        A person who was missed in the last frame is measured again at the rate 1 / hidden_time. A person behind a known
+        pillar or wall is not measured, except by the paper's sensor.
         """
         c = self.config
         again = c.detect_prob if c.certain_sensor else min(c.detect_prob, -np.expm1(-self.dt / c.hidden_time))
-        return np.where(self.slots.missed > 0, again, c.detect_prob)
+        visible = 1.0 if c.certain_sensor else 1 - self.hidden
+        return np.asarray(np.where(self.slots.missed > 0, again, c.detect_prob) * visible)
 
     def _remove(self) -> None:
         """Remove people who are missed for longer than the time window (sec. 2.1.1) or exist with a low probability."""
