@@ -99,7 +99,7 @@ class ParticleSet:
         scheme: "residual" or "systematic". draws: of one cluster after the other.
         """
         for head in self.heads.tolist():
-            weights, members = self.weights[:, head], self.cluster == head
+            weights, members = self.weights[:, head], np.flatnonzero(self.cluster == head)
             if effective_number(weights) > share * self.count * (1 + 1e-9):
                 continue
             if scheme == "residual":
@@ -107,7 +107,7 @@ class ParticleSet:
             else:
                 chosen = systematic_resample(weights, float(draws.random()))
             for values in (self.pos, self.vel, self.exist, self.related):
-                values[:, members] = values[chosen][:, members]
+                values[:, members] = values[chosen[:, None], members]
             self.related[:, :, members] = self.related[:, members].transpose(0, 2, 1)
             self.weights[:, members] = 1 / self.count
 

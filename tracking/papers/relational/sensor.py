@@ -48,11 +48,13 @@ def weigh(particles: ParticleSet, points: Array, detect: Array, config: Particle
     people, certain = particles.people, config.certain_sensor
     if not people:
         return Weighing(False, np.zeros((0, len(points))), np.zeros(0), np.ones(len(points)))
-    particles.regroup(_linked(particles, points, config))
+    reach = np.inf if certain else REACH
+    near = association_sums_kernels.near_detections(particles.pos, points, reach * config.point_noise**2)
+    particles.regroup(_linked(particles, near, config))
     log_sums, marginals = np.empty(particles.exist.shape), np.empty((*particles.exist.shape, len(points)))
     association_sums_kernels.particle_sums(
-        particles.pos, particles.exist, detect, points, config.point_noise, config.clutter_density,
-        np.inf if certain else REACH, particles.cluster, log_sums, marginals,
+        particles.pos, particles.exist, detect, points, config.point_noise, config.clutter_density, reach, near,
+        particles.cluster, log_sums, marginals,
     )  # fmt: skip
     if certain and log_sums[:, particles.heads].max(axis=0).min() < LEAST_LOG:
         return Weighing(True, np.zeros((people, len(points))), np.zeros(people), np.ones(len(points)))
@@ -67,10 +69,13 @@ def weigh(particles: ParticleSet, points: Array, detect: Array, config: Particle
     return Weighing(False, pairs, seen, 1.0 - pairs.sum(axis=0))
 
 
-def _linked(particles: ParticleSet, points: Array, config: ParticleConfig) -> Bools:
+def _linked(particles: ParticleSet, near: Bools, config: ParticleConfig) -> Bools:
     """Returns which people (K, K) must be in one cluster: all in joint mode and with the paper's sensor; else those who
-    may have a detection in common, or walk together in more than a share COUPLED of the particles."""
+    may have a detection in common, or walk together in more than a share COUPLED of the particles.
+
+    near (K, M): which people and detections are within reach in some particle.
+    """
     if config.weights == "joint" or config.certain_sensor:
         return np.ones((particles.people, particles.people), bool)
-    shared = association_sums_kernels.shared_detections(particles.pos, points, REACH * config.point_noise**2)
+    shared = near.astype(float) @ near.T > 0
     return np.asarray(shared | (particles.related.mean(axis=0) > COUPLED))

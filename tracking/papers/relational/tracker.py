@@ -212,10 +212,10 @@ class Relational(Particle):
 
     def _relate(self) -> None:
         p = self.particles
-        pairs = p.people * (p.people - 1) // 2
-        if pairs:
-            uniforms = self.draws[RELATIONS].random((p.count, pairs))
-            transition_kernels.relate(p.pos, p.vel, p.related, uniforms, self._rules)
+        if p.people > 1:
+            pairs = transition_kernels.near_pairs(p.pos, np.asarray(p.related.any(axis=0)), self._rules)
+            uniforms = self.draws[RELATIONS].random((p.count, len(pairs)))
+            transition_kernels.relate(p.pos, p.vel, p.related, pairs, uniforms, self._rules)
 
     def _relations_of_newcomer(self, point: Array) -> Bools:
         """Returns the relations (P, K) bool of a new person at `point` (2,), m: to all members of the group joined."""

@@ -22,6 +22,10 @@ RATE, BIAS, DISTANCE, VELOCITY = range(4)
 at the same place, their loss per m of distance and per m/s of velocity difference."""
 
 
+NEGLIGIBLE = 1e-4
+"""Pairs whose belonging is below this in every particle do not start to walk together."""
+
+
 @njit(cache=True)
 def group_labels(related: Bools, label: Ints) -> None:
     """Write the group of each person in each particle, (P, K): the least number of a person in it.
@@ -95,29 +99,51 @@ def belonging(distance: float, difference: float, rules: Array) -> float:
 
 
 @njit(cache=True)
-def relate(pos: Array, vel: Array, related: Bools, uniforms: Array, rules: Array) -> None:
-    """Draw new relations of all pairs: p(s^r_t | s^a_t, s^r_t-1), eq. 7; related (P, K, K) is changed.
+def near_pairs(pos: Array, related: Bools, rules: Array) -> Ints:
+    """Return the pairs i < j (N, 2) whose relation may change, in order.
 
-    pos (P, K, 2), m, and vel (P, K, 2), m/s: new places and velocities. uniforms (P, K (K - 1) / 2): of the pairs i <
-    j, in the order (0, 1), (0, 2), … rules (4,). The paper leaves this distribution open. Ours: each pair is a chain of
-    two states that starts and stops with the hazards rate g and rate (1 - g), g its `belonging`. So a relation is on
-    after dt with the probability g + (on before - g) exp(-rate dt).
+    pos (P, K, 2), m; related (K, K): pairs that walk together in any particle; rules (4,). Pairs that do not, and whose
+    boxes round all particles are so far apart that their belonging is below NEGLIGIBLE, are left out (ours).
     """
     particles, n, _ = pos.shape
+    box, found, count = np.empty((n, 4)), np.empty((n * (n - 1) // 2, 2), np.int64), 0
+    for i in range(n):
+        box[i, 0], box[i, 1], box[i, 2], box[i, 3] = np.inf, -np.inf, np.inf, -np.inf
+        for p in range(particles):
+            x, y = pos[p, i, 0], pos[p, i, 1]
+            box[i, 0], box[i, 1] = min(box[i, 0], x), max(box[i, 1], x)
+            box[i, 2], box[i, 3] = min(box[i, 2], y), max(box[i, 3], y)
+    for i in range(n):
+        for j in range(i + 1, n):
+            dx = max(box[i, 0] - box[j, 1], box[j, 0] - box[i, 1], 0.0)
+            dy = max(box[i, 2] - box[j, 3], box[j, 2] - box[i, 3], 0.0)
+            if related[i, j] or belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= NEGLIGIBLE:
+                found[count, 0], found[count, 1] = i, j
+                count += 1
+    return found[:count]
+
+
+@njit(cache=True)
+def relate(pos: Array, vel: Array, related: Bools, pairs: Ints, uniforms: Array, rules: Array) -> None:
+    """Draw new relations of pairs: p(s^r_t | s^a_t, s^r_t-1), eq. 7; related (P, K, K) is changed.
+
+    pos (P, K, 2), m, and vel (P, K, 2), m/s: new places and velocities. pairs (N, 2): people i < j; uniforms (P, N) in
+    [0, 1). rules (4,). The paper leaves this distribution open. Ours: each pair is a chain of two states that starts
+    and stops with the hazards rate g and rate (1 - g), g its `belonging`. So a relation is on after dt with the
+    probability g + (on before - g) exp(-rate dt).
+    """
     change = rules[RATE]
-    for p in range(particles):
-        k = 0
-        for i in range(n):
-            for j in range(i + 1, n):
-                u, before = uniforms[p, k], related[p, i, j]
-                k += 1
-                if u < 1.0 - change if before else u >= change:
-                    continue  # whatever the belonging is
-                dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
-                du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
-                g = belonging(math.sqrt(dx * dx + dy * dy), math.sqrt(du * du + dv * dv), rules)
-                on = u < (1.0 - (1.0 - g) * change if before else g * change)
-                related[p, i, j] = related[p, j, i] = on
+    for p in range(len(pos)):
+        for k in range(len(pairs)):
+            i, j = pairs[k]
+            u, before = uniforms[p, k], related[p, i, j]
+            if u < 1.0 - change if before else u >= change:
+                continue  # whatever the belonging is
+            dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
+            du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
+            g = belonging(math.sqrt(dx * dx + dy * dy), math.sqrt(du * du + dv * dv), rules)
+            on = u < (1.0 - (1.0 - g) * change if before else g * change)
+            related[p, i, j] = related[p, j, i] = on
 
 
 @njit(cache=True)

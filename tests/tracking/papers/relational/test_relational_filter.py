@@ -246,8 +246,24 @@ def test_a_pairs_relation_approaches_its_equilibrium_at_its_rate():
     particles = placed(40_000, [[0, 0], [0.5, 0]])
     g, rng = 1 / (1 + np.exp(0.5 - 1.0)), np.random.default_rng(0)
     for step in range(1, 21):
-        transition_kernels.relate(particles.pos, particles.vel, particles.related, rng.random((40_000, 1)), rules)
+        pairs = transition_kernels.near_pairs(particles.pos, particles.related.any(axis=0), rules)
+        uniforms = rng.random((40_000, len(pairs)))
+        transition_kernels.relate(particles.pos, particles.vel, particles.related, pairs, uniforms, rules)
         assert particles.related[:, 0, 1].mean() == pytest.approx(g * (1 - np.exp(-0.05 * step)), abs=0.012)
+
+
+def test_pairs_that_are_far_in_all_particles_and_not_related_are_left_out():
+    rules, particles = np.array([0.1, 5.0, 3.0, 3.0]), placed(10, [[0, 0], [1, 0], [50, 0]])
+    particles.pos[0, 2] = [49.0, 0.0]
+
+    def pairs():
+        return transition_kernels.near_pairs(particles.pos, particles.related.any(axis=0), rules).tolist()
+
+    assert pairs() == [[0, 1]]
+    particles.related[3, 0, 2] = particles.related[3, 2, 0] = True
+    assert pairs() == [[0, 1], [0, 2]]
+    particles.pos[5, 2] = [3.0, 0.0]
+    assert pairs() == [[0, 1], [0, 2], [1, 2]]
 
 
 # E8
