@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-TIMES = (0.8, 2.0, 5.0, 15.0)
+TIMES = (0.8, 2.0, 5.0)
 
 
 def evidence(pos, seconds):
@@ -19,13 +19,14 @@ def evidence(pos, seconds):
     for t in range(steps):
         vel = {p: chord(pos, t, p, seconds) for p in seen[t]}
         for a, b in combinations(seen[t], 2):
-            if np.hypot(*(pos[t, b] - pos[t, a])) < 6.0:
+            if np.hypot(*(pos[t, b] - pos[t, a])) < 4.0:
                 past.setdefault((a, b), []).append((t, instant(pos[t], vel, a, b, seen[t])))
                 row = {
                     f"{name}, {time:g} s": mean(past[a, b], name, t, time, seconds)
                     for name in past[a, b][0][1]
                     for time in TIMES
                 }
+                row["velocity difference"] = past[a, b][-1][1]["velocity difference"]
                 late = max(first[a], first[b])
                 row["distance"] = np.hypot(*(pos[t, b] - pos[t, a]))
                 row["arrival gap"] = abs(first[a] - first[b]) * seconds if min(first[a], first[b]) > 0 else math.nan
@@ -48,7 +49,7 @@ def instant(pos, vel, a, b, seen):
     if pace >= 0.3:
         side, along = abs(apart[0] * m[1] - apart[1] * m[0]) / pace, abs(apart @ m) / pace
     around = [sum(np.hypot(*(pos[q] - pos[p])) < 3.0 for q in seen if q not in (a, b)) for p in (a, b)]
-    within = [q_p for p in (a, b) for q in seen if q not in (a, b) and np.hypot(*(pos[q] - pos[p])) < 6.0
+    within = [q_p for p in (a, b) for q in seen if q not in (a, b) and np.hypot(*(pos[q] - pos[p])) < 4.0
               for q_p in [np.hypot(*(vel[q] - vel[p])) < 0.5]]  # fmt: skip
     return {
         "distance": distance, "velocity difference": np.hypot(*(vel[b] - vel[a])), "share near": float(distance < 1.2),

@@ -98,8 +98,8 @@ def centroid_noise(seen, cov, extent, size, rules, fresh=None):
     The extent is that of measured places. Members redrawn in each frame: as many of those, extent / m. Members who keep
     their places: r^2 I / m and the variance of the mean of m out of n true places drawn without replacement, (n - m) /
     (n - 1) Sigma / m, Sigma being the extent without r^2 I; at least one (or all) is seen. If more are seen than there
-    are, the n members are drawn out of the m seen. fresh: of the seen, those of this frame; the errors of the others
-    are used again.
+    are, the n members are drawn out of the m seen. fresh: of the seen, those of this frame (None: all); the errors of
+    the others are used again.
     """
     noise = rules.noise**2 * np.eye(2)
     if rules.redrawn:
@@ -146,7 +146,7 @@ def masses(sets, mine, shared, points, weights, age, region, x, P, extent, size,
     log, R = [], []
     for s in sets:
         n, mean, cov = moments(points[s], weights[s])
-        R.append(centroid_noise(n, cov, extent, size, rules, weights[s] @ (age[s] == 0)))
+        R.append(centroid_noise(n, cov, extent, size, rules, weights[s] @ (age[s] == 0) or None))
         now = measures(s, weights, age)
         close = multivariate_normal(x[:2], now @ P @ now.T + R[-1]).logpdf(mean)
         many = (1 - NEWCOMERS) * norm(size, sigma).pdf(n) + NEWCOMERS * (size + 1) / (size + 1 + n) ** 2
@@ -173,14 +173,11 @@ def update(g, points, weights, d2, own, hits, share, age, region, x, P, extent, 
         if reference_components.partition(points[some], weights[some], rules.constraint).max() < 0:
             return "nothing", [], None, None, 0.0, *same  # noise
         return "null", some, None, None, 0.0, *same
-    sets = [s for s in sets if (age[s] == 0).any()]
-    if not sets:
-        return "nothing", [], None, None, 0.0, *same
     beta, miss, R = masses(sets, mine, shared, points, weights, age, region, x, P, extent, size, rules)
     states, covariances = [x], [P]
     for s, r in zip(sets, R, strict=True):
         now = measures(s, weights, age)
-        K = P @ now.T @ np.linalg.inv(now @ P @ now.T + r)
+        K = P @ now.T @ np.linalg.inv(now @ P @ now.T + r) * (age[s] == 0).any()
         states.append(x + K @ (moments(points[s], weights[s])[1] - x[:2]))
         covariances.append(P - K @ now @ P)
     mass = np.array([miss, *beta])

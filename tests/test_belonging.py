@@ -8,7 +8,7 @@ import pytest
 from benchmarks.belonging.pair_features import NAMES, Pairs, pair_features
 from benchmarks.belonging.sources import sample, source_of
 from benchmarks.belonging.transfer import average_precision, f1
-from scenarios.loading.resolve import load
+from scenarios.loading.resolve import load, resolve
 from sim.sequence import simulate
 from tests import reference_pair_features as slow
 
@@ -95,3 +95,14 @@ def test_weighted_scores_are_those_of_repeated_frames() -> None:
         steps = [(y[q >= at].sum(), (q >= at).sum()) for at in np.unique(q)[::-1]]
         gains = np.diff([0, *(hits for hits, _ in steps)])
         assert other == pytest.approx(sum(g * h / n for g, (h, n) in zip(gains, steps, strict=True)) / y.sum())
+
+
+def test_streets_have_lone_people_who_stand_at_first_and_at_most_2000_rows_of_a_scene() -> None:
+    (entry,) = (e for e in resolve("streets") if e.name == "stop-alone")
+    truth = simulate(entry.scenario, 1, streams=()).truth
+    assert truth is not None
+    source = source_of([sample(truth)], recording=False)
+    stand = source.features[:, NAMES.index("speed")] < 0.3
+    near = source.features[:, NAMES.index("distance, 0.8 s")] < 1.5
+    assert (stand & near & ~source.mates).sum() > (stand & near & source.mates).sum()
+    assert source.drawn.sum() == min(2000, len(source.drawn))

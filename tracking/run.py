@@ -18,7 +18,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
 from tracking import image_scale
-from tracking.grouping.grouping_choice import Grouping, grouping_of
+from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.prepare import Params, prepare
 from tracking.run_info import Speed, known_people_info, run_info
 from tracking.time_limit import TimeLimited
@@ -144,7 +144,7 @@ def group(
     from tracking.grouping.plausibility import implausible
     from tracking.grouping.velocity_check import velocity_warning
 
-    rule = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
+    rule = (grouping_of(grouping) if isinstance(grouping, str | Path) else grouping) or default_grouping()
     people = known_people(sequence) if run is None else without_groups(run)
     file = sequence.source.get("path", sequence.name)
     if any(t.unit == "group" for t in people):
@@ -162,9 +162,8 @@ def group(
         warnings.warn(text, UserWarning, stacklevel=2)
     info = known_people_info(sequence, tracks, scale)
     if run is not None:
-        told = {key: value for key, value in run.info.items() if key != "grouping"}
-        info = {**told, **{key: info[key] for key in OF_TRACKS}}
-    return TrackingRun(tracks, info if rule is None else {**info, "grouping": rule.as_dict()})
+        info = {**run.info, **{key: info[key] for key in OF_TRACKS}}
+    return TrackingRun(tracks, {**info, "grouping": rule.as_dict()})
 
 
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:

@@ -20,8 +20,8 @@ WHO = {True: "mates", False: "strangers"}
 
 
 def values(source: Source, column: int, mates: bool) -> Array:
-    """Returns the known values of one feature of all rows of mates, or of strangers."""
-    x = source.features[source.mates == mates, column]
+    """Returns the known values of one feature of the drawn rows of mates, or of strangers."""
+    x = source.features[source.drawn & (source.mates == mates), column]
     return np.asarray(x[np.isfinite(x)])
 
 

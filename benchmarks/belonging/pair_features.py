@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from sim.io.formats.velocity import chords
 from sim.truth.proximity import close_pairs
@@ -112,12 +113,8 @@ def exponential_means(frame: Ints, pair: Ints, values: Array, fps: float) -> Arr
 
 def _others(frame: Ints, pos: Array, i: Ints, j: Ints) -> Ints:
     """Returns the number of people other than i and j less than AROUND from their middle, (R,)."""
-    middle = (pos[i] + pos[j]) / 2
-    t = np.concatenate([frame, frame[i]])
-    order = np.argsort(t, kind="stable")
-    a, b = (order[k] for k in close_pairs(t[order], np.concatenate([pos, middle])[order], AROUND))
-    person, row = np.minimum(a, b), np.maximum(a, b) - len(frame)
-    real = (person < len(frame)) & (row >= 0)
-    person, row = person[real], row[real]
-    other = (person != i[row]) & (person != j[row])
-    return np.bincount(row[other], minlength=len(i))
+    apart = np.abs(pos).max(initial=0.0) * 2 + 2 * AROUND  # frames lie this far apart along a third axis
+    tree = cKDTree(np.column_stack([pos, frame * apart]))
+    middle = np.column_stack([(pos[i] + pos[j]) / 2, frame[i] * apart])
+    count = tree.query_ball_point(middle, AROUND, return_length=True)
+    return np.asarray(count - 2 * (np.hypot(*(pos[i] - pos[j]).T) / 2 <= AROUND))

@@ -1,7 +1,8 @@
 """Mode `people` of `benchmarks.belonging`: who is on a street, how they arrive, wait and walk.
 
-Parties are groups, and people without a group. People of the first frame of a scene have not arrived. The field is the
-rectangle of the 1 and 99 % quantiles of all positions of a source. Standing: slower than 0.3 m/s, by chords over 0.5 s.
+Parties are groups, and people without a group. People of the first frame of a scene have not arrived. The field of a
+scene is the convex hull of all positions in it, its edges are the 1 and 99 % quantiles of their coordinates. Standing:
+slower than 0.3 m/s, by chords over 0.5 s.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from benchmarks.belonging.pair_features import NAMES, STANDING
 from benchmarks.belonging.sources import FPS, Source, read
@@ -98,18 +100,21 @@ def arrivals(scene: Scene) -> tuple[Array, Array, Array]:
     return np.diff(np.sort(begin)) / FPS, np.array(flags, bool), place[came]
 
 
-def entries(place: Array, low: Array, high: Array) -> list[str]:
-    """Returns the shares of arrivals at the left, right, lower and upper edge and inside, and the spread along these
-    edges, m, as two texts.
+def positions(scene: Scene) -> Array:
+    """Returns all positions of a scene, (R, 2), m."""
+    return scene.pos[np.isfinite(scene.pos[..., 0])]
 
-    place (K, 2): m; low, high (2,): corners of the field, m.
-    """
-    reach = np.stack([place[:, 0] - low[0], high[0] - place[:, 0], place[:, 1] - low[1], high[1] - place[:, 1]], 1)
-    inside = reach.min(axis=1) > INSIDE
-    side = np.where(inside, 4, reach.argmin(axis=1))
-    shares = [share(side == k) for k in range(5)]
-    spread = [f"{place[side == k, 1 - k // 2].std():.1f}" if (side == k).any() else "–" for k in range(4)]
-    return [", ".join(shares), ", ".join(spread)]
+
+def density(scene: Scene) -> float:
+    """Returns the mean number of people per m² of the field over the frames with people."""
+    present = np.isfinite(scene.pos[..., 0]).sum(axis=1)
+    return float(present[present > 0].mean() / ConvexHull(positions(scene)).volume)  # in two dimensions the area
+
+
+def inside(scene: Scene, place: Array) -> Bools:
+    """Returns True for each place (K, 2), m, that is more than INSIDE from the edges of the scene's field."""
+    low, high = np.quantile(positions(scene), (0.01, 0.99), axis=0)
+    return np.asarray((np.minimum(place - low, high - place) > INSIDE).all(axis=1))
 
 
 def quantiles(x: Array, digits: int = 1) -> str:
@@ -150,12 +155,13 @@ def mate_places(scenes: Sequence[Scene]) -> tuple[Array, Array, Array, Array]:
 def figures(source: Source) -> dict[str, str]:
     """Returns all figures of a source as text, by name."""
     scenes = [scene_of(source, k) for k in range(len(source.length))]
-    pos = np.concatenate([s.pos[np.isfinite(s.pos[..., 0])] for s in scenes])
-    low, high = np.quantile(pos, 0.01, axis=0), np.quantile(pos, 0.99, axis=0)
     minutes = source.length.sum() / FPS / 60
     present = np.concatenate([np.isfinite(s.pos[..., 0]).sum(axis=1) for s in scenes])
     came = np.concatenate([s.first > 0 for s in scenes])
-    gaps, beside, place = (np.concatenate(x) for x in zip(*map(arrivals, scenes), strict=True))
+    came_in = [arrivals(s) for s in scenes]
+    gaps, beside = (np.concatenate([x[k] for x in came_in]) for k in (0, 1))
+    appear = np.concatenate([inside(s, place) for s, (_, _, place) in zip(scenes, came_in, strict=True)])
+    crowded = np.array([density(s) for s in scenes])
     sizes = np.concatenate([np.unique(s.party, return_counts=True)[1] for s in scenes])
     speed = np.concatenate([np.hypot(*np.moveaxis(s.vel, 2, 0)).ravel() for s in scenes])
     grouped = np.concatenate([s.grouped for s in scenes])
@@ -168,15 +174,13 @@ def figures(source: Source) -> dict[str, str]:
     hard, stand = hard_strangers(source)
     near, pace = source.features[:, NAMES.index("distance, 0.8 s")], source.features[:, NAMES.index("speed")]
     alike = (near < MERGE_DISTANCE) & (source.features[:, NAMES.index("velocity difference, 0.8 s")] < MERGE_VELOCITY)
-    area = float(np.prod(high - low))
     people = sum(len(s.party) for s in scenes)
     parties = sum(len(np.unique(s.party[s.first > 0])) for s in scenes)
-    sides, spread = entries(place, low, high)
     return {
         "scenes; minutes; people": f"{len(scenes)}; {minutes:.1f}; {people}",
-        "field, m": f"{high[0] - low[0]:.0f} × {high[1] - low[1]:.0f}",
         "people present (10, 50, 90 %)": quantiles(present, 0),
-        "people per 100 m² (mean over frames with people)": f"{100 * present[present > 0].mean() / area:.1f}",
+        "people per m² (10, 50, 90 % of scenes)": quantiles(crowded, 3),
+        "… least, greatest": f"{crowded.min():.3f}, {crowded.max():.3f}",
         "frames without people": share(present == 0),
         "people present in the first frame, of all": share(~came),
         "arrivals per minute: people; parties": f"{came.sum() / minutes:.1f}; {parties / minutes:.1f}",
@@ -185,8 +189,7 @@ def figures(source: Source) -> dict[str, str]:
         "arrivals with a stranger within 2 s and 3 m": share(beside),
         "arrivals in the first frame after frames without people": share(np.concatenate([*map(_restarts, scenes)])),
         "people who stand when first seen": share(np.concatenate([*map(_first_speed, scenes)]) < STANDING),
-        "arrivals left, right, below, above, inside": sides,
-        "spread (sd) along these edges, m": spread,
+        "arrivals more than 1.5 m inside the field": share(appear),
         "time in view, s": quantiles(np.concatenate([(s.last - s.first + 1) / FPS for s in scenes])),
         "share of people in groups": share(grouped),
         "share of parties of 1, 2, 3, 4, more": ", ".join(

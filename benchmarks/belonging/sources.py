@@ -6,7 +6,7 @@ which benchmarks/peers/classify_pairs.py reads without flockscope; `read` reads 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from tracking.tuning.grouping_episodes import SURVEYED, with_label_errors
 
 FPS = 2.5
 BLOCKS = 10  # of a recording
+SCENE_ROWS = 2_000  # of pairs, at most, of a simulated scene
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Source:
     length (S,): frames of each scene. scene, frame (from 1), id, group (-1: alone) (R,), pos (R, 2) in m: one row per
     person and frame. pair_scene, pair_frame, a, b (K,): of each row of a pair; features (K, 21): columns
     `pair_features.NAMES`; mates (K,): True if the two have one group label in this frame. part (K,): number of the
-    simulation, which all its cuts share; in a recording the tenth of its frames in which the pair is first seen
-    together. Rows of one pair have one part.
+    scene; in a recording the tenth of its frames in which the pair is first seen together. Rows of one pair have one
+    part. drawn (K,): True for all rows of a recording, and for at most SCENE_ROWS of each simulated scene.
     """
 
     length: Ints
@@ -47,6 +48,7 @@ class Source:
     features: Array
     mates: Bools
     part: Ints
+    drawn: Bools
 
 
 def sample(truth: Truth) -> Truth:
@@ -66,9 +68,9 @@ def sample(truth: Truth) -> Truth:
     )  # fmt: skip
 
 
-def source_of(truths: Iterable[Truth], *, recording: bool, cuts: int = 1) -> Source:
-    """Returns the rows of people and pairs of truths at 2.5 frames/s; cuts: so many successive ones are of one part."""
-    scenes = [_rows(number, truth, None if recording else number // cuts) for number, truth in enumerate(truths)]
+def source_of(truths: Iterable[Truth], *, recording: bool) -> Source:
+    """Returns the rows of people and pairs of truths at 2.5 frames/s."""
+    scenes = [_rows(number, truth, None if recording else number) for number, truth in enumerate(truths)]
     return Source(**{name: np.concatenate([rows[name] for rows in scenes]) for name in scenes[0]})
 
 
@@ -83,11 +85,13 @@ def _rows(number: int, truth: Truth, part: int | None) -> dict[str, np.ndarray]:
     first, second = label[pairs.frame, a], label[pairs.frame, b]
     _, met, pair = np.unique(a * len(ids) + b, return_index=True, return_inverse=True)
     tenth = (pairs.frame[met][pair] - 1) * BLOCKS // truth.length
+    rank = np.random.default_rng(number).permutation(len(a))
     return {
         "length": np.array([truth.length]), "scene": np.full(len(truth.frame), number), "frame": truth.frame,
         "id": truth.id, "group": truth.group, "pos": truth.pos, "pair_scene": np.full(len(a), number),
         "pair_frame": pairs.frame, "a": pairs.a, "b": pairs.b, "features": pairs.features,
         "mates": (first >= 0) & (first == second), "part": tenth if part is None else np.full(len(a), part),
+        "drawn": (rank < SCENE_ROWS) | (part is None),
     }  # fmt: skip
 
 
@@ -98,24 +102,13 @@ def recorded(folder: Path) -> Source:
     return source_of([sample(truth)], recording=True)
 
 
-def since(truth: Truth, begin: float) -> Truth:
-    """Returns a sampled truth as if the recording began at `begin`, in s; it must be shorter than the recording."""
-    first = round(begin * truth.fps)
-    r = truth.frame > first
-    return truth.replace(
-        length=truth.length - first, frame=truth.frame[r] - first, id=truth.id[r], group=truth.group[r],
-        pos=None if truth.pos is None else truth.pos[r], visibility=truth.visibility[r],
-    )  # fmt: skip
-
-
-def simulated(name: str, seeds: range, begins: Sequence[float], label_errors: bool) -> Source:
+def simulated(name: str, seeds: range, label_errors: bool) -> Source:
     """Returns all entries and seeds of a scenario, suite or *.toml file.
 
-    begins: times, s; each scene is taken once from each of them on. label_errors: the positions get the errors of a
-    labeller (`SURVEYED`, 0.02 m).
+    label_errors: the positions get the errors of a labeller (`SURVEYED`, 0.02 m).
     """
     truths = (_sampled(entry, seed, label_errors) for entry in resolve(name) for seed in seeds)
-    return source_of((since(truth, begin) for truth in truths for begin in begins), recording=False, cuts=len(begins))
+    return source_of(truths, recording=False)
 
 
 def _sampled(entry: Entry, seed: int, label_errors: bool) -> Truth:
@@ -127,7 +120,7 @@ def _sampled(entry: Entry, seed: int, label_errors: bool) -> Truth:
 def write(folder: Path, name: str, source: Source) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     rows = {field.name: getattr(source, field.name) for field in fields(Source)}
-    np.savez_compressed(folder / f"{name}.npz", **rows, names=np.array(NAMES))
+    np.savez(folder / f"{name}.npz", **rows, names=np.array(NAMES))
 
 
 def read(folder: Path, name: str) -> Source:

@@ -3,8 +3,8 @@
 usage: python classify_pairs.py JOBS.json OUT.npz
 
 Needs nothing of flockscope. Reads sources that `python -m benchmarks.belonging pairs` wrote: FOLDER/NAME.npz with the
-arrays features (K, F), mates (K,), part (K,). JOBS.json: {"folder", "jobs"}. Held-out predictions are those of FOLDS
-folds by source and part.
+arrays features (K, F), mates (K,), part (K,), drawn (K,): rows with False are ignored. JOBS.json: {"folder", "jobs"}.
+Held-out predictions are those of FOLDS folds by source and part.
 
 A job {"kind": "mates", "model": "logistic" or "boosted", "train": [names], "test": [names], "columns": [numbers],
 "threshold": flag} writes K/NAME for each test source: the probabilities that the pairs are mates. They are held-out
@@ -38,13 +38,14 @@ def new_model(kind):
 
 
 def read(folder, names):
-    """Returns features, mates and scene (a number) of all rows of some sources."""
+    """Returns features, mates and scene (a number) of the drawn rows of some sources."""
     features, mates, scene = [], [], []
     for name in names:
         with np.load(f"{folder}/{name}.npz") as file:
-            features.append(file["features"])
-            mates.append(file["mates"])
-            scene.append(file["part"] + 1_000_000 * len(scene))
+            rows = file["drawn"]
+            features.append(file["features"][rows])
+            mates.append(file["mates"][rows])
+            scene.append(file["part"][rows] + 1_000_000 * len(scene))
     return np.concatenate(features), np.concatenate(mates), np.concatenate(scene)
 
 

@@ -83,6 +83,10 @@ def _crowd(scenario: Scenario) -> Iterator[_Range]:
     yield _Range("crowd.spacing", crowd.spacing, 0.1, 10.0, " m")
     yield _Range("crowd.height", crowd.height, 0.3, TALLEST, " m")
     yield _Range("crowd.slowdown_per_member", crowd.slowdown_per_member, 0.0, FASTEST, " m/s")
+    yield _Range("crowd.sway", crowd.sway, 0.0, 0.2, " m")
+    for k in range(2):
+        yield _Range(f"crowd.velocity_noise.{k}", crowd.velocity_noise[k], 0.0, 1.0, " m/s")
+        yield _Range(f"crowd.place_noise.{k}", crowd.place_noise[k], 0.0, 2.0, " m")
     for axis, size in zip("xy", scenario.world.size, strict=True):
         yield _Range(f"world.size.{'xy'.index(axis)}", size, 0.1, 10_000.0, " m")
     for group in scenario.group:

@@ -29,6 +29,7 @@ from scenarios.schema.world import WorldSpec
 FREE_SPEED = Distribution(normal=(1.34, 0.26), clip=(0.5, 2.2))
 GROUP_SIZE = Distribution(poisson=1.1, clip=(1, 12))
 SPACING = Distribution(normal=(0.75, 0.12), clip=(0.5, 1.2))
+SWAY = Distribution(normal=(0.024, 0.007), clip=(0.0, 0.05))
 
 
 class CameraSpec(Model):
@@ -65,13 +66,25 @@ class CrowdSpec(Model):
     """How people walk; the defaults are measured values (docs/experiments/realism.md).
 
     free_speed (of a person alone, m/s), spacing between neighbours in a group (m), body height (m): numbers or
-    distributions. slowdown_per_member: n people walk at their mean free speed less this times (n - 1), m/s."""
+    distributions. slowdown_per_member: n people walk at their mean free speed less this times (n - 1), m/s. sway:
+    amplitude of the sideways movement with each stride at 1.34 m/s, m, a number or distribution. velocity_noise:
+    standard deviations of the wanted velocity along and across its direction, m/s. place_noise: of a walking member's
+    place in the group, forward and sideways, m."""
 
     free_speed: Value = Field(FREE_SPEED, description="walking speed of a person alone, m/s")
     spacing: Value = Field(SPACING, description="distance between neighbours in a group, m")
     height: Value = Field(Distribution(normal=(1.70, 0.09), clip=(1.50, 1.95)), description="body height, m")
     slowdown_per_member: NonNegative = Field(
         0.05, description="a group of n people is slower by this times (n - 1), m/s"
+    )
+    sway: Value = Field(
+        SWAY, description="amplitude of the sideways movement with each stride at 1.34 m/s, m; 0 = none"
+    )
+    velocity_noise: tuple[NonNegative, NonNegative] = Field(
+        (0.08, 0.13), description="standard deviations of the wanted velocity along and across it, m/s; 0 = steady"
+    )
+    place_noise: tuple[NonNegative, NonNegative] = Field(
+        (0.15, 0.05), description="standard deviations of a member's place in a walking group, forward and sideways, m"
     )
 
 

@@ -3,6 +3,7 @@
 Forces on a person, in the order in which they are computed:
 
 - towards the goal, the person's place in the group's formation and the group's velocity: `forces_goal_kernels`;
+- sideways with the strides: `sway_kernels`;
 - away from other people, other groups, walls and pillars: `forces_avoidance_kernels`.
 
 `sim.crowd.world.accelerate` adds them up. A body weighs 1 kg, so a force is an acceleration in m/s². The sum of the
@@ -40,10 +41,21 @@ PASS, NARROW, GATHER, END = range(4)
 # what a group does at the end of its way
 STAND, LEAVE = range(2)
 
-# columns of GroupArrays.status (G, 10): number of members present; mean of their positions, m; mean of their
+# columns of PeopleArrays.noise (N, 4): fluctuation of the wanted velocity in its direction and to its left, m/s; of the
+# place in the formation, forward and left, m
+WANDER_ALONG, WANDER_LEFT, STRAY_AHEAD, STRAY_LEFT = range(4)
+# columns of PeopleArrays.gait (N, 5): cosine and sine of the phase of the strides; velocity of the sway x, y, m/s;
+# amplitude of the sway at 1.34 m/s, m
+COS, SIN, SWAY_X, SWAY_Y, AMPLITUDE = range(5)
+
+# columns of GroupArrays.status (G, 12): number of members present; mean of their positions, m; mean of their
 # velocities, m/s; largest distance of a member from the mean position, m; largest distance of a member from its place
-# in the formation, m; wanted velocity, m/s; 1.0 while other groups avoid this group as a whole, else 0.0
-COUNT, MEAN_X, MEAN_Y, MEAN_VX, MEAN_VY, RADIUS, MAX_OFF_PLACE, WANTED_VX, WANTED_VY, AVOIDED = range(10)
+# in the formation, m; wanted velocity, m/s; 1.0 while other groups avoid this group as a whole, else 0.0; mean of the
+# members' STRAY_AHEAD and STRAY_LEFT, m
+(
+    COUNT, MEAN_X, MEAN_Y, MEAN_VX, MEAN_VY, RADIUS, MAX_OFF_PLACE, WANTED_VX, WANTED_VY, AVOIDED, MEAN_AHEAD,
+    MEAN_LEFT,
+) = range(12)  # fmt: skip
 
 # columns of Obstacles.walls (W, 4), .pillars (P, 3) and .stairs (S, 7)
 X1, Y1, X2, Y2 = range(4)
@@ -139,9 +151,9 @@ class GroupArrays(NamedTuple):
     - speed (G,): m/s. heading (G, 2): unit vector in which the group faces. finish (G,): STAND or LEAVE at the end of
       the way.
     - arrived (G,): True once the end of the way is reached.
-    - status (G, 10), rewritten in each step: number of members present; mean position x, y, m; mean velocity x, y, m/s;
+    - status (G, 12), rewritten in each step: number of members present; mean position x, y, m; mean velocity x, y, m/s;
       largest distance of a member from the mean position, and from its place, m; wanted velocity x, y, m/s; 1.0 while
-      other groups avoid this group as a whole, else 0.0.
+      other groups avoid this group as a whole, else 0.0; mean of the members' fluctuations of place, m.
     """
 
     route: Array
@@ -170,7 +182,7 @@ class GroupArrays(NamedTuple):
             np.tile([1.0, 0.0], (g, 1)),
             np.zeros(g, np.int64),
             np.zeros(g, np.bool_),
-            np.zeros((g, 10)),
+            np.zeros((g, 12)),
         )
 
     def with_room(self, w: int) -> GroupArrays:
@@ -188,7 +200,12 @@ class PeopleArrays(NamedTuple):
     - place (N, 2): place in the formation, m: forward and left of the group's middle.
     - target (N, 2): x, y of the place in a queue, m; used only for people in mode TO_TARGET.
     - pace (N,): greatest speed on the way to the target, m/s.
-    - wander (N, 2): fluctuation of the wanted velocity, m/s.
+    - noise (N, 4): fluctuation of the wanted velocity in its direction and to its left, m/s, and of the place in the
+      formation, forward and left, m.
+    - gait (N, 5): cosine and sine of the phase of the strides; velocity of the sway x, y, m/s; amplitude of the sway at
+      1.34 m/s, m. `sway_kernels` updates all but the amplitude.
+    - calm (N, 4): x, y, vx, vy without the velocity of the sway, m, m/s. wanted (N, 2): wanted velocity without its
+      fluctuation, m/s. The goal kernels overwrite both.
     - tag (N, 4): columns GROUP (index), MODE (IN_GROUP or TO_TARGET), QUEUE (index, -1 in no queue), WAYPOINT (index of
       the first waypoint that this person has not passed).
     """
@@ -196,13 +213,18 @@ class PeopleArrays(NamedTuple):
     place: Array
     target: Array
     pace: Array
-    wander: Array
+    noise: Array
+    gait: Array
+    calm: Array
+    wanted: Array
     tag: Ints
 
     @classmethod
     def empty(cls, n: int) -> PeopleArrays:
-        """Returns arrays for n people: place, target and wander 0, pace 1 m/s, all four columns of `tag` -1."""
-        return cls(np.zeros((n, 2)), np.zeros((n, 2)), np.ones(n), np.zeros((n, 2)), np.full((n, 4), -1, np.int64))
+        """Returns arrays for n people: pace 1 m/s, all four columns of `tag` -1, everything else 0."""
+        two, four = ([np.zeros((n, k)) for _ in range(3)] for k in (2, 4))
+        tag = np.full((n, 4), -1, np.int64)
+        return cls(two[0], two[1], np.ones(n), four[0], np.zeros((n, 5)), four[1], two[2], tag)
 
 
 class Obstacles(NamedTuple):

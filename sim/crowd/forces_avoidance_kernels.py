@@ -64,7 +64,7 @@ def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[
 @njit(cache=True)
 def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
     """Overwrite push (G, 2) with each group's acceleration, m/s², from avoiding other groups as discs (radius + person
-    radius). status (G, 10): columns COUNT … AVOIDED; groups with AVOIDED 0 and pairs of single people get 0. rules
+    radius). status (G, 12): columns COUNT … AVOIDED; groups with AVOIDED 0 and pairs of single people get 0. rules
     (21,): Steering.array(). The smaller group of a pair yields more: its share is 2 × the other's size / both sizes'
     sum."""
     strength, horizon, radius = rules[AVOID_GROUP], rules[AVOID_TIME], rules[PERSON_RADIUS]
@@ -278,7 +278,7 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
 def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
     """Add all avoidance accelerations (of people, groups, walls, pillars) to out (N, 2), m/s², then shorten each row of
     `out` to at most Steering.max_acceleration. `out` holds the accelerations towards goals before. state (N, 4): x, y,
-    vx, vy. tag (N, 4): group, mode, queue, waypoint. status (G, 10): as `drive` left it. walls (W, 4): x1, y1, x2, y2;
+    vx, vy. tag (N, 4): group, mode, queue, waypoint. status (G, 12): as `drive` left it. walls (W, 4): x1, y1, x2, y2;
     pillars (P, 3): x, y, radius; m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. People in a queue
     do not take part in the avoidance of their group as a whole."""
     _avoid_groups(status, rules, push)

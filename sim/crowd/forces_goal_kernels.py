@@ -1,4 +1,4 @@
-"""Forces towards goals, as numba kernels: ways and headings of groups, places in formations, doors, queues, stairs.
+"""Forces towards goals, as numba kernels: ways of groups, places in formations, doors, queues, stairs.
 
 `drive` is the entry. sim.crowd.forces names all columns, slots and units. No kernel calls a kernel of another file,
 because numba's cache does not notice changes in other files.
@@ -16,9 +16,10 @@ from sim.compiler import njit
 # fmt: off
 from sim.crowd.forces import (
     ALIGNMENT, AVOIDED, AXIS_X, AXIS_Y, COHESION_TIME, COUNT, END, FOOT_X, FOOT_Y, GATHER, GATHER_RADIUS, GROUP,
-    HASTE, LENGTH, MAX_OFF_PLACE, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, MODE, NARROW, PASS, PASS_RADIUS, RADIUS,
-    RELAXATION, SLOW_TIME, SLOWDOWN, STAND, TO_TARGET, TURN_TIME, VX, VY, WANTED_VX, WANTED_VY, WAYPOINT, WIDTH,
-    GroupArrays, PeopleArrays, X, Y,
+    HASTE, LENGTH, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, MODE, NARROW, PASS,
+    PASS_RADIUS, RADIUS, RELAXATION, SLOW_TIME, SLOWDOWN, STAND, STRAY_AHEAD, STRAY_LEFT, SWAY_X, SWAY_Y, TO_TARGET,
+    TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, WAYPOINT, WIDTH, GroupArrays, PeopleArrays,
+    X, Y,
 )
 # fmt: on
 # isort: on
@@ -35,32 +36,35 @@ LOOSE = 2.2  # m: a group with a larger radius is not avoided as a whole
 
 
 @njit(cache=True)
-def _average(state, tag, status):  # type: ignore[no-untyped-def]
-    """Overwrite status (G, 10): number of members (COUNT), mean position (m) and mean velocity (m/s) of each group.
+def _average(state, noise, tag, status):  # type: ignore[no-untyped-def]
+    """Overwrite status (G, 12): number of members, means of position (m), velocity (m/s) and stray (m) of each group.
 
-    All other columns but AVOIDED become 0, and so do the means of a group without members. state (N, 4): x, y, vx, vy.
-    tag (N, 4): its column GROUP is the index of each person's group.
+    All other columns but AVOIDED become 0, and so do the means of a group without members. Others: as in `drive`.
     """
     status[:, :AVOIDED] = 0.0
+    status[:, MEAN_AHEAD:] = 0.0
     for i in range(len(state)):
         g = tag[i, GROUP]
         status[g, COUNT] += 1.0
         for k in range(4):
             status[g, MEAN_X + k] += state[i, k]
+        for k in range(2):
+            status[g, MEAN_AHEAD + k] += noise[i, STRAY_AHEAD + k]
     for g in range(len(status)):
         if status[g, COUNT] > 0.0:
             for k in range(MEAN_X, MEAN_VY + 1):
+                status[g, k] /= status[g, COUNT]
+            for k in range(MEAN_AHEAD, MEAN_LEFT + 1):
                 status[g, k] /= status[g, COUNT]
 
 
 @njit(cache=True)
 def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
-    """Raise RADIUS and MAX_OFF_PLACE of each group in status (G, 10) to the largest distance of a member, m.
+    """Raise RADIUS and MAX_OFF_PLACE of each group in status (G, 12) to the largest distance of a member, m.
 
     RADIUS: from the group's mean position. MAX_OFF_PLACE: from the member's place in the formation, whose middle is the
-    gathering point if the current waypoint is GATHER, else the mean position. state (N, 4): x, y, vx, vy. place (N, 2):
-    forward, left, m. tag (N, 4): its column GROUP is the group's index. groups: GroupArrays (ways and headings). Both
-    columns must be 0, and the mean positions set, before the call.
+    gathering point if the current waypoint is GATHER, else the mean position. state, place, tag: as in `drive`. groups:
+    GroupArrays. Both columns must be 0, and the mean positions set, before the call.
     """
     for i in range(len(state)):
         g = tag[i, GROUP]
@@ -80,9 +84,8 @@ def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
 def _pass_doors(groups, people, status):  # type: ignore[no-untyped-def]
     """Advance `groups.current` of each group at a door by one, once every member present has passed the door.
 
-    At a door: the current waypoint is NARROW. A member has passed it if the tag WAYPOINT of `people` is above the
-    current waypoint. A group without members present stays. Overwrites AVOIDED: 0.0 if the group is at a door that a
-    member has not passed yet, else 1.0. status (G, 10) is `groups.status`.
+    At a door: the current waypoint is NARROW. A member has passed it if the tag WAYPOINT is above the current waypoint.
+    A group without members stays. Overwrites AVOIDED: 0.0 at a door that a member present has not passed, else 1.0.
     """
     for g in range(len(status)):
         groups.status[g, AVOIDED] = 1.0
@@ -108,8 +111,7 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
     - Wanted velocity: speed × heading, at most distance / slow_time before an end where the group stands. A group that
       has arrived and stands drifts back to the end of its way at 0.3 m/s at most.
 
-    status (G, 10): columns COUNT … AVOIDED. rules (21,): Steering.array(). A group without members or way is left as it
-    is.
+    status (G, 12), rules (21,): as in `drive`. A group without members or way is left as it is.
     """
     turn_time, slow_time = rules[TURN_TIME], rules[SLOW_TIME]
     gather, radius = rules[GATHER_RADIUS], rules[PASS_RADIUS]
@@ -166,18 +168,18 @@ def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _seek(state, people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
+def _seek(people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
     """Overwrite out (N, 2) with the acceleration of each person towards its goal, m/s².
 
     A person in a queue walks to its target, a member at a door to and through the door. A member who gathers walks to
-    its place round the gathering point, any other to its place in the moving formation, and then also takes up the
-    group's mean velocity. The wanted speed is capped (stairs lower the cap), then the wander is added, less of it below
-    0.3 m/s. Sets the tag WAYPOINT of people who pass a door. state (N, 4): x, y, vx, vy. people, groups: PeopleArrays,
-    GroupArrays. stairs (S, 7): as in Obstacles. rules (21,): Steering.array().
+    its place round the gathering point, any other to its fluctuating place in the moving formation, and then also takes
+    up the group's mean velocity. The wanted speed is capped (stairs lower the cap), then its fluctuations are added.
+    All fluctuations are smaller below 0.3 m/s. Overwrites `people.wanted`, without the fluctuations, and the tag
+    WAYPOINT of people who pass a door. States are those of `people.calm`. people, groups: PeopleArrays, GroupArrays.
+    stairs (S, 7): as in Obstacles. rules (21,): Steering.array().
     """
-    status = groups.status
-    relax, cohesion = rules[RELAXATION], rules[COHESION_TIME]
-    alignment, haste = rules[ALIGNMENT], rules[HASTE]
+    state, noise, status = people.calm, people.noise, groups.status
+    relax, cohesion, alignment, haste = rules[RELAXATION], rules[COHESION_TIME], rules[ALIGNMENT], rules[HASTE]
     for i in range(len(state)):
         g = people.tag[i, GROUP]
         x, y, vx, vy = state[i, X], state[i, Y], state[i, VX], state[i, VY]
@@ -192,8 +194,13 @@ def _seek(state, people, groups, stairs, rules, out):  # type: ignore[no-untyped
             tx, ty = _through_door(groups, people, i, g, x, y, limit)
         else:
             hx, hy = groups.heading[g, 0], groups.heading[g, 1]
-            ox = people.place[i, 0] * hx - people.place[i, 1] * hy
-            oy = people.place[i, 0] * hy + people.place[i, 1] * hx
+            ahead, left = people.place[i, 0], people.place[i, 1]
+            if kind != GATHER:
+                loose = min(1.0, sqrt(status[g, WANTED_VX] ** 2 + status[g, WANTED_VY] ** 2) / STANDING_SPEED)
+                ahead += loose * (noise[i, STRAY_AHEAD] - status[g, MEAN_AHEAD])
+                left += loose * (noise[i, STRAY_LEFT] - status[g, MEAN_LEFT])
+            ox = ahead * hx - left * hy
+            oy = ahead * hy + left * hx
             if kind == GATHER:
                 limit = groups.speed[g]
                 tx = (groups.route[g, w, 0] + ox - x) / GATHER_TIME
@@ -208,9 +215,12 @@ def _seek(state, people, groups, stairs, rules, out):  # type: ignore[no-untyped
         size = sqrt(tx * tx + ty * ty)
         if size > limit:
             tx, ty = tx * limit / size, ty * limit / size
+            size = limit
+        ex, ey = tx / max(size, TINY), ty / max(size, TINY)
         share = min(1.0, size / STANDING_SPEED)
-        tx += share * people.wander[i, 0]
-        ty += share * people.wander[i, 1]
+        tx += share * (noise[i, WANDER_ALONG] * ex - noise[i, WANDER_LEFT] * ey)
+        ty += share * (noise[i, WANDER_ALONG] * ey + noise[i, WANDER_LEFT] * ex)
+        people.wanted[i, 0], people.wanted[i, 1] = size * ex, size * ey
         out[i, 0] = (tx - vx) / relax + align * (status[g, MEAN_VX] - vx)
         out[i, 1] = (ty - vy) / relax + align * (status[g, MEAN_VY] - vy)
 
@@ -219,9 +229,8 @@ def _seek(state, people, groups, stairs, rules, out):  # type: ignore[no-untyped
 def _through_door(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped-def]
     """Returns the wanted velocity (vx, vy), m/s, of person i at (x, y), m, whose group g is at a door.
 
-    It leads to the first waypoint, from the door on, that the person has not passed (tag WAYPOINT of `people`; ways in
-    `groups`). limit: speed, m/s; a person who has passed the door goes on at DOOR_PACE (0.6) of it. Within
-    DOOR_DISTANCE (0.45 m) of the door's middle the person's tag WAYPOINT is set to the waypoint behind the door.
+    It leads to the first waypoint, from the door on, that the person has not passed (tag WAYPOINT). limit: speed, m/s;
+    DOOR_PACE (0.6) of it behind the door. Within DOOR_DISTANCE (0.45 m) of the door's middle the waypoint is passed.
     """
     door = groups.current[g]
     w = max(people.tag[i, WAYPOINT], door)
@@ -238,7 +247,7 @@ def _through_door(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped
 def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
     """Returns the share of the walking speed (0 to 1) that is kept at the point (x, y), m.
 
-    It is column SLOWDOWN of the first row of stairs (S, 7) that the point lies on, edges included; 1.0 off all stairs.
+    It is SLOWDOWN of the first row of stairs (S, 7) that the point lies on, edges included; 1.0 off all stairs.
     """
     for k in range(len(stairs)):
         dx, dy = x - stairs[k, FOOT_X], y - stairs[k, FOOT_Y]
@@ -251,10 +260,9 @@ def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _mark_avoided(groups):  # type: ignore[no-untyped-def]
-    """Overwrite column AVOIDED of groups.status (G, 10) with 1.0 if others avoid the group as a whole, else 0.0.
+    """Overwrite column AVOIDED of groups.status (G, 12) with 1.0 if others avoid the group as a whole, else 0.0.
 
-    A group is avoided if it has members present, none further than LOOSE (2.2 m) from their mean position, and is not
-    at a door.
+    A group with members present, none further than LOOSE (2.2 m) from the mean position, is avoided, but not at a door.
     """
     status = groups.status
     for g in range(len(status)):
@@ -264,33 +272,29 @@ def _mark_avoided(groups):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def drive(  # type: ignore[no-untyped-def]
-    state, place, target, pace, wander, tag,
+    state, place, target, pace, noise, gait, calm, wanted, tag,
     route, kind, length, current, speed, heading, finish, arrived, status,
     stairs, dt, rules, out,
 ):  # fmt: skip
-    """Overwrite out (N, 2) with the accelerations towards goals, m/s², and advance the groups' ways and headings by dt
-    (s).
+    """Overwrite out (N, 2) with the accelerations towards goals, m/s², and advance the groups' ways by dt (s).
 
     Returns True; False, with nothing written, if |x| + |y| + |vx| + |vy| of a person is nan or at least 1e9. state (N,
-    4): x, y, vx, vy, m, m/s. stairs (S, 7): as in Obstacles. rules (21,): Steering.array().
-
-    - Fields of PeopleArrays: place (N, 2) in the formation, forward and left, m; target (N, 2) in a queue, m; pace (N,)
-      to it, m/s; wander (N, 2), m/s; tag (N, 4): group, mode, queue, waypoint.
-    - Fields of GroupArrays: route (G, W, 2), m, and kind (G, W) of waypoints, length (G,) of them used; current (G,)
-      waypoint; speed (G,), m/s; heading (G, 2); finish (G,): STAND or LEAVE; arrived (G,); status (G, 10).
-
-    They are separate arguments because numba takes 3 µs to unpack a named tuple. Modifies current, heading, arrived,
-    status, and the tag WAYPOINT of people who pass a door.
+    4): x, y, vx, vy, m, m/s. stairs (S, 7): as in Obstacles. rules (21,): Steering.array(). The others are the fields
+    of PeopleArrays and GroupArrays; numba takes 3 µs to unpack a named tuple. Modifies calm, wanted, current, heading,
+    arrived, status, and the tag WAYPOINT of people who pass a door.
     """
     for i in range(len(state)):
         if not abs(state[i, X]) + abs(state[i, Y]) + abs(state[i, VX]) + abs(state[i, VY]) < 1e9:
             return False
-    people = PeopleArrays(place, target, pace, wander, tag)
+    for i in range(len(state)):
+        calm[i, X], calm[i, Y] = state[i, X], state[i, Y]
+        calm[i, VX], calm[i, VY] = state[i, VX] - gait[i, SWAY_X], state[i, VY] - gait[i, SWAY_Y]
+    people = PeopleArrays(place, target, pace, noise, gait, calm, wanted, tag)
     groups = GroupArrays(route, kind, length, current, speed, heading, finish, arrived, status)
-    _average(state, tag, status)
-    _spread(state, place, tag, groups, status)
+    _average(calm, noise, tag, status)
+    _spread(calm, place, tag, groups, status)
     _pass_doors(groups, people, status)
     _lead_groups(groups, status, dt, rules)
-    _seek(state, people, groups, stairs, rules, out)
+    _seek(people, groups, stairs, rules, out)
     _mark_avoided(groups)
     return True

@@ -213,8 +213,8 @@ class GroupState:
     def fill(self, people: PeopleArrays, columns: Ints) -> None:
         """Overwrites place, target, pace and tag of `people` (N rows) with the state of the people in columns (N,).
 
-        `people.wander` is left as it is. The mode in the tag is TO_TARGET for people in a queue or held, else IN_GROUP.
-        The pace to a place in a queue is the group's speed, at most 1.4 m/s.
+        Its noise, gait and calm are left as they are. The mode in the tag is TO_TARGET for people in a queue or held,
+        else IN_GROUP. The pace to a place in a queue is the group's speed, at most 1.4 m/s.
         """
         queue = self.queue_of[columns]
         people.place[:] = self.places[columns]

@@ -1,5 +1,4 @@
-"""Draws who takes part: groups with sizes, starts and goals, and each person's height, speed and gait (fluctuation of
-the wanted velocity).
+"""Draws who takes part: groups with sizes, starts and goals, and each person's height, speed, gait and fluctuations.
 
 Every person draws from streams of their own, so one person more changes nobody else. A start from a distribution is
 drawn again, for this group alone, until the group has room there.
@@ -13,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.scenario import GroupSpec, Scenario, group_names
+from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, group_names
 from scenarios.schema.values import Distribution, Point, Value, draw
 from sim.crowd.formation import to_world, walking
 from sim.crowd.stops import PlannedStop, draw_stops
@@ -25,8 +24,8 @@ START_GAP = 0.55  # m between people of different groups at the start
 TRIES = 400  # draws of a start
 STANDING_DISTANCE = 0.3  # m: a group whose goal is no further than this stands
 MIN_SPEED = 0.3  # m/s, of a group
-WANDER_SD = 0.06  # m/s, standard deviation per axis
-WANDER_TIME = 1.5  # s, correlation time
+WANDER_TIME = 1.0  # s, correlation time of the fluctuation of the wanted velocity
+PLACE_TIME = 10.0  # s, correlation time of the fluctuation of the place in the formation
 
 
 @dataclass(frozen=True)
@@ -68,12 +67,15 @@ class Person:
     - column: in the arrays of a Motion, from 0; the person's id is column + 1.
     - key: (entry of the scenario's `group` list, its copy, member), each from 0; keys the person's random streams.
     - free_speed: walking speed alone, m/s. height: of the body, m.
+    - sway: amplitude of the sideways movement with each stride at 1.34 m/s, m. phase: of the strides at first, rad.
     """
 
     column: int
     key: tuple[int, ...]
     free_speed: float
     height: float
+    sway: float
+    phase: float
 
 
 @dataclass
@@ -190,7 +192,8 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
     members = []
     for m in range(size):
         p = draws.rng("person", *key, m)
-        members.append(Person(column + m, (*key, m), draw(crowd.free_speed, p), draw(crowd.height, p)))
+        own_draws = (draw(crowd.free_speed, p), draw(crowd.height, p), draw(crowd.sway, p), p.uniform(0, 2 * np.pi))
+        members.append(Person(column + m, (*key, m), *own_draws))
     speed = own if own is not None else walking_speed([m.free_speed for m in members], crowd.slowdown_per_member)
     q = draws.rng("group", *key, 2)
     stops = draw_stops(spec.stops, size, lambda point: draw_point(point, draws.placement, q), q)
@@ -275,20 +278,21 @@ def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
     return bool((d >= BODY_RADIUS).all())
 
 
-def wander(keys: Sequence[tuple[int, ...]], frames: int, fps: float, seed: int, repeat: int) -> Array:
-    """Returns how each person's wanted velocity fluctuates, shape (frames, P, 2): x, y in m/s, for P people.
+def fluctuations(crowd: CrowdSpec, people: Sequence[Person], frames: int, fps: float, seed: int, repeat: int) -> Array:
+    """Returns how wanted velocities and places fluctuate, shape (frames, P, 4): columns of `PeopleArrays.noise`.
 
-    keys: Person.key of each person. Each person draws from a random stream of its own, keyed by seed, key and repeat.
-    An Ornstein-Uhlenbeck process per axis, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) WANDER_SD
-    n_k, with a = exp(-1 / (fps WANDER_TIME)), standard normal n_k and u_0 = WANDER_SD n_0. The standard deviation
-    WANDER_SD is 0.06 m/s, the correlation time WANDER_TIME 1.5 s. Raises ValueError if the seed is negative.
+    Each of the P people draws from a random stream of its own, keyed by seed, Person.key and repeat. An
+    Ornstein-Uhlenbeck process per column, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) s n_k, with
+    a = exp(-1 / (fps T)), standard normal n_k and u_0 = s n_0. The standard deviations s are those of `crowd`. The
+    correlation time T is WANDER_TIME (1 s) for velocities, PLACE_TIME (10 s) for places. Raises ValueError if the seed
+    is negative.
     """
-    keep = float(np.exp(-1 / (fps * WANDER_TIME)))
-    out = np.empty((frames, len(keys), 2))
-    for p, key in enumerate(keys):
-        out[:, p] = rng(seed, "gait", *key, repeat=repeat).normal(size=(frames, 2))
+    keep = np.exp(-1 / (fps * np.array([WANDER_TIME, WANDER_TIME, PLACE_TIME, PLACE_TIME])))
+    out = np.empty((frames, len(people), 4))
+    for p, person in enumerate(people):
+        out[:, p] = rng(seed, "gait", *person.key, repeat=repeat).normal(size=(frames, 4))
     out[1:] *= np.sqrt(1 - keep**2)
-    out *= WANDER_SD
+    out *= [*crowd.velocity_noise, *crowd.place_noise]
     for k in range(1, frames):
         out[k] += keep * out[k - 1]
     return out

@@ -23,7 +23,7 @@ from sim.crowd.group_state import GroupState
 from sim.crowd.heading import headings
 from sim.crowd.navigation import Navigator, blocked, scene_of
 from sim.crowd.order_execution import OrderExecution, groups_made
-from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, script_placement, wander
+from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.types import Array, Ints, Motion, Scene
 
@@ -48,25 +48,21 @@ def steps_per_frame(fps: float) -> int:
 
 
 def accelerate(
-    state: Array,
-    people: PeopleArrays,
-    groups: GroupArrays,
-    obstacles: Obstacles,
-    dt: float,
-    rules: Array,
-    push: Array,
-    out: Array,
-) -> bool:
+    state: Array, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles,
+    dt: float, rules: Array, push: Array, out: Array,
+) -> bool:  # fmt: skip
     """Overwrites out (N, 2) with the accelerations of all people, m/s², cut to max_acceleration, and advances the
-    groups' ways by dt (s). state (N, 4): x, y, vx, vy in m, m/s. obstacles: walls, pillars and stairs, m. rules (21,):
-    Steering.array(). push (G, 2): scratch, overwritten. Modifies `groups`, and the tag WAYPOINT of people who pass a
-    door. Returns True. Returns False, with nothing written, if a state is not finite or 1e9 or more."""
+    groups' ways and people's strides by dt (s). state (N, 4): x, y, vx, vy in m, m/s. obstacles: walls, pillars and
+    stairs, m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. Modifies `groups`, and gait, calm,
+    wanted and tags of `people`. Returns True. Returns False, with nothing written, if a state is not below 1e9."""
     from sim.crowd.forces_avoidance_kernels import avoid
     from sim.crowd.forces_goal_kernels import drive
+    from sim.crowd.sway_kernels import sway
 
     if not drive(state, *people, *groups, obstacles.stairs, dt, rules, out):
         return False
-    avoid(state, people.tag, groups.status, obstacles.walls, obstacles.pillars, rules, push, out)
+    sway(people.wanted, people.gait, dt, out)
+    avoid(people.calm, people.tag, groups.status, obstacles.walls, obstacles.pillars, rules, push, out)
     return True
 
 
@@ -77,8 +73,9 @@ class World:
       obstacles; push: scratch; members: all people by column; entering: all groups; waiting: those not entered yet;
       groups, orders, errands: the script.
     - `space`, `bodies` (by column): of the physics. state (N, 4): x, y, vx, vy, m, m/s, and `people`: of the N people
-      present, whose columns are `columns`. force: x, y, m/s², of the N people, then zeros for static bodies. states (P,
-      4), group_of (P,): frame being recorded, by column, nan and -1 while absent.
+      present, whose columns are `columns`. gait (P, 5): as in PeopleArrays, by column. force: x, y, m/s², of the N
+      people, then zeros for static bodies. states (P, 4), group_of (P,): frame being recorded, by column, nan and -1
+      while absent.
 
     Construction raises InputError if a group finds no room.
     """
@@ -102,6 +99,7 @@ class World:
         self.space = _space(self.scene)
         self.bodies: dict[int, pymunk.Body] = {}
         self.columns = np.zeros(0, np.int64)
+        self.gait = np.array([(math.cos(m.phase), math.sin(m.phase), 0.0, 0.0, m.sway) for m in self.members])
         self.states = np.full((len(self.members), 4), np.nan)
         self.group_of = np.full(len(self.members), -1, np.int64)
         self.people = PeopleArrays.empty(0)
@@ -124,7 +122,7 @@ class World:
         indices (P,). By column; nan and -1 while absent. The next frame overwrites both. While iterating it
         raises WorkError if a state is not finite."""
         warm = round(self.scenario.warmup * self.fps)
-        noise = wander([m.key for m in self.members], warm + length, self.fps, self.seed, self.repeat)
+        noise = fluctuations(self.scenario.crowd, self.members, warm + length, self.fps, self.seed, self.repeat)
         for f in range(-warm, length):
             if f > -warm:
                 self._advance(noise[f + warm])
@@ -141,12 +139,12 @@ class World:
                 yield self.states, self.group_of
 
     def _advance(self, noise: Array) -> None:
-        """Simulates one frame; noise (P, 2): wandering, x, y in m/s, by column. Does nothing while nobody is present.
+        """Simulates one frame; noise (P, 4): as in PeopleArrays, by column. Does nothing while nobody is present.
         Raises WorkError if a state is not finite."""
         n = len(self.columns)
         if n == 0:
             return
-        noise.take(self.columns, axis=0, out=self.people.wander, mode="clip")
+        noise.take(self.columns, axis=0, out=self.people.noise, mode="clip")
         out = self.force[:n]
         for _ in range(self.substeps):
             if not accelerate(
@@ -158,6 +156,7 @@ class World:
             self._read_buffer.clear()
             pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
         self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
+        self.gait[self.columns] = self.people.gait
 
     def _blown_up(self) -> WorkError:
         """Returns, without raising it, the WorkError for a position or velocity that is not finite."""
@@ -245,8 +244,9 @@ class World:
         self._fill_people()
 
     def _fill_people(self) -> None:
-        """Copies places, targets, pace and tags of the people present from `groups` to `people`."""
+        """Copies places, targets, pace and tags of the people present from `groups` to `people`, and their gait."""
         self.groups.fill(self.people, self.columns)
+        self.people.gait[:] = self.gait[self.columns]
 
     def _motion(self, record: Array, intent: Any) -> Motion:
         """Returns the Motion of T recorded frames and P people, with headings, body sizes and the script's orders.

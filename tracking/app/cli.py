@@ -25,7 +25,7 @@ from tracking.app.command_options import (
 )
 from tracking.app.command_result import INTERRUPTED, CommandResult
 from tracking.app.commands.tune import tune
-from tracking.app.fit_options import FitRelationalOptions, FitSensorOptions
+from tracking.app.fit_options import FitGroupingOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.options_from_dataclass import options_from
 from tracking.app.shared_options import Json, Out
 
@@ -141,6 +141,15 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     from tracking.app.commands.fit import fit_sensor
 
     return fit_sensor(options)
+
+
+@fit.command("grouping")
+@options_from(FitGroupingOptions)
+def fit_grouping(options: FitGroupingOptions) -> CommandResult:
+    """Fit the belief of who belongs together to simulated scenes."""
+    from tracking.app.commands.fit import fit_grouping
+
+    return fit_grouping(options)
 
 
 @fit.command("relational")

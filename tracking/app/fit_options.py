@@ -38,3 +38,19 @@ class FitRelationalOptions:
     seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one seed.")] = (
         "30000:30004"
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitGroupingOptions:
+    """Options of the command `fit grouping`, which fits the belief of who belongs together to simulated scenes.
+
+    names: scenarios, *.toml files or suites. seeds: those fitted to; check: others that the fit is scored with, None:
+    none; each "A:B" (A to B - 1) or one number. out: the TOML file to write.
+    """
+
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write, for --grouping.")]
+    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds of the scenes to fit to.")] = "30000:30002"
+    check: Annotated[str | None, typer.Option("--check", metavar="A:B", help="Other seeds, to score the fit with.")] = (
+        None
+    )

@@ -17,18 +17,18 @@ from sim.types import Array, Bools
 from tracking.fitting.belief_kernels import loss_and_gradient
 from tracking.fitting.grouping_scenes import PairScene
 from tracking.grouping.belief import Belief, Table, stands
-from tracking.grouping.pair_evidence import NAMES
+from tracking.grouping.pair_evidence import NAMES, TIMES
 
 USED = (
     *(f"{name}, {time:g} s" for name in ("distance", "velocity difference", "share near", "sideways")
-      for time in (0.8, 2.0, 5.0, 15.0)),
+      for time in TIMES),
     "lengthwise, 2 s", "lengthwise, 5 s", "others, 2 s", "stream, 2 s", "speed, 2 s", "distance", "arrival gap",
     "first distance",
 )  # fmt: skip
 """Quantities that get a table."""
 KNOTS = 10
 """Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %."""
-CURVED, LARGE = 1e-4, 1e-5
+CURVED, LARGE = 3e-4, 1e-4
 """Weights of the penalties: of curvature; of size, and of the difference of walking and standing."""
 STEPS = 200
 """Most iterations."""
@@ -49,7 +49,7 @@ def sample_of(scenes: Sequence[PairScene]) -> PairSample:
     """Returns the rows of scenes. Raises InputError if there are none."""
     if not scenes:
         remedy = "name scenarios with people who meet"
-        raise InputError(place="fit grouping", got="no two people within 6 m", expected="pairs", remedy=remedy)
+        raise InputError(place="fit grouping", got="no two people within 4 m", expected="pairs", remedy=remedy)
     gaps = [np.where(np.diff(s.pair, prepend=-1) == 0, np.diff(s.step, prepend=0) * s.seconds, -1.0) for s in scenes]
     weight = np.concatenate([np.full(len(s.pair), 1 / len(s.pair) / len(scenes)) for s in scenes])
     return PairSample(

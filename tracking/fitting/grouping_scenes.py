@@ -25,6 +25,8 @@ MISSED = 0.05
 BEGINS = (0.0, 4.0, 8.0)
 """s: times at which scenes of successive seeds begin, if at least LEAST s are left."""
 LEAST = 10.0
+MOST_PAIRS = 300
+"""Pairs of a scene that are kept, drawn at random: bounds memory."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,8 @@ def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScen
 
     Raises InputError if a name or file is wrong, WorkError if a script cannot be fulfilled.
     """
-    for name in names:
-        for entry in resolve(name):
+    for name, entries in [(name, resolve(name)) for name in names]:
+        for entry in entries:
             for seed in seeds:
                 truth = simulated(entry, seed)
                 begin = BEGINS[seed % len(BEGINS)] if truth.length / truth.fps >= LEAST + max(BEGINS) else 0.0
@@ -115,6 +117,7 @@ def rows_of(name: str, people: Walkers) -> PairScene:
         return PairScene(name, seconds, none, none, np.zeros((0, 0), np.float32), none.astype(bool))
     pair, step, a, b, values = (np.concatenate(x) for x in zip(*parts, strict=True))
     first, second = (people.labels[(step + 1) * size - 1, p] for p in (a, b))
-    order = np.lexsort((step, pair))
+    kept = np.flatnonzero(rng(len(pair), "label", 1).permutation(int(pair.max()) + 1)[pair] < MOST_PAIRS)
+    order = kept[np.lexsort((step[kept], pair[kept]))]
     together = (first >= 0) & (first == second)
     return PairScene(name, seconds, pair[order], step[order], values[order], together[order])

@@ -29,7 +29,7 @@ KIND = "belief"
 STANDS, WALKS = 0.2, 0.6
 """m/s: a pair counts as standing below the first, as walking above the second, in between in proportion."""
 SPEED = NAMES.index("speed, 2 s")
-NUMBERS = ("bias", "walking_time", "standing_time", "join", "part", "unseen", "memory", "arrival")
+NUMBERS = ("bias", "walking_time", "standing_time", "join", "part", "unseen", "patience", "memory", "arrival")
 """Numbers of `Belief` in its file."""
 
 
@@ -48,8 +48,9 @@ class Table:
 
     def evidence(self, value: Array, standing: Array) -> Array:
         """Returns the log-odds (R,) of values (R,), nan for unknown; standing (R,): how far the pair stands, 0 to 1."""
-        walk, stand = (np.interp(value, self.at, y) for y in (self.walking, self.standing))
-        return np.where(np.isnan(value), 0.0, walk + standing * (stand - walk))
+        found, some = np.interp(value, self.at, self.walking), standing > 0
+        found[some] += standing[some] * (np.interp(value[some], self.at, self.standing) - found[some])
+        return np.asarray(np.where(np.isnan(value), 0.0, found))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,17 +60,19 @@ class Belief:
     bias: log-odds added to the tables. walking_time, standing_time: s with which the belief follows the evidence.
     join, part: times per second that strangers become mates, and mates strangers; the decision who is in one group
     assumes them, and needs the longer to change the smaller they are. unseen: log-odds of two members of a group
-    without a row. memory (s): a missed member stays so long in the group. arrival (s): a link that began so soon after
-    a track's first frame is no merge.
+    without a row. patience (s): a link breaks after the two have been in different groups for so long. memory (s): a
+    missed member stays so long in the group. arrival (s): a link that began so soon after a track's first frame is no
+    merge.
     """
 
     tables: tuple[Table, ...]
     bias: float
     walking_time: float
     standing_time: float
-    join: float = 0.05
+    join: float = 0.01
     part: float = 0.05
     unseen: float = -4.0
+    patience: float = 2.0
     memory: float = 1.0
     arrival: float = 1.0
 
@@ -128,10 +131,10 @@ def stands(values: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairBeliefs:
-    """Log-odds that two people belong together, one row per pair and step in which both were seen within 6 m.
+    """Log-odds that two people belong together, one row per pair and step in which both were seen within 4 m.
 
     step (R,): from 0, ascending; a, b (R,): columns, a < b; log_odds (R,). distance (m), differ (m/s) (R,): distance,
-    and difference of velocities over the last 0.8 s.
+    and difference of velocities.
     """
 
     step: Ints
@@ -144,14 +147,14 @@ class PairBeliefs:
 
 
 def pair_beliefs(pos: Array, seconds: float, belief: Belief) -> PairBeliefs:
-    """Returns the beliefs of all pairs of people who come within 6 m of each other. Nothing looks ahead.
+    """Returns the beliefs of all pairs of people who come within 4 m of each other. Nothing looks ahead.
 
     pos (S, P, 2): m by step and person (`step_positions`), nan where not seen. seconds: length of a step, s.
     """
     memory = PairMemory(belief, seconds)
     parts = []
     for rows in evidence(pos, seconds):
-        near = (rows.values[:, NAMES.index(name)] for name in ("distance", "velocity difference, 0.8 s"))
+        near = (rows.values[:, NAMES.index(name)] for name in ("distance", "velocity difference"))
         parts.append((rows.step, rows.a, rows.b, *memory.follow(rows), *near))
     if not parts:
         nobody, none = np.zeros(0, np.int64), np.zeros(0)

@@ -83,11 +83,12 @@ def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float,
     low, high = np.minimum(person[i], person[j]), np.maximum(person[i], person[j])
     both, when = low * people + high, t[i]
     order = np.lexsort((when, both))
-    both, first, last = stretches(both[order], when[order], 1)
+    patience = frames_of(belief.patience, 1 / seconds)
+    both, first, last = stretches(both[order], when[order], 1, patience)
     near = (found.distance < MERGE_DISTANCE) & ~(found.differ >= MERGE_VELOCITY)
     onset, parting = _onsets(pair, step, near[order_of_rows], both, first, last, frames_of(BRIDGED, 1 / seconds))
-    ends = last + 1 < steps
-    t = np.concatenate([first, last[ends] + 1])
+    ends = last + patience < steps
+    t = np.concatenate([first, last[ends] + patience])
     columns = np.concatenate([both, both[ends]])
     on = np.concatenate([np.ones(len(first), bool), np.zeros(int(ends.sum()), bool)])
     since = np.concatenate([onset, parting[ends]])

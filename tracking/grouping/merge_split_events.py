@@ -34,7 +34,7 @@ def event_of_change(
 
     `start` is the first onset among the switches that caused the change: links set (merge, form, enter) or removed
     (split, dissolve, leave) between two of its people; t if there is none. For a leave it is the last frame in which
-    two of its people were seen (IndexError if there is none). `end` equals `start` for enter and leave, else t. Returns
+    two of its people were seen, or one if there is none. `end` equals `start` for enter and leave, else t. Returns
     None for an enter that starts in frame `arrival` (from 0) or before: that group was there from the beginning. Raises
     ValueError if no member was seen from 20 frames before the start to t.
 
@@ -48,7 +48,7 @@ def event_of_change(
     start = min(onsets, default=t)
     if change.kind == "leave":
         seen = np.isfinite(pos[: t + 1, change.members, 0]).sum(axis=1)
-        start = int(np.flatnonzero(seen > 1)[-1])
+        start = int(np.flatnonzero(seen >= min(seen.max(), 2))[-1])
     if change.kind == "enter" and start <= arrival:
         return None
     end = start if change.kind in ("enter", "leave") else t

@@ -1,6 +1,6 @@
 """What tells whether two people belong together: distances, motion and surroundings of pairs over time, in steps.
 
-`step_positions` averages positions over steps of at most 0.2 s, and `evidence` returns one row per pair and step with
+`step_positions` averages positions over steps of at most 0.4 s, and `evidence` returns one row per pair and step with
 the quantities of `QUANTITIES` averaged over the past (`TIMES`), and `ARRIVAL`. Nothing looks ahead. Only positions are
 used: velocities are chords of positions over 0.8 s. Lengths are in m.
 """
@@ -16,11 +16,11 @@ from sim.truth.merge_split_rules import MERGE_VELOCITY
 from sim.truth.proximity import close_pairs
 from sim.types import Array, Ints
 
-STEP = 0.2
+STEP = 0.4
 """s: longest step, unless one frame lasts longer."""
 CHORD = 0.8
 """s over which velocities are measured: two frames of a recording with 2.5 frames/s."""
-REACH = 6.0
+REACH = 4.0
 """m: pairs farther apart have no evidence."""
 NEAR = 1.2
 """m."""
@@ -28,13 +28,13 @@ AROUND = 3.0
 """m: others nearer than this to one of the pair are counted."""
 STANDING = 0.3
 """m/s."""
-TIMES = (0.8, 2.0, 5.0, 15.0)
+TIMES = (0.8, 2.0, 5.0)
 """s: means over the past have weights exp(-age / time)."""
 QUANTITIES = (
     "distance", "velocity difference", "share near", "sideways", "lengthwise", "others", "stream", "speed",
 )  # fmt: skip
 """Averaged quantities: see `evidence`."""
-ARRIVAL = ("distance", "arrival gap", "first distance")
+ARRIVAL = ("distance", "velocity difference", "arrival gap", "first distance")
 NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *ARRIVAL)
 """Names of the columns of `PairRows.values`."""
 PORTION = 100_000
@@ -43,7 +43,7 @@ PORTION = 100_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairRows:
-    """Evidence about pairs of people, one row per pair and step in which both were seen less than 6 m apart.
+    """Evidence about pairs of people, one row per pair and step in which both were seen less than 4 m apart.
 
     step (R,): from 0, ascending. a, b (R,): columns of the two people, a < b. pair (R,): number of the pair, from 0.
     values (R, len(NAMES)): columns `NAMES`; nan if unknown.
@@ -57,7 +57,7 @@ class PairRows:
 
 
 def frames_per_step(fps: float) -> int:
-    """Returns the number of frames in a step: as many as last at most 0.2 s, at least one. fps: frames per second."""
+    """Returns the number of frames in a step: as many as last at most 0.4 s, at least one. fps: frames per second."""
     return max(1, int(STEP * fps + 1e-9))
 
 
@@ -97,12 +97,13 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
     Averaged over the pair's rows, with weights exp(-age / time): distance (m); velocity difference (m/s), of vectors;
     share near: of rows in which the distance is below 1.2 m; sideways and lengthwise (m): parts of the distance across
     and along the mean velocity of the two, where that is at least 0.3 m/s, else the whole distance and nan; others:
-    mean of the two numbers of other people within 3 m; stream: of the people other than the pair within 6 m of one of
+    mean of the two numbers of other people within 3 m; stream: of the people other than the pair within 4 m of one of
     them, the share whose velocity differs from that person's by less than 0.5 m/s, nan without others; speed (m/s):
     mean of the two.
 
-    Not averaged: distance (m) of the row; arrival gap (s): between the steps in which the two were first seen, nan if
-    one was seen in step 0; first distance (m): in the first step in which both had been seen, nan if that is step 0.
+    Not averaged: distance (m) and velocity difference (m/s) of the row; arrival gap (s): between the steps in which the
+    two were first seen, nan if one was seen in step 0; first distance (m): in the first step in which both had been
+    seen, nan if that is step 0.
     Unknown velocities leave nan out of the means.
     """
     vel = step_velocities(pos, seconds)
@@ -122,6 +123,7 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
     apart = np.hypot(*(pos[late, column[i]] - pos[late, column[j]]).T)
     arrival = [
         now[:, 0],
+        now[:, 1],
         np.where(came.min(axis=0) > 0, np.abs(came[0] - came[1]) * seconds, np.nan),
         np.where(late > 0, apart, np.nan),
     ]
@@ -134,7 +136,7 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
 def _instant(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
     """Returns the quantities of `QUANTITIES` of each pair of rows i, j at its own step, (R, 8).
 
-    pos, vel (N, 2): m, m/s, one row per person and step. i, j (R,): all pairs within 6 m.
+    pos, vel (N, 2): m, m/s, one row per person and step. i, j (R,): all pairs within 4 m.
     """
     apart, mean = pos[j] - pos[i], (vel[i] + vel[j]) / 2
     distance, differ, pace = (np.hypot(*x.T) for x in (apart, vel[j] - vel[i], mean))
@@ -170,7 +172,7 @@ def _portions(step: Ints) -> Iterator[slice]:
 class ExponentialMeans:
     """Means of the values of pairs over their rows so far, weighted by exp(-age / time), for each time of `TIMES`.
 
-    State, by pair: total (K, V, 4) of weighted values, weight (K, V, 4), and last (K,), the pair's last step.
+    State, by pair: total (K, V, 3) of weighted values, weight (K, V, 3), and last (K,), the pair's last step.
     """
 
     def __init__(self, pairs: int, values: int, seconds: float) -> None:
@@ -180,7 +182,7 @@ class ExponentialMeans:
         self.weight, self.last = np.zeros_like(self.total), np.zeros(pairs, np.int64)
 
     def add(self, step: Ints, pair: Ints, values: Array) -> Array:
-        """Adds rows and returns their means (R, V * 4), times varying fastest; nan before a pair's first number.
+        """Adds rows and returns their means (R, V * 3), times varying fastest; nan before a pair's first number.
 
         step (R,): ascending, not before the last one added; pair (R,): once in a step; values (R, V): nan is left out.
         """

@@ -25,9 +25,9 @@ class PairProbabilities:
 
 
 def pair_probabilities(tracks: Sequence[Tracks], fps: float, px_per_m: float, belief: Belief) -> PairProbabilities:
-    """Returns the probability that two people belong together, for all pairs less than 6 m apart, in each frame.
+    """Returns the probability that two people belong together, for all pairs less than 4 m apart, in each frame.
 
-    The belief changes once in a step of at most 0.2 s and holds until the next; there is no row before the end of the
+    The belief changes once in a step of at most 0.4 s and holds until the next; there is no row before the end of the
     first step, nor in frames in which one of the two has no row. tracks: one `Tracks` per frame, of people, at least
     one. fps: frames per second. px_per_m: px per m, used only in the image. Raises InputError if the tracks are in the
     image and px_per_m is not a number above 0.

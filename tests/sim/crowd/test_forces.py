@@ -9,7 +9,20 @@ import numpy as np
 import pytest
 
 import sim.crowd.forces as forces_names
-from sim.crowd.forces import END, GATHER, GROUP, MODE, QUEUE, WAYPOINT, GroupArrays, Obstacles, PeopleArrays, Steering
+from sim.crowd.forces import (
+    END,
+    GATHER,
+    GROUP,
+    MODE,
+    QUEUE,
+    SWAY_X,
+    SWAY_Y,
+    WAYPOINT,
+    GroupArrays,
+    Obstacles,
+    PeopleArrays,
+    Steering,
+)
 from sim.crowd.forces_avoidance_kernels import _avoid_groups, _pairs, _walls
 from sim.crowd.world import accelerate
 from tests.reference_steering import between_groups, between_people, from_things
@@ -26,6 +39,8 @@ def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, PeopleArray
     people.tag[:, QUEUE] = np.where(r.random(n) < 0.2, 0, -1)
     people.tag[:, WAYPOINT] = 0
     people.place[:] = r.normal(0, 0.7, (n, 2))
+    people.noise[:] = r.normal(0, 0.1, (n, 4))
+    people.gait[:] = r.uniform(0, [1.0, 1.0, 0.2, 0.2, 0.04], (n, 5))
     groups = GroupArrays.empty(int(people.tag[:, GROUP].max()) + 1, 4)
     groups.route[:, 0] = r.uniform(0, side, groups.route[:, 0].shape)
     groups.kind[:, 0] = r.choice([END, GATHER], len(groups.speed))
@@ -96,7 +111,7 @@ def test_very_many_equal_the_slow_twin() -> None:
 def test_groups_equal_the_slow_twin(seed: int) -> None:
     r = np.random.default_rng(seed)
     count = r.integers(0, 4, 40).astype(float)
-    now = np.concatenate([count[:, None], r.uniform(0, 25, (40, 2)), r.normal(size=(40, 2)), r.random((40, 5))], axis=1)
+    now = np.concatenate([count[:, None], r.uniform(0, 25, (40, 2)), r.normal(size=(40, 2)), r.random((40, 7))], axis=1)
     now[:, 9] = (count > 0) & (r.random(40) < 0.9)
     now[seed, 3:5] = 0.0
     push = np.ones((40, 2))
@@ -125,6 +140,7 @@ def test_turning_and_moving_the_scene_turns_the_forces(seed: int) -> None:
     turn, shift = np.array([[c, -s], [s, c]]), np.array([13.0, -4.0])
     state, people, groups = crowd(60, seed)
     turned = np.concatenate([state[:, :2] @ turn.T + shift, state[:, 2:] @ turn.T], axis=1)
+    people.gait[:, SWAY_X : SWAY_Y + 1] = people.gait[:, SWAY_X : SWAY_Y + 1] @ turn.T
     groups.route[:] = groups.route @ turn.T + shift
     groups.heading[:] = groups.heading @ turn.T
     walls = (walls.reshape(-1, 2) @ turn.T + shift).reshape(-1, 4)

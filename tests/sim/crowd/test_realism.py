@@ -49,15 +49,17 @@ def test_neighbours_are_an_arm_apart(size: int) -> None:
 
 
 def test_pairs_walk_abreast() -> None:
-    angle = realism.abreast(walk(2))
-    assert np.median(angle) > 75
-    assert np.quantile(angle, 0.1) > 60
+    # medians of seq_hotel and zara01 are 76 and 75 degrees, their 10 % quantiles 56 and 50 (benchmarks.realism middle)
+    angle = realism.abreast(realism.walk_alone(2, range(1000, 1030)))
+    assert 70 < np.median(angle) < 82
+    assert np.quantile(angle, 0.1) > 50
 
 
 def test_the_middle_of_a_triad_is_slightly_behind() -> None:
     # Zanlungo & Kanda 2013: a V open to the front
-    behind = realism.middle_behind(walk(3))
-    assert (behind > 0).all()
+    # on average: over 9 s the mean place of the middle one fluctuates by 0.2 m
+    behind = realism.middle_behind(realism.walk_alone(3, range(1000, 1030)))
+    assert np.mean(behind > 0) > 0.7
     assert 0.1 < np.median(behind) < 0.4
 
 

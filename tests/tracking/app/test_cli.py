@@ -100,6 +100,10 @@ COMMANDS = {
     ),
     "replay": ("replay {one} --out {out}", "replay {out}/nothing --out {out}/x"),
     "fit sensor": ("fit sensor {data} --out {out}/mine.toml", "fit sensor {out}/nothing --out {out}/mine.toml"),
+    "fit grouping": (
+        "fit grouping side-by-side --seeds 0 --check 1 --out {out}/mine.toml",
+        "fit grouping no-such-scene --out {out}/mine.toml",
+    ),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
     "score": ("score {data} {tracks}", "score {data} {out}/nothing"),
@@ -130,7 +134,7 @@ COMMANDS = {
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
 }
 SMALL = ("scenarios --out", "fit sensor")  # a few kB
-FEW = ("export coco", "sheet", "track", "track blob")  # less than 12 kB
+FEW = ("export coco", "fit grouping", "sheet", "track", "track blob")  # less than 12 kB
 WRITING = [name for name, (good, _) in COMMANDS.items() if "--out {out}" in good]
 
 

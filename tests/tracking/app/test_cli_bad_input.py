@@ -176,7 +176,7 @@ def test_wrong_trackers(name, made, tmp_path, capsys):
     [
         ("scenarios merge --out {0}/plan.pdf", "svg"), ("sheet {1} --out {0}/sheet.jpg", "png"),
         ("overlay {1} --out {0}/film.avi", "mp4"), ("view {1} --out {0}/page", "html"),
-        ("fit sensor {1} --out {0}/mine.txt", "toml"),
+        ("fit sensor {1} --out {0}/mine.txt", "toml"), ("fit grouping merge --out {0}/mine.txt", "toml"),
     ],
 )  # fmt: skip
 def test_a_file_is_what_its_name_says(line, suffix, made, tmp_path, capsys):

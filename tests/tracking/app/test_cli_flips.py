@@ -126,6 +126,9 @@ KEYS = {
     "crowd.spacing": ("", "crowd.spacing=1.1"),
     "crowd.height": ("", "crowd.height=1.6"),
     "crowd.slowdown_per_member": ("", "crowd.slowdown_per_member=0.2"),
+    "crowd.sway": ("", "crowd.sway=0"),
+    "crowd.velocity_noise": ("", "crowd.velocity_noise=[0, 0]"),
+    "crowd.place_noise": ("", "crowd.place_noise=[0, 0]"),
     "group[].size": ("", "group.s.size=3"),
     "group[].start": ("", "group.s.start=[11, 14]"),
     "group[].goal": ("", FAR),
@@ -491,8 +494,9 @@ ELSEWHERE = {
     ("track", "grouping"),  # tests/tracking/tuning/test_rule.py
     ("track", "step_timeout"),  # tests/tracking/test_time_limit.py
 }
-OWN = ("replay", "sensor", "tune")
-"""Commands whose options are tested one by one in files of their own: test_replay.py, test_fit.py, test_tune.py."""
+OWN = ("group", "replay", "sensor", "tune")
+"""Commands whose options are tested one by one in files of their own: commands/test_group.py, test_replay.py,
+test_fit.py, test_tune.py."""
 
 
 def commands(group) -> list[tuple[str, list[str]]]:

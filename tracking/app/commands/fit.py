@@ -1,4 +1,4 @@
-"""`flockscope fit sensor`: measures the errors of a detector on recordings and writes them as a [sensor] table."""
+"""`flockscope fit`: measures the errors of a detector on recordings, or fits the belief of who belongs together."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scenarios.printable import printable
 from sim.types import Sequence as Recording
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult
-from tracking.app.fit_options import FitSensorOptions
+from tracking.app.fit_options import FitGroupingOptions, FitSensorOptions
 
 CHECK_SEEDS = range(30_000, 30_008)
 """Seeds of the simulated detections whose statistics are shown beside the measured ones."""
@@ -68,3 +68,34 @@ def _mean(values: list[float]) -> float:
     """Returns the mean of the finite values, nan if there is none."""
     known = [v for v in values if np.isfinite(v)]
     return float(np.mean(known)) if known else float("nan")
+
+
+def fit_grouping(options: FitGroupingOptions) -> CommandResult:
+    """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments.
+
+    The result's data: "file", "fitted" and, with --check, "checked", each a dictionary of scores
+    (tracking.fitting.belief_scores).
+
+    Raises InputError if --out is no .toml file or cannot be written, a name, a file or seeds are wrong, or no two
+    people come near each other. Raises WorkError if a script cannot be fulfilled or the disk is full.
+    """
+    from sim.io.files.atomic import write_file
+    from tracking.fitting.belief import fit_belief, log_odds_of, sample_of
+    from tracking.fitting.belief_scores import belief_scores
+    from tracking.fitting.grouping_scenes import pair_scenes
+
+    out = option_parsing.output_file(options.out, ".toml")
+    asked = {"fitted": ("--seeds", options.seeds), "checked": ("--check", options.check)}
+    seeds = {key: option_parsing.seeds(text, option) for key, (option, text) in asked.items() if text is not None}
+    samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
+    belief = fit_belief(samples["fitted"])
+    scores = {key: belief_scores(sample, log_odds_of(belief, sample)) for key, sample in samples.items()}
+    words = " ".join(["flockscope fit grouping", *options.names, f"--seeds {options.seeds}"])
+    lines = [
+        f"{key}, seeds {numbers.start}:{numbers.stop}: "
+        + ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
+        for key, numbers in seeds.items()
+    ]  # fmt: skip
+    write_file(out, belief.toml_text("\n".join([words, *lines])).encode())
+    text = "\n".join([*lines, f"→ {out}: use it as --grouping {out}"])
+    return CommandResult({"file": out, **scores}, text)

@@ -112,9 +112,8 @@ def associate(
 
     Returns the state (G,) of each group, the points (G, M) bool of its likeliest association, and the report (G, 6):
     innovation x, y, its covariance xx, xy, yy, normalised mass (weight) of the miss; 0 without a feasible association.
-    - NOTHING = 0: the group has no points, only noise or missed members, or the miss has at least the mass of all
-      associations. No points are chosen. The group is updated by the mixture if it has a feasible association with a
-      point of this frame.
+    - NOTHING = 0: the group has no points, only noise, or the miss has at least the mass of all associations. No points
+      are chosen. The group is updated by the mixture if it has a feasible association.
     - NULL = 1: it has points, more than noise, but no feasible association (points that form one group). All its points
       are chosen; it is not updated.
     - MEASURED = 2: else.
@@ -188,11 +187,11 @@ def _estimate(
     mass) (M,): ordered; the first `start` are unshared. feasible (J,): which associations satisfy the group constraint
     (m_g, eq. 4.1), at least one. region (2, 2): covariance of the search region. x (4,), P (4, 4), extent (2, 2), size
     (1,), report (6,). rest: extent and size must not change. Returns the number of shared points in the likeliest
-    association, or -1 if the miss has at least the mass of all associations together, or none has a point of this
-    frame.
+    association, or -1 if the miss has at least the mass of all associations together.
 
     A place carried for a seconds is a measurement of a seconds ago, moved with the estimated velocity. So the centroid
-    of points whose mean age is a measures xi - a v (ours): H = [I, -a I] and S = H P H' + R.
+    of points whose mean age is a measures xi - a v (ours): H = [I, -a I] and S = H P H' + R. An association of missed
+    members alone says that all points here are others'; it has its mass and leaves the prediction.
     """
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     seen, mean_age = running_ages(weights, age, start)
@@ -202,15 +201,14 @@ def _estimate(
     evidence = np.concatenate((np.zeros(1), np.cumsum(colour[start:])))
     width = rules[COUNT_SD] ** 2 + (rules[COUNT_SHARE] * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
-        if feasible[j] and seen[j] > 0:
-            R, a = centroid_noise(people[j], seen[j], cov[j], extent, size[0], rules), mean_age[j]
+        if feasible[j] and people[j] > 0:
+            fresh = seen[j] if seen[j] > 0 else people[j]
+            R, a = centroid_noise(people[j], fresh, cov[j], extent, size[0], rules), mean_age[j]
             S[j, 0] = P[0, 0] - 2 * a * P[0, 2] + a * a * P[2, 2] + R[0]
             S[j, 1] = P[0, 1] - a * (P[0, 3] + P[1, 2]) + a * a * P[2, 3] + R[1]
             S[j, 2] = P[1, 1] - 2 * a * P[1, 3] + a * a * P[3, 3] + R[2]
             m_d = log_density(mean[j, 0], mean[j, 1], S[j])
             log_mass[j] = m_d + log_count(people[j], size[0], width) + np.log(unit) + evidence[j]  # eq. 4.2, m_g = 1
-    if log_mass.max() == -np.inf:
-        return -1
     log_m_miss = log_miss(weights, start, region, size[0], rules)
     top = max(log_mass.max(), log_m_miss)
     beta, miss = np.exp(log_mass - top), np.exp(log_m_miss - top)
@@ -219,19 +217,19 @@ def _estimate(
     best = int(np.argmax(beta))
     report[INNOVATION_X], report[INNOVATION_Y] = mean[best, 0], mean[best, 1]
     report[S_XX : S_YY + 1], report[MISS_MASS] = S[best], miss
-    _mix(beta, miss, mean, mean_age, S, x, P)
+    _mix(np.where(seen > 0, beta, 0.0), mean, mean_age, S, x, P)
     if not rest:
         _adapt(beta, people, cov, extent, size, rules)
     return best if beta.sum() > miss else -1
 
 
 @njit(cache=True)
-def _mix(beta: Array, miss: float, mean: Array, age: Array, S: Array, x: Array, P: Array) -> None:
+def _mix(beta: Array, mean: Array, age: Array, S: Array, x: Array, P: Array) -> None:
     """Mix the conditional estimates (sec. 4.3) into x (4,) and P (4, 4), in place: means over the J associations.
 
-    x = sum beta_j x_j, P = sum beta_j (P_j + spread of x_j). beta (J,) and miss: normalised masses; mean (J, 2):
-    innovations; age (J,): a of H = [I, -a I], s; S (J, 3): covariances xx, xy, yy of the innovations. Each association
-    has its own gain P H' / S; the miss leaves the prediction.
+    x = sum beta_j x_j, P = sum beta_j (P_j + spread of x_j). beta (J,): normalised masses; what they lack of 1 leaves
+    the prediction. mean (J, 2): innovations; age (J,): a of H = [I, -a I], s; S (J, 3): covariances xx, xy, yy of the
+    innovations. Each association has its own gain P H' / S.
     """
     shift, spread, less = np.zeros(4), np.zeros((4, 4)), np.zeros((4, 4))
     step, PH, gain = np.empty(4), np.empty((4, 2)), np.empty((4, 2))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array, Bools
-from tracking.papers.relational import association_sums_kernels
+from tracking.papers.relational import sensor_kernels
 from tracking.papers.relational.config import ParticleConfig
 from tracking.papers.relational.particle_set import ParticleSet
 
@@ -49,10 +49,10 @@ def weigh(particles: ParticleSet, points: Array, detect: Array, config: Particle
     if not people:
         return Weighing(False, np.zeros((0, len(points))), np.zeros(0), np.ones(len(points)))
     reach = np.inf if certain else REACH
-    near = association_sums_kernels.near_detections(particles.pos, points, reach * config.point_noise**2)
+    near = sensor_kernels.near_detections(particles.pos, points, reach * config.point_noise**2)
     particles.regroup(_linked(particles, near, config))
     log_sums, marginals = np.empty(particles.exist.shape), np.empty((*particles.exist.shape, len(points)))
-    association_sums_kernels.particle_sums(
+    sensor_kernels.particle_sums(
         particles.pos, particles.exist, detect, points, config.point_noise, config.clutter_density, reach, near,
         particles.cluster, log_sums, marginals,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""`flockscope fit sensor` as a user calls it, and `--sensor` with what it wrote."""
+"""`flockscope fit` as a user calls it, and `--sensor` and `--grouping` with what it wrote."""
 
 from __future__ import annotations
 
@@ -73,6 +73,7 @@ def test_real_detectors(shared_data: Path, tmp_path: Path, capsys: pytest.Captur
     [
         (["fit", "sensor", "DATA", "--out", "x.txt"], "--out", "x.txt"),
         (["fit", "sensor", "NOWHERE", "--out", "x.toml"], "", "nothing there"),
+        (["fit", "grouping", "merge", "--seeds", "x", "--out", "x.toml"], "--seeds", "x"),
         (["generate", "merge", "--seeds", "0", "--sensor", "none.toml", "--out", "o"], "", "no such file"),
     ],
 )
@@ -85,3 +86,19 @@ def test_wrong_input_is_one_line(
     assert output["code"] == 2
     assert place in output["error"]["place"]  # type: ignore[index]
     assert got in output["error"]["got"]  # type: ignore[index]
+
+
+def test_a_belief_is_fitted_and_used(made: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    files = [tmp_path / name for name in ("one.toml", "two.toml")]
+    words = ("fit", "grouping", "side-by-side", "pass-by", "--seeds", "30000:30002", "--check", "10000", "--out")
+    first, second = (answer(capsys, *words, file) for file in files)
+    assert first["code"] == second["code"] == 0
+    assert files[0].read_text() == files[1].read_text(), "a fit gives the same file again"
+    assert first["fitted"]["F1"] > 0.95  # type: ignore[index]
+    assert first["fitted"]["pairs"] > 10  # type: ignore[index]
+    tracked = answer(
+        capsys, "track", "blob", made, "--detections", "truth", "--grouping", files[0], "--out", tmp_path / "t"
+    )
+    assert tracked["code"] == 0
+    (run_file,) = (tmp_path / "t").rglob("run.json")
+    assert json.loads(run_file.read_text())["grouping"]["grouping"] == "belief"

@@ -201,7 +201,7 @@ def test_a_run(walk, tmp_path, capsys):
     scored = done(capsys, "score", data, tmp_path / "again", "--against", first)
     assert all(d["what"].startswith("grouping") for d in scored["differences"])
     done(capsys, "group", tmp_path / "again" / "scene-s40000" / "tracks.parquet", "--out", tmp_path / "third")
-    assert "grouping" not in check_run(tmp_path / "third")
+    assert check_run(tmp_path / "third")["grouping"]["acquaintance"] == 1.0, "the default"
     for folder in (first, first / "scene-s40000"):
         assert "the folder of the tracks themselves" in refused(capsys, "group", folder, "--out", folder)
 
@@ -390,12 +390,12 @@ def test_a_run_in_the_image_without_scale(tmp_path, capsys):
 
 
 def test_keys_of_run_json(walk, tmp_path, capsys):
-    """Those of a tracker's run, but its speeds."""
+    """Those of a tracker's run, but its speeds; and always the grouping."""
     done(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
     done(capsys, "track", "group-pda", walk, "--fps", 10, "--out", tmp_path / "t")
     mine, theirs = (check_run(tmp_path / name).keys() for name in "gt")
     assert theirs - mine == {"frames_per_second", "whole_frames_per_second"}
-    assert mine <= theirs
+    assert mine - theirs == {"grouping"}
 
 
 def test_recorded_people(shared_data, tmp_path, capsys):

@@ -1,0 +1,281 @@
+"""Who belongs together, by the rule, by the belief and by SPENCER's relations, from labelled people.
+
+    python -m benchmarks.belief recordings [--data FOLDER]
+    python -m benchmarks.belief suites [--scenes standard friends-meet …] [--seeds 20000:20003] [--rough]
+    python -m benchmarks.belief rates [--scenes street crowd party mixed] [--seeds 20000:20003]
+    python -m benchmarks.belief calibration [--scenes streets] [--seeds 20000:20001]
+    python -m benchmarks.belief ablation --train standard streets … [--seeds 30000:30002] [--check 20000:20001]
+    python -m benchmarks.belief cost [--people 100]
+
+recordings: pairwise F1 on seq_hotel and zara01 from labelled positions, with intervals by blocks of frames; then from
+positions that err by 0.1 m, with 5 % missed, mean over 10 draws. CAVIAR's Meet_WalkTogether1 at its own scale. SPENCER
+(Linder et al. 2016) relates pairs of each frame by a linear model and takes connected components; it uses labelled
+velocities.
+suites: pairwise F1, group F1, event F1, merges that are wrong or missed, and seconds until a merge is reported; means
+over sequences with 95 % intervals, and the paired difference. --rough: positions err by 0.1 m, 5 % are missed.
+rates: pairwise F1 from the same motion at 2.5, 10 and 25 frames/s.
+calibration: probability and share of mates by bin, expected calibration error, all scenes weighing the same.
+ablation: the fit without each quantity: log loss and F1 on --check seeds, and F1 on the recordings.
+cost: CPU time per second of a walking crowd, beside that of `blob` on its detections.
+--grouping FILE.toml: another belief.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from benchmarks.belonging.transfer import f1
+from benchmarks.grouping import pairs_in_frames
+from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser, seed_range
+from benchmarks.support.tables import head, interval, number, row, signed, table
+from scenarios.loading.resolve import resolve
+from sim.io.source import open_source
+from sim.sequence import simulate
+from sim.types import Array, Bools, Ints, Truth
+from tracking.fitting.belief import USED, fit_belief, log_odds_of, sample_of
+from tracking.fitting.belief_scores import belief_scores, reliability
+from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
+from tracking.grouping.belief import Belief
+from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.grouping_choice import Grouping, grouping_of
+from tracking.grouping.link_rule import LinkRule
+from tracking.scoring.evaluation import evaluate
+from tracking.stats import block_intervals, mean_interval
+from tracking.tuning.grouping_episodes import people_as_tracks
+
+KEYS = ("pairwise_F1", "group_F1_hull", "event_F1", "merge_latency")
+RATES = {2.5: 20, 10.0: 5, 25.0: 2}
+"""Frame rate and step of frames at 50 frames/s."""
+
+
+def spencer(truth: Truth, i: Ints, j: Ints) -> Bools:
+    """Returns which pairs of rows SPENCER's default relations put into one group: its linear model, as written out in
+    the software (spencer_people_tracking), from labelled positions and velocities."""
+    assert truth.pos is not None
+    assert truth.vel is not None
+    distance = np.hypot(*(truth.pos[i] - truth.pos[j]).T)
+    speed = np.hypot(*truth.vel.T)
+    heading = np.where(speed < 0.1, 0.0, np.arctan2(truth.vel[:, 1], truth.vel[:, 0]))
+    turn = np.abs((heading[i] - heading[j] + np.pi) % (2 * np.pi) - np.pi)
+    differ = np.abs(speed[i] - speed[j])
+    strength = 1.553 * (3.038 - 1.875 * distance - 0.560 * differ - 0.913 * turn) + 0.0124
+    linked = (strength > 0) & (distance <= 3.0) & (differ <= 1.0) & (turn <= np.pi / 4)
+    rows = len(truth.frame)
+    part = connected_components(coo_array((np.ones(linked.sum()), (i[linked], j[linked])), (rows, rows)))[1]
+    return np.asarray(part[i] == part[j])
+
+
+def grouped_pairs(truth: Truth, grouping: Grouping, i: Ints, j: Ints) -> Bools:
+    """Returns which pairs of rows the grouping puts into one group."""
+    group = np.concatenate([t.group for t in derive(people_as_tracks(truth), truth.fps, truth.px_per_m, grouping)])
+    return np.asarray((group[i] >= 0) & (group[i] == group[j]))
+
+
+def rough(truth: Truth, seed: int) -> Truth:
+    """Returns a truth whose positions err by 0.1 m, without velocities, and of which 5 % of the rows are missing."""
+    assert truth.pos is not None
+    r = np.random.default_rng(seed)
+    kept = r.random(len(truth.frame)) >= MISSED
+    rows = {name: getattr(truth, name)[kept] for name in ("frame", "id", "group", "visibility")}
+    pos = (truth.pos + r.normal(0, DETECTED.sd, truth.pos.shape))[kept]
+    return truth.replace(**rows, pos=pos, vel=None, box=None, truncation=None)
+
+
+def recordings(data: Path, belief: Belief) -> None:
+    head(["recording", "SPENCER", "rule", "belief", "belief minus rule", "belief minus SPENCER"])
+    for folder in (HOTEL, ZARA):
+        truth = _truth(data / folder)
+        i, j, same = pairs_in_frames(truth)
+        found = [spencer(truth, i, j), *(grouped_pairs(truth, g, i, j) for g in (LinkRule(), belief))]
+        frame = truth.frame[i] - 1
+
+        def scores(weight: Array, found: list[Bools] = found, frame: Ints = frame, same: Bools = same) -> Array:
+            other, rule, own = (f1(weight, frame, same, x) for x in found)
+            return np.column_stack([other, rule, own, own - rule, own - other])
+
+        ends = block_intervals(scores, truth.length, truth.fps, scales=("share",) * 3 + (None, None))  # type: ignore[arg-type]
+        cells = [tuple(map(float, values)) for values in zip(*ends, strict=True)]
+        row([Path(folder).name, *(interval(*x) for x in cells[:3]), *(signed(*x) for x in cells[3:])])
+        draws = []
+        for seed in range(10):
+            erring = rough(truth, seed)
+            i, j, same = pairs_in_frames(erring)
+            frame = erring.frame[i] - 1
+            once = np.ones((1, truth.length))
+            draws.append([f1(once, frame, same, grouped_pairs(erring, g, i, j))[0] for g in (LinkRule(), belief)])
+        rule, own = np.mean(draws, axis=0)
+        row([f"{Path(folder).name}, 0.1 m, 5 % missed", "–", number(rule), number(own), f"{own - rule:+.3f}", "–"])
+    truth = _truth(data / WALK_TOGETHER)
+    people, both = people_as_tracks(truth), (LinkRule(), belief)
+    found = [evaluate(truth, derive(people, truth.fps, truth.px_per_m, g)) for g in both]
+    rule, own = (float(x["pairwise_F1"]) for x in found)
+    row([f"Meet_WalkTogether1, {truth.px_per_m:.1f} px/m", "–", number(rule), number(own), f"{own - rule:+.3f}", "–"])
+
+
+def _truth(path: Path) -> Truth:
+    truth = open_source(path, images=False)[0].truth
+    assert truth is not None
+    return truth
+
+
+def suites(names: Sequence[str], seeds: range, belief: Belief, erring: bool) -> None:
+    columns = ["pairwise F1", "group F1", "event F1", "merge reported after, s", "merges right, wrong, missed"]
+    for name in names:
+        found: dict[str, list[list[float]]] = {"rule": [], "belief": []}
+        merges = {key: np.zeros(3) for key in found}
+        for entry in resolve(name):
+            for seed in seeds:
+                truth = simulated(entry, seed)
+                people = people_as_tracks(rough(truth, seed) if erring else truth)
+                for key, grouping in (("rule", LinkRule()), ("belief", belief)):
+                    scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m, grouping))
+                    found[key].append([scores[k] for k in KEYS])
+                    merges[key] += np.nan_to_num([scores[f"merge_{k}"] for k in ("TP", "FP", "FN")])
+        values = {key: np.array(rows) for key, rows in found.items()}
+        cells = {key: [*_cells(interval, x), ", ".join(f"{n:.0f}" for n in merges[key])] for key, x in values.items()}
+        cells["belief minus rule"] = [*_cells(signed, values["belief"] - values["rule"]), ""]
+        title = f"{Path(name).stem}, seeds {seeds.start}:{seeds.stop}, {len(values['rule'])} sequences"
+        table(title, "", columns, cells)
+
+
+def _cells(write: object, values: Array) -> list[str]:
+    ends = mean_interval(values)
+    return [write(*map(float, x)) for x in zip(*ends, strict=True)]  # type: ignore[operator]
+
+
+def rates(names: Sequence[str], seeds: range, belief: Belief) -> None:
+    head(["scenes", *(f"{fps:g} frames/s" for fps in RATES)])
+    for name in names:
+        found = []
+        for entry in resolve(name, ["camera.fps=50"]):
+            for seed in seeds:
+                truth = simulate(entry.scenario, seed, entry.repeat, streams=()).truth
+                assert truth is not None
+                found.append([_f1_every(truth, every, belief) for every in RATES.values()])
+        row([Path(name).stem, *(number(x) for x in np.sum(found, axis=0)[:, 0] / np.sum(found, axis=0)[:, 1])])
+
+
+def _f1_every(truth: Truth, every: int, belief: Belief) -> tuple[float, float]:
+    """Returns twice the hits, and the true plus the found pairs, in every n-th frame of a truth; the last of a step of
+    2.5 frames/s counts."""
+    kept = (truth.frame - 1) % every == 0
+    rows = {name: getattr(truth, name)[kept] for name in ("id", "group", "visibility", "pos")}
+    slow = truth.replace(
+        **rows, frame=(truth.frame[kept] - 1) // every + 1, fps=truth.fps / every, vel=None, box=None, truncation=None,
+        length=(truth.length - 1) // every + 1,
+    )  # fmt: skip
+    i, j, same = pairs_in_frames(slow)
+    found = grouped_pairs(slow, belief, i, j)
+    return 2.0 * float((same & found).sum()) * every, float(same.sum() + found.sum()) * every
+
+
+def calibration(names: Sequence[str], seeds: range, belief: Belief) -> None:
+    for name in names:
+        sample = sample_of(list(pair_scenes([name], seeds)))
+        log_odds = log_odds_of(belief, sample)
+        scores = belief_scores(sample, log_odds)
+        print(f"\n{Path(name).stem}: " + ", ".join(f"{key} {value:.4g}" for key, value in scores.items()) + "\n")
+        head(["probability", "share of rows", "mean probability", "share of mates"])
+        for k, (share, mean, mates) in enumerate(reliability(log_odds, sample.together, sample.weight)):
+            row([f"{k / 15:.2f}–{(k + 1) / 15:.2f}", number(share, 4), number(mean), number(mates)])
+
+
+FAMILIES: Mapping[str, tuple[str, ...]] = {
+    "distance": ("distance",), "velocity difference": ("velocity difference",), "share near": ("share near",),
+    "sideways, lengthwise": ("sideways", "lengthwise"), "others, stream (chance)": ("others", "stream"),
+    "speed": ("speed",), "arrival": ("arrival gap", "first distance"), "means over 5 s": (),
+}  # fmt: skip
+
+
+def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> None:
+    train, test = (sample_of(list(pair_scenes(names, s))) for s in (seeds, check))
+    truths = {Path(folder).name: _truth(data / folder) for folder in (HOTEL, ZARA)}
+    head(["without", "log loss", "calibration error", "F1", *truths])
+    for family, words in {"": (), **FAMILIES}.items():
+        used = [name for name in USED if name.split(",")[0] not in words]
+        if family and not words:
+            used = [name for name in USED if not name.endswith(" 5 s")]
+        belief = fit_belief(train, used)
+        scores = belief_scores(test, log_odds_of(belief, test))
+        real = []
+        for truth in truths.values():
+            i, j, same = pairs_in_frames(truth)
+            found = grouped_pairs(truth, belief, i, j)
+            real.append(number(float(f1(np.ones((1, truth.length)), truth.frame[i] - 1, same, found)[0])))
+        row([family or "–", *(f"{scores[k]:.4f}" for k in ("log loss", "calibration error", "F1")), *real])
+
+
+def crowd_tracks(people: int, frames: int, fps: float) -> Iterator[tuple[Ints, Ints, Array]]:
+    """Yields frame, column and positions of people who walk in pairs, 0.1 people per m², as one array each."""
+    r = np.random.default_rng(0)
+    side = (people / 0.1) ** 0.5
+    heading = r.uniform(0, 2 * np.pi, people // 2)
+    start = r.uniform(0, side, (people // 2, 2))
+    t = np.arange(frames)[:, None, None] / fps
+    middle = start + 1.3 * t * np.column_stack([np.cos(heading), np.sin(heading)])
+    both = np.concatenate([middle, middle + 0.7], axis=1)
+    pos = np.abs(both % (2 * side) - side) + r.normal(0, 0.02, both.shape)
+    frame, column = np.nonzero(np.ones(pos.shape[:2], bool))
+    yield frame, column, pos[frame, column]
+
+
+def cost(people: int, belief: Belief) -> None:
+    from tracking.grouping.belief_partition import belief_links
+    from tracking.grouping.link_rule import find_links
+
+    fps, frames = 10.0, 600
+    ((frame, column, pos),) = crowd_tracks(people, frames, fps)
+    vel = np.zeros_like(pos)
+    for name, work in {
+        "belief": lambda: belief_links(frame, column, pos, frames, fps, belief),
+        "rule": lambda: find_links(frame, column, pos, vel, frames, fps, LinkRule()),
+    }.items():
+        spent = []
+        for _ in range(3):
+            begun = time.process_time()
+            work()
+            spent.append(time.process_time() - begun)
+        print(f"{name}: {1000 * min(spent) / frames:.3f} ms per frame with {people} people")
+
+
+def main() -> None:
+    parser = new_parser(__doc__)
+    parser.add_argument("mode", choices=["recordings", "suites", "rates", "calibration", "ablation", "cost"])
+    parser.add_argument("--scenes", nargs="+", metavar="NAME", help="scenarios, suites or *.toml files")
+    parser.add_argument("--train", nargs="+", metavar="NAME", help="ablation: to fit to", default=["standard"])
+    parser.add_argument("--rough", action="store_true", help="suites: positions err and rows are missing")
+    parser.add_argument("--grouping", default="belief", metavar="FILE.toml", help="another belief")
+    parser.add_argument("--people", type=int, default=100, help="cost: number of people")
+    add_seeds(parser, "20000:20001")
+    parser.add_argument("--check", type=seed_range, default="20000:20001", metavar="A:B", help="ablation: test seeds")
+    add_data(parser)
+    args = parser.parse_args()
+    belief = grouping_of(args.grouping)
+    assert isinstance(belief, Belief), "--grouping names a belief"
+    _run(args, belief)
+
+
+def _run(args: argparse.Namespace, belief: Belief) -> None:
+    if args.mode == "recordings":
+        recordings(args.data, belief)
+    elif args.mode == "suites":
+        suites(args.scenes or ["standard", "friends-meet"], args.seeds, belief, args.rough)
+    elif args.mode == "rates":
+        rates(args.scenes or ["street", "crowd", "party", "mixed"], args.seeds, belief)
+    elif args.mode == "calibration":
+        calibration(args.scenes or ["standard"], args.seeds, belief)
+    elif args.mode == "ablation":
+        ablation(args.train, args.seeds, args.check, args.data)
+    else:
+        cost(args.people, belief)
+
+
+if __name__ == "__main__":
+    main()
