@@ -21,7 +21,12 @@ from sim.types import Tracker
 from tracking.config import Config
 from tracking.user_code import tracker_failed, user_code, what_was_raised
 
-REGISTRY = {"blob": "tracking.papers.blob.tracker:Blob", "group-pda": "tracking.papers.group_pda.tracker:GroupPda"}
+REGISTRY = {
+    "blob": "tracking.papers.blob.tracker:Blob",
+    "group-pda": "tracking.papers.group_pda.tracker:GroupPda",
+    "relational": "tracking.papers.relational.tracker:Relational",
+    "particle": "tracking.papers.relational.tracker:Particle",
+}
 NEEDS = ("pixels", "stereo", "boxes", "points")
 
 

@@ -1,4 +1,4 @@
-"""The options of `fit sensor` and `fit grouping`, as in `command_options`."""
+"""The options of the commands `fit …`: as those of other commands in `tracking.app.command_options`."""
 
 from __future__ import annotations
 
@@ -22,6 +22,22 @@ class FitSensorOptions:
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Recordings with gt and det, pooled.")]
     out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")]
     fps: Fps = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitRelationalOptions:
+    """Options of the command `fit relational`, which learns the motion of people and of pairs from simulated truth.
+
+    names: scenarios, *.toml files or suites. seeds: "A:B" (A to B - 1) or one number. out: the TOML file to write.
+    """
+
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.toml", help="File to write: parameters of relational, for --params.")
+    ]
+    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one seed.")] = (
+        "30000:30004"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

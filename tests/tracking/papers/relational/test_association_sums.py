@@ -1,0 +1,104 @@
+"""Sums over mappings (companion page E2, E3): against brute force, closed counts, and the Bethe value."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.reference_relational import sum_over_mappings
+from tracking.papers.relational.association_sums_kernels import exact_sum, propagated_sum, sparse_sum
+
+
+def summed(kernel, W, miss, spare):
+    found = np.full(W.shape, np.nan)
+    if kernel is not sparse_sum:
+        return kernel(W, miss, spare, found), found
+    logs = np.empty(len(W))
+    sparse_sum(W, miss, spare, np.zeros(len(W), np.int64), logs, found)
+    return logs[0], found
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_equals_brute_force(seed):
+    """Also with zeros in the matrix, impossible misses and columns that must be used."""
+    rng = np.random.default_rng(seed)
+    n, m = rng.integers(1, 6, 2)
+    W = rng.exponential(size=(n, m)) * (rng.random((n, m)) < 0.7) * 10.0 ** rng.integers(-3, 4)
+    miss, spare = (rng.random(k) * (rng.random(k) < 0.8) for k in (n, m))
+    true, shares = sum_over_mappings(W, miss, spare)
+    for kernel in (exact_sum, sparse_sum):
+        log_sum, found = summed(kernel, W, miss, spare)
+        assert math.exp(log_sum) == pytest.approx(true, rel=1e-12)
+        if true:
+            np.testing.assert_allclose(found, shares, rtol=0, atol=1e-12)
+
+
+def test_six_by_six_equals_brute_force():
+    rng = np.random.default_rng(0)
+    W, miss, spare = rng.exponential(size=(6, 6)), rng.random(6), rng.random(6)
+    true, shares = sum_over_mappings(W, miss, spare)
+    log_sum, found = summed(sparse_sum, W, miss, spare)
+    assert math.exp(log_sum) == pytest.approx(true, rel=1e-12)
+    np.testing.assert_allclose(found, shares, atol=1e-12)
+
+
+@pytest.mark.parametrize(("n", "count"), list(enumerate([2, 7, 34, 209, 1546, 13327], 1)))
+def test_number_of_mappings(n, count):
+    log_sum, _ = summed(sparse_sum, np.ones((n, n)), np.ones(n), np.ones(n))
+    assert math.exp(log_sum) == pytest.approx(count, rel=1e-12)
+
+
+def test_permanent():
+    """Complete mappings of as many: all of one's is n!."""
+    log_sum, found = summed(sparse_sum, np.ones((8, 8)), np.zeros(8), np.ones(8))
+    assert math.exp(log_sum) == pytest.approx(math.factorial(8), rel=1e-12)
+    np.testing.assert_allclose(found, 1 / 8)
+
+
+def test_permutations_change_nothing():
+    rng = np.random.default_rng(1)
+    W, miss, spare = rng.exponential(size=(5, 7)), rng.random(5), rng.random(7)
+    i, j = rng.permutation(5), rng.permutation(7)
+    log_sum, found = summed(sparse_sum, W, miss, spare)
+    other, moved = summed(sparse_sum, np.ascontiguousarray(W[i][:, j]), miss[i], spare[j])
+    assert other == pytest.approx(log_sum, rel=1e-13)
+    np.testing.assert_allclose(moved, found[i][:, j], atol=1e-13)
+
+
+def test_nobody_detected_ever():
+    log_sum, found = summed(sparse_sum, np.zeros((3, 4)), np.ones(3), np.ones(4))
+    assert log_sum == 0.0
+    assert not found.any()
+
+
+def test_tiny_and_huge_weights():
+    """Rows are scaled: products far outside the range of a float are summed."""
+    W = np.full((9, 9), 1e-200)
+    log_sum, _ = summed(sparse_sum, W, np.zeros(9), np.ones(9))
+    assert log_sum == pytest.approx(9 * math.log(1e-200) + math.lgamma(10), rel=1e-12)
+
+
+def test_bethe_value_is_a_lower_bound():
+    """On 300 matrices; exact with one row or one column (E3)."""
+    worst = 1.0
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        n, m = rng.integers(1, 6, 2)
+        W, miss, spare = rng.exponential(size=(n, m)) * 10.0 ** rng.integers(-2, 3), rng.random(n) + 0.01, np.ones(m)
+        true, _ = summed(exact_sum, W, miss, spare)
+        bethe, _ = summed(propagated_sum, W, miss, spare)
+        assert bethe <= true + 1e-9
+        if min(n, m) == 1:
+            assert bethe == pytest.approx(true, abs=1e-9)
+        worst = min(worst, math.exp(bethe - true))
+    assert 0.3 < worst < 0.9
+
+
+def test_large_sums_are_propagated():
+    rng = np.random.default_rng(2)
+    W = rng.exponential(size=(14, 14))
+    log_sum, found = summed(sparse_sum, W, np.full(14, 0.5), np.ones(14))
+    assert log_sum == summed(propagated_sum, W, np.full(14, 0.5), np.ones(14))[0]
+    assert (found.sum(0) < 1 + 1e-6).all()

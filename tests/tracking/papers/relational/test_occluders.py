@@ -1,0 +1,52 @@
+"""Who is behind a known pillar or wall, and what the trackers make of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.types import Camera, Context, Detections, Frame, Scene
+from tracking.papers.relational.occluders import hidden_share
+from tracking.papers.relational.tracker import Particle
+
+CAMERA = Camera("pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([0.0, -10.0, 3.0]), np.eye(3))
+PILLAR = Scene(np.array([20.0, 20.0]), pillars=np.array([[0.0, 0.0, 0.3]]))
+WALL = Scene(np.array([20.0, 20.0]), walls=np.array([[[-1.0, 0.0], [1.0, 0.0]]]))
+
+
+@pytest.mark.parametrize("scene", [PILLAR, WALL])
+def test_behind_beside_and_in_front(scene):
+    pos = np.array([[[0.0, 2.0], [1.5, 2.0], [0.0, -1.0], [0.0, 40.0]]])
+    found = hidden_share(pos, np.ones((1, 4)), CAMERA, scene)
+    assert found.tolist() == [1.0, 0.0, 0.0, float(scene.pillar_height > 3.0 - 2.15 * 0.2)]
+
+
+def test_low_occluders_hide_nobody_beyond_them():
+    low = PILLAR.replace(pillar_height=1.0)
+    assert hidden_share(np.array([[[0.0, 2.0]]]), np.ones((1, 1)), CAMERA, low).tolist() == [0.0]
+
+
+def test_a_share_of_the_particles():
+    pos = np.array([[[0.0, 2.0]], [[5.0, 2.0]]])
+    assert hidden_share(pos, np.array([[0.3], [0.7]]), CAMERA, PILLAR).tolist() == pytest.approx([0.3])
+
+
+@pytest.mark.parametrize(("camera", "scene"), [(None, PILLAR), (CAMERA, None), (CAMERA, Scene(np.ones(2)))])
+def test_without_knowledge_nobody_is_hidden(camera, scene):
+    assert hidden_share(np.array([[[0.0, 2.0]]]), np.ones((1, 1)), camera, scene).tolist() == [0.0]
+
+
+@pytest.mark.parametrize(("scene", "kept"), [(PILLAR, True), (None, False)])
+def test_a_person_behind_a_pillar_is_kept(scene, kept):
+    """A person who waits behind a pillar for 4 s, longer than the time window, is still tracked if it is known."""
+    tracker = Particle()
+    tracker.reset(Context(10.0, float("nan"), CAMERA, scene), 0)
+    places = [(-1.0 + 0.1 * k, 2.0) for k in range(10)] + [None] * 40
+    for k, place in enumerate(places, 1):
+        pos = np.zeros((0, 2)) if place is None else np.array([place])
+        if place is None:  # stand still: the test is of the belief, not of the motion
+            tracker.particles.vel[:] = 0.0
+            tracker.particles.pos[:] = [0.0, 2.0]
+        found = Detections(k, 0.1 * k, "ground", pos, None, None, np.ones(len(pos)))
+        tracks = tracker.step(Frame(k, 0.1 * k), found)
+    assert (len(tracks.id) == 1) == kept

@@ -1,0 +1,305 @@
+"""Limits and closed forms of `relational` and `particle` (companion page, section 3, E1 and E4 to E9)."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
+from sim.types import Context, Detections, Frame
+from tracking.papers.relational import sensor, transition_kernels
+from tracking.papers.relational.config import ParticleConfig, RelationalConfig
+from tracking.papers.relational.particle_set import ParticleSet
+from tracking.papers.relational.tracker import Particle, Relational
+from tracking.prepare import prepare
+
+CERTAIN = {"detect_prob": 1.0, "clutter_density": 0.0, "resample_share": 1.0}
+
+
+def flat_table(diffusion):
+    """A speed table without drift and with one diffusion."""
+    rows = range(1, 6)
+    return {f"drift_{k}": 0.0 for k in rows} | {f"diffusion_{k}": diffusion for k in rows} | {"noise_scale": 1.0}
+
+
+def detections(index, *points):
+    pos = np.array(points, float).reshape(-1, 2)
+    return Detections(index, index - 1.0, "ground", pos, None, None, np.ones(len(pos)))
+
+
+def stepped(tracker, fps, *frames, seed=0):
+    """The tracks of frames given as lists of points, None for a frame without information."""
+    tracker.reset(Context(fps, float("nan")), seed)
+    out = []
+    for k, points in enumerate(frames, 1):
+        found = None if points is None else detections(k, *points)
+        out.append(tracker.step(Frame(k, (k - 1) / fps), found))
+    return out
+
+
+def placed(count, pos, vel=None, exist=1.0):
+    """`count` equal particles of people at pos (K, 2) with velocities vel (K, 2)."""
+    pos = np.asarray(pos, float)
+    vel = np.zeros_like(pos) if vel is None else np.asarray(vel, float)
+    made = ParticleSet.empty(count)
+    for place, velocity in zip(pos, vel, strict=True):
+        none = np.zeros(made.exist.shape, bool)
+        made.add(np.tile(place, (count, 1)), np.tile(velocity, (count, 1)), exist, none)
+    return made
+
+
+# E1
+
+
+def kalman(points, r, speed, spread, dt):
+    """The exact filter of one coordinate: places after each frame; the first one starts it."""
+    x, P = np.array([points[0], 0.0]), np.diag([r * r, speed * speed])
+    A, G = np.array([[1, dt], [0, 1.0]]), np.array([dt, 1.0]) * spread
+    out = [x[0]]
+    for z in points[1:]:
+        x, P = A @ x, A @ P @ A.T + np.outer(G, G)
+        K = P[:, 0] / (P[0, 0] + r * r)
+        x, P = x + K * (z - x[0]), P - np.outer(K, P[0])
+        out.append(x[0])
+    return np.array(out)
+
+
+def test_one_person_converges_to_the_kalman_filter():
+    """The error of the mean falls as the root of the number of particles (E1)."""
+    rng, fps, frames = np.random.default_rng(5), 10.0, 12
+    points = np.cumsum(rng.normal(0.1, 0.03, (frames, 2)), axis=0)
+    config = ParticleConfig(**CERTAIN, **flat_table(0.5), point_noise=0.1, speed_prior=0.8)
+    true = np.stack([kalman(points[:, d], 0.1, 0.8, 0.5 * fps**-0.5, 1 / fps) for d in (0, 1)], axis=1)
+    counts, errors = [500, 2000, 8000], []
+    for count in counts:
+        tracker = Particle(dataclasses.replace(config, particles=count))
+        runs = [stepped(tracker, fps, *([p] for p in points), seed=s) for s in range(8)]
+        means = np.array([[t.pos[0] for t in run] for run in runs])
+        errors.append(np.sqrt(np.mean((means - true)[:, 2:] ** 2)))
+    slope = np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    assert slope == pytest.approx(-0.5, abs=0.1)
+    assert errors[-1] < 0.004
+
+
+# E4
+
+
+def same_tracks(first, second):
+    for a, b in zip(first, second, strict=True):
+        assert a.id.tolist() == b.id.tolist()
+        assert a.pos.tobytes() == b.pos.tobytes()
+        assert a.vel.tobytes() == b.vel.tobytes()
+        assert a.cov.tobytes() == b.cov.tobytes()
+
+
+def test_without_relations_it_is_the_baseline_to_the_last_bit():
+    """Relations are drawn from streams of their own (E4)."""
+    scene = simulate(load("cross", ["camera.fps=5", "duration=5"]), 40_002, 0, ())
+    runs = []
+    for name, params in (("particle", {}), ("relational", {"relation_bias": -40.0})):
+        ready = prepare(name, scene, detections="file", params={"particles": 200} | params)
+        ready.reset(3)
+        runs.append([ready.step(frame) for frame in ready.frames()])
+    assert max(len(t.id) for t in runs[0]) > 3
+    same_tracks(*runs)
+
+
+def test_one_person_has_no_relations():
+    walk = [[(0.1 * k, 0.0)] for k in range(20)]
+    same_tracks(stepped(Particle(), 10.0, *walk), stepped(Relational(), 10.0, *walk))
+
+
+def test_relations_change_the_motion():
+    """Two people side by side: the test of equality can fail."""
+    walk = [[(0.1 * k, 0.0), (0.1 * k, 0.7)] for k in range(20)]
+    alone, related = stepped(Particle(), 10.0, *walk), stepped(Relational(), 10.0, *walk)
+    assert not np.array_equal(alone[-1].pos, related[-1].pos)
+
+
+# E5
+
+
+def riccati(r, steps=400):
+    """The stationary variance of a hidden partner's velocity, per axis: exact, C = 1, steps of 1 s, noise r."""
+    A = np.array([[1, 0.5, 0.5], [0, 0.5, 0.5], [0, 0.5, 0.5]])  # x1, v1, v2
+    G = np.array([[1, 0], [1, 0], [0, 1.0]])
+    P = np.diag([r * r, 1.0, 1.0])
+    for _ in range(steps):
+        P = A @ P @ A.T + G @ G.T
+        K = P[:, 0] / (P[0, 0] + r * r)
+        P = P - np.outer(K, P[0])
+    return P[2, 2]
+
+
+def test_the_exact_filter_of_a_hidden_partner_has_the_closed_form():
+    assert riccati(1e-5) == pytest.approx(5**0.5 - 1, abs=1e-4)
+
+
+def hidden_variance(related, seen, steps, count=20_000, r=0.4):
+    """The velocity variance of person 2, per axis, by frame; person 1 is measured where `seen`."""
+    config = ParticleConfig(**flat_table(1.0), point_noise=r, clutter_density=1e-6)
+    rng, particles, out = np.random.default_rng(1), placed(count, [[0, 0], [5, 0]]), []
+    particles.related[:, 0, 1] = particles.related[:, 1, 0] = related
+    truth, velocity = np.zeros(2), np.zeros(2)
+    for _ in range(steps):
+        noise = rng.standard_normal((count, 2, 2))
+        label = particles.labels()
+        transition_kernels.move(
+            particles.pos, particles.vel, particles.exist, label, noise, config.speed_table(1.0), 1.0
+        )
+        velocity = 0.7 * velocity + rng.standard_normal(2)
+        truth = truth + velocity
+        points = (truth + r * rng.standard_normal(2))[None] if seen else np.zeros((0, 2))
+        particles.pos[:, 1] = 1e6  # never near the detection
+        if seen:
+            sensor.weigh(particles, points, np.array([0.9, 0.0]), config)
+            particles.resample(1.0, "residual", rng)
+        out.append(particles.vel[:, 1].var(axis=0).mean())
+    return np.array(out)
+
+
+def test_a_hidden_partner_has_a_bounded_velocity_variance():
+    """(sqrt 5 - 1) C^2 as the noise of the visible one falls; information flows from the seen to the hidden (E5)."""
+    found = hidden_variance(True, True, 60)[15:]
+    assert found.mean() == pytest.approx(riccati(0.4), rel=0.03)
+    assert found.mean() < 4 / 3 * 0.97
+
+
+def test_a_hidden_free_walker_diffuses():
+    np.testing.assert_allclose(hidden_variance(False, False, 8), np.arange(1, 9), rtol=0.05)
+
+
+# E6
+
+
+def test_without_information_weights_stay_and_people_go_straight_on():
+    tracker = Relational(RelationalConfig(**flat_table(1e-6)))
+    walk = [[(0.1 * k, 0.0), (0.1 * k, 1.0)] for k in range(15)]
+    before = stepped(tracker, 10.0, *walk)[-1]
+    tracker.particles.weights = np.random.default_rng(0).dirichlet(np.ones(tracker.particles.count), 2).T.copy()
+    weights = tracker.particles.weights.copy()
+    first = tracker.step(Frame(16, 1.5), None)
+    second = tracker.step(Frame(17, 1.6), None)
+    assert np.array_equal(tracker.particles.weights, weights)
+    assert first.id.tolist() == second.id.tolist() == before.id.tolist()
+    np.testing.assert_allclose(second.pos, first.pos + 0.1 * second.vel, atol=1e-3)
+
+
+@pytest.mark.parametrize("detect", [np.zeros(2), np.full(2, 0.9)])
+def test_people_who_are_equal_in_all_particles_change_no_weight(detect):
+    particles = placed(50, [[0, 0], [3, 0]])
+    sensor.weigh(particles, np.zeros((0, 2)), detect, ParticleConfig())
+    np.testing.assert_allclose(particles.weights, 1 / 50, rtol=1e-12)
+
+
+def test_a_newcomer_in_an_empty_scene_is_alone_and_beside_a_group_in_it_by_half():
+    """Sec. 3.2; far from all groups a newcomer is alone (ours)."""
+    rules, count = np.array([0.05, 12.0, 3.0, 3.0]), 20_000
+    u = np.random.default_rng(0).random(count)
+
+    def joined(pos, related=()):
+        particles = placed(count, np.array(pos).reshape(-1, 2))
+        for i, j in related:
+            particles.related[:, i, j] = particles.related[:, j, i] = True
+        group = transition_kernels.join(
+            particles.pos, particles.exist, particles.labels(), np.array([0.0, 0.5]), 0.5, u, rules
+        )
+        return [float((group == g).mean()) for g in range(-1, len(pos))]
+
+    assert joined([]) == [1.0]
+    assert joined([[0, 0]]) == pytest.approx([0.5, 0.5], abs=0.01)
+    assert joined([[0, 0], [1, 0]], [(0, 1)]) == pytest.approx([0.5, 0.5, 0], abs=0.01)
+    assert joined([[0, 0], [0, 1]]) == pytest.approx([0.5, 0.25, 0.25], abs=0.01)
+    assert joined([[0, 30]]) == pytest.approx([1, 0], abs=0.01)
+
+
+# E7
+
+
+def test_new_relations_depend_on_new_attributes_alone(monkeypatch):
+    """Given the attributes at t and the relations at t - 1, attributes at t - 1 have no effect (eq. 7)."""
+    rng = np.random.default_rng(2)
+    new_pos, new_vel = rng.normal(0, 1, (300, 4, 2)), rng.normal(0, 0.3, (300, 4, 2))
+
+    def to_new(pos, vel, *_):
+        pos[:], vel[:] = new_pos, new_vel
+
+    monkeypatch.setattr(transition_kernels, "move", to_new)
+    found = []
+    for seed in (0, 1):
+        tracker = Relational(RelationalConfig(particles=300))
+        tracker.reset(Context(10.0, float("nan")), 7)
+        tracker.particles = placed(300, np.random.default_rng(seed).normal(0, 3, (4, 2)))
+        tracker.particles.related[:, 0, 1] = tracker.particles.related[:, 1, 0] = True
+        tracker._forecast()
+        found.append(tracker.particles.related.copy())
+    assert np.array_equal(*found)
+    assert 0 < found[0].mean() < 1
+
+
+def test_a_pairs_relation_approaches_its_equilibrium_at_its_rate():
+    rules = np.array([-np.expm1(-0.5 * 0.1), 1.0, 1.0, 0.0])
+    particles = placed(40_000, [[0, 0], [0.5, 0]])
+    g, rng = 1 / (1 + np.exp(0.5 - 1.0)), np.random.default_rng(0)
+    for step in range(1, 21):
+        pairs = transition_kernels.near_pairs(particles.pos, particles.related.any(axis=0), rules)
+        uniforms = rng.random((40_000, len(pairs)))
+        transition_kernels.relate(particles.pos, particles.vel, particles.related, pairs, uniforms, rules)
+        assert particles.related[:, 0, 1].mean() == pytest.approx(g * (1 - np.exp(-0.05 * step)), abs=0.012)
+
+
+def test_pairs_that_are_far_in_all_particles_and_not_related_are_left_out():
+    rules, particles = np.array([0.1, 5.0, 3.0, 3.0]), placed(10, [[0, 0], [1, 0], [50, 0]])
+    particles.pos[0, 2] = [49.0, 0.0]
+
+    def pairs():
+        return transition_kernels.near_pairs(particles.pos, particles.related.any(axis=0), rules).tolist()
+
+    assert pairs() == [[0, 1]]
+    particles.related[3, 0, 2] = particles.related[3, 2, 0] = True
+    assert pairs() == [[0, 1], [0, 2]]
+    particles.pos[5, 2] = [3.0, 0.0]
+    assert pairs() == [[0, 1], [0, 2], [1, 2]]
+
+
+# E8
+
+
+def test_the_papers_sensor_breaks_down_and_goes_on():
+    """A person who jumps has weight 0 in all particles; with missed people and false alarms this cannot be (E8)."""
+    walk = [[(0.1 * k, 0.0)] for k in range(10)] + [[(60.0 + 0.1 * k, 0.0)] for k in range(10)]
+    paper, ours = Particle(ParticleConfig(**CERTAIN)), Particle()
+    tracks = stepped(paper, 10.0, *walk)
+    assert paper.vanished > 0
+    assert any(np.abs(tracks[-1].pos - [60.9, 0]).max(axis=1) < 0.2), "the person is found again"
+    stepped(ours, 10.0, *walk)
+    assert ours.vanished == 0
+
+
+def test_a_sensor_without_false_alarms_misses_nobody():
+    with pytest.raises(InputError, match="clutter_density"):
+        ParticleConfig(clutter_density=0.0, detect_prob=0.9)
+
+
+# E9
+
+
+@pytest.mark.parametrize("related", [False, True])
+def test_diffusion_is_that_of_any_frame_rate(related):
+    spreads = []
+    for fps in (25.0, 12.5):
+        particles, rng = placed(20_000, [[0, 0], [1, 0]], [[1, 0], [1, 0]]), np.random.default_rng(3)
+        particles.related[:, 0, 1] = particles.related[:, 1, 0] = related
+        config = ParticleConfig()
+        for _ in range(round(fps)):
+            noise = rng.standard_normal((20_000, 2, 2))
+            args = particles.pos, particles.vel, particles.exist, particles.labels(), noise
+            transition_kernels.move(*args, config.speed_table(1 / fps), 1 / fps)
+        mean = particles.vel.mean(axis=1) if related else particles.vel[:, 0]
+        place = particles.pos.mean(axis=1) if related else particles.pos[:, 0]
+        spreads.append([mean.std(axis=0).mean(), place.std(axis=0).mean()])
+    np.testing.assert_allclose(spreads[0], spreads[1], rtol=0.05)

@@ -1,0 +1,152 @@
+"""`fit_relational`: the speed table and the relation dynamics of `relational`, learned from clean simulated truth.
+
+Speed table (Table 3 of Cattelani et al. 2012): for each row of speeds the mean of the velocity's change over LAG,
+against the direction of motion, and its standard deviation per axis; as drift per second and diffusion per root second.
+The paper learns from differences of measured boxes, which mixes the sensor's errors with the motion.
+
+Relations (ours; the paper gives none): a logistic regression of "in one true group" on distance and velocity
+difference, and the rate at which the relation follows it: the one whose moving average of probabilities has the least
+log loss.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Array, Bools, Ints, Truth
+
+LAG = 0.4
+"""Time over which changes of velocity are measured, s: steering is correlated over shorter times."""
+NEAR = 6.0
+"""Pairs farther apart teach nothing, m."""
+LEAST = 500
+"""Fewest rows from which anything is fitted."""
+RATES = tuple(0.05 * 2.0**k for k in range(9))
+"""Rates of relations that are tried, 1/s."""
+STEPS = 50
+"""Most steps of Newton's method."""
+
+
+@dataclass(frozen=True)
+class TruePairs:
+    """Pairs of people of a sequence, one row per pair and frame, sorted by pair, then frame.
+
+    pair, frame (R,). design (R, 3): 1, minus distance in m, minus velocity difference in m/s. same (R,): True if both
+    are in one true group. dt: s between frames.
+    """
+
+    pair: Ints
+    frame: Ints
+    design: Array
+    same: Bools
+    dt: float
+
+
+def fit_relational(truths: Iterable[Truth], ends: Array) -> dict[str, float]:
+    """Return fitted parameters of `relational` by name: drift_k, diffusion_k, relation_rate, _bias, _distance,
+    _velocity.
+
+    truths: of simulated sequences with positions, velocities and groups; ends (4,): upper ends of the rows of the speed
+    table, m/s. Raises InputError with fewer than 500 changes of velocity, or without pairs of both kinds.
+    """
+    changes, pairs = [], []
+    for truth in truths:
+        changes.append(velocity_changes(truth))
+        pairs.append(pair_rows(truth))
+    speed, along, across, lag = (np.concatenate(x) for x in zip(*changes, strict=True)) if changes else np.zeros((4, 0))
+    same = np.concatenate([p.same for p in pairs]) if pairs else np.zeros(0, bool)
+    if len(speed) < LEAST or same.all() or not same.any():
+        raise InputError(
+            place="scenes", got=f"{len(speed)} changes of velocity, {int(same.sum())} pairs in groups of {len(same)}",
+            expected=f"{LEAST} changes, and pairs in and out of groups", remedy="give more seeds or scenarios",
+        )  # fmt: skip
+    row = np.searchsorted(ends, speed)
+    out: dict[str, float] = {}
+    for k in range(len(ends) + 1):
+        inside = row == k
+        if not inside.any():
+            inside = np.ones(len(row), bool)
+        drift = 0.0 if k == 0 else max(-float(np.mean(along[inside] / lag[inside])), 0.0)
+        spread = np.mean((along[inside] + drift * lag[inside]) ** 2 / lag[inside] + across[inside] ** 2 / lag[inside])
+        out |= {f"drift_{k + 1}": drift, f"diffusion_{k + 1}": float(np.sqrt(spread / 2))}
+    weights = logistic(np.concatenate([p.design for p in pairs]), same)
+    losses = [_log_loss(pairs, weights, rate) for rate in RATES]
+    rate = RATES[int(np.argmin(losses))]
+    names = ("relation_bias", "relation_distance", "relation_velocity")
+    return out | {"relation_rate": rate} | dict(zip(names, weights.tolist(), strict=True))
+
+
+def velocity_changes(truth: Truth) -> tuple[Array, Array, Array, Array]:
+    """Return speed (R,), m/s, and the change of velocity after it along and across its direction (R,), m/s, and the
+    time of the change (R,), s."""
+    assert truth.pos is not None
+    assert truth.vel is not None
+    frames = max(1, round(LAG * truth.fps))
+    order = np.lexsort((truth.frame, truth.id))
+    frame, id, vel = truth.frame[order], truth.id[order], truth.vel[order]
+    later = np.arange(len(frame)) + frames
+    later = later[later < len(frame)]
+    now = later - frames
+    kept = (id[now] == id[later]) & (frame[later] - frame[now] == frames)
+    now, later = now[kept], later[kept]
+    speed = np.hypot(*vel[now].T)
+    ahead = vel[now] / np.maximum(speed, 1e-9)[:, None]
+    change = vel[later] - vel[now]
+    along = (change * ahead).sum(axis=1)
+    across = change[:, 1] * ahead[:, 0] - change[:, 0] * ahead[:, 1]
+    return speed, along, across, np.full(len(now), frames / truth.fps)
+
+
+def pair_rows(truth: Truth) -> TruePairs:
+    """Return the rows of the pairs of a sequence that are at most NEAR apart."""
+    assert truth.pos is not None
+    assert truth.vel is not None
+    people, found = int(truth.id.max(initial=0)) + 1, []
+    for index in range(1, truth.length + 1):
+        r = truth.rows(index)
+        pos, vel, id, group = truth.pos[r], truth.vel[r], truth.id[r], truth.group[r]
+        a, b = np.triu_indices(len(id), 1)
+        distance, differ = (np.hypot(*(x[a] - x[b]).T) for x in (pos, vel))
+        near = distance <= NEAR
+        a, b, distance, differ = a[near], b[near], distance[near], differ[near]
+        design = np.stack([np.ones(len(a)), -distance, -differ], axis=1)
+        found.append((id[a] * people + id[b], np.full(len(a), index), design, (group[a] >= 0) & (group[a] == group[b])))
+    pair, frame, design, same = (np.concatenate(x) for x in zip(*found, strict=True))
+    order = np.lexsort((frame, pair))
+    return TruePairs(pair[order], frame[order], design[order], same[order], 1 / truth.fps)
+
+
+def logistic(design: Array, same: Bools) -> Array:
+    """Return the weights (3,) of a logistic regression by Newton's method; design (R, 3), same (R,)."""
+    weights = np.zeros(design.shape[1])
+    for _ in range(STEPS):
+        p = 1 / (1 + np.exp(-np.clip(design @ weights, -40, 40)))
+        gradient = design.T @ (same - p)
+        hessian = (design * (p * (1 - p))[:, None]).T @ design + 1e-6 * np.eye(len(weights))
+        step = np.linalg.solve(hessian, gradient)
+        weights = weights + step
+        if np.abs(step).max() < 1e-8:
+            break
+    return weights
+
+
+def _log_loss(sequences: list[TruePairs], weights: Array, rate: float) -> float:
+    """Returns the mean log loss of the relation's expectation, a moving average of probabilities with this rate."""
+    from scipy.signal import lfilter
+
+    total, count = 0.0, 0
+    for rows in sequences:
+        g = 1 / (1 + np.exp(-np.clip(rows.design @ weights, -40, 40)))
+        new = -np.expm1(-rate * rows.dt)
+        cuts = np.flatnonzero((np.diff(rows.pair) != 0) | (np.diff(rows.frame) != 1)) + 1
+        for part in np.split(np.arange(len(g)), cuts):
+            if len(part):
+                smooth = lfilter([new], [1, new - 1], g[part], zi=[(1 - new) * g[part[0]]])[0]
+                p = np.clip(smooth, 1e-6, 1 - 1e-6)
+                total -= float(np.log(np.where(rows.same[part], p, 1 - p)).sum())
+                count += len(part)
+    return total / max(count, 1)

@@ -1,0 +1,237 @@
+"""Kernels of tracking.papers.relational.sensor: sums over all mappings of people to detections.
+
+A mapping gives each of n rows (people) at most one of m columns (detections), and each column to at most one row. Its
+weight is the product of W[i, j] over the pairs, miss[i] over the rows without a column, and spare[j] over the columns
+without a row. `exact_sum` adds the weights of all mappings by dynamic programming over subsets of columns, O(n m 2^m);
+`propagated_sum` approximates it by belief propagation, O(n m) a sweep. Both also return the marginals: the share of the
+sum in mappings that contain each pair. Slow twin for tests: tests/reference_relational.py.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sim.compiler import njit
+from sim.types import Array, Ints
+
+EXACT_BITS = 12
+"""Largest number of columns of an exact sum; above it sums are propagated."""
+SWEEPS = 200
+"""Most sweeps of belief propagation."""
+CONVERGED = 1e-10
+"""Belief propagation ends when no message changes by more than this share."""
+TINY = 1e-300
+"""A row that is never without column counts as missed with this weight in belief propagation."""
+
+
+@njit(cache=True)
+def exact_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
+    """Return the log of the sum over all mappings, -inf if it is 0, and write the marginals (n, m) of the pairs.
+
+    W (n, m), miss (n,), spare (m,): not negative. forward[i, S] is the sum over mappings of rows before i to exactly
+    the columns S; backward[i, S] that of the rows from i on, S being taken. Rows are divided by their maxima, whose
+    logs are added up.
+    """
+    n, m = W.shape
+    full = 1 << m
+    forward, backward = np.zeros((n + 1, full)), np.zeros((n + 1, full))
+    forward[0, 0] = 1.0
+    log_scale = 0.0
+    for i in range(n):
+        top = 0.0
+        for s in range(full):
+            total = forward[i, s] * miss[i]
+            for j in range(m):
+                if s >> j & 1:
+                    total += forward[i, s ^ (1 << j)] * W[i, j]
+            forward[i + 1, s] = total
+            top = max(top, total)
+        if top == 0.0:
+            marginals[:] = 0.0
+            return -math.inf
+        log_scale += math.log(top)
+        for s in range(full):
+            forward[i + 1, s] /= top
+    for s in range(full):
+        free = 1.0
+        for j in range(m):
+            if not s >> j & 1:
+                free *= spare[j]
+        backward[n, s] = free
+    total = 0.0
+    for s in range(full):
+        total += forward[n, s] * backward[n, s]
+    if total == 0.0:
+        marginals[:] = 0.0
+        return -math.inf
+    for i in range(n - 1, -1, -1):
+        top = 0.0
+        for s in range(full):
+            value = backward[i + 1, s] * miss[i]
+            for j in range(m):
+                if not s >> j & 1:
+                    value += backward[i + 1, s | (1 << j)] * W[i, j]
+            backward[i, s] = value
+            top = max(top, value)
+        without = 0.0
+        for s in range(full):
+            without += forward[i, s] * backward[i + 1, s]
+        whole = without * miss[i]
+        for j in range(m):
+            pair = 0.0
+            if W[i, j] > 0:
+                for s in range(full):
+                    if not s >> j & 1:
+                        pair += forward[i, s] * backward[i + 1, s | (1 << j)]
+            marginals[i, j] = pair * W[i, j]
+            whole += marginals[i, j]
+        for j in range(m):
+            marginals[i, j] /= whole
+        for s in range(full):
+            backward[i, s] /= top
+    return log_scale + math.log(total)
+
+
+@njit(cache=True)
+def propagated_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
+    """Return the Bethe approximation of the log of the sum over all mappings, and write its marginals (n, m).
+
+    W (n, m), miss (n,), spare (m,): not negative. Messages of Williams & Lau 2014: with psi = W / (miss spare),
+    mu[i, j] = psi[i, j] / (1 + sum of psi nu over the other columns) and nu[i, j] = 1 / (1 + sum of mu over the other
+    rows). The value is exact for one row or one column, and a lower bound in all cases that were tried.
+    """
+    n, m = W.shape
+    psi, mu, nu = np.zeros((n, m)), np.zeros((n, m)), np.ones((n, m))
+    log_sum = 0.0
+    for i in range(n):
+        log_sum += math.log(max(miss[i], TINY))
+    for j in range(m):
+        log_sum += math.log(max(spare[j], TINY))
+        for i in range(n):
+            psi[i, j] = W[i, j] / (max(miss[i], TINY) * max(spare[j], TINY))
+    for _ in range(SWEEPS):
+        change = 0.0
+        for i in range(n):
+            whole = 1.0
+            for j in range(m):
+                whole += psi[i, j] * nu[i, j]
+            for j in range(m):
+                mu[i, j] = psi[i, j] / max(whole - psi[i, j] * nu[i, j], 1.0)
+        for j in range(m):
+            whole = 1.0
+            for i in range(n):
+                whole += mu[i, j]
+            for i in range(n):
+                new = 1.0 / max(whole - mu[i, j], 1.0)
+                change = max(change, abs(new - nu[i, j]) / new)
+                nu[i, j] = new
+        if change < CONVERGED:
+            break
+    for i in range(n):
+        whole = 1.0
+        for j in range(m):
+            whole += psi[i, j] * nu[i, j]
+        log_sum += math.log(whole)
+        for j in range(m):
+            marginals[i, j] = psi[i, j] * nu[i, j] / whole
+    for j in range(m):
+        whole = 1.0
+        for i in range(n):
+            whole += mu[i, j]
+            log_sum -= math.log(1.0 + mu[i, j] * nu[i, j])
+        log_sum += math.log(whole)
+    return log_sum
+
+
+@njit(cache=True)
+def dense_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
+    """Return the log of the sum over all mappings and write the marginals (n, m): exact if n or m is at most 12, else
+    propagated. Arguments as of `exact_sum`; subsets are those of the smaller side."""
+    n, m = W.shape
+    if min(n, m) > EXACT_BITS:
+        return propagated_sum(W, miss, spare, marginals)
+    if m <= n:
+        return exact_sum(W, miss, spare, marginals)
+    turned = np.empty((m, n))
+    log_sum = exact_sum(np.ascontiguousarray(W.T), spare, miss, turned)
+    marginals[:] = turned.T
+    return log_sum
+
+
+@njit(cache=True)
+def sparse_sum(W: Array, miss: Array, spare: Array, cluster: Ints, log_sums: Array, marginals: Array) -> None:
+    """Write the logs of the sums over all mappings of each cluster (n,), and the marginals (n, m).
+
+    Arguments as of `exact_sum`. Rows and columns with a pair of weight above 0 are linked; a sum is the product over
+    connected components of `dense_sum`. cluster (n,): a row for each row; that of a component's first row has its log.
+    Columns without a row count in the cluster of row 0. Without rows nothing is written.
+    """
+    n, m = W.shape
+    marginals[:], log_sums[:] = 0.0, 0.0
+    row_done, column_done = np.zeros(n, np.bool_), np.zeros(m, np.bool_)
+    rows, columns = np.empty(n, np.int64), np.empty(m, np.int64)
+    for start in range(n):
+        if row_done[start]:
+            continue
+        row_done[start] = True
+        rows[0], count, width, head = start, 1, 0, 0
+        while head < count:
+            i = rows[head]
+            head += 1
+            for j in range(m):
+                if W[i, j] > 0 and not column_done[j]:
+                    column_done[j] = True
+                    columns[width] = j
+                    width += 1
+                    for k in range(n):
+                        if W[k, j] > 0 and not row_done[k]:
+                            row_done[k] = True
+                            rows[count] = k
+                            count += 1
+        log_sums[cluster[start]] += _component_sum(W, miss, spare, marginals, rows[:count], columns[:width])
+    for j in range(m):
+        if n > 0 and not column_done[j]:
+            log_sums[cluster[0]] += math.log(spare[j]) if spare[j] > 0 else -math.inf
+
+
+@njit(cache=True)
+def _line_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no-untyped-def]
+    """Returns what `_component_sum` returns for one row or one column, all of whose pairs have a weight above 0."""
+    total = 1.0
+    for i in rows:
+        total *= miss[i]
+    for j in columns:
+        total *= spare[j]
+    for i in rows:
+        for j in columns:
+            weight = W[i, j]
+            for other in rows:
+                weight *= miss[other] if other != i else 1.0
+            for other in columns:
+                weight *= spare[other] if other != j else 1.0
+            marginals[i, j] = weight
+            total += weight
+    for i in rows:
+        for j in columns:
+            marginals[i, j] /= total if total > 0 else 1.0
+    return math.log(total) if total > 0 else -math.inf
+
+
+@njit(cache=True)
+def _component_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no-untyped-def]
+    """Returns the log of the sum over mappings of these rows (n',) and columns (m',), and writes their marginals."""
+    if len(columns) == 0:
+        return math.log(miss[rows[0]]) if miss[rows[0]] > 0 else -math.inf
+    if len(columns) == 1 or len(rows) == 1:
+        return _line_sum(W, miss, spare, marginals, rows, columns)
+    block, found = np.empty((len(rows), len(columns))), np.empty((len(rows), len(columns)))
+    for a in range(len(rows)):
+        for b in range(len(columns)):
+            block[a, b] = W[rows[a], columns[b]]
+    log_sum = dense_sum(block, miss[rows], spare[columns], found)
+    for a in range(len(rows)):
+        for b in range(len(columns)):
+            marginals[rows[a], columns[b]] = found[a, b]
+    return log_sum

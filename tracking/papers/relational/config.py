@@ -1,0 +1,167 @@
+"""The parameters of `relational` and `particle`. Lengths are metres; in the image positions are divided by px per m.
+
+`particle` has the parameters of people, `relational` these and those of relations: in a comparison both filters have
+the same parameters (sec. 3.4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Array
+from tracking.config import Config, param
+
+ROWS = 5
+"""Rows of the speed table (Table 3)."""
+
+
+@dataclass(frozen=True)
+class ParticleConfig(Config):
+    """The parameters of the tracker `particle`, a particle filter without relations; each field states default, range
+    and unit.
+
+    They are the number of particles, the speed table of the motion, the sensor, births, deaths and reporting. Raises
+    InputError if the upper ends of the speed table's rows do not increase, or if clutter_density is 0 and detect_prob
+    is below 1.
+    """
+
+    tracker: ClassVar[str] = "particle"
+
+    particles: int = param(1000, (50, 20000), "particles", "number of particles", "int", online=False, tunable=False)
+    resample_share: float = param(
+        0.5,
+        (0.0, 1.0),
+        "share",
+        "particles are resampled if their effective number is at most this share of them; 1: in every frame (the "
+        "paper), below 1 ours",
+    )
+    resampling: str = param(
+        "residual", ("residual", "systematic"), "", "residual: as in sec. 2.1; systematic: ours", "categorical"
+    )
+
+    weights: str = param(
+        "factorised",
+        ("factorised", "joint"),
+        "",
+        "factorised: people who share no detection and do not walk together have weights of their own (ours); joint: a "
+        "particle has one weight (the paper)",
+        "categorical",
+        before="joint",
+    )
+
+    noise_scale: float = param(
+        3.0, (0.1, 10.0), "", "the standard deviations of the speed table are multiplied by this (ours)", "log"
+    )
+    speed_1: float = param(0.15, (0.0, 100.0), "m/s", "upper end of row 1 of the speed table", tunable=False)
+    speed_2: float = param(0.6, (0.0, 100.0), "m/s", "upper end of row 2 of the speed table", tunable=False)
+    speed_3: float = param(1.0, (0.0, 100.0), "m/s", "upper end of row 3 of the speed table", tunable=False)
+    speed_4: float = param(1.4, (0.0, 100.0), "m/s", "upper end of row 4 of the speed table", tunable=False)
+    drift_1: float = param(0.0, (0.0, 1000.0), "m/s^2", "row 1: mean deceleration (column B)", tunable=False)
+    drift_2: float = param(0.165, (0.0, 1000.0), "m/s^2", "row 2: mean deceleration", tunable=False)
+    drift_3: float = param(0.086, (0.0, 1000.0), "m/s^2", "row 3: mean deceleration", tunable=False)
+    drift_4: float = param(0.047, (0.0, 1000.0), "m/s^2", "row 4: mean deceleration", tunable=False)
+    drift_5: float = param(0.03, (0.0, 1000.0), "m/s^2", "row 5: mean deceleration", tunable=False)
+    diffusion_1: float = param(
+        0.074, (0.0, 1000.0), "m/s^1.5", "row 1: standard deviation of the velocity per root second (column C)",
+        tunable=False,
+    )  # fmt: skip
+    diffusion_2: float = param(0.238, (0.0, 1000.0), "m/s^1.5", "row 2: the same", tunable=False)
+    diffusion_3: float = param(0.196, (0.0, 1000.0), "m/s^1.5", "row 3: the same", tunable=False)
+    diffusion_4: float = param(0.123, (0.0, 1000.0), "m/s^1.5", "row 4: the same", tunable=False)
+    diffusion_5: float = param(0.094, (0.0, 1000.0), "m/s^1.5", "row 5: the same", tunable=False)
+    speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity, per axis", "log")
+
+    point_noise: float = param(
+        0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis (sec. 3.3)", "log"
+    )
+    detect_prob: float = param(
+        0.95, (0.3, 1.0), "probability", "that a person who was measured in the last frame is measured (ours)"
+    )
+    hidden_time: float = param(
+        0.3, (0.05, 20.0), "s", "mean time until a person who is not measured is measured again (ours)", "log"
+    )
+    clutter_density: float = param(
+        0.002, (0.0, 1.0), "1/m^2", "false alarms per frame and square metre; 0: none (ours)"
+    )
+    birth_rate: float = param(0.003, (1e-5, 1.0), "1/(m^2 s)", "new people per square metre and second (ours)", "log")
+    birth_doubt: float = param(
+        0.5,
+        (0.05, 1.0),
+        "probability",
+        "least probability that a detection is nobody's for it to start a person (ours)",
+    )
+    survival_time: float = param(30.0, (1.0, 1000.0), "s", "mean time until a person disappears (ours)", "log")
+    time_window: float = param(
+        3.0, (0.1, 30.0), "s", "a person who is not measured for so long is removed (sec. 2.1.1)", "log"
+    )
+    least_existence: float = param(
+        0.02, (0.0, 0.5), "probability", "a person whose existence is less probable is removed (ours)"
+    )
+    report_existence: float = param(
+        0.5, (0.0, 1.0), "probability", "people whose existence is at least so probable are reported (ours)"
+    )
+
+    def check(self) -> None:
+        """Refuse a speed table whose rows do not follow each other, and a sensor without clutter that misses people."""
+        for row, (low, high) in enumerate(pairwise(self.speed_ends.tolist()), 2):
+            if high <= low:
+                raise InputError(
+                    place=f"speed_{row}", got=f"{high:g}", expected=f"more than speed_{row - 1} = {low:g}",
+                    remedy="give the rows of the speed table by increasing speed",
+                )  # fmt: skip
+        if self.clutter_density == 0 and self.detect_prob < 1:
+            raise InputError(
+                place="clutter_density", got="0", expected="above 0 if detect_prob is below 1",
+                remedy="set both for the paper's sensor: detect_prob 1 and clutter_density 0",
+            )  # fmt: skip
+
+    @property
+    def certain_sensor(self) -> bool:
+        """True for the paper's sensor, without missed people and false alarms: its mappings are complete."""
+        return self.detect_prob == 1 and self.clutter_density == 0
+
+    @property
+    def speed_ends(self) -> Array:
+        """The upper ends of the first four rows of the speed table, (4,), m/s."""
+        return np.array([self.speed_1, self.speed_2, self.speed_3, self.speed_4])
+
+    def speed_table(self, dt: float) -> Array:
+        """Return the speed table (5, 3) of a step of dt s: upper end of the speed in m/s (inf in the last row), mean
+        loss of speed in m/s (column B), standard deviation of the velocity per axis in m/s (column C)."""
+        drift = np.array([getattr(self, f"drift_{k}") for k in range(1, ROWS + 1)])
+        diffusion = np.array([getattr(self, f"diffusion_{k}") for k in range(1, ROWS + 1)])
+        return np.stack(
+            [np.append(self.speed_ends, np.inf), drift * dt, self.noise_scale * diffusion * np.sqrt(dt)], axis=1
+        )
+
+
+@dataclass(frozen=True)
+class RelationalConfig(ParticleConfig):
+    """The parameters of the tracker `relational`: those of `particle` and those of the relation "walking together".
+
+    Two people start or stop walking together with hazards whose equilibrium is the probability 1 / (1 + exp(-l)), l =
+    relation_bias - relation_distance d - relation_velocity |v1 - v2|.
+    """
+
+    tracker: ClassVar[str] = "relational"
+
+    relation_rate: float = param(
+        1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
+    )
+    relation_bias: float = param(5.9, (-40.0, 40.0), "", "log odds of walking together at the same place (ours)")
+    relation_distance: float = param(3.3, (0.0, 40.0), "1/m", "loss of log odds per metre of distance (ours)")
+    relation_velocity: float = param(5.9, (0.0, 40.0), "s/m", "loss of log odds per m/s of velocity difference (ours)")
+    newcomer_share: float = param(
+        0.5, (0.0, 1.0), "probability", "that a new person near a group belongs to it (sec. 3.2)"
+    )
+    together: float = param(
+        0.5, (0.05, 0.95), "probability", "two people are in one group if they walk together with at least this (ours)"
+    )
+    inertia: float = param(
+        1.0, (0.0, 6.0), "", "log odds beyond `together` that are needed to join or leave a group (ours)"
+    )

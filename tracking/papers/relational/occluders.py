@@ -1,0 +1,53 @@
+"""Whether people are behind the pillars and walls of a known scene: the belief in occlusion of sec. 2.1.1.
+
+A person is taken as hidden if the line from a pinhole camera to the middle of the body meets a pillar or a wall. People
+do not hide each other here. Without a pinhole camera or a scene nobody is hidden.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Bools, Camera, Scene
+
+MIDDLE = 0.85
+"""Height of the middle of a body, m."""
+
+
+def hidden_share(pos: Array, weights: Array, camera: Camera | None, scene: Scene | None) -> Array:
+    """Return the probability (K,) that each person is behind a pillar or wall.
+
+    pos (P, K, 2), m; weights (P, K): of the particles, sum 1 for each person.
+    """
+    if camera is None or scene is None or camera.kind != "pinhole" or not len(scene.pillars) + len(scene.walls):
+        return np.zeros(pos.shape[1])
+    hidden = np.zeros(pos.shape[:2], bool)
+    for pillar in scene.pillars:
+        hidden |= _behind_pillar(pos, pillar, scene.pillar_height, camera.position)
+    for wall in scene.walls:
+        hidden |= _behind_wall(pos, wall, scene.wall_height, camera.position)
+    return np.asarray((weights * hidden).sum(axis=0))
+
+
+def _behind_pillar(pos: Array, pillar: Array, top: float, eye: Array) -> Bools:
+    """Returns (P, K) True where the line from eye (3,) to a person meets the pillar (3,) x, y, radius."""
+    to_person, to_pillar = pos - eye[:2], pillar[:2] - eye[:2]
+    along = np.clip((to_person @ to_pillar) / np.maximum(np.square(to_person).sum(axis=2), 1e-12), 0.0, 1.0)
+    apart = to_person * along[..., None] - to_pillar
+    return np.asarray((np.square(apart).sum(axis=2) < pillar[2] ** 2) & (_height(along, eye) < top))
+
+
+def _behind_wall(pos: Array, wall: Array, top: float, eye: Array) -> Bools:
+    """Returns (P, K) True where the line from eye (3,) to a person meets the wall (2, 2)."""
+    to_person, side, start = pos - eye[:2], wall[1] - wall[0], wall[0] - eye[:2]
+    det = to_person[..., 0] * side[1] - to_person[..., 1] * side[0]
+    det = np.where(np.abs(det) < 1e-12, np.inf, det)
+    along = (start[0] * side[1] - start[1] * side[0]) / det
+    place = (start[0] * to_person[..., 1] - start[1] * to_person[..., 0]) / det
+    meets = (along > 0) & (along < 1) & (place >= 0) & (place <= 1)
+    return np.asarray(meets & (_height(along, eye) < top))
+
+
+def _height(along: Array, eye: Array) -> Array:
+    """Returns the height of the line to the middle of a body at a share `along` of it, m."""
+    return np.asarray(eye[2] + along * (MIDDLE - eye[2]))

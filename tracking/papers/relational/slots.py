@@ -1,0 +1,57 @@
+"""What `relational` knows of people beside the particles: ids, time since the last measurement, sizes of boxes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+
+BOX_TIME = 0.5
+"""Time constant with which the size of a person's box follows measured boxes, s (ours)."""
+
+
+@dataclass
+class Slots:
+    """The people of a sequence, one row for each of K slots of the particles (all ours).
+
+    id (K,): the track's id, -1 until the person is first reported. missed (K,): time since the last measurement, s, 0
+    if measured in this frame. size (K, 2): width and height of the box, px, nan if none was measured. next_id: the next
+    new id.
+    """
+
+    id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    missed: Array = field(default_factory=lambda: np.zeros(0))
+    size: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    next_id: int = 1
+
+    def add(self, size: Array) -> None:
+        """Add a person who is measured in this frame; size (2,): width, height of the box, px, nan without."""
+        self.id = np.append(self.id, -1)
+        self.missed = np.append(self.missed, 0.0)
+        self.size = np.concatenate([self.size, size[None]])
+
+    def keep(self, rows: Bools) -> None:
+        """Remove all people but those where `rows` (K,) is True."""
+        self.id, self.missed, self.size = self.id[rows], self.missed[rows], self.size[rows]
+
+    def measure(self, seen: Array, pairs: Array, sizes: Array | None, dt: Array) -> None:
+        """Note who was measured in a frame: those with seen (K,) above 1/2; dt (K,): s by which others count as missed.
+
+        pairs (K, M): probability of each person and detection; sizes (M, 2): width and height of the detected boxes,
+        px, None without boxes. The size follows the most probable box if its pair is more probable than not.
+        """
+        self.missed = np.where(seen > 0.5, 0.0, self.missed + dt)
+        if sizes is None or not pairs.size:
+            return
+        best = pairs.argmax(axis=1)
+        sure = pairs[np.arange(len(best)), best] > 0.5
+        old, new = self.size[sure], sizes[best[sure]]
+        self.size[sure] = np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt[sure, None] / BOX_TIME))
+
+    def name(self, rows: Bools) -> None:
+        """Give new ids to the people where `rows` (K,) is True who have none."""
+        new = np.flatnonzero(rows & (self.id < 0))
+        self.id[new] = self.next_id + np.arange(len(new))
+        self.next_id += len(new)

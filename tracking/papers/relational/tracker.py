@@ -1,0 +1,236 @@
+"""`particle` and `relational`: people tracked by a particle filter, without and with who walks together.
+
+Cattelani, Manfredotti, Messina, "Multiple object tracking with relations", ICPRAM 2012. The state of a particle is s =
+(s^a, s^r) (eq. 5): attributes s^a, place x and velocity v of each person; relations s^r, which pairs of people walk
+together. z are the detections of a frame, w the weights. The steps of a frame:
+
+    forecast  s^a ~ p(s^a_t | s^a_t-1, s^r_t-1)  attributes from old relations  eq. 8, sec. 3.2      transition_kernels
+              s^r ~ p(s^r_t | s^a_t, s^r_t-1)    relations from new attributes  eq. 7                transition_kernels
+    weight    w = w p(z_t | s^a_t)               sum over all mappings          eqs 6, 12, sec. 3.3  sensor
+    births    x ~ N(z, .), v ~ N(0, .)           relations of newcomers         secs. 2.1.1, 3.2     tracker
+    estimate  means over particles                                                                   report
+    resample  residual sampling                                                 sec. 2.1             filters.particles
+
+Readings of the paper: eq. 2 and eq. 8 condition on all earlier states, s_1:t-1; the last factor of eq. 14 is p(s^a_t-1,
+s^r_t-1 | z_1:t-1), and relations are summed. Table 3 is in m/frame in columns B and C, per axis, and in cm/frame in
+column A. A group has the mean velocity vector of its members; the row of the table is that of this mean's length.
+
+Departures, all ours:
+- The speed table is learned from simulated people without errors; a row is a drift and a diffusion, so that it holds at
+  any frame rate. Table 3, of measured boxes at 25 frames/s, is the preset caviar-25fps.
+- Relations change by hazards per second; the paper does not say how. Each pair is a chain of two states, and groups are
+  connected components: this needs no labels, and gives the probability that two people walk together.
+- People have slots that are common to all particles. That a person exists is a probability in each particle, and not
+  drawn: particles with and without each of many newcomers would be few.
+- The sensor has missed people and false alarms. A person not measured in the last frame is measured with a smaller
+  probability, as people are hidden for a while.
+- Behind the pillars and walls of a known scene people are not measured, and neither die nor count as missed.
+- A detection that is probably nobody's starts a person, who has no weight until the next frame.
+- People who share no detection and do not walk together have weights of their own (factorised); particles are
+  resampled if they are worth few.
+- Groups are the consistent partition of the pairs' probabilities against `together`; ids by the identity rule.
+The preset `paper` switches off what has a parameter.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from sim.rng import rng
+from sim.truth.identity import Identities
+from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Plane, Tracks
+from tracking.image_scale import required
+from tracking.papers.relational import report, sensor, transition_kernels
+from tracking.papers.relational.config import ParticleConfig, RelationalConfig
+from tracking.papers.relational.occluders import hidden_share
+from tracking.papers.relational.particle_set import ParticleSet
+from tracking.papers.relational.slots import Slots
+
+MOTION, BIRTHS, RESAMPLING, RELATIONS, JOINING = range(5)
+"""Keys of the random streams. Relations have streams of their own, so that they change no other draw."""
+
+
+class Particle:
+    """The tracker `particle`: a joint particle filter of people who do not know of each other.
+
+    Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
+    the people; hidden (K,): probability that each person is behind a known pillar or wall; identities, the groups;
+    plane, "ground" or "image"; context; draws, the random streams; vanished: number of frames in which all weights were
+    0; effective: least effective number of particles of any person in the last measured frame. All but config exist
+    after `reset` only.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("points",)
+    config_class: ClassVar[type[ParticleConfig]] = ParticleConfig
+
+    def __init__(self, config: ParticleConfig | None = None) -> None:
+        self.config = config or self.config_class()
+
+    def reset(self, context: Context, seed: int) -> None:
+        """Forget everything and start a sequence. seed: of all random numbers.
+
+        Until the first detections `plane` is "image" with a scale but no camera, else "ground".
+        """
+        self.context = context
+        self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
+        self.identities = Identities()
+        self.draws = [rng(seed, "tracker", key) for key in range(JOINING + 1)]
+        self.plane: Plane = "image" if context.camera is None and context.px_per_m > 0 else "ground"
+        self.hidden = np.zeros(0)
+        self.vanished, self.effective = 0, float(self.config.particles)
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        """Return the people of the frame as Tracks; updates all particles.
+
+        `detections.pos` is used (x, y). None is a frame without information, which is forecast only; no detections are
+        a frame in which everybody is missed. Raises InputError if points are in the image and the context has no scale
+        above 0.
+        """
+        self._forecast()
+        if detections is not None:
+            self._measure(detections)
+        tracks = self._report(frame)
+        if detections is not None:
+            self.particles.resample(self.config.resample_share, self.config.resampling, self.draws[RESAMPLING])
+        return tracks
+
+    @property
+    def dt(self) -> float:
+        """Time between frames, s."""
+        return 1.0 / self.context.fps
+
+    @property
+    def unit(self) -> float:
+        """Length of a metre in the unit of the points: 1 on the ground, px per m in the image."""
+        return required(self.context.px_per_m) if self.plane == "image" else 1.0
+
+    def _forecast(self) -> None:
+        """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
+        p, c = self.particles, self.config
+        noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
+        transition_kernels.move(p.pos, p.vel, p.exist, p.labels(), noise, c.speed_table(self.dt), self.dt)
+        ground = self.plane == "ground"
+        self.hidden = hidden_share(p.pos, p.weights, self.context.camera if ground else None, self.context.scene)
+        if not c.certain_sensor:
+            p.exist *= np.exp(-self.dt * (1 - self.hidden) / c.survival_time)
+        self._relate()
+
+    def _relate(self) -> None:
+        """Draw new relations; people of `particle` have none."""
+
+    def _measure(self, detections: Detections) -> None:
+        """Weigh the particles by a frame's detections; remove people and start new ones.
+
+        Detections are taken in order of x, then y, so that their order has no effect.
+        """
+        self.plane = "image" if detections.plane == "image" else "ground"
+        order = np.lexsort(detections.pos[:, 1::-1].T)
+        points = np.ascontiguousarray(detections.pos[order, :2] / self.unit)
+        image_boxes = self.plane == "image" and detections.box is not None
+        sizes = detections.box[order, 2:] if image_boxes and detections.box is not None else None
+        said = sensor.weigh(self.particles, points, self._detection_probability(), self.config)
+        self.vanished += said.vanished
+        self.effective = float(self.particles.effective().min(initial=self.particles.count))
+        self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
+        self._remove()
+        for j in np.flatnonzero(said.nobody > self.config.birth_doubt).tolist():
+            self._start(points[j], np.full(2, np.nan) if sizes is None else sizes[j])
+
+    def _detection_probability(self) -> Array:
+        """Returns the probability (K,) that each person is measured if existing (ours).
+
+        A person who was missed in the last frame is measured again at the rate 1 / hidden_time. A person behind a known
+        pillar or wall is not measured, except by the paper's sensor.
+        """
+        c = self.config
+        again = c.detect_prob if c.certain_sensor else min(c.detect_prob, -np.expm1(-self.dt / c.hidden_time))
+        visible = 1.0 if c.certain_sensor else 1 - self.hidden
+        return np.asarray(np.where(self.slots.missed > 0, again, c.detect_prob) * visible)
+
+    def _remove(self) -> None:
+        """Remove people who are missed for longer than the time window (sec. 2.1.1) or exist with a low probability."""
+        c = self.config
+        keep = (self.particles.existence >= c.least_existence) & (self.slots.missed <= c.time_window + 1e-9)
+        if not keep.all():
+            self.particles.keep(keep)
+            self.slots.keep(keep)
+
+    def _start(self, point: Array, size: Array) -> None:
+        """Add a person at a detection (secs. 2.1.1, 3.2): point (2,) m; size (2,): of the box, px, nan without.
+
+        Place and velocity are normal about the detection and about 0. The existence is the share of new people among
+        new people and false alarms (ours).
+        """
+        p, c, draws = self.particles, self.config, self.draws[BIRTHS].standard_normal((2, self.particles.count, 2))
+        born = c.birth_rate * self.dt
+        related = self._relations_of_newcomer(point)
+        p.add(
+            point + c.point_noise * draws[0], c.speed_prior * draws[1], born / (born + c.clutter_density), related
+        )  # fmt: skip
+        self.slots.add(size)
+
+    def _relations_of_newcomer(self, point: Array) -> Bools:
+        """Returns the relations (P, K) bool of a new person at `point` (2,), m, to those who are there: none."""
+        return np.zeros(self.particles.exist.shape, bool)
+
+    def _report(self, frame: Frame) -> Tracks:
+        """Returns the Tracks of the frame: people who exist with at least `report_existence`, on the ground in m, in
+        the image in px."""
+        pos, vel, cov, exist = report.estimates(self.particles)
+        rows = exist >= self.config.report_existence
+        self.slots.name(rows)
+        pos, vel, cov, score, id = pos[rows], vel[rows], cov[rows], np.minimum(exist[rows], 1.0), self.slots.id[rows]
+        if self.plane == "image":
+            pos, vel, cov = pos * self.unit, vel * self.unit, cov * self.unit**2
+        box = report.boxes(pos, self.slots.size[rows]) if self.plane == "image" else None
+        group, groups = self._groups(frame.index, id, np.flatnonzero(rows))
+        return Tracks(frame.index, frame.t, self.plane, "person", id, group, pos, vel, cov, box, score, groups)
+
+    def _groups(self, frame: int, id: Ints, rows: Ints) -> tuple[Ints, Groups | None]:
+        """Returns the group (N,) of each reported person, and Groups or None; `particle` reports none."""
+        return np.full(len(id), -1), None
+
+
+class Relational(Particle):
+    """The tracker `relational`: the particle filter of `particle` with the relation "walking together" in it.
+
+    together (K, K): probability that each pair walks together, in the last frame, by slots; 1 on the diagonal. The rest
+    of the state is that of Particle.
+    """
+
+    config_class: ClassVar[type[ParticleConfig]] = RelationalConfig
+    config: RelationalConfig
+
+    @property
+    def _rules(self) -> Array:
+        """The parameters of relations (4,) as transition_kernels has them: RATE, BIAS, DISTANCE, VELOCITY."""
+        c = self.config
+        new = -np.expm1(-c.relation_rate * self.dt)
+        return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
+
+    def _relate(self) -> None:
+        p = self.particles
+        if p.people > 1:
+            pairs = transition_kernels.near_pairs(p.pos, np.asarray(p.related.any(axis=0)), self._rules)
+            uniforms = self.draws[RELATIONS].random((p.count, len(pairs)))
+            transition_kernels.relate(p.pos, p.vel, p.related, pairs, uniforms, self._rules)
+
+    def _relations_of_newcomer(self, point: Array) -> Bools:
+        """Returns the relations (P, K) bool of a new person at `point` (2,), m: to all members of the group joined."""
+        p, label = self.particles, self.particles.labels()
+        uniforms = self.draws[JOINING].random(p.count)
+        group = transition_kernels.join(
+            p.pos, p.exist, label, point, self.config.newcomer_share, uniforms, self._rules
+        )  # fmt: skip
+        return np.asarray(label == group[:, None])
+
+    def _groups(self, frame: int, id: Ints, rows: Ints) -> tuple[Ints, Groups | None]:
+        """Returns the group (N,) of each reported person, -1 for alone, and empty Groups if there is none."""
+        p = self.particles
+        self.together = transition_kernels.pairs_together(p.labels(), p.exist, p.weights, p.cluster)
+        c, before = self.config, report.known_groups(self.identities, id)
+        found = report.groups_of_pairs(self.together[np.ix_(rows, rows)], before, c.together, c.inertia)
+        group = report.group_ids(self.identities, frame, id, found)
+        return group, report.no_groups(group)

@@ -1,0 +1,230 @@
+"""Kernels of `relational`: motion given relations (sec. 3.2), relations given motion, and what pairs have in common.
+
+Arrays are over P particles and K people. related (P, K, K) bool, symmetric, is the relation "walking together" of each
+pair; the groups of a particle are the connected components of its related pairs. The columns of the speed table are
+named here.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sim.compiler import njit
+from sim.types import Array, Bools, Ints
+
+SPEED, DRIFT, SPREAD = range(3)
+"""Columns of a speed table (5, 3): upper end of a row's speeds, mean loss of speed in a step and standard deviation of
+the velocity after it, per axis; all in m/s."""
+RATE, BIAS, DISTANCE, VELOCITY = range(4)
+"""Slots of `rules` (4,): weight that the old relation loses in a step, 1 - exp(-rate dt); log odds of walking together
+at the same place, their loss per m of distance and per m/s of velocity difference."""
+
+
+NEGLIGIBLE = 1e-4
+"""Pairs whose belonging is below this in every particle do not start to walk together."""
+
+
+@njit(cache=True)
+def group_labels(related: Bools, label: Ints) -> None:
+    """Write the group of each person in each particle, (P, K): the least number of a person in it.
+
+    related (P, K, K): which pairs are related, of each particle. Groups are connected components; a person alone has
+    the own number.
+    """
+    particles, n, _ = related.shape
+    waiting = np.empty(n, np.int64)
+    for p in range(particles):
+        label[p] = -1
+        for start in range(n):
+            if label[p, start] >= 0:
+                continue
+            label[p, start] = start
+            waiting[0], count, head = start, 1, 0
+            while head < count:
+                i = waiting[head]
+                head += 1
+                for j in range(start + 1, n):
+                    if label[p, j] < 0 and related[p, i, j]:
+                        label[p, j] = start
+                        waiting[count] = j
+                        count += 1
+
+
+@njit(cache=True)
+def move(pos: Array, vel: Array, exist: Array, label: Ints, noise: Array, table: Array, dt: float) -> None:  # fmt: skip
+    """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
+
+    pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; label (P, K): the groups of old
+    relations; noise (P, K, 2): standard normals; table (5, 3): the speed table of the step.
+
+    v_i = u - B u / |u| + C noise, with u the mean velocity of the person's group, and B, C of the table's row for |u|
+    (Table 3). x_i = x_i + v_i dt. The mean weights people by their existence (ours); u of a person alone is the own
+    velocity.
+    """
+    particles, n, _ = pos.shape
+    sum_x, sum_y, weight, size = np.empty(n), np.empty(n), np.empty(n), np.empty(n, np.int64)
+    for p in range(particles):
+        sum_x[:], sum_y[:], weight[:], size[:] = 0.0, 0.0, 0.0, 0
+        for i in range(n):
+            g = label[p, i]
+            sum_x[g] += exist[p, i] * vel[p, i, 0]
+            sum_y[g] += exist[p, i] * vel[p, i, 1]
+            weight[g] += exist[p, i]
+            size[g] += 1
+        for i in range(n):
+            g = label[p, i]
+            x, y = vel[p, i, 0], vel[p, i, 1]
+            if size[g] > 1 and weight[g] > 0:
+                x, y = sum_x[g] / weight[g], sum_y[g] / weight[g]
+            speed = math.sqrt(x * x + y * y)
+            row = 0
+            while speed > table[row, SPEED]:
+                row += 1
+            keep = 1.0 - table[row, DRIFT] / speed if speed > 0 else 1.0
+            vel[p, i, 0] = x * keep + table[row, SPREAD] * noise[p, i, 0]
+            vel[p, i, 1] = y * keep + table[row, SPREAD] * noise[p, i, 1]
+            pos[p, i, 0] += dt * vel[p, i, 0]
+            pos[p, i, 1] += dt * vel[p, i, 1]
+
+
+@njit(cache=True)
+def belonging(distance: float, difference: float, rules: Array) -> float:
+    """Return the equilibrium probability that two people walk together (ours).
+
+    distance: between them, m; difference: of their velocities, m/s; rules (4,).
+    """
+    return 1.0 / (1.0 + math.exp(rules[DISTANCE] * distance + rules[VELOCITY] * difference - rules[BIAS]))
+
+
+@njit(cache=True)
+def near_pairs(pos: Array, related: Bools, rules: Array) -> Ints:
+    """Return the pairs i < j (N, 2) whose relation may change, in order.
+
+    pos (P, K, 2), m; related (K, K): pairs that walk together in any particle; rules (4,). Pairs that do not, and whose
+    boxes round all particles are so far apart that their belonging is below NEGLIGIBLE, are left out (ours).
+    """
+    particles, n, _ = pos.shape
+    box, found, count = np.empty((n, 4)), np.empty((n * (n - 1) // 2, 2), np.int64), 0
+    for i in range(n):
+        box[i, 0], box[i, 1], box[i, 2], box[i, 3] = np.inf, -np.inf, np.inf, -np.inf
+        for p in range(particles):
+            x, y = pos[p, i, 0], pos[p, i, 1]
+            box[i, 0], box[i, 1] = min(box[i, 0], x), max(box[i, 1], x)
+            box[i, 2], box[i, 3] = min(box[i, 2], y), max(box[i, 3], y)
+    for i in range(n):
+        for j in range(i + 1, n):
+            dx = max(box[i, 0] - box[j, 1], box[j, 0] - box[i, 1], 0.0)
+            dy = max(box[i, 2] - box[j, 3], box[j, 2] - box[i, 3], 0.0)
+            if related[i, j] or belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= NEGLIGIBLE:
+                found[count, 0], found[count, 1] = i, j
+                count += 1
+    return found[:count]
+
+
+@njit(cache=True)
+def relate(pos: Array, vel: Array, related: Bools, pairs: Ints, uniforms: Array, rules: Array) -> None:
+    """Draw new relations of pairs: p(s^r_t | s^a_t, s^r_t-1), eq. 7; related (P, K, K) is changed.
+
+    pos (P, K, 2), m, and vel (P, K, 2), m/s: new places and velocities. pairs (N, 2): people i < j; uniforms (P, N) in
+    [0, 1). rules (4,). The paper leaves this distribution open. Ours: each pair is a chain of two states that starts
+    and stops with the hazards rate g and rate (1 - g), g its `belonging`. So a relation is on after dt with the
+    probability g + (on before - g) exp(-rate dt).
+    """
+    change = rules[RATE]
+    for p in range(len(pos)):
+        for k in range(len(pairs)):
+            i, j = pairs[k]
+            u, before = uniforms[p, k], related[p, i, j]
+            if u < 1.0 - change if before else u >= change:
+                continue  # whatever the belonging is
+            dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
+            du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
+            g = belonging(math.sqrt(dx * dx + dy * dy), math.sqrt(du * du + dv * dv), rules)
+            on = u < (1.0 - (1.0 - g) * change if before else g * change)
+            related[p, i, j] = related[p, j, i] = on
+
+
+@njit(cache=True)
+def join(pos: Array, exist: Array, label: Ints, place: Array, share: float, uniforms: Array, rules: Array) -> Ints:
+    """Return the group (P,) that a new person at `place` (2,), m, joins in each particle, -1 for alone (sec. 3.2).
+
+    pos (P, K, 2), m; exist (P, K); label (P, K): groups; uniforms (P,) in [0, 1); rules (4,). With the probability
+    `share` (the paper: 1/2) the person joins a group, people alone being groups of one; which one is drawn in
+    proportion to the belonging at the distance of the group's nearest member, at equal velocities (ours). Where these
+    sum to less than 1, the person is alone with what is missing.
+    """
+    particles, n, _ = pos.shape
+    chosen, near = np.full(particles, -1), np.empty(n)
+    for p in range(particles):
+        near[:] = 0.0
+        for i in range(n):
+            dx, dy = pos[p, i, 0] - place[0], pos[p, i, 1] - place[1]
+            g = exist[p, i] * belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
+            near[label[p, i]] = max(near[label[p, i]], g)
+        left = uniforms[p] * max(near.sum(), 1.0)
+        for g in range(n):
+            left -= share * near[g]
+            if left < 0:
+                chosen[p] = g
+                break
+    return chosen
+
+
+@njit(cache=True)
+def pairs_together(label: Ints, exist: Array, weights: Array, cluster: Ints) -> Array:
+    """Return the probability (K, K) that i and j are in one group, given that both exist; 1 on the diagonal.
+
+    label (P, K): groups; exist (P, K): probabilities of existence; weights (P, K): of the particles; cluster (K,):
+    people with equal numbers have one weight, others the product of theirs. 0 for a pair that does not exist.
+    """
+    particles, n = label.shape
+    both, same = np.zeros((n, n)), np.zeros((n, n))
+    for p in range(particles):
+        for i in range(n):
+            for j in range(i):
+                w = weights[p, i] * exist[p, i] * exist[p, j]
+                if cluster[i] != cluster[j]:
+                    w *= weights[p, j]
+                both[i, j] += w
+                if label[p, i] == label[p, j]:
+                    same[i, j] += w
+    out = np.eye(n)
+    for i in range(n):
+        for j in range(i):
+            if both[i, j] > 0:
+                out[i, j] = out[j, i] = same[i, j] / both[i, j]
+    return out
+
+
+@njit(cache=True)
+def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, cov: Array, total: Array) -> None:
+    """Write mean (K, 4) and covariance (K, 4, 4) of each person's x, y, vx, vy, and the probability of existence (K,).
+
+    Particles count by weight times existence, or by weight alone for a person who exists in none. pos, vel (P, K, 2), m
+    and m/s; exist (P, K); weights (P, K), sum 1 for each person.
+    """
+    particles, n = exist.shape
+    state = np.empty(4)
+    for k in range(n):
+        for p in range(particles):
+            total[k] += weights[p, k] * exist[p, k]
+        alone = total[k] <= 0.0
+        whole = 1.0 if alone else total[k]
+        for p in range(particles):
+            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
+            mean[k, 0] += w * pos[p, k, 0]
+            mean[k, 1] += w * pos[p, k, 1]
+            mean[k, 2] += w * vel[p, k, 0]
+            mean[k, 3] += w * vel[p, k, 1]
+        for p in range(particles):
+            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
+            for d in range(2):
+                state[d], state[d + 2] = pos[p, k, d] - mean[k, d], vel[p, k, d] - mean[k, d + 2]
+            for a in range(4):
+                for b in range(a + 1):
+                    cov[k, a, b] += w * state[a] * state[b]
+        for a in range(4):
+            for b in range(a):
+                cov[k, b, a] = cov[k, a, b]
