@@ -50,10 +50,12 @@ def run_info(
     px_per_m_frames (number of first frames whose boxes gave the scale, 0 for none); background (text on the sample,
     None without); causal (True if there is a frame from which on no later frame is used); causal_from (the first such
     frame, from 1, or None); frames (number); frames_per_second (the tracker's steps alone);
-    whole_frames_per_second (with reading); versions (of packages, by name).
+    whole_frames_per_second (with reading); versions (of packages, by name); diagnostics (what the tracker tells of
+    itself after the last frame, its attribute of this name; lacking if it has none).
     """
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
+    diagnostics = getattr(prepared.tracker, "diagnostics", None)
     return {
         "tracker": prepared.name,
         "config": prepared.config.as_dict() if prepared.config else {},
@@ -64,6 +66,7 @@ def run_info(
         **_facts(prepared.sequence, tracks, scale, begins),
         "frames_per_second": speed.tracker,
         "whole_frames_per_second": speed.whole,
+        **({} if diagnostics is None else {"diagnostics": diagnostics}),
     }
 
 

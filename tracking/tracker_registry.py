@@ -26,6 +26,7 @@ REGISTRY = {
     "group-pda": "tracking.papers.group_pda.tracker:GroupPda",
     "relational": "tracking.papers.relational.tracker:Relational",
     "particle": "tracking.papers.relational.tracker:Particle",
+    "joint": "tracking.papers.joint.tracker:Joint",
 }
 NEEDS = ("pixels", "stereo", "boxes", "points")
 

@@ -44,6 +44,19 @@ def systematic_resample(weights: Array, uniform: float) -> Ints:
     return np.searchsorted(_cumulative(weights), (np.arange(count) + uniform) / count, side="right")
 
 
+def systematic_resample_rows(weights: Array, uniforms: Array) -> Ints:
+    """Return the indices (R, P) that replace the old particles of R sets, ascending in each row: systematic sampling.
+
+    weights (R, P): sum 1 in each row. uniforms (R,) in [0, 1), one for each set.
+    """
+    rows, count = weights.shape
+    total = np.cumsum(weights, axis=1)
+    total /= total[:, -1:]
+    reached = np.ceil(count * total - uniforms[:, None]).astype(np.int64)
+    copies = np.diff(reached, axis=1, prepend=0)
+    return np.repeat(np.tile(np.arange(count), rows), copies.ravel()).reshape(rows, count)
+
+
 def _cumulative(weights: Array) -> Array:
     """Returns the cumulated weights (P,), divided by their sum; inf from the last particle with a weight on."""
     total = np.cumsum(weights)

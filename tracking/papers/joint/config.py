@@ -1,0 +1,162 @@
+"""The parameters of `joint`. Lengths are metres; in the image positions are divided by px per m.
+
+The weights of the event classifier are the file event_classifier.toml of this folder, which `flockscope fit joint`
+writes; it names the command, the seeds and the scores of the fit.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from sim.types import Array
+from tracking.config import Config, param
+from tracking.papers.joint import group_events_kernels as events
+
+FITTED: dict[str, float] = tomllib.loads(
+    Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8")
+)["params"]
+SIZE_PRIORS = {"none": events.SIZE_NONE, "merge": events.SIZE_MERGE, "all": events.SIZE_ALL}
+TERMS = ("distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "bias")
+"""Terms of the event classifier, in the order of the features of group_events_kernels."""
+
+
+def _weight(event: str, term: str, unit: str, meaning: str) -> Any:
+    return param(FITTED[f"{event}_{term}"], (-100.0, 100.0), unit, f"{event}: {meaning}", tunable=False)
+
+
+@dataclass(frozen=True)
+class JointConfig(Config):
+    """The parameters of the tracker `joint`; each field states default, range and unit.
+
+    They are the numbers of particles, the variant of the paper, the individuals' proposal and dynamics, the cluster
+    validity, the events, births and losses, and the estimate.
+    """
+
+    tracker: ClassVar[str] = "joint"
+
+    particles: int = param(50, (1, 500), "particles", "N_x, particles of individuals", "int", online=False, tunable=False)
+    partitions: int = param(
+        50, (1, 500), "particles", "N_z, partitions under each particle", "int", online=False, tunable=False
+    )
+    variant: str = param(
+        "full",
+        ("full", "VAR1", "VAR1-standstill", "VAR2", "VAR3"),
+        "",
+        "full: the whole model; VAR1: groups do not move individuals; VAR1-standstill: the same, read literally; VAR2: "
+        "VAR1, and partitions are drawn uniformly; VAR3: VAR2, and partitions have no validity",
+        "categorical",
+        tunable=False,
+    )
+    individuals: str = param(
+        "filtered",
+        ("filtered", "measured"),
+        "",
+        "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)",
+        "categorical",
+        tunable=False,
+    )
+    weights: str = param(
+        "people",
+        ("people", "joint"),
+        "",
+        "people: each person is resampled by the own part of the weight, then the particles by the rest (ours); joint: "
+        "a particle has one weight (the paper)",
+        "categorical",
+    )
+
+    proposal: str = param(
+        "informed",
+        ("informed", "detection"),
+        "",
+        "second part of the individuals' proposal; informed: p(x' | x, y) (ours); detection: normal about the detection",
+        "categorical",
+    )
+    alpha: float = param(0.1, (0.0, 1.0), "share", "of the dynamics in the individuals' proposal")
+    place_noise: float = param(0.15, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma (ours)", "log")
+    velocity_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma (ours)", "log")
+    point_noise: float = param(
+        0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis (ours)", "log"
+    )
+
+    validity_rate: float = param(
+        20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"
+    )
+    normaliser: str = param(
+        "energy",
+        ("energy", "sampled"),
+        "",
+        "energy: eq. 4 as printed; sampled: p(Z | X) sums to 1 over the partitions of a particle (ours)",
+        "categorical",
+    )
+    scatter: float = param(0.5, (0.05, 2.0), "m", "s_0: prior scatter of a cluster (ours)", "log")
+    scatter_people: float = param(1.0, (0.0, 5.0), "people", "nu: people that the prior scatter counts for (ours)")
+    apart: float = param(2.0, (0.5, 10.0), "m", "D_0: distance of a virtual other cluster (ours)", "log")
+    velocity_time: float = param(
+        1.0, (0.0, 5.0), "s", "m per m/s: weight of velocities beside places in the validity (ours)"
+    )
+
+    lag: float = param(0.4, (0.05, 3.0), "s", "between the two times of the features of events (ours)", online=False)
+    event_rate: float = param(1.0, (0.05, 20.0), "", "factor of the rate of merges and splits (ours)", "log")
+    parts_sharpness: float = param(
+        8.0, (0.0, 50.0), "", "weight of the validity when the parts of a split are drawn (ours)"
+    )
+    size_prior: str = param(
+        "merge",
+        ("merge", "all", "none"),
+        "",
+        "events on which the prior over group sizes acts; all: the paper, merge and none: ours",
+        "categorical",
+    )
+    size_mean: float = param(1.0, (0.0, 20.0), "people", "mu of the prior over group sizes")
+    size_std: float = param(5.0, (0.5, 50.0), "people", "sigma of the prior over group sizes", "log")
+
+    estimate: str = param(
+        "binder",
+        ("binder", "histogram"),
+        "",
+        "binder: the partition of least expected Binder loss (ours); histogram: Fig. 3",
+        "categorical",
+    )
+    inertia: float = param(
+        0.1, (0.0, 0.45), "probability", "beyond 1/2 that a pair needs to join or leave a group (ours)"
+    )
+
+    speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity (ours)", "log")
+    gate: float = param(0.999, (0.9, 0.99999), "probability", "that a detection of a person is in the gate (ours)")
+    confirm_time: float = param(0.3, (0.0, 3.0), "s", "for which a new person must be seen to be tracked (ours)")
+    coast_time: float = param(1.0, (0.1, 10.0), "s", "a person who is missed for longer is removed (ours)", "log")
+
+    merge_distance_early: float = _weight("merge", "distance_early", "", "weight of log(1 + d_KL), earlier time")
+    merge_velocity_early: float = _weight("merge", "velocity_early", "s/m", "weight of d_v, earlier time")
+    merge_spread_early: float = _weight("merge", "spread_early", "1/m", "weight of d_intra, earlier time")
+    merge_distance_late: float = _weight("merge", "distance_late", "", "weight of log(1 + d_KL), later time")
+    merge_velocity_late: float = _weight("merge", "velocity_late", "s/m", "weight of d_v, later time")
+    merge_spread_late: float = _weight("merge", "spread_late", "1/m", "weight of d_intra, later time")
+    merge_bias: float = _weight("merge", "bias", "", "constant")
+    split_distance_early: float = _weight("split", "distance_early", "", "weight of log(1 + d_KL), earlier time")
+    split_velocity_early: float = _weight("split", "velocity_early", "s/m", "weight of d_v, earlier time")
+    split_spread_early: float = _weight("split", "spread_early", "1/m", "weight of d_intra, earlier time")
+    split_distance_late: float = _weight("split", "distance_late", "", "weight of log(1 + d_KL), later time")
+    split_velocity_late: float = _weight("split", "velocity_late", "s/m", "weight of d_v, later time")
+    split_spread_late: float = _weight("split", "spread_late", "1/m", "weight of d_intra, later time")
+    split_bias: float = _weight("split", "bias", "", "constant")
+
+    @property
+    def classifier(self) -> Array:
+        """The weights (2, 7) of Merge and Split: of the six features, then the constant."""
+        return np.array([[getattr(self, f"{event}_{term}") for term in TERMS] for event in ("merge", "split")])
+
+    @property
+    def scales(self) -> Array:
+        """The scales (3,) of the validity, as partition_kernels has them: s_0, nu, D_0."""
+        return np.array([self.scatter, self.scatter_people, self.apart])
+
+    def rules(self, dt: float, lag: float) -> Array:
+        """Return the rules (6,) of events in a step of dt s, as group_events_kernels has them; lag: s."""
+        size = SIZE_PRIORS[self.size_prior]
+        return np.array([dt / lag, self.parts_sharpness, self.event_rate, size, self.size_mean, self.size_std])

@@ -1,0 +1,114 @@
+"""Algorithm 1: the decentralised particle filter of a state (X, Z), for any four distributions.
+
+N_x particles of X, and under each of them N_z particles of Z. A frame runs steps 4 to 7 and then 1 to 3, as the proposal
+of X uses the new frame. p_{N_z} are sums over the nested particles:
+
+    p_{N_z}(y | X)  = 1/N_z sum_j p(y | X, Z_j)
+    p_{N_z}(X' | X) = sum_j qbar_j p(X' | X, Z_j),   which is the normaliser of step 5
+
+X consists of K components (people). What a component alone adds to the weight of step 1 is kept apart, so that
+components can be resampled one by one (ours).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from sim.types import Array, Ints
+from tracking.filters.particles import effective_number, systematic_resample_rows
+
+
+class Model(Protocol):
+    """The four distributions of Table 1. p_0 is any reference dynamics of the components.
+
+    individuals: step 4. Returns X' (N_x, K, D) drawn from pi(X' | X, y), and (N_x, K): log of p(y | x'_k) p_0(x'_k |
+    x_k) / pi(x'_k | x_k, y). dynamics: log of p(X' | X, Z) / p_0(X' | X), (N_x, N_z). groups: step 7. Returns Z' drawn
+    from pi(Z' | X', X, Z, y), (N_x, N_z, ...). energy: log of p(Z' | X'), (N_x, N_z), the part of p(y | X', Z') (eq. 4)
+    that depends on Z'.
+    """
+
+    def individuals(self, x: Array) -> tuple[Array, Array]: ...
+    def dynamics(self, new: Array, x: Array, z: Ints) -> Array: ...
+    def groups(self, new: Array, x: Array, z: Ints) -> Ints: ...
+    def energy(self, new: Array, z: Ints) -> Array: ...
+
+
+@dataclass
+class Nested:
+    """The particles after steps 1 and 3 of a frame, before step 2.
+
+    x (N_x, K, D): X. z (N_x, N_z, ...): Z. log_q (N_x, N_z): log of qbar (step 3), normalised over j. log_w (N_x, K):
+    what the components add to log w (step 1). log_rest (N_x,): what X as a whole adds.
+    """
+
+    x: Array
+    z: Ints
+    log_q: Array
+    log_w: Array
+    log_rest: Array
+
+    def weights(self) -> Array:
+        """Return the weights w of step 1, (N_x,), sum 1."""
+        return normalised(self.log_w.sum(axis=1) + self.log_rest)
+
+    def rest_weights(self) -> Array:
+        """Return the weights of what X as a whole adds, (N_x,), sum 1."""
+        return normalised(self.log_rest)
+
+    def component_weights(self) -> Array:
+        """Return the weights of each component alone, (N_x, K), sum 1 for each component."""
+        return normalised(self.log_w.T).T
+
+
+def advance(old: Nested, model: Model, uniforms: Array) -> Nested:
+    """Return the particles of the next frame: steps 4 to 7, then 1 and 3. `old` is as after step 2.
+
+    uniforms (N_x,): of step 6.
+    """
+    new, log_w = model.individuals(old.x)  # step 4
+    log_q = old.log_q + model.dynamics(new, old.x, old.z)  # step 5
+    log_dynamics = log_sum(log_q)  # p_{N_z}(X' | X) / p_0(X' | X)
+    chosen = systematic_resample_rows(np.exp(log_q - log_dynamics[:, None]), uniforms)  # step 6
+    z = old.z[np.arange(len(chosen))[:, None], chosen]
+    z = model.groups(new, old.x, z)  # step 7
+    log_y = model.energy(new, z)
+    log_group = log_sum(log_y)
+    log_rest = log_dynamics + log_group - np.log(log_y.shape[1])  # step 1
+    return Nested(new, z, log_y - log_group[:, None], log_w, log_rest)  # step 3
+
+
+def joint_indices(nested: Nested, uniform: float) -> Ints:
+    """Return the indices (N_x,) of step 2 by the weights of step 1."""
+    return systematic_resample_rows(nested.weights()[None], np.array([uniform]))[0]
+
+
+def component_indices(nested: Nested, uniforms: Array) -> tuple[Ints, Ints]:
+    """Return the indices of step 2 in two stages (ours): (N_x, K) of each component alone, then (N_x,) of the rest.
+
+    uniforms (K + 1,).
+    """
+    single = systematic_resample_rows(nested.component_weights().T, uniforms[:-1]).T
+    rest = systematic_resample_rows(nested.rest_weights()[None], uniforms[-1:])[0]
+    return single, rest
+
+
+def effective_share(weights: Array) -> float:
+    """Return the effective number of particles as a share of them; weights (N,), sum 1."""
+    return effective_number(weights) / len(weights)
+
+
+def log_sum(values: Array) -> Array:
+    """Return log(sum(exp(values))) over the last axis; -inf where all are."""
+    top = values.max(axis=-1, keepdims=True)
+    top = np.where(np.isfinite(top), top, 0.0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.exp(values - top).sum(axis=-1)) + top[..., 0])
+
+
+def normalised(log_weights: Array) -> Array:
+    """Return weights that sum to 1 over the last axis."""
+    weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))
+    return np.asarray(weights / weights.sum(axis=-1, keepdims=True))

@@ -1,0 +1,128 @@
+"""The four distributions of Table 1 for a frame: individuals, dynamics, group proposal, observation (sec. 4)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from sim.types import Array, Ints
+from tracking.papers.joint import group_events_kernels, partition_kernels
+from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.decentralised_filter import log_sum
+from tracking.papers.joint.individuals import Proposal, precision_of, process_noise
+from tracking.papers.joint.individuals_kernels import group_dynamics, own_dynamics
+
+STATE = 4
+"""Columns of a state: x, y, m, and vx, vy, m/s."""
+
+
+@dataclass(frozen=True)
+class FrameModel:
+    """The distributions of a frame; a Model of decentralised_filter.
+
+    X is (N_x, K, 4 L): the states of the last L frames, the newest first, L frames being the lag. Z is (N_x, N_z, K),
+    labels as partition_kernels has them.
+
+    config; dt: s; z (K, 2): measured places, m, nan for a person who was not measured; motion, choices, events: the
+    random streams of step 4 (normals and uniforms) and of step 7.
+    """
+
+    config: JointConfig
+    dt: float
+    z: Array
+    motion: np.random.Generator
+    choices: np.random.Generator
+    events: np.random.Generator
+
+    @property
+    def sigma(self) -> Array:
+        """Sigma of one axis, (3,)."""
+        return process_noise(self.config.place_noise, self.config.velocity_noise, self.dt)
+
+    def individuals(self, x: Array) -> tuple[Array, Array]:
+        """Step 4: pi(X_{t+1} | X_{0:t}, y)."""
+        c, old = self.config, _states(x)
+        shape = old.shape[:2]
+        normals, uniforms = self.motion.standard_normal((*shape, STATE)), self.choices.random(shape)
+        proposal = Proposal(self.sigma, c.point_noise, self.dt, c.alpha, c.proposal == "informed")
+        new, log_w = proposal.draw(old, self.z, normals, uniforms)
+        if c.individuals == "measured":
+            new, log_w = self._known(x, old), np.zeros(shape)
+        return np.concatenate([new, x[..., :-STATE]], axis=-1), log_w
+
+    def _known(self, x: Array, old: Array) -> Array:
+        """Returns the states (N_x, K, 4) of DEEPER-JIGT.2: places as measured, velocities over the lag."""
+        seen = np.isfinite(self.z[:, 0])[:, None]
+        place = np.where(seen, self.z, old[..., :2] + self.dt * old[..., 2:])
+        frames = x.shape[-1] // STATE
+        velocity = (place - x[..., -STATE : -STATE + 2]) / (frames * self.dt)
+        return np.concatenate([place, np.where(seen, velocity, old[..., 2:])], axis=-1)
+
+    def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
+        """log p(X_{t+1} | X_t, Z_t) / p_0, with eq. 3 as p_0: eq. 5, and 0 where groups do not move individuals."""
+        variant = self.config.variant
+        out = np.zeros(z.shape[:2])
+        if variant in ("VAR1", "VAR2", "VAR3"):
+            return out
+        late, early = _states(new), _states(x)
+        precision, scale = precision_of(self.sigma)
+        own = np.empty(late.shape[:2])
+        own_dynamics(late, early, precision, scale, self.dt, own)
+        if variant == "VAR1-standstill":
+            still = np.empty(late.shape[:2])
+            own_dynamics(late, early, precision, scale, 0.0, still)
+            return out + (still - own).sum(axis=1)[:, None]
+        group_dynamics(late, early, z, precision, scale, self.dt, out)
+        return np.asarray(out - own.sum(axis=1)[:, None])
+
+    def groups(self, new: Array, x: Array, z: Ints) -> Ints:
+        """Step 7: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7; uniform over all partitions in VAR2 and VAR3."""
+        c, shape = self.config, z.shape
+        out = z.copy()
+        if c.variant in ("VAR2", "VAR3"):
+            partition_kernels.uniform_partitions(
+                stam_cumulated(shape[2]), self.events.random((*shape[:2], shape[2] + 1)), out
+            )  # fmt: skip
+            return out
+        late, early = _states(new), np.ascontiguousarray(x[..., -STATE:])
+        uniforms = self.events.random((*shape, 3))
+        lag = x.shape[-1] // STATE * self.dt
+        group_events_kernels.propose(
+            early, late, self._points(late), out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
+        )  # fmt: skip
+        return out
+
+    def energy(self, new: Array, z: Ints) -> Array:
+        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), with lambda_cl per second; 0 in VAR3."""
+        c = self.config
+        out = np.zeros(z.shape[:2])
+        if c.variant == "VAR3":
+            return out
+        partition_kernels.validities(self._points(_states(new)), z, c.scales, out)
+        out *= -c.validity_rate * self.dt
+        if c.normaliser == "sampled":
+            out -= log_sum(out)[:, None] - math.log(out.shape[1])
+        return out
+
+    def _points(self, state: Array) -> Array:
+        """Returns states (N_x, K, 4) as the validity sees them: places, and velocities as lengths, m."""
+        points = state.copy()
+        points[..., 2:] *= self.config.velocity_time
+        return points
+
+
+def _states(x: Array) -> Array:
+    """Returns the newest states of X, (N_x, K, 4)."""
+    return np.ascontiguousarray(x[..., :STATE])
+
+
+@cache
+def stam_cumulated(people: int) -> Array:
+    """Return the cumulated probabilities of m = 1, 2, ... boxes in Stam's sampler of partitions: m^K / m!, sum 1."""
+    m = np.arange(1, 4 * people + 40)
+    log_p = people * np.log(m) - np.array([math.lgamma(k + 1) for k in m.tolist()])
+    p = np.exp(log_p - log_p.max())
+    return np.asarray(np.cumsum(p) / p.sum())

@@ -1,0 +1,53 @@
+"""The state estimate (sec. 4): means of the individuals, and one partition for all particles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Ints
+from tracking.papers.joint import partition_kernels
+
+
+def moments(state: Array, weights: Array) -> tuple[Array, Array]:
+    """Return means (K, 4) and covariances (K, 4, 4) of states (N_x, K, 4); weights (N_x, K): sum 1 for each person."""
+    mean = np.einsum("ik,ikd->kd", weights, state)
+    away = state - mean
+    return mean, np.einsum("ik,ikd,ike->kde", weights, away, away)
+
+
+def binder_partition(together: Array, label: Ints, before: Ints, inertia: float) -> list[Ints]:
+    """Return the groups of two or more people, as arrays of rows: the partition of least expected Binder loss (ours).
+
+    together (K, K): co-membership C, the probability that each pair is in one group; label (N_x, N_z, K): the sampled
+    partitions; before (K,): group of each person in the last frame, -1 for alone. The loss is the sum over pairs of |1(k
+    ~ l) - C_kl|; a pair that was together counts as `inertia` more probable, any other as less. The search starts from
+    the best sampled partition and from the last frame's, and moves one person after the other.
+    """
+    people = len(together)
+    same = (before[:, None] >= 0) & (before[:, None] == before)
+    gain = together - 0.5 + np.where(same, inertia, -inertia)
+    sampled = np.empty(people, np.int64)
+    partition_kernels.best_sampled(gain, label, sampled)
+    starts = [sampled, _numbered(before)]
+    gains = [partition_kernels.binder_moves(gain, start) for start in starts]
+    return groups_of(starts[int(np.argmax(gains))])
+
+
+def histogram_partition(label: Ints, weights: Array) -> list[Ints]:
+    """Return the groups of two or more people by the histogram of Fig. 3: each person has the label of most weight."""
+    votes = np.empty((label.shape[2], label.shape[2]))
+    partition_kernels.head_votes(label, weights, votes)
+    return groups_of(votes.argmax(axis=1))
+
+
+def groups_of(label: Ints) -> list[Ints]:
+    """Return the rows of each label (K,) that two or more people carry."""
+    found = (np.flatnonzero(label == g) for g in np.unique(label))
+    return [rows for rows in found if len(rows) > 1]
+
+
+def _numbered(group: Ints) -> Ints:
+    """Returns groups (K,), -1 for alone, as clusters numbered from 1, people alone included."""
+    alone = group < 0
+    named = np.where(alone, group.max(initial=0) + 1 + np.arange(len(group)), group)
+    return np.asarray(np.unique(named, return_inverse=True)[1] + 1)

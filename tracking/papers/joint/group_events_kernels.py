@@ -1,0 +1,283 @@
+"""Kernels of the joint group proposal (eqs 6, 7): features of a group and its nearest one, events, and what they do.
+
+States are (K, 4): x, y in m, vx, vy in m/s. The features of a group g and its nearest group g' are (d_KL, d_v, d_intra)
+at two times, a lag apart, both with the members of Z_t, and g' the nearest at the earlier time. People alone are groups
+of one (ours).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sim.compiler import njit
+from sim.types import Array, Ints
+from tracking.papers.joint.partition_kernels import canonical, clusters, same_row, validity_of
+
+SIZE, X, Y, VX, VY, XX, XY, YY, SPREAD = range(9)
+"""Columns of moments (G, 9): number of people, mean place and velocity, covariance of the places shrunk to PRIOR, mean
+squared distance to the mean place."""
+PRIOR, PRIOR_WEIGHT = 0.35, 1.0
+"""Standard deviation per axis, m, to which covariances of places are shrunk, and the people that it counts for."""
+LOG_KL_MOST = 8.0
+"""Largest log(1 + d_KL); also its value without another group."""
+FEATURES = 6
+"""d_KL, d_v, d_intra at the earlier time, then at the later one."""
+RATIO, SHARPNESS, RATE, SIZE_MODE, SIZE_MEAN, SIZE_STD = range(6)
+"""Slots of `rules` (6,): time step over lag; weight of the validity in the choice of parts; factor of the rate of
+events; where the size prior acts; its mean and standard deviation, people."""
+SIZE_NONE, SIZE_MERGE, SIZE_ALL = range(3)
+"""Values of rules[SIZE_MODE]: the size prior acts on no event, on Merge alone, on every event."""
+ORDER, EVENT, PARTS = range(3)
+"""Slots of a person's uniforms: place of its group in the order of visits; event; parts of a split."""
+MOST_LISTED = 6
+"""Largest group of which all divisions into two parts are tried."""
+
+
+@njit(cache=True)
+def moments_of(state: Array, cluster: Ints, count: int, out: Array) -> None:
+    """Write the moments (G, 9) of the clusters of people: state (K, 4), cluster (K,), count G."""
+    n = len(cluster)
+    out[:count] = 0.0
+    for k in range(n):
+        g = cluster[k]
+        out[g, SIZE] += 1
+        for d in range(4):
+            out[g, X + d] += state[k, d]
+    for g in range(count):
+        for d in range(4):
+            out[g, X + d] /= out[g, SIZE]
+    for k in range(n):
+        g = cluster[k]
+        x, y = state[k, 0] - out[g, X], state[k, 1] - out[g, Y]
+        out[g, XX] += x * x
+        out[g, XY] += x * y
+        out[g, YY] += y * y
+    for g in range(count):
+        out[g, SPREAD] = (out[g, XX] + out[g, YY]) / out[g, SIZE]
+        weight = out[g, SIZE] + PRIOR_WEIGHT
+        out[g, XX] = (out[g, XX] + PRIOR_WEIGHT * PRIOR**2) / weight
+        out[g, YY] = (out[g, YY] + PRIOR_WEIGHT * PRIOR**2) / weight
+        out[g, XY] /= weight
+
+
+@njit(cache=True)
+def log_symmetric_kl(a: Array, b: Array) -> float:
+    """Return log(1 + d_KL) of two rows of moments, at most LOG_KL_MOST; d_KL is the sum of both directions.
+
+    With covariances A, B and difference d of the means: (tr(A^-1 B) + tr(B^-1 A) - 4 + d' (A^-1 + B^-1) d) / 2.
+    """
+    det_a, det_b = a[XX] * a[YY] - a[XY] ** 2, b[XX] * b[YY] - b[XY] ** 2
+    traces = (a[YY] * b[XX] - 2 * a[XY] * b[XY] + a[XX] * b[YY]) * (1 / det_a + 1 / det_b)
+    x, y = a[X] - b[X], a[Y] - b[Y]
+    xx, yy, xy = a[YY] / det_a + b[YY] / det_b, a[XX] / det_a + b[XX] / det_b, a[XY] / det_a + b[XY] / det_b
+    divergence = (traces - 4 + xx * x * x - 2 * xy * x * y + yy * y * y) / 2
+    return min(math.log1p(max(divergence, 0.0)), LOG_KL_MOST)
+
+
+@njit(cache=True)
+def nearest_clusters(moments: Array, count: int, nearest: Ints) -> None:
+    """Write the cluster with the nearest mean place to each of `count` clusters, -1 without another one."""
+    for g in range(count):
+        nearest[g], least = -1, np.inf
+        for h in range(count):
+            far = (moments[g, X] - moments[h, X]) ** 2 + (moments[g, Y] - moments[h, Y]) ** 2
+            if h != g and far < least:
+                least, nearest[g] = far, h
+
+
+@njit(cache=True)
+def features_of(early: Array, late: Array, g: int, other: int, out: Array) -> None:
+    """Write the features (6,) of cluster g and its nearest cluster `other` (-1: none); early, late: moments (G, 9)."""
+    for k in range(2):
+        moments = early if k == 0 else late
+        out[3 * k] = LOG_KL_MOST if other < 0 else log_symmetric_kl(moments[g], moments[other])
+        out[3 * k + 1] = 0.0
+        if other >= 0:
+            x, y = moments[g, VX] - moments[other, VX], moments[g, VY] - moments[other, VY]
+            out[3 * k + 1] = math.sqrt(x * x + y * y)
+        out[3 * k + 2] = math.sqrt(moments[g, SPREAD])
+
+
+@njit(cache=True)
+def partition_features(early: Array, late: Array, label: Ints, features: Array, nearest: Ints, head: Ints) -> int:
+    """Write features (G, 6), nearest cluster and head of each cluster of one partition; return G.
+
+    early, late (K, 4): states at both times; label (K,): the partition.
+    """
+    n = len(label)
+    cluster = np.empty(n, np.int64)
+    count = clusters(label, cluster, head)
+    first, second = np.empty((n, 9)), np.empty((n, 9))
+    moments_of(early, cluster, count, first)
+    moments_of(late, cluster, count, second)
+    nearest_clusters(first, count, nearest)
+    for g in range(count):
+        features_of(first, second, g, nearest[g], features[g])
+    return count
+
+
+@njit(cache=True)
+def event_probabilities(
+    features: Array, size: float, other: float, weights: Array, rules: Array
+) -> tuple[float, float]:
+    """Return the probabilities of Merge and Split of a group in a step: pi(e | X, g, g'), eq. 7.
+
+    features (6,); size, other: people in g and g', other = 0 if a merge is excluded; weights (2, 7): of Merge and
+    Split, the constant last; rules: as RATIO and the following. The classifier gives probabilities over the lag, against
+    None; they are turned into those of a step as hazards (ours). One person does not split.
+    """
+    scores = np.array([weights[0, FEATURES], weights[1, FEATURES], 0.0])
+    for k in range(FEATURES):
+        scores[0] += weights[0, k] * features[k]
+        scores[1] += weights[1, k] * features[k]
+    mode = rules[SIZE_MODE]
+    if mode != SIZE_NONE:
+        mean, spread = rules[SIZE_MEAN], rules[SIZE_STD]
+        scores[0] -= ((size + other - mean) / spread) ** 2 / 2
+        if mode == SIZE_ALL:
+            scores[1] -= ((size / 2 - mean) / spread) ** 2 / 2
+            scores[2] -= ((size - mean) / spread) ** 2 / 2
+    if other == 0:
+        scores[0] = -np.inf
+    if size < 2:
+        scores[1] = -np.inf
+    top = max(scores[0], scores[1], scores[2])
+    merge, split, none = math.exp(scores[0] - top), math.exp(scores[1] - top), math.exp(scores[2] - top)
+    total = merge + split + none
+    happening = merge + split
+    if happening == 0:
+        return 0.0, 0.0
+    quiet = max(none / total, 1e-12) ** (rules[RATIO] * rules[RATE])
+    return (1 - quiet) * merge / happening, (1 - quiet) * split / happening
+
+
+@njit(cache=True)
+def propose(
+    early: Array, late: Array, points: Array, label: Ints, uniforms: Array, weights: Array, rules: Array, scales: Array
+) -> None:
+    """Draw Z_{t+1} from the joint group proposal for all particles: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7.
+
+    early, late (N_x, K, 4): states at both times; points (N_x, K, D): the later ones as the validity sees them, m; label
+    (N_x, N_z, K): Z_t, changed in place; uniforms (N_x, N_z, K, 3): of the heads of groups. weights, rules: as
+    event_probabilities; scales: as partition_kernels.SCATTER and the following.
+
+    Groups are visited in random order. A group that an event has changed is not visited. A pair of groups that are each
+    other's nearest draws its merge once, so that the probability is the pair's (ours).
+    """
+    particles, partitions, n = label.shape
+    cluster, head, nearest = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
+    first, second, features = np.empty((n, 9)), np.empty((n, 9)), np.empty(FEATURES)
+    order, changed, visited = np.empty(n), np.empty(n, np.bool_), np.empty(n, np.bool_)
+    merge, split = np.empty(n), np.empty(n)
+    before = np.empty(n, np.int64)
+    for i in range(particles):
+        count = 0
+        for j in range(partitions):
+            if j == 0 or not same_row(label[i, j], before):
+                before[:] = label[i, j]
+                count = clusters(before, cluster, head)
+                moments_of(early[i], cluster, count, first)
+                moments_of(late[i], cluster, count, second)
+                nearest_clusters(first, count, nearest)
+                for g in range(count):
+                    h = nearest[g]
+                    features_of(first, second, g, h, features)
+                    other = first[h, SIZE] if h >= 0 else 0.0
+                    merge[g], split[g] = event_probabilities(features, first[g, SIZE], other, weights, rules)
+            for g in range(count):
+                order[g] = uniforms[i, j, head[g], ORDER]
+                changed[g] = visited[g] = False
+            for g in np.argsort(order[:count]):
+                if changed[g]:
+                    continue
+                h, u = nearest[g], uniforms[i, j, head[g], EVENT]
+                p_merge, p_split = merge[g], split[g]
+                if h < 0 or changed[h] or (visited[h] and nearest[h] == g):
+                    p_merge = 0.0
+                visited[g] = True
+                if u < p_merge:
+                    changed[g] = changed[h] = True
+                    name = 1 + min(head[g], head[h])
+                    for k in range(n):
+                        if cluster[k] == g or cluster[k] == h:
+                            label[i, j, k] = name
+                elif u < p_merge + p_split:
+                    changed[g] = True
+                    divide(points[i], cluster, g, uniforms[i, j, head[g], PARTS], rules[SHARPNESS], scales, label[i, j])
+
+
+@njit(cache=True)
+def divide(
+    points: Array, cluster: Ints, g: int, uniform: float, sharpness: float, scales: Array, label: Ints
+) -> None:
+    """Divide cluster g into two parts, drawn with probabilities exp(-sharpness d_cl) of the two parts (ours).
+
+    points (K, D): m; cluster (K,); uniform in [0, 1); label (K,): changed in place. Up to MOST_LISTED people all
+    divisions are candidates; of larger groups those that leave one person out, and cuts across the first principal axis
+    of the points.
+    """
+    members = np.flatnonzero(cluster == g)
+    n = len(members)
+    own = points[members]
+    sides = candidates(own)
+    centre, scatter = np.empty((2, points.shape[1])), np.empty(2)
+    energy = np.empty(len(sides))
+    for c in range(len(sides)):
+        energy[c] = sharpness * validity_of(own, sides[c], 2, scales, centre, scatter)
+    least = energy.min()
+    total = np.cumsum(np.exp(least - energy))
+    chosen = sides[min(np.searchsorted(total, uniform * total[-1], side="right"), len(sides) - 1)]
+    for side in range(2):
+        first, size = -1, 0
+        for k in range(n):
+            if chosen[k] == side:
+                size += 1
+                if first < 0:
+                    first = members[k]
+        for k in range(n):
+            if chosen[k] == side:
+                label[members[k]] = 1 + first if size > 1 else 0
+
+
+@njit(cache=True)
+def candidates(points: Array) -> Ints:
+    """Return the candidate divisions of n points (n, D), (C, n): the side of each point, 0 or 1; both sides occur."""
+    n, dims = points.shape
+    if n <= MOST_LISTED:
+        count = 2 ** (n - 1) - 1
+        sides = np.zeros((count, n), np.int64)
+        for c in range(count):
+            for k in range(1, n):
+                sides[c, k] = ((c + 1) >> (k - 1)) & 1
+        return sides
+    sides = np.zeros((2 * n - 1, n), np.int64)
+    for k in range(n):
+        sides[k, k] = 1
+    mean = np.zeros(dims)
+    for k in range(n):
+        mean += points[k] / n
+    axis = points[0] - mean + 1e-9
+    for _ in range(30):
+        new = np.zeros(dims)
+        for k in range(n):
+            new += (points[k] - mean) * np.dot(points[k] - mean, axis)
+        axis = new / max(math.sqrt(np.dot(new, new)), 1e-12)
+    along = np.empty(n)
+    for k in range(n):
+        along[k] = np.dot(points[k] - mean, axis)
+    ranked = np.argsort(along)
+    for cut in range(1, n):
+        for k in range(cut):
+            sides[n + cut - 1, ranked[k]] = 1
+    return sides
+
+
+@njit(cache=True)
+def relabel(label: Ints) -> None:
+    """Bring all labels (N_x, N_z, K) into their canonical form, in place."""
+    particles, partitions, _ = label.shape
+    for i in range(particles):
+        for j in range(partitions):
+            canonical(label[i, j])

@@ -1,0 +1,245 @@
+"""Kernels on partitions Z of K people into groups: labels, cluster validity, uniform partitions, co-membership.
+
+A label (K,) is 0 for a person alone, else 1 + the least number of a person in the group. Such a label is the same for
+equal partitions, so that no result depends on how groups are called. A cluster is a group or a person alone; its head
+is its least person. Arrays of labels are (N_x, N_z, K): N_z partitions under each of N_x particles.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sim.compiler import njit
+from sim.types import Array, Ints
+
+SCATTER, WEIGHT, APART = range(3)
+"""Slots of `scales` (3,): prior scatter s_0, number of people nu that it counts for, virtual distance D_0; m, 1, m."""
+
+
+@njit(cache=True)
+def same_row(a: Ints, b: Ints) -> bool:
+    """Return True if two labels (K,) are equal."""
+    for k in range(len(a)):
+        if a[k] != b[k]:
+            return False
+    return True
+
+
+@njit(cache=True)
+def canonical(label: Ints) -> None:
+    """Rename the groups of a label (K,) in place: 0 for a person alone, else 1 + the least person of the group.
+
+    Negative labels count as alone, and so does a label that one person carries.
+    """
+    n = len(label)
+    old = label.copy()
+    for k in range(n):
+        label[k] = 0
+    for k in range(n):
+        if old[k] <= 0 or label[k] > 0:
+            continue
+        for other in range(k + 1, n):
+            if old[other] == old[k]:
+                label[k] = k + 1
+                label[other] = k + 1
+
+
+@njit(cache=True)
+def clusters(label: Ints, cluster: Ints, head: Ints) -> int:
+    """Write the cluster of each person, (K,), numbered from 0 by their heads, and the heads; return their number G.
+
+    head (K,): the first G entries are the least person of each cluster.
+    """
+    count = 0
+    for k in range(len(label)):
+        if label[k] == 0 or label[k] == k + 1:
+            cluster[k] = count
+            head[count] = k
+            count += 1
+        else:
+            cluster[k] = cluster[label[k] - 1]
+    return count
+
+
+@njit(cache=True)
+def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre: Array, scatter: Array) -> float:
+    """Return d_cl(Z, X) of one partition: the Davies-Bouldin index with a floor of the scatter (ours).
+
+    points (K, D): m; cluster (K,): number of each person's cluster, below `count`; scales: as SCATTER, WEIGHT, APART.
+    centre (K, D), scatter (K,): work space. S_g = (sum |x - c_g| + nu s_0) / (n_g + nu); R_g = max(max_h (S_g + S_h) /
+    max(|c_g - c_h|, s_0), S_g / D_0); the index is the mean of R_g over all clusters, people alone included.
+    """
+    n, dims = points.shape
+    s0, nu, apart = scales[SCATTER], scales[WEIGHT], scales[APART]
+    size = np.zeros(count)
+    for g in range(count):
+        scatter[g] = nu * s0
+        for d in range(dims):
+            centre[g, d] = 0.0
+    for k in range(n):
+        g = cluster[k]
+        size[g] += 1
+        for d in range(dims):
+            centre[g, d] += points[k, d]
+    for g in range(count):
+        for d in range(dims):
+            centre[g, d] /= size[g]
+    for k in range(n):
+        g, total = cluster[k], 0.0
+        if size[g] > 1:
+            for d in range(dims):
+                total += (points[k, d] - centre[g, d]) ** 2
+            scatter[g] += math.sqrt(total)
+    for g in range(count):
+        scatter[g] /= size[g] + nu
+    worst = np.empty(count)
+    for g in range(count):
+        worst[g] = scatter[g] / apart
+    for g in range(count):
+        for h in range(g):
+            total = 0.0
+            for d in range(dims):
+                total += (centre[g, d] - centre[h, d]) ** 2
+            ratio = (scatter[g] + scatter[h]) / max(math.sqrt(total), s0)
+            worst[g] = max(worst[g], ratio)
+            worst[h] = max(worst[h], ratio)
+    return worst.mean()
+
+
+@njit(cache=True)
+def validities(points: Array, label: Ints, scales: Array, out: Array) -> None:
+    """Write d_cl(Z, X) of each partition, (N_x, N_z); points (N_x, K, D), m; label (N_x, N_z, K)."""
+    particles, partitions, n = label.shape
+    cluster, head = np.empty(n, np.int64), np.empty(n, np.int64)
+    centre, scatter = np.empty((n, points.shape[2])), np.empty(n)
+    for i in range(particles):
+        for j in range(partitions):
+            if j > 0 and same_row(label[i, j], label[i, j - 1]):
+                out[i, j] = out[i, j - 1]
+                continue
+            count = clusters(label[i, j], cluster, head)
+            out[i, j] = validity_of(points[i], cluster, count, scales, centre, scatter)
+
+
+@njit(cache=True)
+def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
+    """Write partitions drawn uniformly from all partitions of K people, (N_x, N_z, K) (VAR2).
+
+    Stam's sampler: a number of boxes m is drawn with probabilities proportional to m^K / m!, whose cumulated values
+    for m = 1, 2, ... are `cumulated`; then each person is thrown into one of m boxes. uniforms (N_x, N_z, K + 1).
+    """
+    particles, partitions, n = label.shape
+    for i in range(particles):
+        for j in range(partitions):
+            boxes = 1 + np.searchsorted(cumulated, uniforms[i, j, n] * cumulated[-1], side="right")
+            for k in range(n):
+                label[i, j, k] = 1 + int(uniforms[i, j, k] * boxes)
+            canonical(label[i, j])
+
+
+@njit(cache=True)
+def co_membership(label: Ints, weights: Array, out: Array) -> None:
+    """Write C_kl, the sum of weights of the partitions in which k and l are in one group, (K, K); 1 on the diagonal.
+
+    label (N_x, N_z, K); weights (N_x, N_z): sum 1.
+    """
+    particles, partitions, n = label.shape
+    out[:] = 0.0
+    for i in range(particles):
+        j = 0
+        while j < partitions:
+            weight, last = weights[i, j], j
+            while last + 1 < partitions and same_row(label[i, last + 1], label[i, j]):
+                last += 1
+                weight += weights[i, last]
+            for k in range(n):
+                if label[i, j, k] > 0:
+                    for other in range(k):
+                        if label[i, j, other] == label[i, j, k]:
+                            out[k, other] += weight
+            j = last + 1
+    for k in range(n):
+        out[k, k] = 1.0
+        for other in range(k):
+            out[other, k] = out[k, other]
+
+
+@njit(cache=True)
+def head_votes(label: Ints, weights: Array, out: Array) -> None:
+    """Write the weighted histogram of Fig. 3 summed over i, (K, K): weight of partitions in which k's cluster has head
+    g. A person alone is the head of the own cluster (ours: nobody votes for group 0)."""
+    particles, partitions, n = label.shape
+    out[:] = 0.0
+    for i in range(particles):
+        for j in range(partitions):
+            for k in range(n):
+                out[k, k if label[i, j, k] == 0 else label[i, j, k] - 1] += weights[i, j]
+
+
+@njit(cache=True)
+def binder_moves(gain: Array, label: Ints) -> float:
+    """Improve a partition by moves of one person until none helps; return its gain.
+
+    gain (K, K): symmetric, what it is worth that a pair is in one group; label (K,): the partition to start from,
+    changed in place; labels from 1, one for each cluster, people alone included. The gain is the sum over pairs in one
+    cluster. Binder's loss of the partition is a constant less this sum if gain = 2 C - 1.
+    """
+    n = len(label)
+    worth = np.empty(n + 1)
+    moved = True
+    while moved:
+        moved = False
+        for k in range(n):
+            worth[:] = 0.0
+            for other in range(n):
+                if other != k:
+                    worth[label[other]] += gain[k, other]
+            best, at = worth[label[k]], label[k]
+            for g in range(1, n + 1):
+                if worth[g] > best + 1e-12:
+                    best, at = worth[g], g
+            if at == label[k] or best < 0:
+                empty = 0
+                if best < -1e-12:
+                    for g in range(1, n + 1):
+                        used = False
+                        for other in range(n):
+                            used = used or (other != k and label[other] == g)
+                        if not used:
+                            empty = g
+                            break
+                if empty == 0 or empty == label[k]:
+                    continue
+                at = empty
+            label[k] = at
+            moved = True
+    total = 0.0
+    for k in range(n):
+        for other in range(k):
+            if label[k] == label[other]:
+                total += gain[k, other]
+    return total
+
+
+@njit(cache=True)
+def best_sampled(gain: Array, label: Ints, out: Ints) -> None:
+    """Write the partition (K,) of largest gain among label (N_x, N_z, K), as clusters numbered from 1; gain (K, K)."""
+    particles, partitions, n = label.shape
+    head = np.empty(n, np.int64)
+    cluster = np.empty(n, np.int64)
+    best = -np.inf
+    for i in range(particles):
+        for j in range(partitions):
+            if j > 0 and same_row(label[i, j], label[i, j - 1]):
+                continue
+            clusters(label[i, j], cluster, head)
+            total = 0.0
+            for k in range(n):
+                for other in range(k):
+                    if cluster[k] == cluster[other]:
+                        total += gain[k, other]
+            if total > best:
+                best = total
+                out[:] = cluster + 1

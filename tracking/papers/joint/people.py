@@ -1,0 +1,124 @@
+"""Who is tracked: detections are associated with people, new people are started and lost ones removed (all ours).
+
+The paper does not say how individuals start, end or get their detections. One association serves all particles: that
+of least total cost with the means over particles. A new person is followed by a Kalman filter until confirmed, and then
+drawn into the particles from its posterior, alone in all partitions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.filters import kalman
+from tracking.filters.assignment import optimal
+
+BOX_TIME = 0.5
+"""Time constant with which the size of a person's box follows measured boxes, s."""
+NEWCOMER_NOISE = 1.0
+"""Standard deviation of the acceleration of a person who is not confirmed, m/s^2."""
+
+
+@dataclass
+class People:
+    """The K tracked people: one row each.
+
+    id (K,): of the track. missed (K,): s since the last measurement. size (K, 2): width, height of the box, px, nan if
+    unknown. next_id: the next new id.
+    """
+
+    id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    missed: Array = field(default_factory=lambda: np.zeros(0))
+    size: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    next_id: int = 1
+
+    def add(self, size: Array) -> None:
+        """Add people; size (M, 2): of their boxes, px, nan if unknown."""
+        new = len(size)
+        self.id = np.append(self.id, self.next_id + np.arange(new))
+        self.missed = np.append(self.missed, np.zeros(new))
+        self.size = np.concatenate([self.size, size])
+        self.next_id += new
+
+    def keep(self, rows: Bools) -> None:
+        """Remove all people but those where `rows` (K,) is True."""
+        self.id, self.missed, self.size = self.id[rows], self.missed[rows], self.size[rows]
+
+    def record(self, rows: Ints, sizes: Array | None, dt: float) -> None:
+        """Note that the people `rows` (R,) were measured, with boxes of `sizes` (R, 2), px, or None; others missed."""
+        self.missed += dt
+        self.missed[rows] = 0.0
+        if sizes is not None:
+            old = self.size[rows]
+            self.size[rows] = np.where(np.isnan(old), sizes, sizes + (old - sizes) * np.exp(-dt / BOX_TIME))
+
+
+@dataclass
+class Newcomers:
+    """People who are not confirmed yet, a Kalman filter for each.
+
+    bank (5, M, 2): filters of x, y, m. age (M,): s since the first measurement. missed (M,): s since the last one. size
+    (M, 2): width, height of the last box, px, nan if unknown.
+    """
+
+    bank: Array = field(default_factory=lambda: np.zeros((5, 0, 2)))
+    age: Array = field(default_factory=lambda: np.zeros(0))
+    missed: Array = field(default_factory=lambda: np.zeros(0))
+    size: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def predict(self, dt: float) -> None:
+        """Go on for dt s without a measurement."""
+        kalman.predict(self.bank, dt, kalman.white_acceleration(dt, np.full(2, NEWCOMER_NOISE)))
+        self.age += dt
+        self.missed += dt
+
+    def measure(self, points: Array, sizes: Array | None, noise: float, gate: float) -> Bools:
+        """Update by the points (M, 2), m, that they are associated with; return flags of the points left over."""
+        d2 = kalman.distances(self.bank, points, noise**2)
+        rows, columns = optimal(np.where(d2 <= gate, d2, np.inf), 2 * gate)
+        kalman.update(self.bank, rows, points[columns], noise**2)
+        self.missed[rows] = 0.0
+        if sizes is not None:
+            self.size[rows] = sizes[columns]
+        free = np.ones(len(points), bool)
+        free[columns] = False
+        return free
+
+    def start(self, points: Array, sizes: Array | None, noise: float, speed: float) -> None:
+        """Add a person at each of the points (M, 2), m; speed: standard deviation of the velocity per axis, m/s."""
+        new = len(points)
+        self.bank = np.concatenate([self.bank, kalman.born(points, noise**2, speed**2)], axis=1)
+        self.age, self.missed = np.append(self.age, np.zeros(new)), np.append(self.missed, np.zeros(new))
+        self.size = np.concatenate([self.size, np.full((new, 2), np.nan) if sizes is None else sizes])
+
+    def keep(self, rows: Bools) -> None:
+        """Remove all but those where `rows` (M,) is True."""
+        self.bank, self.age = self.bank[:, rows], self.age[rows]
+        self.missed, self.size = self.missed[rows], self.size[rows]
+
+    def draw(self, rows: Bools, normals: Array) -> Array:
+        """Return states (N, R, 4) drawn from the posteriors of the R people `rows`; normals (N, R, 4)."""
+        place, rate, var, cross, rate_var = self.bank[:, rows]
+        a = np.sqrt(var)
+        b = cross / a
+        c = np.sqrt(np.maximum(rate_var - b * b, 0.0))
+        u, v = normals[..., :2], normals[..., 2:]
+        return np.concatenate([place + a * u, rate + b * u + c * v], axis=-1)
+
+
+def associate(mean: Array, cov: Array, points: Array, noise: float, gate: float) -> tuple[Ints, Ints]:
+    """Return rows and columns (R,) of the associated people and points: least total of d^2 + ln |S| (one to one).
+
+    mean (K, 2), cov (K, 2, 2): of the predicted places, m; points (M, 2), m; noise: standard deviation of a point;
+    gate: largest d^2, the squared Mahalanobis distance.
+    """
+    if not len(mean) or not len(points):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    S = cov + noise**2 * np.eye(2)
+    error = points[None] - mean[:, None]
+    d2 = np.einsum("kmi,kmi->km", error, np.linalg.solve(S[:, None], error[..., None])[..., 0])
+    log_det = np.linalg.slogdet(S)[1]
+    log_det = log_det - log_det.min()
+    return optimal(np.where(d2 <= gate, d2 + log_det[:, None], np.inf), gate + float(log_det.max()) + 1e-9)

@@ -1,0 +1,245 @@
+"""`joint`: individuals and groups tracked jointly by a decentralised particle filter (DEEPER-JIGT).
+
+Bazzani, Cristani, Murino, "Decentralized particle filter for joint individual-group tracking", CVPR Workshops 2012. The
+state is (X, Z): X places and velocities of K individuals, Z the partition of them into groups; y the detections. N_x
+particles of X, N_z partitions under each. The steps of a frame, with the numbers of Algorithm 1:
+
+    4  X' ~ pi(X' | X, y)              composite proposal                     sec. 4, eq. 3  individuals
+    5  q = qbar p(X' | X, Z)           groups move individuals                eq. 5          individuals_kernels
+    6  resample Z by q                                                                       decentralised_filter
+    7  Z' ~ pi(Z' | X', X, Z)          Merge, Split, None of each group       eqs 6, 7       group_events_kernels
+    1  w = p_Nz(y | X') p_Nz(X' | X) / pi(X' | X, y)                          eq. 4          decentralised_filter
+    3  qbar = p(y | X', Z')            cluster validity d_cl                  eq. 4          partition_kernels
+       estimate                        means, co-membership                   Fig. 3         estimate
+    2  resample X and Z by w                                                                 decentralised_filter
+
+p_Nz(X' | X) is the normaliser of step 5. Steps 4 to 7 run when the new frame is there, as the proposal uses it.
+
+Readings of the paper: label 0 is nobody's group: it is left out of eq. 5, each person alone is a cluster of the
+validity, and nobody votes for it. Eq. 4 is used as printed, as an energy. VAR1 has the constant velocity of eq. 3.
+
+Departures, all ours:
+- Detections are points, associated with people once for all particles; p(y | x) is normal. Births, confirmation and
+  losses.
+- The proposal is a mixture for each person, not of products. Its second part is p(x' | x, y), the product of dynamics
+  and likelihood. Sigma is made of two noises per root second.
+- Each person is resampled by the own part of the weight, and the particles by the rest.
+- The Davies-Bouldin index has a prior scatter and a virtual other cluster, sees velocities, and acts per second.
+- People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
+  features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
+- The partition is that of least Binder loss, with inertia; ids follow the identity rule.
+The preset `paper` switches off what has a parameter.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from sim.rng import rng
+from sim.truth.identity import Identities
+from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
+from tracking.grouping import reported_groups
+from tracking.image_scale import required
+from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
+from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.decentralised_filter import Nested
+from tracking.papers.joint.distributions import STATE, FrameModel
+from tracking.papers.joint.group_events_kernels import relabel
+from tracking.papers.joint.individuals import moved, process_noise
+from tracking.papers.joint.particle_health import ParticleHealth
+from tracking.papers.joint.people import Newcomers, People, associate
+
+MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS = range(6)
+"""Keys of the random streams."""
+
+
+class Joint:
+    """The tracker `joint`: people and the groups they form, from points.
+
+    Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
+    particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; together (K, K):
+    probability that each pair is in one group, in the last frame; health: how many particles the weights are worth;
+    draws, the random streams; plane, "ground" or "image"; context. All but config exist after `reset` only.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("points",)
+    config_class: ClassVar[type[JointConfig]] = JointConfig
+
+    def __init__(self, config: JointConfig | None = None) -> None:
+        self.config = config or JointConfig()
+
+    def reset(self, context: Context, seed: int) -> None:
+        """Forget everything and start a sequence. seed: of all random numbers.
+
+        Until the first detections `plane` is "image" with a scale but no camera, else "ground".
+        """
+        c, self.context = self.config, context
+        self.frames = max(1, round(c.lag * context.fps))
+        shape = (c.particles, c.partitions)
+        self.nested = Nested(
+            np.zeros((c.particles, 0, STATE * self.frames)), np.zeros((*shape, 0), np.int64),
+            np.full(shape, -np.log(c.partitions)), np.zeros((c.particles, 0)), np.zeros(c.particles),
+        )  # fmt: skip
+        self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
+        self.together = np.zeros((0, 0))
+        self.health = ParticleHealth(c.particles, context.fps)
+        self.draws = [rng(seed, "tracker", key) for key in range(BIRTHS + 1)]
+        self.plane: Plane = "image" if context.camera is None and context.px_per_m > 0 else "ground"
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        """Return the people of the frame and their groups as Tracks; updates all particles.
+
+        `detections.pos` is used (x, y). None is a frame without information: nobody counts as missed. Raises InputError
+        if points are in the image and the context has no scale above 0.
+        """
+        points, sizes = self._points(detections)
+        rows, columns = self._associate(points)
+        z = np.full((len(self.people.id), 2), np.nan)
+        z[rows] = points[columns]
+        self._filter(z)
+        tracks = self._report(frame)
+        self._resample()
+        if detections is not None:
+            free = np.ones(len(points), bool)
+            free[columns] = False
+            self.people.record(rows, None if sizes is None else sizes[columns], self.dt)
+            self._keep(self.people.missed <= self.config.coast_time + 1e-9)
+            self._newcomers(points[free], None if sizes is None else sizes[free])
+        return tracks
+
+    @property
+    def dt(self) -> float:
+        """Time between frames, s."""
+        return 1.0 / self.context.fps
+
+    @property
+    def unit(self) -> float:
+        """Length of a metre in the unit of the points: 1 on the ground, px per m in the image."""
+        return required(self.context.px_per_m) if self.plane == "image" else 1.0
+
+    @property
+    def diagnostics(self) -> dict[str, Any]:
+        """What run.json tells of the particles: means over frames of shares of effective particles and ancestors."""
+        return self.health.summary()
+
+    def _points(self, detections: Detections | None) -> tuple[Array, Array | None]:
+        """Returns places (M, 2), m, in order of x, then y, and sizes of boxes (M, 2), px, or None; sets `plane`."""
+        if detections is None:
+            return np.zeros((0, 2)), None
+        self.plane = "image" if detections.plane == "image" else "ground"
+        order = np.lexsort(detections.pos[:, 1::-1].T)
+        boxed = self.plane == "image" and detections.box is not None
+        sizes = detections.box[order, 2:] if boxed and detections.box is not None else None
+        return np.ascontiguousarray(detections.pos[order, :2] / self.unit), sizes
+
+    def _associate(self, points: Array) -> tuple[Ints, Ints]:
+        """Returns rows and columns (R,) of people and their points (M, 2), m, by the predicted means and covariances."""
+        from scipy.stats import chi2
+
+        c, ahead = self.config, moved(self.nested.x[..., :STATE], self.dt)
+        weights = np.full(ahead.shape[:2], 1 / len(ahead))
+        mean, cov = estimate.moments(ahead, weights)
+        spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
+        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, c.point_noise, float(chi2.ppf(c.gate, 2)))
+
+    def _filter(self, z: Array) -> None:
+        """Steps 4 to 7, 1 and 3; z (K, 2): measured places, nan for none."""
+        if not len(z):
+            return
+        draws = self.draws
+        model = FrameModel(self.config, self.dt, z, draws[MOTION], draws[CHOICES], draws[EVENTS])
+        self.nested = decentralised_filter.advance(self.nested, model, draws[PARTITIONS].random(self.config.particles))
+        relabel(self.nested.z)
+
+    def _resample(self) -> None:
+        """Step 2."""
+        nested, draws = self.nested, self.draws[RESAMPLING]
+        people = nested.x.shape[1]
+        if not people:
+            return
+        self.health.weigh(nested, self.config.weights == "joint")
+        if self.config.weights == "joint":
+            chosen = decentralised_filter.joint_indices(nested, float(draws.random()))
+            own = np.repeat(chosen[:, None], people, axis=1)
+        else:
+            single, chosen = decentralised_filter.component_indices(nested, draws.random(people + 1))
+            own = single[chosen]
+        columns = np.arange(people)
+        self.health.resample(own)
+        self.nested = Nested(
+            nested.x[own, columns], nested.z[chosen], nested.log_q[chosen], np.zeros_like(nested.log_w),
+            np.zeros_like(nested.log_rest),
+        )  # fmt: skip
+
+    def _keep(self, rows: Bools) -> None:
+        """Remove all people but those where `rows` (K,) is True."""
+        if rows.all():
+            return
+        n = self.nested
+        label = n.z
+        kept = np.ascontiguousarray(label[..., rows])
+        relabel(kept)
+        self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest)
+        self.people.keep(rows)
+        self.health.keep(rows)
+
+    def _newcomers(self, points: Array, sizes: Array | None) -> None:
+        """Follow people who are not confirmed, with the points (M, 2) that are nobody's; add those who are confirmed."""
+        from scipy.stats import chi2
+
+        c, new = self.config, self.newcomers
+        new.predict(self.dt)
+        free = new.measure(points, sizes, c.point_noise, float(chi2.ppf(c.gate, 2)))
+        new.start(points[free], None if sizes is None else sizes[free], c.point_noise, c.speed_prior)
+        sure = (new.age >= c.confirm_time - 1e-9) & (new.missed == 0)
+        if sure.any():
+            self._add(sure)
+        new.keep(~sure & (new.missed <= c.confirm_time + 1e-9))
+
+    def _add(self, rows: Bools) -> None:
+        """Draw the newcomers `rows` into the particles, alone in all partitions; their earlier states are straight."""
+        n, c = self.nested, self.config
+        normals = self.draws[BIRTHS].standard_normal((c.particles, int(rows.sum()), STATE))
+        if c.individuals == "measured":
+            normals[:] = 0.0
+        state = self.newcomers.draw(rows, normals)
+        past = np.concatenate([moved(state, -k * self.dt) for k in range(self.frames)], axis=-1)
+        alone = np.zeros((*n.z.shape[:2], past.shape[1]), np.int64)
+        self.nested = Nested(
+            np.concatenate([n.x, past], axis=1), np.concatenate([n.z, alone], axis=2), n.log_q,
+            np.concatenate([n.log_w, np.zeros(past.shape[:2])], axis=1), n.log_rest,
+        )  # fmt: skip
+        self.people.add(self.newcomers.size[rows])
+        self.health.add(past.shape[1])
+
+    def _report(self, frame: Frame) -> Tracks:
+        """Returns the Tracks of the frame, on the ground in m, in the image in px."""
+        n, c, id = self.nested, self.config, self.people.id
+        joint = n.weights()
+        weights = n.component_weights() if c.weights == "people" else np.repeat(joint[:, None], len(id), axis=1)
+        mean, cov = estimate.moments(n.x[..., :STATE], weights)
+        pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
+        box = reported_groups.boxes(pos, self.people.size) if self.plane == "image" else None
+        group = reported_groups.group_ids(self.identities, frame.index, id, self._groups(joint))
+        groups = reported_groups.no_groups(group)
+        score = np.ones(len(id))
+        return Tracks(
+            frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov * self.unit**2, box, score, groups
+        )  # fmt: skip
+
+    def _groups(self, joint: Array) -> list[Ints]:
+        """Returns the rows of the members of each group; sets `together`; joint (N_x,): the weights of step 1."""
+        n, c, id = self.nested, self.config, self.people.id
+        if not len(id):
+            self.together = np.zeros((0, 0))
+            return []
+        particle = n.rest_weights() if c.weights == "people" else joint
+        weights = particle[:, None] * np.exp(n.log_q)
+        self.together = np.empty((len(id), len(id)))
+        partition_kernels.co_membership(n.z, weights, self.together)
+        if c.estimate == "histogram":
+            return estimate.histogram_partition(n.z, weights)
+        before = reported_groups.known_groups(self.identities, id)
+        return estimate.binder_partition(self.together, n.z, before, c.inertia)
