@@ -25,7 +25,7 @@ from tracking.app.command_options import (
 )
 from tracking.app.command_result import INTERRUPTED, CommandResult
 from tracking.app.commands.tune import tune
-from tracking.app.fit_options import FitGroupingOptions, FitRelationalOptions, FitSensorOptions
+from tracking.app.fit_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.options_from_dataclass import options_from
 from tracking.app.shared_options import Json, Out
 
@@ -150,6 +150,15 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     from tracking.app.commands.fit import fit_grouping
 
     return fit_grouping(options)
+
+
+@fit.command("joint")
+@options_from(FitJointOptions)
+def fit_joint(options: FitJointOptions) -> CommandResult:
+    """Learn the merges and splits of the tracker joint from simulated truth."""
+    from tracking.app.commands.fit_joint import fit_joint
+
+    return fit_joint(options)
 
 
 @fit.command("relational")

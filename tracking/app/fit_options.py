@@ -41,6 +41,24 @@ class FitRelationalOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class FitJointOptions:
+    """Options of the command `fit joint`, which learns merges and splits of groups from simulated truth.
+
+    names: scenarios, *.toml files or suites. seeds: those fitted to; check: others that the fit is scored with, None:
+    none; each "A:B" (A to B - 1) or one number. out: the TOML file to write.
+    """
+
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.toml", help="File to write: parameters of joint, for --params.")
+    ]
+    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds of the scenes to fit to.")] = "30000:30002"
+    check: Annotated[str | None, typer.Option("--check", metavar="A:B", help="Other seeds, to score the fit with.")] = (
+        None
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class FitGroupingOptions:
     """Options of the command `fit grouping`, which fits the belief of who belongs together to simulated scenes.
 

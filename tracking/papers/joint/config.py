@@ -103,7 +103,18 @@ class JointConfig(Config):
     lag: float = param(0.4, (0.05, 3.0), "s", "between the two times of the features of events (ours)", online=False)
     event_rate: float = param(1.0, (0.05, 20.0), "", "factor of the rate of merges and splits (ours)", "log")
     parts_sharpness: float = param(
-        8.0, (0.0, 50.0), "", "weight of the validity when the parts of a split are drawn (ours)"
+        8.0,
+        (0.0, 50.0),
+        "",
+        "weight of the validity where the parts of a split, or the group of a new person, are drawn (ours)",
+    )
+    newcomers: str = param(
+        "validity",
+        ("validity", "alone"),
+        "",
+        "validity: a new person joins the nearest group with the probability of the validity (ours); alone: with label "
+        "0 (the paper)",
+        "categorical",
     )
     size_prior: str = param(
         "merge",
@@ -150,6 +161,11 @@ class JointConfig(Config):
     def classifier(self) -> Array:
         """The weights (2, 7) of Merge and Split: of the six features, then the constant."""
         return np.array([[getattr(self, f"{event}_{term}") for term in TERMS] for event in ("merge", "split")])
+
+    @property
+    def largest_distance(self) -> float:
+        """Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom."""
+        return float(-2 * np.log1p(-self.gate))
 
     @property
     def scales(self) -> Array:

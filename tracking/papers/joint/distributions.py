@@ -109,9 +109,14 @@ class FrameModel:
 
     def _points(self, state: Array) -> Array:
         """Returns states (N_x, K, 4) as the validity sees them: places, and velocities as lengths, m."""
-        points = state.copy()
-        points[..., 2:] *= self.config.velocity_time
-        return points
+        return validity_points(state, self.config.velocity_time)
+
+
+def validity_points(x: Array, velocity_time: float) -> Array:
+    """Return the newest states of X (N_x, K, 4 or more) as the validity sees them, (N_x, K, 4): velocities as m."""
+    points = _states(x).copy()
+    points[..., 2:] *= velocity_time
+    return points
 
 
 def _states(x: Array) -> Array:

@@ -186,9 +186,13 @@ def propose(
                     features_of(first, second, g, h, features)
                     other = first[h, SIZE] if h >= 0 else 0.0
                     merge[g], split[g] = event_probabilities(features, first[g, SIZE], other, weights, rules)
+            happens = False
             for g in range(count):
                 order[g] = uniforms[i, j, head[g], ORDER]
                 changed[g] = visited[g] = False
+                happens = happens or uniforms[i, j, head[g], EVENT] < merge[g] + split[g]
+            if not happens:
+                continue
             for g in np.argsort(order[:count]):
                 if changed[g]:
                     continue
@@ -272,6 +276,65 @@ def candidates(points: Array) -> Ints:
         for k in range(cut):
             sides[n + cut - 1, ranked[k]] = 1
     return sides
+
+
+@njit(cache=True)
+def place_newcomer(points: Array, label: Ints, person: int, uniforms: Array, sharpness: float, scales: Array) -> None:
+    """Draw whether a person who is alone joins the nearest cluster, in all partitions (ours).
+
+    points (N_x, K, D): m; label (N_x, N_z, K): changed in place; uniforms (N_x, N_z). The probabilities of apart and
+    together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one.
+    """
+    particles, partitions, n = label.shape
+    cluster, head = np.empty(n, np.int64), np.empty(n, np.int64)
+    before, join, other = np.empty(n, np.int64), 0.0, -1
+    for i in range(particles):
+        for j in range(partitions):
+            if j == 0 or not same_row(label[i, j], before):
+                before[:] = label[i, j]
+                count = clusters(before, cluster, head)
+                other = _nearest_to(points[i], cluster, count, person)
+                if other >= 0:
+                    join = _join_probability(points[i], cluster, other, person, sharpness, scales)
+            if other < 0 or uniforms[i, j] >= join:
+                continue
+            name = 1 + min(person, head[other])
+            for k in range(n):
+                if cluster[k] == other or k == person:
+                    label[i, j, k] = name
+
+
+@njit(cache=True)
+def _nearest_to(points: Array, cluster: Ints, count: int, person: int) -> int:
+    """Returns the cluster, not the own one, whose mean place is nearest to the person; -1 without another."""
+    n = len(cluster)
+    x, y, size = np.zeros(count), np.zeros(count), np.zeros(count)
+    for k in range(n):
+        x[cluster[k]] += points[k, 0]
+        y[cluster[k]] += points[k, 1]
+        size[cluster[k]] += 1
+    best, least = -1, np.inf
+    for g in range(count):
+        far = (x[g] / size[g] - points[person, 0]) ** 2 + (y[g] / size[g] - points[person, 1]) ** 2
+        if g != cluster[person] and far < least:
+            best, least = g, far
+    return best
+
+
+@njit(cache=True)
+def _join_probability(
+    points: Array, cluster: Ints, other: int, person: int, sharpness: float, scales: Array
+) -> float:
+    """Returns the probability that a person alone joins the cluster `other`."""
+    members = np.flatnonzero(cluster == other)
+    own = np.empty((len(members) + 1, points.shape[1]))
+    own[0], own[1:] = points[person], points[members]
+    centre, scatter = np.empty((2, points.shape[1])), np.empty(2)
+    sides = np.ones(len(own), np.int64)
+    sides[0] = 0
+    apart = validity_of(own, sides, 2, scales, centre, scatter)
+    together = validity_of(own, np.zeros(len(own), np.int64), 1, scales, centre, scatter)
+    return 1 / (1 + math.exp(min(sharpness * (together - apart), 700.0)))
 
 
 @njit(cache=True)

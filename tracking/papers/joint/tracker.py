@@ -45,13 +45,13 @@ from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
-from tracking.papers.joint.distributions import STATE, FrameModel
-from tracking.papers.joint.group_events_kernels import relabel
+from tracking.papers.joint.distributions import STATE, FrameModel, validity_points
+from tracking.papers.joint.group_events_kernels import place_newcomer, relabel
 from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
 
-MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS = range(6)
+MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)
 """Keys of the random streams."""
 
 
@@ -85,7 +85,7 @@ class Joint:
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
         self.together = np.zeros((0, 0))
         self.health = ParticleHealth(c.particles, context.fps)
-        self.draws = [rng(seed, "tracker", key) for key in range(BIRTHS + 1)]
+        self.draws = [rng(seed, "tracker", key) for key in range(PLACING + 1)]
         self.plane: Plane = "image" if context.camera is None and context.px_per_m > 0 else "ground"
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
@@ -136,13 +136,11 @@ class Joint:
 
     def _associate(self, points: Array) -> tuple[Ints, Ints]:
         """Returns rows and columns (R,) of people and their points (M, 2), m, by the predicted means and covariances."""
-        from scipy.stats import chi2
-
         c, ahead = self.config, moved(self.nested.x[..., :STATE], self.dt)
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
         mean, cov = estimate.moments(ahead, weights)
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
-        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, c.point_noise, float(chi2.ppf(c.gate, 2)))
+        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, c.point_noise, c.largest_distance)
 
     def _filter(self, z: Array) -> None:
         """Steps 4 to 7, 1 and 3; z (K, 2): measured places, nan for none."""
@@ -151,7 +149,6 @@ class Joint:
         draws = self.draws
         model = FrameModel(self.config, self.dt, z, draws[MOTION], draws[CHOICES], draws[EVENTS])
         self.nested = decentralised_filter.advance(self.nested, model, draws[PARTITIONS].random(self.config.particles))
-        relabel(self.nested.z)
 
     def _resample(self) -> None:
         """Step 2."""
@@ -187,11 +184,9 @@ class Joint:
 
     def _newcomers(self, points: Array, sizes: Array | None) -> None:
         """Follow people who are not confirmed, with the points (M, 2) that are nobody's; add those who are confirmed."""
-        from scipy.stats import chi2
-
         c, new = self.config, self.newcomers
         new.predict(self.dt)
-        free = new.measure(points, sizes, c.point_noise, float(chi2.ppf(c.gate, 2)))
+        free = new.measure(points, sizes, c.point_noise, c.largest_distance)
         new.start(points[free], None if sizes is None else sizes[free], c.point_noise, c.speed_prior)
         sure = (new.age >= c.confirm_time - 1e-9) & (new.missed == 0)
         if sure.any():
@@ -213,6 +208,15 @@ class Joint:
         )  # fmt: skip
         self.people.add(self.newcomers.size[rows])
         self.health.add(past.shape[1])
+        if c.newcomers == "validity":
+            self._place(past.shape[1])
+
+    def _place(self, new: int) -> None:
+        """Draw whether each of the `new` last people joins the nearest group or person."""
+        n, c = self.nested, self.config
+        points = validity_points(n.x, c.velocity_time)
+        for person in range(n.x.shape[1] - new, n.x.shape[1]):
+            place_newcomer(points, n.z, person, self.draws[PLACING].random(n.log_q.shape), c.parts_sharpness, c.scales)
 
     def _report(self, frame: Frame) -> Tracks:
         """Returns the Tracks of the frame, on the ground in m, in the image in px."""
@@ -242,4 +246,5 @@ class Joint:
         if c.estimate == "histogram":
             return estimate.histogram_partition(n.z, weights)
         before = reported_groups.known_groups(self.identities, id)
-        return estimate.binder_partition(self.together, n.z, before, c.inertia)
+        known = np.isin(id, np.array(sorted(self.identities.people), np.int64))
+        return estimate.binder_partition(self.together, n.z, before, c.inertia * np.outer(known, known))

@@ -1,0 +1,146 @@
+"""Events of groups: features, rates, merges, splits, conflicts (companion page, section 4, D2 to D4)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.reference_joint import all_partitions, label_of, validity
+from tracking.papers.joint import group_events_kernels as events
+from tracking.papers.joint.config import JointConfig
+
+SCALES = np.array([0.5, 1.0, 2.0])
+BIAS = -1
+COUNT = 20_000
+
+
+def weights(merge=-100.0, split=-100.0):
+    table = np.zeros((2, 7))
+    table[:, BIAS] = merge, split
+    return table
+
+
+def rules(ratio=0.25, sharpness=8.0, rate=1.0, mode=events.SIZE_NONE, mean=1.0, std=1.5):
+    return np.array([ratio, sharpness, rate, mode, mean, std])
+
+
+def proposed(pos, label, table, rule=None, count=COUNT, seed=0):
+    """The partitions (count, K) drawn from one partition of standing people."""
+    pos = np.asarray(pos, float)
+    state = np.concatenate([pos, np.zeros_like(pos)], axis=1)[None]
+    labels = np.tile(np.asarray(label, np.int64), (1, count, 1))
+    uniforms = np.random.default_rng(seed).random((1, count, len(pos), 3))
+    events.propose(state, state, state, labels, uniforms, table, rules() if rule is None else rule, SCALES)
+    return labels[0]
+
+
+def share(drawn, label):
+    return float((drawn == np.asarray(label)).all(axis=1).mean())
+
+
+def test_without_events_partitions_stay():
+    label = [1, 1, 0, 4, 4]
+    drawn = proposed(np.arange(10).reshape(5, 2), label, weights(), count=50)
+    assert (drawn == label).all()
+
+
+def test_a_pair_of_people_merges_once_with_its_probability():
+    """Two people are each other's nearest: the pair draws its merge once, though both are visited (D3)."""
+    probability = 1 / (1 + np.exp(1.0))
+    hazard = 1 - (1 - probability) ** 0.25
+    drawn = proposed([[0, 0], [1, 0]], [0, 0], weights(merge=-1.0))
+    assert share(drawn, [1, 1]) == pytest.approx(hazard, abs=0.01)
+
+
+def test_the_rate_of_events_does_not_depend_on_the_frame_rate():
+    features = np.array([2.0, 0.3, 0.5, 1.5, 0.2, 0.6])
+    table, lag, quiet = JointConfig().classifier, 0.4, []
+    for dt in (0.1, 0.05):
+        p = sum(events.event_probabilities(features, 2.0, 1.0, table, rules(ratio=dt / lag)))
+        quiet.append((1 - p) ** (1 / dt))
+    assert quiet[0] == pytest.approx(quiet[1])
+
+
+def test_over_a_lag_the_probabilities_are_the_classifiers():
+    features, table = np.array([2.0, 0.3, 0.5, 1.5, 0.2, 0.6]), JointConfig().classifier
+    scores = np.append(table[:, :6] @ features + table[:, 6], 0.0)
+    expected = np.exp(scores) / np.exp(scores).sum()
+    assert events.event_probabilities(features, 2.0, 1.0, table, rules(ratio=1.0)) == pytest.approx(expected[:2])
+    no_merge = np.exp(scores[1]) / np.exp(scores[1:]).sum()
+    assert events.event_probabilities(features, 2.0, 0.0, table, rules(ratio=1.0)) == pytest.approx((0.0, no_merge))
+    assert events.event_probabilities(features, 1.0, 0.0, table, rules(ratio=1.0)) == (0.0, 0.0)
+
+
+def test_the_size_prior_acts_on_merges_or_on_all_events():
+    features, table = np.zeros(6), weights(0.0, 0.0)
+
+    def odds(mode, size, other):
+        merge, split = events.event_probabilities(features, size, other, table, rules(1.0, mode=mode))
+        return merge / (1 - merge - split), split / (1 - merge - split)
+
+    assert odds(events.SIZE_NONE, 3, 3) == pytest.approx((1, 1))
+    assert odds(events.SIZE_MERGE, 3, 3) == pytest.approx((np.exp(-(25 / 4.5)), 1))
+    assert odds(events.SIZE_ALL, 6, 1)[1] == pytest.approx(106, rel=0.01)
+    assert odds(events.SIZE_ALL, 4, 1)[1] == pytest.approx(5.9, rel=0.02)
+
+
+def test_a_group_splits_into_all_pairs_of_parts_by_their_validity():
+    pos = np.array([[0, 0], [0.6, 0], [2.0, 0], [2.7, 0.1]])
+    drawn = proposed(pos, [1, 1, 1, 1], weights(split=100.0), rules(ratio=1.0))
+    points = np.concatenate([pos, np.zeros_like(pos)], axis=1)
+    parts = [p for p in all_partitions(4) if len(p) == 2]
+    energy = np.array([validity(points, p, *SCALES) for p in parts])
+    expected = np.exp(-8 * energy) / np.exp(-8 * energy).sum()
+    for p, probability in zip(parts, expected, strict=True):
+        assert share(drawn, label_of(p)) == pytest.approx(probability, abs=0.012)
+
+
+def test_of_a_large_group_the_cut_between_two_clumps_is_found():
+    rng = np.random.default_rng(1)
+    pos = np.concatenate([rng.normal(0, 0.3, (5, 2)), rng.normal(0, 0.3, (4, 2)) + [3, 0]])
+    order = rng.permutation(9)
+    drawn = proposed(pos[order], np.ones(9), weights(split=100.0), rules(ratio=1.0, sharpness=50.0), count=500)
+    true = label_of([np.flatnonzero(order < 5).tolist(), np.flatnonzero(order >= 5).tolist()])
+    assert share(drawn, true) > 0.9
+
+
+def test_parts_of_one_person_are_alone():
+    drawn = proposed([[0, 0], [1, 0]], [1, 1], weights(split=100.0), rules(ratio=1.0), count=20)
+    assert not drawn.any()
+
+
+def test_a_group_takes_part_in_one_event_of_a_frame():
+    """Three people in a row, merges certain: two of them merge, the third cannot join in the same frame (D3)."""
+    drawn = proposed([[0, 0], [1, 0], [2, 0]], [0, 0, 0], weights(merge=100.0), rules(ratio=1.0))
+    assert {tuple(d) for d in drawn.tolist()} == {(1, 1, 0), (0, 2, 2)}
+
+
+def test_a_group_merges_with_the_nearest_one_only():
+    drawn = proposed([[0, 0], [0.8, 0], [3, 0], [9, 0]], [1, 1, 0, 0], weights(merge=100.0), rules(ratio=1.0))
+    assert {tuple(d) for d in drawn.tolist()} <= {(1, 1, 1, 0), (1, 1, 3, 3)}
+
+
+def test_features_are_those_of_the_definition():
+    early = np.array([[0, 0, 1, 0], [1, 0, 1, 0], [4, 1, 0, 0.5]], float)
+    late = early + [0.2, 0, 0, 0]
+    features, nearest, head = np.empty((3, 6)), np.empty(3, np.int64), np.empty(3, np.int64)
+    assert events.partition_features(early, late, np.array([1, 1, 0]), features, nearest, head) == 2
+    assert (nearest[:2].tolist(), head[:2].tolist()) == ([1, 0], [0, 2])
+    prior = events.PRIOR**2 * np.eye(2)
+    A, B = (np.diag([0.5, 0]) + prior) / 3, prior / 2
+    d = np.array([3.5, 1])
+    inverse = np.linalg.inv(A), np.linalg.inv(B)
+    kl = (np.trace(inverse[0] @ B) + np.trace(inverse[1] @ A) - 4 + d @ (inverse[0] + inverse[1]) @ d) / 2
+    expected = [min(np.log1p(kl), events.LOG_KL_MOST), np.hypot(1, 0.5), 0.5]
+    np.testing.assert_allclose(features[0], expected * 2)
+    np.testing.assert_allclose(features[1, [2, 5]], 0)
+
+
+@pytest.mark.parametrize("count", [2, 4, 6, 7, 10])
+def test_candidate_divisions_are_proper_and_different(count):
+    sides = events.candidates(np.random.default_rng(count).normal(0, 1, (count, 2)))
+    assert (sides.min(axis=1) == 0).all()
+    assert (sides.max(axis=1) == 1).all()
+    if count <= events.MOST_LISTED:
+        folded = {tuple(s if s[0] == 0 else 1 - s) for s in sides}
+        assert len(folded) == len(sides) == 2 ** (count - 1) - 1

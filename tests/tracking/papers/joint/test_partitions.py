@@ -1,0 +1,151 @@
+"""Partitions: labels, cluster validity, uniform draws, the Binder estimate (companion page, section 4, E5 to E7)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.reference_joint import all_partitions, binder_gain, label_of, validity
+from tracking.papers.joint import partition_kernels
+from tracking.papers.joint.distributions import stam_cumulated
+from tracking.papers.joint.estimate import binder_partition, groups_of, histogram_partition
+
+SCALES = np.array([0.5, 1.0, 2.0])
+PAIRS = np.array([[0, 0], [0.7, 0], [10, 0], [10.7, 0]])
+
+
+def validities(points, labels, scales=SCALES):
+    labels = np.asarray(labels)[None]
+    out = np.empty(labels.shape[:2])
+    partition_kernels.validities(np.asarray(points, float)[None], labels, scales, out)
+    return out[0]
+
+
+def test_a_label_does_not_depend_on_how_groups_are_called():
+    """E5."""
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        parts = list(all_partitions(5))[rng.integers(52)]
+        label = np.zeros(5, np.int64)
+        for name, part in zip(rng.permutation(20)[: len(parts)], parts, strict=True):
+            label[part] = name + 1
+        alone = [p[0] for p in parts if len(p) == 1]
+        label[alone] = rng.choice([0, -1, 50], len(alone)) if len(set(alone)) < 2 else 0
+        partition_kernels.canonical(label)
+        assert label.tolist() == label_of(parts).tolist()
+
+
+def test_the_validity_is_that_of_the_definition():
+    rng = np.random.default_rng(1)
+    points, parts = rng.normal(0, 2, (5, 4)), list(all_partitions(5))
+    expected = [validity(points, p, *SCALES) for p in parts]
+    np.testing.assert_allclose(validities(points, [label_of(p) for p in parts]), expected)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [PAIRS, [[0, 0], [0.7, 0], [1.4, 0]], [[0, 0], [0.7, 0], [5, 5]]],
+    ids=["two pairs", "abreast", "a pair and one"],
+)
+def test_the_true_partition_is_the_best_of_all(points):
+    """E6: strictly better than all alone, all in one, and every other partition."""
+    n = len(points)
+    true = {4: [[0, 1], [2, 3]], 3: [[0, 1, 2]] if points[2][0] < 5 else [[0, 1], [2]]}[n]
+    parts = list(all_partitions(n))
+    found = validities(points, [label_of(p) for p in parts])
+    ranked = np.argsort(found)
+    assert label_of(parts[ranked[0]]).tolist() == label_of(true).tolist()
+    assert found[ranked[1]] > 1.3 * found[ranked[0]]
+
+
+def test_the_example_of_two_pairs():
+    labels = [label_of(p) for p in ([[0, 1], [2, 3]], [[0, 2], [1, 3]], [[0], [1], [2], [3]], [[0, 1, 2, 3]])]
+    assert validities(PAIRS, labels)[[0, 2, 3]] == pytest.approx([0.2, 0.71, 2.05], abs=0.01)
+
+
+def test_a_pair_is_better_together_below_a_distance():
+    for d, together in ((1.49, True), (1.51, False)):
+        alone, pair = validities([[0, 0], [d, 0]], [[0, 0], [1, 1]])
+        assert (pair < alone) == together
+
+
+def test_scaling_all_lengths_changes_no_validity():
+    rng = np.random.default_rng(2)
+    points, parts = rng.normal(0, 2, (4, 2)), [label_of(p) for p in all_partitions(4)]
+    scaled = validities(7 * points, parts, SCALES * [7, 1, 7])
+    np.testing.assert_allclose(validities(points, parts), scaled)
+
+
+def uniform(people, count):
+    label = np.empty((1, count, people), np.int64)
+    uniforms = np.random.default_rng(3).random((1, count, people + 1))
+    partition_kernels.uniform_partitions(stam_cumulated(people), uniforms, label)
+    return label[0]
+
+
+def test_partitions_are_drawn_uniformly():
+    """E7: chi-squared of the 15 partitions of 4 people, 14 degrees of freedom; 36.1 is the quantile 0.999."""
+    drawn = uniform(4, 60_000)
+    expected = len(drawn) / 15
+    counts = [int((drawn == label_of(p)).all(axis=1).sum()) for p in all_partitions(4)]
+    assert sum(counts) == len(drawn)
+    assert sum((n - expected) ** 2 / expected for n in counts) < 36.1
+
+
+def test_the_mean_number_of_clusters_of_ten_people():
+    """E7: Bell(11) / Bell(10) - 1."""
+    drawn = uniform(10, 40_000)
+    heads = (drawn == 0) | (drawn == np.arange(1, 11))
+    assert heads.sum(axis=1).mean() == pytest.approx(678570 / 115975 - 1, abs=0.02)
+
+
+def sampled(rng, people, count):
+    parts = list(all_partitions(people))
+    return np.array([[label_of(parts[k]) for k in rng.integers(len(parts), size=count)]])
+
+
+def test_co_membership_is_the_share_of_partitions():
+    rng = np.random.default_rng(4)
+    label, weights = sampled(rng, 5, 30), rng.dirichlet(np.ones(30))[None]
+    out = np.empty((5, 5))
+    partition_kernels.co_membership(np.sort(label, axis=1), weights, out)
+    label = np.sort(label, axis=1)
+    same = (label[0, :, :, None] == label[0, :, None]) & (label[0, :, :, None] > 0)
+    expected = np.einsum("j,jkl->kl", weights[0], same.astype(float))
+    np.fill_diagonal(expected, 1)
+    np.testing.assert_allclose(out, expected)
+
+
+def test_the_estimate_has_the_least_binder_loss_of_all_partitions():
+    rng, alone = np.random.default_rng(5), np.full(5, -1)
+    best = 0
+    for _ in range(60):
+        label, weights = sampled(rng, 5, 12), rng.dirichlet(np.ones(12))[None]
+        together = np.empty((5, 5))
+        partition_kernels.co_membership(label, weights, together)
+        found = binder_partition(together, label, alone, 0.0)
+        members = {int(k) for rows in found for k in rows}
+        parts = [rows.tolist() for rows in found] + [[k] for k in range(5) if k not in members]
+        gains = [binder_gain(together - 0.5, p) for p in all_partitions(5)]
+        best += binder_gain(together - 0.5, parts) > max(gains) - 1e-9
+    assert best >= 58
+
+
+def test_inertia_keeps_a_pair_and_keeps_others_apart():
+    def groups(c, before, inertia):
+        together = np.array([[1, c], [c, 1.0]])
+        found = binder_partition(together, np.zeros((1, 1, 2), np.int64), np.array(before), inertia)
+        return [rows.tolist() for rows in found]
+
+    assert groups(0.55, [-1, -1], 0.0) == groups(0.45, [4, 4], 0.1) == groups(0.65, [-1, -1], 0.1) == [[0, 1]]
+    assert groups(0.55, [-1, -1], 0.1) == groups(0.35, [4, 4], 0.1) == groups(0.45, [-1, -1], 0.0) == []
+
+
+def test_the_histogram_takes_each_persons_label_of_most_weight():
+    label = np.array([[[1, 1, 0], [1, 1, 1], [0, 0, 0]]])
+    assert [r.tolist() for r in histogram_partition(label, np.array([[0.5, 0.2, 0.3]]))] == [[0, 1]]
+    assert [r.tolist() for r in histogram_partition(label, np.array([[0.1, 0.8, 0.1]]))] == [[0, 1, 2]]
+
+
+def test_groups_have_two_people():
+    assert [r.tolist() for r in groups_of(np.array([3, 1, 3, 2]))] == [[0, 2]]

@@ -1,0 +1,194 @@
+"""The event classifier of `joint`, learned from simulated truth: pi(e | X, g, g'), eq. 7 of Bazzani et al. 2012.
+
+A multinomial logistic regression over (d_KL, d_v, d_intra) of a group and its nearest one at two times a lag apart, as
+the tracker computes them. Classes are Merge, Split and None, at their natural frequency, so that the probabilities are
+those of an event within the lag. Rows are all groups of the true partition, people alone included, every STRIDE; and,
+once for each person who appears, the partition in which the newcomers are alone. Places and velocities have errors as
+large as those of a filter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.rng import rng
+from sim.types import Array, Bools, Ints, Truth
+from tracking.papers.joint.config import TERMS
+from tracking.papers.joint.group_events_kernels import FEATURES, partition_features
+from tracking.papers.joint.partition_kernels import canonical
+
+STRIDE = 0.2
+"""Time between two partitions that are looked at, s."""
+NEW = 0.3
+"""Time after which a person who has appeared is looked at as alone, s."""
+PLACE_ERROR, VELOCITY_ERROR = 0.04, 0.12
+"""Standard deviations of the errors of places, m, and velocities, m/s, per axis."""
+RIDGE = 1e-3
+"""Weight of the squared coefficients, of standardised features, in the loss of a row."""
+LEAST = 20
+"""Fewest merges, and splits, from which a classifier is fitted."""
+MERGE, SPLIT, NONE = range(3)
+CLASSES = ("merge", "split", "none")
+
+
+@dataclass(frozen=True)
+class EventRows:
+    """Groups and what happened to them within the lag, one row for each group and time.
+
+    features (R, 6): as group_events_kernels; event (R,): MERGE, SPLIT or NONE; possible (R, 3): which events are: one
+    person does not split, a group without another one does not merge. seconds: time that the partitions cover.
+    """
+
+    features: Array
+    event: Ints
+    possible: Bools
+    seconds: float
+
+    @classmethod
+    def joined(cls, parts: Iterable[EventRows]) -> EventRows:
+        """Return all rows together."""
+        given = [*parts, cls(np.zeros((0, FEATURES)), np.zeros(0, np.int64), np.zeros((0, 3), bool), 0.0)]
+        features, event, possible = (
+            np.concatenate([getattr(p, name) for p in given]) for name in ("features", "event", "possible")
+        )
+        return cls(features, event, possible, sum(p.seconds for p in given))
+
+
+def event_rows(truth: Truth, lag: float, seed: int) -> EventRows:
+    """Return the rows of a sequence; lag: s between the two times of the features; seed: of the errors.
+
+    truth: with positions, velocities and groups of a simulated sequence.
+    """
+    assert truth.pos is not None
+    assert truth.vel is not None
+    frames, stride = max(1, round(lag * truth.fps)), max(1, round(STRIDE * truth.fps))
+    new = round(NEW * truth.fps)
+    first = {}
+    for f, p in zip(truth.frame.tolist(), truth.id.tolist(), strict=True):
+        first.setdefault(p, f)
+    appeared = {f + new for f in first.values()}
+    draws, found = rng(seed, "label", 2), []
+    for early in range(1, truth.length - frames + 1):
+        whole = (early - 1) % stride == 0
+        if not whole and early not in appeared:
+            continue
+        a, b = truth.rows(early), truth.rows(early + frames)
+        _, i, j = np.intersect1d(truth.id[a], truth.id[b], return_indices=True)
+        i, j = i + a.start, j + b.start
+        states = [_erring(np.concatenate([truth.pos[r], truth.vel[r]], axis=1), draws) for r in (i, j)]
+        before, after = truth.group[i], truth.group[j]
+        if whole:
+            found.append(rows_of(states[0], states[1], before, after))
+        if early in appeared:
+            fresh = np.array([first[p] + new == early for p in truth.id[i].tolist()], bool)
+            found.append(rows_of(states[0], states[1], np.where(fresh, -1, before), after))
+    parts = EventRows.joined(found)
+    return EventRows(parts.features, parts.event, parts.possible, truth.length / truth.fps)
+
+
+def _erring(state: Array, draws: np.random.Generator) -> Array:
+    """Returns states (K, 4) with errors of a filter."""
+    spread = np.array([PLACE_ERROR, PLACE_ERROR, VELOCITY_ERROR, VELOCITY_ERROR])
+    return np.asarray(state + spread * draws.standard_normal(state.shape))
+
+
+def rows_of(early: Array, late: Array, before: Ints, after: Ints) -> EventRows:
+    """Return the rows of one partition; early, late (K, 4): states; before, after (K,): groups, -1 for alone.
+
+    A group splits if its members are not in one group afterwards, and merges if it shares a group with a member of the
+    nearest group.
+    """
+    people = len(before)
+    label = before + 1
+    canonical(label)
+    features, nearest, head = np.empty((people, FEATURES)), np.empty(people, np.int64), np.empty(people, np.int64)
+    count = partition_features(early, late, label, features, nearest, head)
+    event, possible = np.full(count, NONE), np.ones((count, 3), bool)
+    members = [np.flatnonzero(label == label[h]) if label[h] > 0 else np.array([h]) for h in head[:count].tolist()]
+    for g in range(count):
+        own, other = after[members[g]], nearest[g]
+        possible[g] = other >= 0, len(own) > 1, True
+        if len(own) > 1 and (own.min() < 0 or own.min() != own.max()):
+            event[g] = SPLIT
+        elif other >= 0 and own[0] >= 0 and (after[members[other]] == own[0]).any():
+            event[g] = MERGE
+    return EventRows(features[:count], event, possible, 0.0)
+
+
+def fit_events(rows: EventRows) -> dict[str, float]:
+    """Return the weights of Merge and Split by the names of the config: merge_distance_early, ..., split_bias.
+
+    Raises InputError with fewer than LEAST merges or splits.
+    """
+    from scipy.optimize import minimize
+
+    counts = np.bincount(rows.event, minlength=3)
+    if counts[:NONE].min() < LEAST:
+        raise InputError(
+            place="scenes", got=f"{counts[MERGE]} merges, {counts[SPLIT]} splits", expected=f"{LEAST} of each",
+            remedy="give more seeds or scenarios with events",
+        )  # fmt: skip
+    mean, spread = rows.features.mean(axis=0), rows.features.std(axis=0) + 1e-9
+    design = np.concatenate([(rows.features - mean) / spread, np.ones((len(rows.event), 1))], axis=1)
+    target = np.eye(3)[rows.event]
+
+    def loss(flat: Array) -> tuple[float, Array]:
+        weights = flat.reshape(2, FEATURES + 1)
+        log_p = _log_probabilities(design, weights, rows.possible)
+        error = (np.exp(log_p) - target)[:, :NONE]
+        ridge = weights.copy()
+        ridge[:, -1] = 0.0
+        gradient = error.T @ design / len(design) + RIDGE / len(design) * 2 * ridge
+        value = -log_p[np.arange(len(design)), rows.event].mean() + RIDGE / len(design) * (ridge**2).sum()
+        return float(value), gradient.ravel()
+
+    found = minimize(loss, np.zeros(2 * (FEATURES + 1)), jac=True, method="L-BFGS-B", options={"maxiter": 2000})
+    weights = found.x.reshape(2, FEATURES + 1)
+    weights[:, :FEATURES] /= spread
+    weights[:, FEATURES] -= weights[:, :FEATURES] @ mean
+    names = [f"{event}_{term}" for event in CLASSES[:NONE] for term in TERMS]
+    return {name: round(float(value), 4) for name, value in zip(names, weights.ravel(), strict=True)}
+
+
+def log_probabilities(rows: EventRows, weights: dict[str, float]) -> Array:
+    """Return log pi of Merge, Split and None, (R, 3); -inf for an event that is not possible."""
+    table = np.array([[weights[f"{event}_{term}"] for term in TERMS] for event in CLASSES[:NONE]])
+    design = np.concatenate([rows.features, np.ones((len(rows.event), 1))], axis=1)
+    return _log_probabilities(design, table, rows.possible)
+
+
+def _log_probabilities(design: Array, weights: Array, possible: Bools) -> Array:
+    scores = np.concatenate([design @ weights.T, np.zeros((len(design), 1))], axis=1)
+    scores = np.where(possible, scores, -np.inf)
+    top = scores.max(axis=1, keepdims=True)
+    return np.asarray(scores - top - np.log(np.exp(scores - top).sum(axis=1, keepdims=True)))
+
+
+def event_scores(rows: EventRows, weights: dict[str, float]) -> dict[str, float]:
+    """Return scores of a classifier on rows: rows, merges and splits (numbers); log_loss and prior_log_loss, of a model
+    that knows the frequencies alone, per row; and of merge and split the mean probability of the rows with and without
+    the event, and the expected number of events over the true one."""
+    log_p = log_probabilities(rows, weights)
+    p, counts = np.exp(log_p), np.bincount(rows.event, minlength=3)
+    share = np.maximum(counts / max(len(rows.event), 1), 1e-12)
+    prior = np.where(rows.possible, share, 0.0)
+    prior /= prior.sum(axis=1, keepdims=True)
+    each = np.arange(len(rows.event))
+    scores = {
+        "rows": float(len(rows.event)),
+        "log_loss": -float(log_p[each, rows.event].mean()),
+        "prior_log_loss": -float(np.log(prior[each, rows.event]).mean()),
+    }
+    for event in (MERGE, SPLIT):
+        name, there = CLASSES[event], rows.event == event
+        scores |= {
+            f"{name}s": float(counts[event]),
+            f"{name}_probability": float(p[there, event].mean()) if there.any() else float("nan"),
+            f"{name}_false_probability": float(p[~there, event].mean()),
+            f"{name}_expected_over_true": float(p[:, event].sum() / max(counts[event], 1)),
+        }
+    return scores
