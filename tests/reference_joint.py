@@ -45,9 +45,7 @@ def validity(points: np.ndarray, parts: list[list[int]], s0: float, nu: float, a
     return float(np.mean(found))
 
 
-def log_group_dynamics(
-    new: np.ndarray, old: np.ndarray, parts: list[list[int]], sigma: np.ndarray, dt: float
-) -> float:
+def log_group_dynamics(new: np.ndarray, old: np.ndarray, parts: list[list[int]], sigma: np.ndarray, dt: float) -> float:
     """Returns log p(X' | X, Z) of eq. 5; new, old (K, 4); sigma (4, 4)."""
     B = np.zeros((4, 4))
     B[0, 2] = B[1, 3] = dt

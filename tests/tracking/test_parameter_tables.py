@@ -12,6 +12,7 @@ from tracking.detect.background_settings import BackgroundSettings
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.papers.joint.config import JointConfig
 from tracking.papers.relational.config import RelationalConfig
 
 REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
@@ -23,6 +24,7 @@ PAGES = [
     (BlobConfig, "trackers/blob.md"),
     (GroupPdaConfig, "trackers/group-pda.md"),
     (RelationalConfig, "trackers/relational.md"),
+    (JointConfig, "trackers/joint.md"),
 ]
 
 
@@ -33,7 +35,9 @@ def test_the_page_holds_the_table(config: type[Config], page: str) -> None:
     )
 
 
-@pytest.mark.parametrize(("package", "page"), [("group_pda", "group-pda.md"), ("relational", "relational.md")])
+@pytest.mark.parametrize(
+    ("package", "page"), [("group_pda", "group-pda.md"), ("relational", "relational.md"), ("joint", "joint.md")]
+)
 def test_the_page_of_a_tracker_holds_its_constants(package: str, page: str) -> None:
     assert constants_table(package) in (REFERENCE / "trackers" / page).read_text(encoding="utf-8"), (
         f"put the output of python -m tracking.constants_table {package} into the page"

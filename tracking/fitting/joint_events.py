@@ -2,9 +2,8 @@
 
 A multinomial logistic regression over (d_KL, d_v, d_intra) of a group and its nearest one at two times a lag apart, as
 the tracker computes them. Classes are Merge, Split and None, at their natural frequency, so that the probabilities are
-those of an event within the lag. Rows are all groups of the true partition, people alone included, every STRIDE; and,
-once for each person who appears, the partition in which the newcomers are alone. Places and velocities have errors as
-large as those of a filter.
+those of an event within the lag. Rows are all groups of the true partition, people alone included, every STRIDE. Places and
+velocities have errors as large as those of a filter.
 """
 
 from __future__ import annotations
@@ -23,8 +22,6 @@ from tracking.papers.joint.partition_kernels import canonical
 
 STRIDE = 0.2
 """Time between two partitions that are looked at, s."""
-NEW = 0.3
-"""Time after which a person who has appeared is looked at as alone, s."""
 PLACE_ERROR, VELOCITY_ERROR = 0.04, 0.12
 """Standard deviations of the errors of places, m, and velocities, m/s, per axis."""
 RIDGE = 1e-3
@@ -66,26 +63,13 @@ def event_rows(truth: Truth, lag: float, seed: int) -> EventRows:
     assert truth.pos is not None
     assert truth.vel is not None
     frames, stride = max(1, round(lag * truth.fps)), max(1, round(STRIDE * truth.fps))
-    new = round(NEW * truth.fps)
-    first = {}
-    for f, p in zip(truth.frame.tolist(), truth.id.tolist(), strict=True):
-        first.setdefault(p, f)
-    appeared = {f + new for f in first.values()}
     draws, found = rng(seed, "label", 2), []
-    for early in range(1, truth.length - frames + 1):
-        whole = (early - 1) % stride == 0
-        if not whole and early not in appeared:
-            continue
+    for early in range(1, truth.length - frames + 1, stride):
         a, b = truth.rows(early), truth.rows(early + frames)
         _, i, j = np.intersect1d(truth.id[a], truth.id[b], return_indices=True)
         i, j = i + a.start, j + b.start
         states = [_erring(np.concatenate([truth.pos[r], truth.vel[r]], axis=1), draws) for r in (i, j)]
-        before, after = truth.group[i], truth.group[j]
-        if whole:
-            found.append(rows_of(states[0], states[1], before, after))
-        if early in appeared:
-            fresh = np.array([first[p] + new == early for p in truth.id[i].tolist()], bool)
-            found.append(rows_of(states[0], states[1], np.where(fresh, -1, before), after))
+        found.append(rows_of(states[0], states[1], truth.group[i], truth.group[j]))
     parts = EventRows.joined(found)
     return EventRows(parts.features, parts.event, parts.possible, truth.length / truth.fps)
 

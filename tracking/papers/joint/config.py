@@ -17,9 +17,9 @@ from sim.types import Array
 from tracking.config import Config, param
 from tracking.papers.joint import group_events_kernels as events
 
-FITTED: dict[str, float] = tomllib.loads(
-    Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8")
-)["params"]
+FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8"))[
+    "params"
+]
 SIZE_PRIORS = {"none": events.SIZE_NONE, "merge": events.SIZE_MERGE, "all": events.SIZE_ALL}
 TERMS = ("distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "bias")
 """Terms of the event classifier, in the order of the features of group_events_kernels."""
@@ -39,7 +39,9 @@ class JointConfig(Config):
 
     tracker: ClassVar[str] = "joint"
 
-    particles: int = param(50, (1, 500), "particles", "N_x, particles of individuals", "int", online=False, tunable=False)
+    particles: int = param(
+        50, (1, 2000), "particles", "N_x, particles of individuals", "int", online=False, tunable=False
+    )
     partitions: int = param(
         50, (1, 500), "particles", "N_z, partitions under each particle", "int", online=False, tunable=False
     )
@@ -73,15 +75,15 @@ class JointConfig(Config):
         "informed",
         ("informed", "detection"),
         "",
-        "second part of the individuals' proposal; informed: p(x' | x, y) (ours); detection: normal about the detection",
+        "second part of the proposal; informed: p(x' | x, y) (ours); detection: normal about the detection",
         "categorical",
     )
     alpha: float = param(0.1, (0.0, 1.0), "share", "of the dynamics in the individuals' proposal")
-    place_noise: float = param(0.15, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma (ours)", "log")
-    velocity_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma (ours)", "log")
-    point_noise: float = param(
-        0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis (ours)", "log"
+    place_noise: float = param(
+        0.15, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma; the paper gives no Sigma", "log"
     )
+    velocity_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
+    point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")
 
     validity_rate: float = param(
         20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"

@@ -1,7 +1,7 @@
 """Algorithm 1: the decentralised particle filter of a state (X, Z), for any four distributions.
 
-N_x particles of X, and under each of them N_z particles of Z. A frame runs steps 4 to 7 and then 1 to 3, as the proposal
-of X uses the new frame. p_{N_z} are sums over the nested particles:
+N_x particles of X, and under each of them N_z particles of Z. A frame runs steps 4 to 7 and then 1 to 3, as the
+proposal of X uses the new frame. p_{N_z} are sums over the nested particles:
 
     p_{N_z}(y | X)  = 1/N_z sum_j p(y | X, Z_j)
     p_{N_z}(X' | X) = sum_j qbar_j p(X' | X, Z_j),   which is the normaliser of step 5
@@ -21,19 +21,21 @@ from sim.types import Array, Ints
 from tracking.filters.particles import effective_number, systematic_resample_rows
 
 
-class Model(Protocol):
-    """The four distributions of Table 1. p_0 is any reference dynamics of the components.
+class Distributions(Protocol):
+    """The four distributions of Table 1. p_0 is any reference dynamics of the components."""
 
-    individuals: step 4. Returns X' (N_x, K, D) drawn from pi(X' | X, y), and (N_x, K): log of p(y | x'_k) p_0(x'_k |
-    x_k) / pi(x'_k | x_k, y). dynamics: log of p(X' | X, Z) / p_0(X' | X), (N_x, N_z). groups: step 7. Returns Z' drawn
-    from pi(Z' | X', X, Z, y), (N_x, N_z, ...). energy: log of p(Z' | X'), (N_x, N_z), the part of p(y | X', Z') (eq. 4)
-    that depends on Z'.
-    """
+    def individuals(self, x: Array) -> tuple[Array, Array]:
+        """Step 4: return X' (N_x, K, D) drawn from pi(X' | X, y), and the log (N_x, K) of p(y | x'_k) p_0(x'_k | x_k) /
+        pi(x'_k | x_k, y)."""
 
-    def individuals(self, x: Array) -> tuple[Array, Array]: ...
-    def dynamics(self, new: Array, x: Array, z: Ints) -> Array: ...
-    def groups(self, new: Array, x: Array, z: Ints) -> Ints: ...
-    def energy(self, new: Array, z: Ints) -> Array: ...
+    def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
+        """Return the log (N_x, N_z) of p(X' | X, Z) / p_0(X' | X)."""
+
+    def groups(self, new: Array, x: Array, z: Ints) -> Ints:
+        """Step 7: return Z' (N_x, N_z, ...) drawn from pi(Z' | X', X, Z, y)."""
+
+    def energy(self, new: Array, z: Ints) -> Array:
+        """Return the log (N_x, N_z) of p(Z' | X'), the part of p(y | X', Z') of eq. 4 that depends on Z'."""
 
 
 @dataclass
@@ -63,7 +65,7 @@ class Nested:
         return normalised(self.log_w.T).T
 
 
-def advance(old: Nested, model: Model, uniforms: Array) -> Nested:
+def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
     """Return the particles of the next frame: steps 4 to 7, then 1 and 3. `old` is as after step 2.
 
     uniforms (N_x,): of step 6.
@@ -82,7 +84,7 @@ def advance(old: Nested, model: Model, uniforms: Array) -> Nested:
 
 def joint_indices(nested: Nested, uniform: float) -> Ints:
     """Return the indices (N_x,) of step 2 by the weights of step 1."""
-    return systematic_resample_rows(nested.weights()[None], np.array([uniform]))[0]
+    return np.asarray(systematic_resample_rows(nested.weights()[None], np.array([uniform]))[0])
 
 
 def component_indices(nested: Nested, uniforms: Array) -> tuple[Ints, Ints]:

@@ -21,7 +21,7 @@ STATE = 4
 
 @dataclass(frozen=True)
 class FrameModel:
-    """The distributions of a frame; a Model of decentralised_filter.
+    """The distributions of a frame; Distributions of decentralised_filter.
 
     X is (N_x, K, 4 L): the states of the last L frames, the newest first, L frames being the lag. Z is (N_x, N_z, K),
     labels as partition_kernels has them.
@@ -45,7 +45,7 @@ class FrameModel:
     def individuals(self, x: Array) -> tuple[Array, Array]:
         """Step 4: pi(X_{t+1} | X_{0:t}, y)."""
         c, old = self.config, _states(x)
-        shape = old.shape[:2]
+        shape = x.shape[0], x.shape[1]
         normals, uniforms = self.motion.standard_normal((*shape, STATE)), self.choices.random(shape)
         proposal = Proposal(self.sigma, c.point_noise, self.dt, c.alpha, c.proposal == "informed")
         new, log_w = proposal.draw(old, self.z, normals, uniforms)
@@ -74,7 +74,7 @@ class FrameModel:
         if variant == "VAR1-standstill":
             still = np.empty(late.shape[:2])
             own_dynamics(late, early, precision, scale, 0.0, still)
-            return out + (still - own).sum(axis=1)[:, None]
+            return np.asarray(out + (still - own).sum(axis=1)[:, None])
         group_dynamics(late, early, z, precision, scale, self.dt, out)
         return np.asarray(out - own.sum(axis=1)[:, None])
 
@@ -104,8 +104,8 @@ class FrameModel:
         partition_kernels.validities(self._points(_states(new)), z, c.scales, out)
         out *= -c.validity_rate * self.dt
         if c.normaliser == "sampled":
-            out -= log_sum(out)[:, None] - math.log(out.shape[1])
-        return out
+            out -= log_sum(out)[:, None] - math.log(z.shape[1])
+        return np.asarray(out)
 
     def _points(self, state: Array) -> Array:
         """Returns states (N_x, K, 4) as the validity sees them: places, and velocities as lengths, m."""

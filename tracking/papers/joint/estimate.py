@@ -19,9 +19,10 @@ def binder_partition(together: Array, label: Ints, before: Ints, inertia: Array 
     """Return the groups of two or more people, as arrays of rows: the partition of least expected Binder loss (ours).
 
     together (K, K): co-membership C, the probability that each pair is in one group; label (N_x, N_z, K): the sampled
-    partitions; before (K,): group of each person in the last frame, -1 for alone. The loss is the sum over pairs of |1(k
-    ~ l) - C_kl|; a pair that was together counts as `inertia`, (K, K) or a number, more probable, any other as less. The search starts from
-    the best sampled partition and from the last frame's, and moves one person after the other.
+    partitions; before (K,): group of each person in the last frame, -1 for alone; inertia: (K, K) or a number. The loss
+    is the sum over pairs of |1(k ~ l) - C_kl|; a pair that was together counts as `inertia` more probable, any other as
+    less. The search starts from the best sampled partition and from the last frame's, and moves one person after the
+    other.
     """
     people = len(together)
     same = (before[:, None] >= 0) & (before[:, None] == before)

@@ -16,8 +16,8 @@ from tracking.papers.joint.individuals_kernels import CROSS, PLACE, RATE, own_dy
 
 
 def process_noise(place: float, velocity: float, dt: float) -> Array:
-    """Return Sigma of one axis, (3,): white acceleration of root density `velocity`, m/s^1.5, and jitter of the place of
-    root density `place`, m/s^0.5, over dt s."""
+    """Return Sigma of one axis, (3,): white acceleration of root density `velocity`, m/s^1.5, and jitter of the place
+    of root density `place`, m/s^0.5, over dt s."""
     density = velocity**2
     return np.array([density * dt**3 / 3 + place**2 * dt, density * dt**2 / 2, density * dt])
 

@@ -21,10 +21,10 @@ SCATTER, WEIGHT, APART = range(3)
 @njit(cache=True)
 def same_row(a: Ints, b: Ints) -> bool:
     """Return True if two labels (K,) are equal."""
-    for k in range(len(a)):
-        if a[k] != b[k]:
-            return False
-    return True
+    k = 0
+    while k < len(a) and a[k] == b[k]:
+        k += 1
+    return k == len(a)
 
 
 @njit(cache=True)
@@ -44,6 +44,15 @@ def canonical(label: Ints) -> None:
             if old[other] == old[k]:
                 label[k] = k + 1
                 label[other] = k + 1
+
+
+@njit(cache=True)
+def relabel(label: Ints) -> None:
+    """Bring all labels (N_x, N_z, K) into their canonical form, in place."""
+    particles, partitions, _ = label.shape
+    for i in range(particles):
+        for j in range(partitions):
+            canonical(label[i, j])
 
 
 @njit(cache=True)
@@ -105,7 +114,7 @@ def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre:
             ratio = (scatter[g] + scatter[h]) / max(math.sqrt(total), s0)
             worst[g] = max(worst[g], ratio)
             worst[h] = max(worst[h], ratio)
-    return worst.mean()
+    return float(worst.mean())
 
 
 @njit(cache=True)

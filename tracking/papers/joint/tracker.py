@@ -46,7 +46,7 @@ from tracking.papers.joint import decentralised_filter, estimate, partition_kern
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import STATE, FrameModel, validity_points
-from tracking.papers.joint.group_events_kernels import place_newcomer, relabel
+from tracking.papers.joint.division_kernels import place_newcomer
 from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
@@ -135,7 +135,7 @@ class Joint:
         return np.ascontiguousarray(detections.pos[order, :2] / self.unit), sizes
 
     def _associate(self, points: Array) -> tuple[Ints, Ints]:
-        """Returns rows and columns (R,) of people and their points (M, 2), m, by the predicted means and covariances."""
+        """Returns rows and columns (R,) of people and their points (M, 2), m, by predicted means and covariances."""
         c, ahead = self.config, moved(self.nested.x[..., :STATE], self.dt)
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
         mean, cov = estimate.moments(ahead, weights)
@@ -177,13 +177,13 @@ class Joint:
         n = self.nested
         label = n.z
         kept = np.ascontiguousarray(label[..., rows])
-        relabel(kept)
+        partition_kernels.relabel(kept)
         self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest)
         self.people.keep(rows)
         self.health.keep(rows)
 
     def _newcomers(self, points: Array, sizes: Array | None) -> None:
-        """Follow people who are not confirmed, with the points (M, 2) that are nobody's; add those who are confirmed."""
+        """Follow people who are not confirmed, with the points (M, 2) of nobody; add those who are confirmed."""
         c, new = self.config, self.newcomers
         new.predict(self.dt)
         free = new.measure(points, sizes, c.point_noise, c.largest_distance)
@@ -228,9 +228,9 @@ class Joint:
         box = reported_groups.boxes(pos, self.people.size) if self.plane == "image" else None
         group = reported_groups.group_ids(self.identities, frame.index, id, self._groups(joint))
         groups = reported_groups.no_groups(group)
-        score = np.ones(len(id))
+        score, cov = np.ones(len(id)), cov * self.unit**2
         return Tracks(
-            frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov * self.unit**2, box, score, groups
+            frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov, box, score, groups
         )  # fmt: skip
 
     def _groups(self, joint: Array) -> list[Ints]:
@@ -246,5 +246,5 @@ class Joint:
         if c.estimate == "histogram":
             return estimate.histogram_partition(n.z, weights)
         before = reported_groups.known_groups(self.identities, id)
-        known = np.isin(id, np.array(sorted(self.identities.people), np.int64))
+        known = np.isin(id, np.array(sorted(self.identities.people), np.int64)).astype(float)
         return estimate.binder_partition(self.together, n.z, before, c.inertia * np.outer(known, known))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, label_of, validity
+from tracking.papers.joint import division_kernels
 from tracking.papers.joint import group_events_kernels as events
 from tracking.papers.joint.config import JointConfig
 
@@ -97,7 +98,7 @@ def test_a_group_splits_into_all_pairs_of_parts_by_their_validity():
 
 def test_of_a_large_group_the_cut_between_two_clumps_is_found():
     rng = np.random.default_rng(1)
-    pos = np.concatenate([rng.normal(0, 0.3, (5, 2)), rng.normal(0, 0.3, (4, 2)) + [3, 0]])
+    pos = np.concatenate([rng.normal(0, 0.3, (5, 2)), rng.normal([3, 0], 0.3, (4, 2))])
     order = rng.permutation(9)
     drawn = proposed(pos[order], np.ones(9), weights(split=100.0), rules(ratio=1.0, sharpness=50.0), count=500)
     true = label_of([np.flatnonzero(order < 5).tolist(), np.flatnonzero(order >= 5).tolist()])
@@ -122,7 +123,7 @@ def test_a_group_merges_with_the_nearest_one_only():
 
 def test_features_are_those_of_the_definition():
     early = np.array([[0, 0, 1, 0], [1, 0, 1, 0], [4, 1, 0, 0.5]], float)
-    late = early + [0.2, 0, 0, 0]
+    late = early + np.array([0.2, 0, 0, 0])
     features, nearest, head = np.empty((3, 6)), np.empty(3, np.int64), np.empty(3, np.int64)
     assert events.partition_features(early, late, np.array([1, 1, 0]), features, nearest, head) == 2
     assert (nearest[:2].tolist(), head[:2].tolist()) == ([1, 0], [0, 2])
@@ -138,9 +139,34 @@ def test_features_are_those_of_the_definition():
 
 @pytest.mark.parametrize("count", [2, 4, 6, 7, 10])
 def test_candidate_divisions_are_proper_and_different(count):
-    sides = events.candidates(np.random.default_rng(count).normal(0, 1, (count, 2)))
+    sides = division_kernels.candidates(np.random.default_rng(count).normal(0, 1, (count, 2)))
     assert (sides.min(axis=1) == 0).all()
     assert (sides.max(axis=1) == 1).all()
-    if count <= events.MOST_LISTED:
+    if count <= division_kernels.MOST_LISTED:
         folded = {tuple(s if s[0] == 0 else 1 - s) for s in sides}
         assert len(folded) == len(sides) == 2 ** (count - 1) - 1
+
+
+def placed(pos, label, count=4000):
+    """The partitions after the last person, alone so far, was placed."""
+    points = np.concatenate([np.asarray(pos, float), np.zeros((len(pos), 2))], axis=1)[None]
+    labels = np.tile(np.asarray(label, np.int64), (1, count, 1))
+    uniforms = np.random.default_rng(0).random((1, count))
+    division_kernels.place_newcomer(points, labels, len(pos) - 1, uniforms, 8.0, SCALES)
+    return labels[0]
+
+
+@pytest.mark.parametrize("away", [0.7, 1.5, 3.0])
+def test_a_newcomer_joins_the_nearest_person_by_the_validity(away):
+    points = np.array([[0, 0], [away, 0]])
+    apart, together = (validity(points, p, *SCALES) for p in ([[0], [1]], [[0, 1]]))
+    expected = np.exp(-8 * together) / (np.exp(-8 * together) + np.exp(-8 * apart))
+    assert share(placed(points, [0, 0]), [1, 1]) == pytest.approx(expected, abs=0.025)
+    assert (expected > 0.5) == (away < 1.5) or away == 1.5
+
+
+def test_a_newcomer_joins_a_whole_group_and_nobody_else_changes():
+    drawn = placed([[0, 0], [0.7, 0], [9, 9], [0.9, 1.0]], [1, 1, 0, 0])
+    assert {tuple(d) for d in drawn.tolist()} == {(1, 1, 0, 0), (1, 1, 0, 1)}
+    assert share(drawn, [1, 1, 0, 1]) > 0.5
+    assert not placed([[1, 1]], [0]).any()

@@ -1,0 +1,163 @@
+"""Limits of `joint`: the Kalman filter, DEEPER-JIGT.2, labels, births and losses (companion page, section 4, E2, D7)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
+from sim.types import Context, Detections, Frame
+from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.individuals import process_noise
+from tracking.papers.joint.partition_kernels import canonical
+from tracking.papers.joint.tracker import Joint
+from tracking.prepare import prepare
+from tracking.run import track
+
+FPS = 10.0
+QUIET = {"merge_bias": -100.0, "split_bias": -100.0}
+
+
+def detections(index, points):
+    pos = np.array(points, float).reshape(-1, 2)
+    return Detections(index, (index - 1) / FPS, "ground", pos, None, None, np.ones(len(pos)))
+
+
+def stepped(tracker, frames, seed=0):
+    """The tracks of frames given as lists of points, None for a frame without information."""
+    tracker.reset(Context(FPS, float("nan")), seed)
+    out = []
+    for k, points in enumerate(frames, 1):
+        found = None if points is None else detections(k, points)
+        out.append(tracker.step(Frame(k, (k - 1) / FPS), found))
+    return out
+
+
+def walk(starts, velocity, frames, noise=0.0, seed=0):
+    """Places of people who walk straight, by frame."""
+    rng, starts = np.random.default_rng(seed), np.array(starts, float)
+    steps = np.arange(frames)[:, None, None] / FPS * np.asarray(velocity)
+    return list(starts + steps + noise * rng.standard_normal((frames, len(starts), 2)))
+
+
+def kalman(tracker, points, config):
+    """The exact means of x and y of one person, from the newcomer's posterior on: Sigma of eq. 3, noise of a point."""
+    frames = int(np.ceil(config.confirm_time * FPS - 1e-9)) + 1
+    bank = Joint(config)
+    bank.reset(Context(FPS, float("nan")), 0)
+    for k in range(1, frames):
+        bank.step(Frame(k, (k - 1) / FPS), detections(k, [points[k - 1]]))
+    new = bank.newcomers
+    new.predict(1 / FPS)
+    new.measure(np.array([points[frames - 1]]), None, config.point_noise, config.largest_distance)
+    place, rate, var, cross, rate_var = new.bank[:, 0]
+    x, P = np.concatenate([place, rate]), np.kron([[var[0], cross[0]], [cross[0], rate_var[0]]], np.eye(2))
+    A, H = np.eye(4) + np.eye(4, k=2) / FPS, np.eye(4)[:2]
+    a, b, c = process_noise(config.place_noise, config.velocity_noise, 1 / FPS)
+    out = []
+    for z in points[frames:]:
+        x, P = A @ x, A @ P @ A.T + np.kron([[a, b], [b, c]], np.eye(2))
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + config.point_noise**2 * np.eye(2))
+        x, P = x + K @ (z - H @ x), P - K @ H @ P
+        out.append(x)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("weights", ["people", "joint"])
+def test_people_alone_have_the_kalman_filter(weights):
+    """Z all alone, no validity, exact association, locally optimal proposal (E2)."""
+    config = JointConfig(
+        particles=1000, partitions=1, weights=weights, alpha=0.0, validity_rate=0.0, newcomers="alone", **QUIET
+    )
+    points = walk([[0, 0], [20, 0], [40, 5]], [1.2, 0.3], 25, noise=0.08)
+    runs = [stepped(Joint(config), points, seed) for seed in range(6)]
+    for person in range(3):
+        exact = kalman(Joint(config), [p[person] for p in points], config)
+        found = np.mean([[t.pos[person] for t in run[-len(exact) :]] for run in runs], axis=0)
+        assert np.sqrt(np.mean((found - exact[:, :2]) ** 2)) < 0.006
+        assert np.sqrt(np.mean((exact[1:, :2] - [p[person] for p in points[-len(exact) + 1 :]]) ** 2)) > 0.03
+
+
+def test_individuals_who_are_measured_are_the_same_in_all_particles():
+    """p(X | y) of DEEPER-JIGT.2 is a delta: particles of X differ in nothing (D7)."""
+    tracker = Joint(JointConfig(individuals="measured"))
+    points = walk([[0, 0], [0, 0.7], [5, 5]], [1.0, 0.0], 20)
+    tracks = stepped(tracker, points)
+    assert np.ptp(tracker.nested.x, axis=0).max() < 1e-12
+    np.testing.assert_allclose(tracks[-1].pos, points[-1], atol=1e-9)
+    np.testing.assert_allclose(tracks[-1].vel, [[1, 0]] * 3, atol=1e-6)
+    assert tracks[-1].group[0] == tracks[-1].group[1] >= 0 > tracks[-1].group[2]
+
+
+@pytest.mark.parametrize("variant", ["full", "VAR1", "VAR1-standstill", "VAR2", "VAR3"])
+def test_variants_track_and_keep_labels_in_their_form(variant):
+    """Equal partitions have equal labels, however groups came about, so that no result depends on names (E5)."""
+    scene = simulate(load("merge", ["camera.fps=5", "duration=10"]), 40_003, 0, ())
+    ready = prepare("joint", scene, detections="file", params={"variant": variant, "particles": 15, "partitions": 15})
+    ready.reset(0)
+    groups = 0
+    for frame in ready.frames():
+        groups += (ready.step(frame).group >= 0).sum()
+        z = ready.tracker.nested.z
+        for label in z.reshape(z.shape[0] * z.shape[1], -1):
+            named = label.copy()
+            canonical(named)
+            assert np.array_equal(named, label)
+    assert groups > 20 or variant in ("VAR2", "VAR3")
+
+
+def test_groups_move_individuals_in_the_full_model_only():
+    """Two people side by side: eq. 5 is evaluated with the partitions, and VAR1 has no use for them."""
+    points = walk([[0, 0], [0, 0.7]], [1.0, 0.0], 20, noise=0.05)
+    full = stepped(Joint(JointConfig(validity_rate=0.0)), points)
+    var1 = stepped(Joint(JointConfig(validity_rate=0.0, variant="VAR1")), points)
+    alone = stepped(Joint(JointConfig(validity_rate=0.0, variant="VAR1", newcomers="alone", **QUIET)), points)
+    assert not np.array_equal(full[-1].pos, var1[-1].pos)
+    assert np.array_equal(var1[-1].pos, alone[-1].pos)
+
+
+def test_a_pair_that_walks_together_is_a_group_and_crossing_strangers_are_none():
+    pair = walk([[0, 0], [0, 0.7]], [1.2, 0.0], 40, noise=0.05)
+    stranger = walk([[6, -3]], [0.0, 1.2], 40, noise=0.05, seed=1)
+    tracks = stepped(Joint(), [np.concatenate([a, b]) for a, b in zip(pair, stranger, strict=True)])
+    for t in tracks[8:]:
+        k = np.argsort(t.pos[:, 1]) if t.index < 20 else np.arange(3)
+        together = t.group[t.group >= 0]
+        assert len(together) == 2, (t.index, k)
+        assert len(set(together.tolist())) == 1
+
+
+def test_parting_people_split():
+    a = walk([[0, 0]], [1.0, 0.0], 70, noise=0.05)
+    straight = [[0.0, 0.7 + 0.1 * max(k - 30, 0)] for k in range(70)]
+    b = [np.array([[p[0] + x[0, 0], p[1]]]) for p, x in zip(straight, a, strict=True)]
+    tracks = stepped(Joint(), [np.concatenate([x, y]) for x, y in zip(a, b, strict=True)])
+    assert all((t.group >= 0).all() for t in tracks[8:30])
+    assert (tracks[-1].group < 0).all()
+
+
+def test_a_person_who_is_missed_goes_on_and_is_removed():
+    points = walk([[0, 0]], [1.0, 0.0], 20)
+    gone = [[]] * 15
+    tracks = stepped(Joint(JointConfig(coast_time=1.0)), points + gone)
+    assert [len(t.id) for t in tracks[-15:]] == [1] * 11 + [0] * 4
+    assert tracks[29].pos[0, 0] == pytest.approx(2.9, abs=0.4)
+
+
+def test_a_lost_image_removes_nobody():
+    tracks = stepped(Joint(), [*walk([[0, 0]], [1.0, 0.0], 20), *[None] * 25])
+    assert tracks[-1].id.tolist() == tracks[19].id.tolist() == [1]
+
+
+def test_a_false_alarm_of_one_frame_is_no_person():
+    assert not any(len(t.id) for t in stepped(Joint(), [[[3, 3]], [], [], [], []]))
+
+
+def test_the_run_tells_what_the_particles_are_worth():
+    scene = simulate(load("merge", ["camera.fps=5", "duration=8"]), 40_003, 0, ())
+    info = track("joint", scene, detections="file").info["diagnostics"]
+    assert 0.02 <= info["distinct_ancestors"] <= 1
+    assert 0.02 <= info["effective_particles"] <= 1
+    assert 0.02 <= info["effective_particles_of_a_person"] <= 1
+    assert Joint().config == JointConfig()
