@@ -16,7 +16,7 @@ over sequences with 95 % intervals, and the paired difference. --rough: position
 rates: pairwise F1 from the same motion at 2.5, 10 and 25 frames/s.
 calibration: probability and share of mates by bin, expected calibration error, all scenes weighing the same.
 ablation: the fit without each quantity: log loss and F1 on --check seeds, and F1 on the recordings.
-cost: CPU time per second of a walking crowd, beside that of `blob` on its detections.
+cost: CPU time per frame of a walking crowd, of the belief and of the rule.
 --grouping FILE.toml: another belief.
 """
 
@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from benchmarks.belonging.transfer import f1
-from benchmarks.grouping import pairs_in_frames
+from benchmarks.grouping import linked_pairs, pairs_in_frames
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser, seed_range
 from benchmarks.support.tables import head, interval, number, row, signed, table
 from scenarios.loading.resolve import resolve
@@ -40,15 +40,15 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Truth
 from tracking.fitting.belief import USED, fit_belief, log_odds_of, sample_of
-from tracking.fitting.belief_scores import belief_scores, reliability
+from tracking.fitting.belief_scores import BINS, belief_scores, reliability
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouped_tracks import derive
-from tracking.grouping.grouping_choice import Grouping, grouping_of
+from tracking.grouping.grouping_choice import grouping_of
+from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals, mean_interval
-from tracking.tuning.grouping_episodes import people_as_tracks
 
 KEYS = ("pairwise_F1", "group_F1_hull", "event_F1", "merge_latency")
 RATES = {2.5: 20, 10.0: 5, 25.0: 2}
@@ -72,12 +72,6 @@ def spencer(truth: Truth, i: Ints, j: Ints) -> Bools:
     return np.asarray(part[i] == part[j])
 
 
-def grouped_pairs(truth: Truth, grouping: Grouping, i: Ints, j: Ints) -> Bools:
-    """Returns which pairs of rows the grouping puts into one group."""
-    group = np.concatenate([t.group for t in derive(people_as_tracks(truth), truth.fps, truth.px_per_m, grouping)])
-    return np.asarray((group[i] >= 0) & (group[i] == group[j]))
-
-
 def rough(truth: Truth, seed: int) -> Truth:
     """Returns a truth whose positions err by 0.1 m, without velocities, and of which 5 % of the rows are missing."""
     assert truth.pos is not None
@@ -93,7 +87,7 @@ def recordings(data: Path, belief: Belief) -> None:
     for folder in (HOTEL, ZARA):
         truth = _truth(data / folder)
         i, j, same = pairs_in_frames(truth)
-        found = [spencer(truth, i, j), *(grouped_pairs(truth, g, i, j) for g in (LinkRule(), belief))]
+        found = [spencer(truth, i, j), *(linked_pairs(truth, g, i, j)[0] for g in (LinkRule(), belief))]
         frame = truth.frame[i] - 1
 
         def scores(weight: Array, found: list[Bools] = found, frame: Ints = frame, same: Bools = same) -> Array:
@@ -109,7 +103,7 @@ def recordings(data: Path, belief: Belief) -> None:
             i, j, same = pairs_in_frames(erring)
             frame = erring.frame[i] - 1
             once = np.ones((1, truth.length))
-            draws.append([f1(once, frame, same, grouped_pairs(erring, g, i, j))[0] for g in (LinkRule(), belief)])
+            draws.append([f1(once, frame, same, linked_pairs(erring, g, i, j)[0])[0] for g in (LinkRule(), belief)])
         rule, own = np.mean(draws, axis=0)
         row([f"{Path(folder).name}, 0.1 m, 5 % missed", "–", number(rule), number(own), f"{own - rule:+.3f}", "–"])
     truth = _truth(data / WALK_TOGETHER)
@@ -172,7 +166,7 @@ def _f1_every(truth: Truth, every: int, belief: Belief) -> tuple[float, float]:
         length=(truth.length - 1) // every + 1,
     )  # fmt: skip
     i, j, same = pairs_in_frames(slow)
-    found = grouped_pairs(slow, belief, i, j)
+    found = linked_pairs(slow, belief, i, j)[0]
     return 2.0 * float((same & found).sum()) * every, float(same.sum() + found.sum()) * every
 
 
@@ -184,13 +178,13 @@ def calibration(names: Sequence[str], seeds: range, belief: Belief) -> None:
         print(f"\n{Path(name).stem}: " + ", ".join(f"{key} {value:.4g}" for key, value in scores.items()) + "\n")
         head(["probability", "share of rows", "mean probability", "share of mates"])
         for k, (share, mean, mates) in enumerate(reliability(log_odds, sample.together, sample.weight)):
-            row([f"{k / 15:.2f}–{(k + 1) / 15:.2f}", number(share, 4), number(mean), number(mates)])
+            row([f"{k / BINS:.2f}–{(k + 1) / BINS:.2f}", number(share, 4), number(mean), number(mates)])
 
 
 FAMILIES: Mapping[str, tuple[str, ...]] = {
     "distance": ("distance",), "velocity difference": ("velocity difference",), "share near": ("share near",),
     "sideways, lengthwise": ("sideways", "lengthwise"), "others, stream (chance)": ("others", "stream"),
-    "speed": ("speed",), "arrival": ("arrival gap", "first distance"), "means over 5 s": (),
+    "speed": ("speed",), "arrival": ("arrival gap", "first distance"), "means over 5 s": ("5 s",),
 }  # fmt: skip
 
 
@@ -199,21 +193,19 @@ def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> No
     truths = {Path(folder).name: _truth(data / folder) for folder in (HOTEL, ZARA)}
     head(["without", "log loss", "calibration error", "F1", *truths])
     for family, words in {"": (), **FAMILIES}.items():
-        used = [name for name in USED if name.split(",")[0] not in words]
-        if family and not words:
-            used = [name for name in USED if not name.endswith(" 5 s")]
+        used = [name for name in USED if not {*name.split(", ")} & {*words}]
         belief = fit_belief(train, used)
         scores = belief_scores(test, log_odds_of(belief, test))
         real = []
         for truth in truths.values():
             i, j, same = pairs_in_frames(truth)
-            found = grouped_pairs(truth, belief, i, j)
+            found = linked_pairs(truth, belief, i, j)[0]
             real.append(number(float(f1(np.ones((1, truth.length)), truth.frame[i] - 1, same, found)[0])))
         row([family or "–", *(f"{scores[k]:.4f}" for k in ("log loss", "calibration error", "F1")), *real])
 
 
-def crowd_tracks(people: int, frames: int, fps: float) -> Iterator[tuple[Ints, Ints, Array]]:
-    """Yields frame, column and positions of people who walk in pairs, 0.1 people per m², as one array each."""
+def crowd_tracks(people: int, frames: int, fps: float) -> tuple[Ints, Ints, Array]:
+    """Returns frame, column and positions of people who walk in pairs, 0.1 people per m², as one array each."""
     r = np.random.default_rng(0)
     side = (people / 0.1) ** 0.5
     heading = r.uniform(0, 2 * np.pi, people // 2)
@@ -223,7 +215,7 @@ def crowd_tracks(people: int, frames: int, fps: float) -> Iterator[tuple[Ints, I
     both = np.concatenate([middle, middle + 0.7], axis=1)
     pos = np.abs(both % (2 * side) - side) + r.normal(0, 0.02, both.shape)
     frame, column = np.nonzero(np.ones(pos.shape[:2], bool))
-    yield frame, column, pos[frame, column]
+    return frame, column, pos[frame, column]
 
 
 def cost(people: int, belief: Belief) -> None:
@@ -231,7 +223,7 @@ def cost(people: int, belief: Belief) -> None:
     from tracking.grouping.link_rule import find_links
 
     fps, frames = 10.0, 600
-    ((frame, column, pos),) = crowd_tracks(people, frames, fps)
+    frame, column, pos = crowd_tracks(people, frames, fps)
     vel = np.zeros_like(pos)
     for name, work in {
         "belief": lambda: belief_links(frame, column, pos, frames, fps, belief),

@@ -35,8 +35,9 @@ from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY
 from sim.truth.queue_detection import WAITING_SPEED
 from sim.types import Truth
 from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.grouping_choice import Grouping
+from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
-from tracking.tuning.grouping_episodes import people_as_tracks
 
 CHOSEN = LinkRule(near=1.0, idle=0.4)  # the best setting of mode `choose` with seeds 0:4
 RULES = {
@@ -71,9 +72,9 @@ def scores(true: np.ndarray, found: np.ndarray) -> str:
     return f"F1 {f1:.3f}   precision {hit / found.sum():.3f}   recall {hit / true.sum():.3f}"
 
 
-def linked_pairs(truth: Truth, rule: LinkRule, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
+def linked_pairs(truth: Truth, rule: Grouping, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
     """Returns which pairs of rows the rule puts into one group, and how many events of each kind it reports."""
-    derived = derive(people_as_tracks(truth), truth.fps, rule=rule)
+    derived = derive(people_as_tracks(truth), truth.fps, truth.px_per_m, rule)
     group = np.concatenate([t.group for t in derived])
     return (group[i] >= 0) & (group[i] == group[j]), Counter(e.kind for t in derived for e in t.events)
 

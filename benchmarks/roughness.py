@@ -13,7 +13,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from benchmarks.belonging.pair_features import NAMES, pair_features
-from benchmarks.belonging.sources import FPS
+from benchmarks.belonging.sources import FPS, are_mates
 from sim.types import Array, Bools, Ints, Truth
 
 WINDOW = 10  # frames
@@ -77,10 +77,7 @@ def _of(truth: Truth) -> Roughness:
     still = windows[(speed < 0.15) & (steps.max(axis=1) * FPS < 0.5)]
     spread, angle = _mates(pos, vel, group)
     pairs = pair_features(truth.frame, truth.id, truth.pos, FPS)
-    label = np.full((truth.length + 1, len(ids)), -1, np.int64)
-    label[truth.frame, column] = truth.group
-    a, b = (label[pairs.frame, np.searchsorted(ids, one)] for one in (pairs.a, pairs.b))
-    apart = pairs.features[(a >= 0) & (a == b), VELOCITY_DIFFERENCE]
+    apart = pairs.features[are_mates(truth, pairs), VELOCITY_DIFFERENCE]
     return Roughness(
         acceleration[np.isfinite(acceleration)], _spectra(windows[speed > WALKING]), speed[speed > WALKING],
         apart[np.isfinite(apart)], spread, angle, _label_errors(still),

@@ -36,8 +36,9 @@ from sim.crowd.world import run
 from sim.sequence import observe, simulate
 from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY
 from sim.truth.order_fulfilment import PATIENCE, RULE_TIME
-from sim.types import Array, Motion, Tracks, Truth
+from sim.types import Array, Motion, Truth
 from tracking.grouping.grouped_tracks import with_groups
+from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.scoring import evaluate
 from tracking.scoring.evaluation import Scores
@@ -109,16 +110,6 @@ def orders(entry: Entry, seeds: range) -> None:
     print("; ".join(text), *failed, sep="\n    ", flush=True)
 
 
-def true_people(truth: Truth, index: int) -> Tracks:
-    """Returns the true people of a frame as tracks that name no groups."""
-    now = truth.at(index)
-    assert now.pos is not None
-    assert now.vel is not None
-    n = len(now.id)
-    no_group, cov, score = np.full(n, -1), np.zeros((n, 4, 4)), np.ones(n)
-    return Tracks(index, now.t, "ground", "person", now.id, no_group, now.pos, now.vel, cov, None, score)
-
-
 def rule_scores(entry: Entry, seeds: range, rules: Sequence[str]) -> dict[str, list[Scores]]:
     """Returns the scores of each sequence by rule; a seed that cannot be simulated is printed and left out."""
     found: dict[str, list[Scores]] = {rule: [] for rule in rules}
@@ -129,7 +120,7 @@ def rule_scores(entry: Entry, seeds: range, rules: Sequence[str]) -> dict[str, l
             print(f"{entry.name}, seed {seed}: {error.line()}")
             continue
         assert truth is not None
-        tracks = [true_people(truth, index) for index in range(1, truth.length + 1)]
+        tracks = people_as_tracks(truth)
         for rule in rules:
             found[rule].append(evaluate(truth, with_groups(tracks, truth.fps, truth.px_per_m, RULES[rule])))
     return found

@@ -37,6 +37,7 @@ from sim.types import Sequence, Tracks
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source
 from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.recording_intervals import recording_differences
 from tracking.run import track
@@ -44,7 +45,6 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.frame_weights import weighted_scorer
 from tracking.tracker_registry import find
 from tracking.tuning import tune
-from tracking.tuning.grouping_episodes import people_as_tracks
 from tracking.tuning.options import TuneOptions
 from tracking.tuning.search_plan import search_plan
 from tracking.tuning.study import open_study

@@ -22,6 +22,8 @@ DEPTH = 32
 """Tables and lists inside each other in a TOML or JSON file."""
 NESTING = f"at most {DEPTH} tables and lists inside each other"
 """Words for what DEPTH allows."""
+REPEATS = 10_000
+"""Entries that one row of a suite stands for."""
 INTEGER = 2**63 - 1
 """Largest whole number in a TOML or JSON file, also with a minus sign."""
 

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from sim.io.formats.velocity import chords
 from sim.truth.proximity import close_pairs
 from sim.types import Array, Ints
+from tracking.grouping.pair_evidence import ExponentialMeans
 
 REACH = 5.0  # m: pairs that are never nearer are left out
 NEAR = 1.2  # m
@@ -76,8 +77,8 @@ def pair_features(frame: Ints, id: Ints, pos: Array, fps: float) -> Pairs:
         _others(frame, pos, i, j),
         (speed[i] + speed[j]) / 2,
     ]
-    means = exponential_means(t, pair, now, fps)
-    return Pairs(t, id[i], id[j], np.column_stack([means.reshape(len(t), len(NAMES) - len(ARRIVAL)), *arrival]))
+    means = ExponentialMeans(len(first_row), len(FAMILIES), 1 / fps, TIMES).add(t, pair, now)
+    return Pairs(t, id[i], id[j], np.column_stack([means, *arrival]))
 
 
 def _instant(apart: Array, vel_a: Array, vel_b: Array) -> Array:
@@ -88,27 +89,6 @@ def _instant(apart: Array, vel_a: Array, vel_b: Array) -> Array:
     across = np.abs(apart[:, 0] * mean[:, 1] - apart[:, 1] * mean[:, 0]) / np.where(pace > 0, pace, 1.0)
     sideways = np.where(pace >= STANDING, across, distance)  # False where nan
     return np.column_stack([distance, np.hypot(*(vel_a - vel_b).T), distance < NEAR, sideways])
-
-
-def exponential_means(frame: Ints, pair: Ints, values: Array, fps: float) -> Array:
-    """Returns the mean of each column over the rows of the same pair up to each row, (R, V, 4), one per time of TIMES.
-
-    A row's weight is exp(-age / time). frame (R,): ascending; pair (R,): from 0, once in a frame; values (R, V): nan is
-    left out of the mean, which is nan before the first number. fps: frames per second.
-    """
-    out = np.full((*values.shape, len(TIMES)), np.nan)
-    total = np.zeros((int(pair.max(initial=-1)) + 1, *out.shape[1:]))
-    weight, last = np.zeros_like(total), np.zeros(len(total))
-    for rows in np.split(np.arange(len(frame)), np.flatnonzero(np.diff(frame)) + 1):
-        k, x = pair[rows], values[rows, :, None]
-        age = (frame[rows] - last[k])[:, None, None] / fps
-        fade = np.exp(-age / np.array(TIMES))
-        weight[k] = weight[k] * fade + np.isfinite(x)
-        total[k] = total[k] * fade + np.nan_to_num(x)
-        last[k] = frame[rows]
-        np.divide(total[k], weight[k], out=(mean := np.full(total[k].shape, np.nan)), where=weight[k] > 0)
-        out[rows] = mean
-    return out
 
 
 def _others(frame: Ints, pos: Array, i: Ints, j: Ints) -> Ints:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.belonging.pair_features import NAMES, pair_features
+from benchmarks.belonging.pair_features import NAMES, Pairs, pair_features
 from scenarios.loading.resolve import Entry, resolve
 from sim.io.source import open_source
 from sim.sequence import simulate
@@ -78,11 +78,8 @@ def _rows(number: int, truth: Truth, part: int | None) -> dict[str, np.ndarray]:
     """Returns the fields of `Source` for one scene; part: None stands for the tenths of a recording."""
     assert truth.pos is not None
     pairs = pair_features(truth.frame, truth.id, truth.pos, FPS)
-    ids, column = np.unique(truth.id, return_inverse=True)
-    label = np.full((truth.length + 1, len(ids)), -1, np.int64)
-    label[truth.frame, column] = truth.group
+    ids = np.unique(truth.id)
     a, b = (np.searchsorted(ids, person) for person in (pairs.a, pairs.b))
-    first, second = label[pairs.frame, a], label[pairs.frame, b]
     _, met, pair = np.unique(a * len(ids) + b, return_index=True, return_inverse=True)
     tenth = (pairs.frame[met][pair] - 1) * BLOCKS // truth.length
     rank = np.random.default_rng(number).permutation(len(a))
@@ -90,9 +87,18 @@ def _rows(number: int, truth: Truth, part: int | None) -> dict[str, np.ndarray]:
         "length": np.array([truth.length]), "scene": np.full(len(truth.frame), number), "frame": truth.frame,
         "id": truth.id, "group": truth.group, "pos": truth.pos, "pair_scene": np.full(len(a), number),
         "pair_frame": pairs.frame, "a": pairs.a, "b": pairs.b, "features": pairs.features,
-        "mates": (first >= 0) & (first == second), "part": tenth if part is None else np.full(len(a), part),
+        "mates": are_mates(truth, pairs), "part": tenth if part is None else np.full(len(a), part),
         "drawn": (rank < SCENE_ROWS) | (part is None),
     }  # fmt: skip
+
+
+def are_mates(truth: Truth, pairs: Pairs) -> Bools:
+    """Returns flags (K,): True if the two of a row of pairs have one group label in its frame."""
+    ids, column = np.unique(truth.id, return_inverse=True)
+    label = np.full((truth.length + 1, len(ids)), -1, np.int64)
+    label[truth.frame, column] = truth.group
+    a, b = (label[pairs.frame, np.searchsorted(ids, person)] for person in (pairs.a, pairs.b))
+    return np.asarray((a >= 0) & (a == b))
 
 
 def recorded(folder: Path) -> Source:

@@ -28,13 +28,13 @@ from sim.io.source import open_source
 from sim.types import Array, Tracks, Truth
 from tracking.app.pictures.overlay import write_overlay
 from tracking.grouping.grouped_tracks import with_groups
+from tracking.grouping.known_people import people_as_tracks
 from tracking.recording_intervals import recording_differences, recording_intervals
 from tracking.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.frame_weights import weighted_scorer
 from tracking.scoring.one_plane import in_one_plane
 from tracking.scoring.people_and_groups import INSIDE
-from tracking.tuning.grouping_episodes import people_as_tracks
 
 DRAWS = 1000
 KEYS = ("group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP", "group_MOTA", "group_GDSR2", "group_F1", "group_IDSW")

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from scenarios.limits import REPEATS
 from scenarios.loading.toml_files import SUITES, Table, did_you_mean, parse, suite_names
 
 NAME = r"[A-Za-z][A-Za-z0-9_.-]*"
@@ -24,7 +25,7 @@ KEYS = {"name": str, "scenario": str, "set": list, "repeat": int}
 
 EXPECTED = {
     "set": 'a list of "key=value"',
-    "repeat": "a number from 1",
+    "repeat": f"a number from 1 to {REPEATS}",
     "name": "a name: a letter, then letters, digits, '_', '.' or '-'",
 }
 
@@ -132,7 +133,7 @@ def _check(entry: Table, place: str, path: Path) -> None:
         good = isinstance(value, KEYS[key]) and not isinstance(value, bool)
         good = good and (key != "set" or all(isinstance(text, str) for text in value))
         good = good and (key != "name" or re.fullmatch(NAME, value) is not None)
-        if not good or (key == "repeat" and value < 1):
+        if not good or (key == "repeat" and not 1 <= value <= REPEATS):
             expected = EXPECTED.get(key, "a string")
             raise InputError(
                 file=path, place=f"{place}.{key}", got=repr(value), expected=expected, remedy="correct the value"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from sim.compiler import njit
 from sim.types import Array, Bools
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def loss_and_gradient(
     place: np.ndarray, part: np.ndarray, standing: Array, gap: Array, together: Bools, weight: Array,
     walk: Array, stand: Array, rest: Array, log_odds: Array, gradient: Array,

@@ -170,30 +170,30 @@ def _portions(step: Ints) -> Iterator[slice]:
 
 
 class ExponentialMeans:
-    """Means of the values of pairs over their rows so far, weighted by exp(-age / time), for each time of `TIMES`.
+    """Means of the values of pairs over their rows so far, weighted by exp(-age / time), for each of T times.
 
-    State, by pair: total (K, V, 3) of weighted values, weight (K, V, 3), and last (K,), the pair's last step.
+    State, by pair: total (K, V, T) of weighted values, weight (K, V, T), and last (K,), the pair's last step.
     """
 
-    def __init__(self, pairs: int, values: int, seconds: float) -> None:
-        """pairs: number of pairs; values: per row; seconds: length of a step, s."""
-        self.seconds = seconds
-        self.total = np.zeros((pairs, values, len(TIMES)))
+    def __init__(self, pairs: int, values: int, seconds: float, times: tuple[float, ...] = TIMES) -> None:
+        """pairs: number of pairs; values: per row; seconds: length of a step, s; times: s."""
+        self.seconds, self.times = seconds, np.array(times)
+        self.total = np.zeros((pairs, values, len(times)))
         self.weight, self.last = np.zeros_like(self.total), np.zeros(pairs, np.int64)
 
     def add(self, step: Ints, pair: Ints, values: Array) -> Array:
-        """Adds rows and returns their means (R, V * 3), times varying fastest; nan before a pair's first number.
+        """Adds rows and returns their means (R, V * T), times varying fastest; nan before a pair's first number.
 
         step (R,): ascending, not before the last one added; pair (R,): once in a step; values (R, V): nan is left out.
         """
-        out = np.full((*values.shape, len(TIMES)), np.nan)
+        out = np.full((*values.shape, len(self.times)), np.nan)
         for rows in np.split(np.arange(len(step)), np.flatnonzero(np.diff(step)) + 1):
             k, x = pair[rows], values[rows, :, None]
             age = (step[rows] - self.last[k]) * self.seconds
-            fade, known = np.exp(-age[:, None] / np.array(TIMES))[:, None], np.isfinite(x)
+            fade, known = np.exp(-age[:, None] / self.times)[:, None], np.isfinite(x)
             weight = self.weight[k] * fade + known
             total = self.total[k] * fade + np.where(known, x, 0.0)
             self.weight[k], self.total[k], self.last[k] = weight, total, step[rows]
             mean = np.full_like(total, np.nan)
             out[rows] = np.divide(total, weight, out=mean, where=weight > 0)
-        return out.reshape(len(step), -1)
+        return out.reshape(len(step), values.shape[1] * len(self.times))

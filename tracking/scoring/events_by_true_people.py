@@ -191,19 +191,20 @@ def _contained(groups: GroupRows, person: Ints, ids: Sequence[int], span: range)
 
     groups: the tracker's groups in frames; person (K,): true id of each of their memberships; span: frame numbers, only
     its start and stop (excluded) count. A person belongs to the one group that contained the person in most frames (of
-    equals the lowest id), and only if these are more than half of the frames in which the group was reported. One frame
-    is not enough, because the hulls of people behind each other overlap in the image. A group without people gives an
-    empty `EventMembers`.
+    equals the one that contained the fewest people, then the lowest id), and only if these are more than half of the
+    frames in which the group was reported. One frame is not enough, because the hulls of people behind each other
+    overlap in the image. A group without people gives an empty `EventMembers`.
     """
     rows, now = groups.rows, (groups.rows.frame >= span.start) & (groups.rows.frame < span.stop)
     reported = Counter(rows.id[now].tolist())
     inside = now[groups.of]
     pairs, times = np.unique(np.stack([person[inside], rows.id[groups.of[inside]]]), axis=1, return_counts=True)
-    best: dict[int, tuple[int, int]] = {}  # person: (number of frames, minus the group's id)
+    people = Counter(pairs[1].tolist())
+    best: dict[int, tuple[int, int, int]] = {}  # person: (number of frames, minus the group's people, minus its id)
     for p, group, n in zip(*pairs.tolist(), times.tolist(), strict=True):
-        best[p] = max(best.get(p, (0, 0)), (n, -group))
+        best[p] = max(best.get(p, (0, 0, 0)), (n, -people[group], -group))
     return tuple(
-        EventMembers(frozenset(p for p, (n, minus) in best.items() if -minus == id and 2 * n > reported[id]))
+        EventMembers(frozenset(p for p, (n, _, minus) in best.items() if -minus == id and 2 * n > reported[id]))
         for id in ids
     )
 

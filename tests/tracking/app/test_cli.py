@@ -106,6 +106,7 @@ COMMANDS = {
     ),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
+    "group": ("group {data} --out {out}", "group {out}/nothing --out {out}/x"),
     "score": ("score {data} {tracks}", "score {data} {out}/nothing"),
     "score one": ("score {one} {tracks}/scene-s40000", "score {one} {tracks}/scene-s40001"),
     "score text": ("score {one} {tracks}/scene-s40000/tracks.mot.txt", "score {one} {one}/gt/groups.csv"),

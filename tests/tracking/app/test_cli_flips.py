@@ -307,7 +307,7 @@ def hard_scene():
     scene = load("cross", ["group.passers.repeat=6", "camera.tilt_deg=15", "duration=12"])
     sensor = scene.sensor.model_copy(update={"detect_prob": 0.75, "clutter_rate": 2.0, "persistence": 0.6})
     scene = scene.model_copy(update={"sensor": sensor})
-    sequence = observe(scene, simulate(scene, 11), check=False)
+    sequence = observe(scene, simulate(scene, 14), check=False)
     return dataclasses.replace(sequence, load_truth=None)
 
 
@@ -494,7 +494,7 @@ ELSEWHERE = {
     ("track", "grouping"),  # tests/tracking/tuning/test_rule.py
     ("track", "step_timeout"),  # tests/tracking/test_time_limit.py
 }
-OWN = ("group", "replay", "sensor", "tune")
+OWN = ("group", "grouping", "replay", "sensor", "tune")
 """Commands whose options are tested one by one in files of their own: commands/test_group.py, test_replay.py,
 test_fit.py, test_tune.py."""
 

@@ -13,6 +13,7 @@ from sim.hashing import file_hash
 from sim.io.source import open_source
 from sim.io.store import seal
 from sim.io.store.run_seal import read_run
+from tests.refusals import refused
 from tests.sealing import seal_again
 from tracking.app.cli import run
 from tracking.run import track
@@ -47,14 +48,6 @@ def made(tmp_path_factory) -> Path:
 def tracks(made: Path, tmp_path: Path) -> Path:
     """A copy of blob's tracks, to be spoilt."""
     return Path(shutil.copytree(made / "blob", tmp_path / "tracks"))
-
-
-def refused(capsys, *words: object) -> str:
-    capsys.readouterr()
-    assert run([str(word) for word in words]) == 2
-    line = capsys.readouterr().err
-    assert line.count("\n") == 1
-    return line
 
 
 def readers(data: Path, tracks: Path, out: Path) -> list[list[object]]:

@@ -11,9 +11,9 @@ from tests.test_belonging import walk
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.belief_partition import partition
 from tracking.grouping.grouped_tracks import MEMBERSHIP_KINDS, derive
+from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.pair_evidence import NAMES, evidence, frames_per_step, step_positions
 from tracking.grouping.pair_probabilities import pair_probabilities
-from tracking.tuning.grouping_episodes import people_as_tracks
 
 
 def places(seed, frames=30, people=7, seconds=0.2):

@@ -25,6 +25,7 @@ from sim.io.store.validate import validate
 from tests.sealing import seal_again
 
 ROOT = Path(__file__).resolve().parents[4]
+PAIRS = bytes(range(256))
 INFO = {"tracker": "blob", "config": {"a": 1.5e-7}, "seed": 0, "sequence": "s", "fps": 10.0}
 
 
@@ -36,7 +37,7 @@ def write(folder: Path, files: dict[str, bytes]) -> Path:
 
 
 def test_the_seal_names_every_file(tmp_path, make_tracks):
-    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO, pairs=PAIRS)
     run = read_run(folder)
     assert set(run["files"]) == {p.name for p in folder.iterdir()} - {"run.json"} == set(NAMES) - {"run.json"}
     assert run["files"]["tracks.txt"]["bytes"] == (folder / "tracks.txt").stat().st_size
@@ -47,7 +48,7 @@ def test_the_seal_names_every_file(tmp_path, make_tracks):
 @pytest.mark.parametrize("name", NAMES)
 def test_no_flipped_bit_is_accepted(tmp_path, make_tracks, name):
     """One bit in each of 200 places of every file, spread over the whole of it; every fifth bit of run.json."""
-    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO, pairs=PAIRS)
     path, right = folder / name, (folder / name).read_bytes()
     bits = 8 * len(right)
     chosen = range(0, bits, 5) if name == "run.json" else np.unique(np.linspace(0, bits - 1, 200).astype(int)).tolist()
@@ -67,7 +68,7 @@ def test_no_flipped_bit_is_accepted(tmp_path, make_tracks, name):
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "run.json"])
 def test_a_deleted_or_cut_file_is_named(tmp_path, make_tracks, name):
-    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO, pairs=PAIRS)
     (folder / name).write_bytes((folder / name).read_bytes()[:-1])
     with pytest.raises(InputError, match=r"truncated.*track again") as error:
         read_tracks(folder)
@@ -107,7 +108,7 @@ def test_a_run_of_an_older_version_is_one_line(tmp_path, make_tracks):
 
 def test_files_of_two_runs_are_refused(tmp_path, make_tracks):
     """Whichever file is of the other run; and one that this run would not have."""
-    one, two = (tracks_files(make_tracks(seed), fps=10.0, info=INFO) for seed in (1, 2))
+    one, two = (tracks_files(make_tracks(seed), fps=10.0, info=INFO, pairs=PAIRS + bytes([seed])) for seed in (1, 2))
     for name in NAMES:
         folder = write(tmp_path / name, {**one, name: two[name]})
         with pytest.raises(InputError, match="track again"):

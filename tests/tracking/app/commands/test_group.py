@@ -19,6 +19,7 @@ from sim.io.store.run_seal import NAMES, check_run
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import Tracks
+from tests.refusals import refused
 from tests.sealing import seal_again
 from tests.short_scene import write_short_scene
 from tracking import group
@@ -79,14 +80,6 @@ def done(capsys, *words: object) -> dict:
     found = json.loads(capsys.readouterr().out)
     assert code == 0, found
     return found
-
-
-def refused(capsys, *words: object) -> str:
-    capsys.readouterr()
-    assert run([str(word) for word in words]) == 2
-    line = capsys.readouterr().err
-    assert line.count("\n") == 1
-    return line
 
 
 def told(tracks: Tracks) -> list[dict]:

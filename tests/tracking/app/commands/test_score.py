@@ -25,7 +25,7 @@ from tracking.stats import mean_interval
 def made(tmp_path_factory) -> Path:
     """Two seeds of a scene with a merge; blob's tracks from its sensor's detections, and from the truth."""
     folder = tmp_path_factory.mktemp("score")
-    line = ["generate", "merge", "--seeds", "3:5", "--streams", "none", "--out", str(folder / "data")]
+    line = ["generate", "merge", "--seeds", "5:7", "--streams", "none", "--out", str(folder / "data")]
     assert run(line) == 0
     for name in ("file", "truth"):
         options = ["--detections", name, "--out", str(folder / name)]
@@ -42,7 +42,7 @@ def scored(capsys, *arguments: object) -> dict:
 @pytest.mark.parametrize("by", ["hull", "members"])
 def test_files_are_memory(made: Path, capsys, by: str) -> None:
     found = scored(capsys, made / "data", made / "file", "--group-match", by)
-    for seed, row in zip((3, 4), found["sequences"], strict=True):
+    for seed, row in zip((5, 6), found["sequences"], strict=True):
         sequence = simulate(load("merge"), seed)
         expected = evaluate(sequence.truth, track("blob", sequence, detections="file"), group_match=by)
         assert (row["name"], row["group_match"], row["surface"]) == (f"merge-s{seed:05d}", by, "ground")
@@ -52,14 +52,14 @@ def test_files_are_memory(made: Path, capsys, by: str) -> None:
 
 @pytest.fixture(scope="module")
 def scene() -> Sequence:
-    return simulate(load("merge"), 3)
+    return simulate(load("merge"), 5)
 
 
 @pytest.mark.parametrize("plane", ["ground", "image"])
 def test_files_are_memory_for_groups_as_wholes(made: Path, scene: Sequence, tmp_path: Path, capsys, plane: str) -> None:
     """Hulls, extents, sizes and events come back exactly, and with them every score; of people there is none."""
     answers = wholes(scene, plane)
-    data = made / "data" / "flockscope-train" / "merge-s00003"
+    data = made / "data" / "flockscope-train" / "merge-s00005"
     folder = tmp_path / data.name
     write_tracks(folder, answers, fps=scene.fps, camera=scene.camera, scene=scene.scene)
     for by in ("hull", "members"):
@@ -75,10 +75,10 @@ def test_files_are_memory_for_groups_as_wholes(made: Path, scene: Sequence, tmp_
 
 def test_tables_of_a_tracker_of_groups(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
     """There is no table of people; the objective is in the table of groups."""
-    folder = tmp_path / "merge-s00003"
+    folder = tmp_path / "merge-s00005"
     write_tracks(folder, wholes(scene, "ground"), fps=scene.fps)
     capsys.readouterr()
-    assert run(["score", str(made / "data" / "flockscope-train" / "merge-s00003"), str(folder)]) == 0
+    assert run(["score", str(made / "data" / "flockscope-train" / "merge-s00005"), str(folder)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].strip() == "groups, strict"
     assert lines[1].split()[:3] == ["sequence", "objective", "1-FP"]
@@ -139,7 +139,7 @@ def test_the_mean_has_every_key_and_an_interval(made: Path, capsys) -> None:
     _, low, high = mean_interval(np.array([[first], [second]]))
     assert (mean["low"], mean["high"]) == (max(0.0, low[0]), min(1.0, high[0])), "within the score's range"
     assert found["mean"]["cross_F1"] == {"mean": None, "low": None, "high": None}
-    one = scored(capsys, made / "data" / "flockscope-train" / "merge-s00003", made / "file")["mean"]["HOTA"]
+    one = scored(capsys, made / "data" / "flockscope-train" / "merge-s00005", made / "file")["mean"]["HOTA"]
     assert one["low"] is one["high"] is None
 
 
@@ -179,14 +179,14 @@ def test_what_differs_comes_first(made: Path, capsys) -> None:
 def in_image(made: Path, folder: Path, scene: Sequence) -> Path:
     """A run of one sequence whose people lie in the image."""
     answers = [t.replace(plane="image") for t in one_plane.in_image(track("blob", scene, detections="file"))]
-    info = {"tracker": "blob", "sequence": "merge-s00003", "plane": "image", "fps": scene.fps, "detections": "image"}
-    write_tracks(folder / "merge-s00003", answers, fps=scene.fps, camera=scene.camera, scene=scene.scene, info=info)
+    info = {"tracker": "blob", "sequence": "merge-s00005", "plane": "image", "fps": scene.fps, "detections": "image"}
+    write_tracks(folder / "merge-s00005", answers, fps=scene.fps, camera=scene.camera, scene=scene.scene, info=info)
     return folder
 
 
 def test_two_runs_are_compared_in_one_plane(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
     """One run lies in the image, the other on the ground: metres were subtracted from pixels."""
-    data = made / "data" / "flockscope-train" / "merge-s00003"
+    data = made / "data" / "flockscope-train" / "merge-s00005"
     image = in_image(made, tmp_path / "image", scene)
     alone = scored(capsys, data, made / "file")["sequences"][0]
     assert alone["surface"] == "ground"
@@ -201,8 +201,8 @@ def test_two_runs_are_compared_in_one_plane(made: Path, scene: Sequence, tmp_pat
 
 
 def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
-    data, folder = made / "data" / "flockscope-train" / "merge-s00003", tmp_path / "wholes"
-    write_tracks(folder / "merge-s00003", wholes(scene, "ground"), fps=scene.fps)
+    data, folder = made / "data" / "flockscope-train" / "merge-s00005", tmp_path / "wholes"
+    write_tracks(folder / "merge-s00005", wholes(scene, "ground"), fps=scene.fps)
     image = in_image(made, tmp_path / "image", scene)
     assert run(["score", str(data), str(folder), "--against", str(image)]) == 2
     error = capsys.readouterr().err
@@ -212,7 +212,7 @@ def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, 
 
 def test_every_score_lies_in_its_interval_of_one_recording(made: Path, capsys) -> None:
     """Resampled frames were joined, and each join was a switch: IDSW 24 had the interval [46, 76]."""
-    one = made / "data" / "flockscope-train" / "merge-s00003"
+    one = made / "data" / "flockscope-train" / "merge-s00005"
     found = scored(capsys, one, made / "file", "--against", made / "truth", "--blocks", "200")
     known = 0
     for means in (found["mean"], found["difference"]):
@@ -226,7 +226,7 @@ def test_every_score_lies_in_its_interval_of_one_recording(made: Path, capsys) -
 
 @pytest.mark.slow
 def test_blocks_of_a_single_recording(made: Path, capsys) -> None:
-    one = made / "data" / "flockscope-train" / "merge-s00003"
+    one = made / "data" / "flockscope-train" / "merge-s00005"
     found = scored(capsys, one, made / "truth", "--against", made / "file", "--blocks", "20")
     (row,) = found["sequences"]
     for key in ("HOTA", "pairwise_F1", "MOTA"):
@@ -244,7 +244,7 @@ def test_blocks_of_a_single_recording(made: Path, capsys) -> None:
 
 def test_a_short_recording_is_an_indication_only(made: Path, capsys, monkeypatch) -> None:
     """The scene lasts under a minute; with the border below its length it is long enough."""
-    one = [made / "data" / "flockscope-train" / "merge-s00003", made / "file"]
+    one = [made / "data" / "flockscope-train" / "merge-s00005", made / "file"]
     (note,) = scored(capsys, *one, "--blocks", "2")["notes"]
     assert "indicative under 60 s" in note
     assert run(["score", *map(str, one), "--blocks", "2"]) == 0
@@ -274,8 +274,8 @@ def test_tables(made: Path, capsys) -> None:
 
 
 def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:
-    gt = made / "data" / "flockscope-train" / "merge-s00003" / "gt" / "gt.txt"
-    shown = made / "file" / "merge-s00003" / "tracks.mot.txt"
+    gt = made / "data" / "flockscope-train" / "merge-s00005" / "gt" / "gt.txt"
+    shown = made / "file" / "merge-s00005" / "tracks.mot.txt"
     found = scored(capsys, gt, shown, "--fps", "10")["sequences"][0]
     assert found["HOTA"] > 0.5
     unknown = ("group", "pairwise", "GMITRE", "right", "exact", "merge", "event")
