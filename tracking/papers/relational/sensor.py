@@ -43,7 +43,8 @@ def weigh(particles: ParticleSet, points: Array, detect: Array, noise: float, co
     """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say.
 
     points (M, 2): m; detect (K,): probability that each person is measured if existing; noise: standard deviation of a
-    point per axis, m. Clusters, weights and existence of the particles are changed. If all weights vanish, which only the paper's sensor can bring about, they are not.
+    point per axis, m. Clusters, weights and existence of the particles are changed. If all weights vanish, which only
+    the paper's sensor can bring about, they are not.
     """
     people, certain = particles.people, config.certain_sensor
     if not people:

@@ -78,7 +78,8 @@ class Particle:
         the scale px_per_m is zero or negative, or neither known nor learned from the sample, or if the sample cannot be
         used.
         """
-        self.context, self.shown = context, None
+        self.context = context
+        self.shown: Tracks | None = None
         self.pixels = None if context.background is None else ForegroundBlobs(self.config, context)
         if self.pixels is not None:
             self.context = context = context.replace(px_per_m=self.pixels.scale)
@@ -106,10 +107,10 @@ class Particle:
         self._forecast()
         if detections is not None:
             self._measure(detections)
-        self.shown = self._report(frame)
+        self.shown = tracks = self._report(frame)
         if detections is not None:
             self.particles.resample(self.config.resample_share, self.config.resampling, self.draws[RESAMPLING])
-        return self.shown
+        return tracks
 
     @property
     def px_per_m(self) -> float:
