@@ -1,4 +1,4 @@
-"""The options of the commands `fit …`: as those of other commands in `tracking.app.command_options`."""
+"""The options of the commands `fit …`, as in `command_options`."""
 
 from __future__ import annotations
 

@@ -27,6 +27,8 @@ LEAST = 500
 """Fewest rows from which anything is fitted."""
 RATES = tuple(0.05 * 2.0**k for k in range(9))
 """Rates of relations that are tried, 1/s."""
+PRIOR = 5.0
+"""Standard deviation of the prior of each logistic weight, about 0: pairs that a line separates have finite weights."""
 STEPS = 50
 """Most steps of Newton's method."""
 
@@ -121,12 +123,13 @@ def pair_rows(truth: Truth) -> TruePairs:
 
 
 def logistic(design: Array, same: Bools) -> Array:
-    """Return the weights (3,) of a logistic regression by Newton's method; design (R, 3), same (R,)."""
+    """Return the weights (3,) of a logistic regression with a normal prior, by Newton's method; design (R, 3), same
+    (R,)."""
     weights = np.zeros(design.shape[1])
     for _ in range(STEPS):
         p = 1 / (1 + np.exp(-np.clip(design @ weights, -40, 40)))
-        gradient = design.T @ (same - p)
-        hessian = (design * (p * (1 - p))[:, None]).T @ design + 1e-6 * np.eye(len(weights))
+        gradient = design.T @ (same - p) - weights / PRIOR**2
+        hessian = (design * (p * (1 - p))[:, None]).T @ design + np.eye(len(weights)) / PRIOR**2
         step = np.linalg.solve(hessian, gradient)
         weights = weights + step
         if np.abs(step).max() < 1e-8:

@@ -104,6 +104,10 @@ COMMANDS = {
         "fit grouping side-by-side --seeds 0 --check 1 --out {out}/mine.toml",
         "fit grouping no-such-scene --out {out}/mine.toml",
     ),
+    "fit relational": (
+        "fit relational cross --seeds 30000 --out {out}/mine.toml",
+        "fit relational no-such-scene --out {out}/mine.toml",
+    ),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
     "group": ("group {data} --out {out}", "group {out}/nothing --out {out}/x"),
@@ -134,7 +138,7 @@ COMMANDS = {
     ),
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
 }
-SMALL = ("scenarios --out", "fit sensor")  # a few kB
+SMALL = ("scenarios --out", "fit sensor", "fit relational")  # a few kB
 FEW = ("export coco", "fit grouping", "sheet", "track", "track blob")  # less than 12 kB
 WRITING = [name for name, (good, _) in COMMANDS.items() if "--out {out}" in good]
 

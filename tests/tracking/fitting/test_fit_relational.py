@@ -22,6 +22,14 @@ def test_logistic_regression_finds_its_weights():
     np.testing.assert_allclose(logistic(design, same), true, rtol=0.05)
 
 
+def test_pairs_that_a_line_separates_have_finite_weights():
+    distance = np.linspace(0, 4, 400)
+    weights = logistic(np.stack([np.ones(400), -distance, np.zeros(400)], axis=1), distance < 1.5)
+    assert weights[0] / weights[1] == pytest.approx(1.5, abs=0.05)
+    assert weights[2] == 0
+    assert 3 < weights[1] < 30
+
+
 def test_without_scenes_nothing_is_fitted():
     with pytest.raises(InputError, match="0 changes of velocity"):
         fit_relational([], ENDS)

@@ -7,27 +7,28 @@ the same parameters (sec. 3.4).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Array
-from tracking.config import Config, param
+from tracking.config import param
+from tracking.detect.background_settings import BackgroundSettings
 
 ROWS = 5
 """Rows of the speed table (Table 3)."""
 
 
 @dataclass(frozen=True)
-class ParticleConfig(Config):
+class ParticleConfig(BackgroundSettings):
     """The parameters of the tracker `particle`, a particle filter without relations; each field states default, range
     and unit.
 
-    They are the number of particles, the speed table of the motion, the sensor, births, deaths and reporting. Raises
-    InputError if the upper ends of the speed table's rows do not increase, or if clutter_density is 0 and detect_prob
-    is below 1.
+    They are the number of particles, the speed table of the motion, the sensor, births, deaths, reporting and the
+    background model. A speed belongs to the first row of the speed table whose upper end it does not exceed. Raises
+    InputError if clutter_density is 0 and detect_prob is below 1, or if foreground_time is shorter than
+    background_time.
     """
 
     tracker: ClassVar[str] = "particle"
@@ -77,7 +78,20 @@ class ParticleConfig(Config):
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity, per axis", "log")
 
     point_noise: float = param(
-        0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis (sec. 3.3)", "log"
+        0.08,
+        (0.005, 2.0),
+        "m",
+        "from points: standard deviation of a measured position, per axis (sec. 3.3)",
+        "log",
+        sees="points",
+    )
+    pixel_noise: float = param(
+        0.15,
+        (0.005, 2.0),
+        "m",
+        "from pixels: standard deviation of the centre of a blob, per axis (ours)",
+        "log",
+        sees="pixels",
     )
     detect_prob: float = param(
         0.95, (0.3, 1.0), "probability", "that a person who was measured in the last frame is measured (ours)"
@@ -106,14 +120,17 @@ class ParticleConfig(Config):
         0.5, (0.0, 1.0), "probability", "people whose existence is at least so probable are reported (ours)"
     )
 
+    most_foreground: float = param(
+        0.6,
+        (0.05, 1.0),
+        "share",
+        "from pixels: a frame with a larger share of foreground is ignored (ours)",
+        sees="pixels",
+    )
+
     def check(self) -> None:
-        """Refuse a speed table whose rows do not follow each other, and a sensor without clutter that misses people."""
-        for row, (low, high) in enumerate(pairwise(self.speed_ends.tolist()), 2):
-            if high <= low:
-                raise InputError(
-                    place=f"speed_{row}", got=f"{high:g}", expected=f"more than speed_{row - 1} = {low:g}",
-                    remedy="give the rows of the speed table by increasing speed",
-                )  # fmt: skip
+        """Refuse a sensor without clutter that misses people."""
+        super().check()
         if self.clutter_density == 0 and self.detect_prob < 1:
             raise InputError(
                 place="clutter_density", got="0", expected="above 0 if detect_prob is below 1",

@@ -39,21 +39,22 @@ class Weighing:
     nobody: Array
 
 
-def weigh(particles: ParticleSet, points: Array, detect: Array, config: ParticleConfig) -> Weighing:
+def weigh(particles: ParticleSet, points: Array, detect: Array, noise: float, config: ParticleConfig) -> Weighing:
     """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say.
 
-    points (M, 2): m; detect (K,): probability that each person is measured if existing. Clusters, weights and existence
-    of the particles are changed. If all weights vanish, which only the paper's sensor can bring about, they are not.
+    points (M, 2): m; detect (K,): probability that each person is measured if existing; noise: standard deviation of a
+    point per axis, m. Clusters, weights and existence of the particles are changed. If all weights vanish, which only
+    the paper's sensor can bring about, they are not.
     """
     people, certain = particles.people, config.certain_sensor
     if not people:
         return Weighing(False, np.zeros((0, len(points))), np.zeros(0), np.ones(len(points)))
     reach = np.inf if certain else REACH
-    near = sensor_kernels.near_detections(particles.pos, points, reach * config.point_noise**2)
+    near = sensor_kernels.near_detections(particles.pos, points, reach * noise**2)
     particles.regroup(_linked(particles, near, config))
     log_sums, marginals = np.empty(particles.exist.shape), np.empty((*particles.exist.shape, len(points)))
     sensor_kernels.particle_sums(
-        particles.pos, particles.exist, detect, points, config.point_noise, config.clutter_density, reach, near,
+        particles.pos, particles.exist, detect, points, noise, config.clutter_density, reach, near,
         particles.cluster, log_sums, marginals,
     )  # fmt: skip
     if certain and log_sums[:, particles.heads].max(axis=0).min() < LEAST_LOG:

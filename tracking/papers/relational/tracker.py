@@ -44,6 +44,7 @@ from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Pl
 from tracking.image_scale import required
 from tracking.papers.relational import report, sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
+from tracking.papers.relational.from_pixels import ForegroundBlobs
 from tracking.papers.relational.occluders import hidden_share
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.slots import Slots
@@ -57,12 +58,13 @@ class Particle:
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
     the people; hidden (K,): probability that each person is behind a known pillar or wall; identities, the groups;
-    plane, "ground" or "image"; context; draws, the random streams; vanished: number of frames in which all weights were
+    pixels: detector of blobs, None from points; shown: the tracks that were reported last, None before; plane, "ground"
+    or "image"; context; draws, the random streams; vanished: number of frames in which all weights were
     0; effective: least effective number of particles of any person in the last measured frame. All but config exist
     after `reset` only.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("points",)
+    needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
     config_class: ClassVar[type[ParticleConfig]] = ParticleConfig
 
     def __init__(self, config: ParticleConfig | None = None) -> None:
@@ -71,35 +73,60 @@ class Particle:
     def reset(self, context: Context, seed: int) -> None:
         """Forget everything and start a sequence. seed: of all random numbers.
 
-        Until the first detections `plane` is "image" with a scale but no camera, else "ground".
+        With a background sample in the context pixels are tracked, else points. Until the first detections `plane` is
+        "image" from pixels, or with a scale but no camera, else "ground". If pixels are tracked, raises InputError if
+        the scale px_per_m is zero or negative, or neither known nor learned from the sample, or if the sample cannot be
+        used.
         """
         self.context = context
+        self.shown: Tracks | None = None
+        self.pixels = None if context.background is None else ForegroundBlobs(self.config, context)
+        if self.pixels is not None:
+            self.context = context = context.replace(px_per_m=self.pixels.scale)
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
         self.identities = Identities()
         self.draws = [rng(seed, "tracker", key) for key in range(JOINING + 1)]
-        self.plane: Plane = "image" if context.camera is None and context.px_per_m > 0 else "ground"
+        flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
+        self.plane: Plane = "image" if flat else "ground"
         self.hidden = np.zeros(0)
         self.vanished, self.effective = 0, float(self.config.particles)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Return the people of the frame as Tracks; updates all particles.
 
-        `detections.pos` is used (x, y). None is a frame without information, which is forecast only; no detections are
-        a frame in which everybody is missed. Raises InputError if points are in the image and the context has no scale
-        above 0.
+        From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
+        pixels one with too much foreground, is forecast only; no detections are a frame in which everybody is missed.
+        Raises InputError if points are in the image and the context has no scale above 0, or if the picture's size or
+        dtype is not the background sample's.
         """
+        if self.pixels is not None:
+            if self.pixels.config is not self.config:
+                self.pixels.follow(self.config)
+            known = None if self.shown is None else self.shown.box
+            detections = self.pixels.detections(frame, np.zeros((0, 4)) if known is None else known)
         self._forecast()
         if detections is not None:
             self._measure(detections)
-        tracks = self._report(frame)
+        self.shown = tracks = self._report(frame)
         if detections is not None:
             self.particles.resample(self.config.resample_share, self.config.resampling, self.draws[RESAMPLING])
         return tracks
 
     @property
+    def px_per_m(self) -> float:
+        """Scale of the image in px per metre: the context's, or, from pixels, learned from its background sample; nan
+        if unknown."""
+        return self.context.px_per_m
+
+    @property
     def dt(self) -> float:
         """Time between frames, s."""
         return 1.0 / self.context.fps
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a measured position, per axis, m."""
+        return self.config.point_noise if self.pixels is None else self.config.pixel_noise
 
     @property
     def unit(self) -> float:
@@ -130,7 +157,7 @@ class Particle:
         points = np.ascontiguousarray(detections.pos[order, :2] / self.unit)
         image_boxes = self.plane == "image" and detections.box is not None
         sizes = detections.box[order, 2:] if image_boxes and detections.box is not None else None
-        said = sensor.weigh(self.particles, points, self._detection_probability(), self.config)
+        said = sensor.weigh(self.particles, points, self._detection_probability(), self.noise, self.config)
         self.vanished += said.vanished
         self.effective = float(self.particles.effective().min(initial=self.particles.count))
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
@@ -167,7 +194,7 @@ class Particle:
         born = c.birth_rate * self.dt
         related = self._relations_of_newcomer(point)
         p.add(
-            point + c.point_noise * draws[0], c.speed_prior * draws[1], born / (born + c.clutter_density), related
+            point + self.noise * draws[0], c.speed_prior * draws[1], born / (born + c.clutter_density), related
         )  # fmt: skip
         self.slots.add(size)
 

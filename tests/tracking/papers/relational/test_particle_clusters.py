@@ -85,8 +85,8 @@ def test_weights_of_clusters_multiply_to_the_joint_weight():
     """Far from each other, the joint likelihood is the product of the clusters' likelihoods."""
     points = np.array([[0.02, 0.05], [0.45, -0.02], [8.1, 0.0]])
     joint, apart = three(), three()
-    sensor.weigh(joint, points, np.full(3, 0.9), ParticleConfig(weights="joint"))
-    sensor.weigh(apart, points, np.full(3, 0.9), ParticleConfig())
+    sensor.weigh(joint, points, np.full(3, 0.9), 0.08, ParticleConfig(weights="joint"))
+    sensor.weigh(apart, points, np.full(3, 0.9), 0.08, ParticleConfig())
     assert joint.cluster.tolist() == [0, 0, 0]
     assert apart.cluster.tolist() == [0, 0, 2]
     product = apart.weights[:, 0] * apart.weights[:, 2]
@@ -98,7 +98,7 @@ def test_people_who_walk_together_share_a_cluster_without_a_common_detection():
     """A hidden partner in another cluster would lose its help."""
     particles = three()
     particles.related[:, 0, 2] = particles.related[:, 2, 0] = True
-    sensor.weigh(particles, np.zeros((0, 2)), np.full(3, 0.9), RelationalConfig())
+    sensor.weigh(particles, np.zeros((0, 2)), np.full(3, 0.9), 0.08, RelationalConfig())
     assert particles.cluster.tolist() == [0, 1, 0]
 
 
@@ -107,7 +107,7 @@ def test_existence_by_bayes():
     particles = three()
     far = np.array([[0.0, 0.0]])
     particles.pos[:, 0], particles.pos[:, 1] = far[0], [5.0, 0.0]
-    sensor.weigh(particles, far, np.full(3, 0.8), ParticleConfig(clutter_density=1e-9))
+    sensor.weigh(particles, far, np.full(3, 0.8), 0.08, ParticleConfig(clutter_density=1e-9))
     np.testing.assert_allclose(particles.exist[:, 2], 0.9 * 0.2 / (1 - 0.9 * 0.8), rtol=1e-12)
     np.testing.assert_allclose(particles.exist[:, 0], 1.0, atol=1e-6)
 

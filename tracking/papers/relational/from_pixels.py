@@ -1,0 +1,60 @@
+"""From a picture to the detections of `relational` and `particle`: each foreground blob is one detection (ours).
+
+The foreground comes from tracking.detect.foreground. A blob that holds several people is one detection, so people who
+share a blob are missed but for one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Context, Detections, Frame
+from tracking.detect.foreground import Foreground, convex_areas
+from tracking.detect.person_size import PersonSize
+from tracking.image_scale import required
+from tracking.papers.relational.config import ParticleConfig
+
+
+class ForegroundBlobs:
+    """Foreground blobs as detections in the image.
+
+    State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
+    is nan, learned from lone people in its background sample.
+
+    The context must have a background sample (else AssertionError). Raises InputError if the scale is neither known nor
+    learned, if it is zero or negative, or if the sample cannot be used.
+    """
+
+    def __init__(self, config: ParticleConfig, context: Context) -> None:
+        assert context.background is not None
+        self.config = config
+        self.foreground = Foreground(context, config, config.most_foreground)
+        if np.isnan(context.px_per_m):
+            size = PersonSize(context)
+            self.foreground.learn_person_size(size, context.background)
+            self.foreground.px_per_m = size.px_per_m
+        self.scale = self.foreground.px_per_m = required(self.foreground.px_per_m)
+
+    def follow(self, config: ParticleConfig) -> None:
+        """Replace the config: settings of the background model change; what the model learned and the scale stay."""
+        self.config = config
+        self.foreground.follow(config, config.most_foreground)
+
+    def detections(self, frame: Frame, people: Array) -> Detections | None:
+        """Return the blobs of the frame's picture as detections; None without a picture, or if more of it is foreground
+        than `most_foreground`.
+
+        people (N, 4): boxes of the tracked people, left, top, width, height, px. The background model learns from the
+        picture except inside them, so that people who stand still do not become background. Raises InputError if the
+        picture's size or dtype is not the background sample's.
+        """
+        if frame.image is None:
+            return None
+        seen = self.foreground.segment(frame.image)
+        corners = [box[:2] + box[2:] * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) for box in people]
+        self.foreground.adapt(seen, convex_areas(self.foreground.shape, corners))
+        if not seen.plausible:
+            return None
+        box = self.foreground.person_blobs(seen.mask).box
+        centre = box[:, :2] + box[:, 2:] / 2
+        return Detections(frame.index, frame.t, "image", centre, None, box, np.ones(len(box)))
