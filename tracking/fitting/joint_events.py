@@ -2,8 +2,8 @@
 
 A multinomial logistic regression over (d_KL, d_v, d_intra) of a group and its nearest one at two times a lag apart, as
 the tracker computes them. Classes are Merge, Split and None, at their natural frequency, so that the probabilities are
-those of an event within the lag. Rows are all groups of the true partition, people alone included, every STRIDE. Places and
-velocities have errors as large as those of a filter.
+those of an event within the lag. Rows are all groups of the true partition, people alone included, every STRIDE. Places
+and velocities have errors as large as those of a filter.
 """
 
 from __future__ import annotations

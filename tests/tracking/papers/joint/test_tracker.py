@@ -1,4 +1,4 @@
-"""Limits of `joint`: the Kalman filter, DEEPER-JIGT.2, labels, births and losses (companion page, section 4, E2, D7)."""
+"""Limits of `joint`: the Kalman filter, DEEPER-JIGT.2, labels, births, losses (companion page, section 4, E2, D7)."""
 
 from __future__ import annotations
 
