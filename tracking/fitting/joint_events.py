@@ -26,7 +26,7 @@ PLACE_ERROR, VELOCITY_ERROR = 0.04, 0.12
 """Standard deviations of the errors of places, m, and velocities, m/s, per axis."""
 RIDGE = 1e-3
 """Weight of the squared coefficients, of standardised features, in the loss of a row."""
-LEAST = 20
+LEAST = 5
 """Fewest merges, and splits, from which a classifier is fitted."""
 MERGE, SPLIT, NONE = range(3)
 CLASSES = ("merge", "split", "none")

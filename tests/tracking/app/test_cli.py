@@ -108,6 +108,10 @@ COMMANDS = {
         "fit relational cross --seeds 30000 --out {out}/mine.toml",
         "fit relational no-such-scene --out {out}/mine.toml",
     ),
+    "fit joint": (
+        "fit joint party --seeds 30000:30003 --out {out}/mine.toml",
+        "fit joint no-such-scene --out {out}/mine.toml",
+    ),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
     "group": ("group {data} --out {out}", "group {out}/nothing --out {out}/x"),
@@ -138,7 +142,7 @@ COMMANDS = {
     ),
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
 }
-SMALL = ("scenarios --out", "fit sensor", "fit relational")  # a few kB
+SMALL = ("scenarios --out", "fit sensor", "fit relational", "fit joint")  # a few kB
 FEW = ("export coco", "fit grouping", "sheet", "track", "track blob")  # less than 12 kB
 WRITING = [name for name, (good, _) in COMMANDS.items() if "--out {out}" in good]
 
