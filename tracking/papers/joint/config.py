@@ -14,7 +14,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sim.types import Array
-from tracking.config import Config, param
+from tracking.config import param
+from tracking.detect.background_settings import BackgroundSettings
 from tracking.papers.joint import group_events_kernels as events
 
 FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8"))[
@@ -30,11 +31,12 @@ def _weight(event: str, term: str, unit: str, meaning: str) -> Any:
 
 
 @dataclass(frozen=True)
-class JointConfig(Config):
+class JointConfig(BackgroundSettings):
     """The parameters of the tracker `joint`; each field states default, range and unit.
 
     They are the numbers of particles, the variant of the paper, the individuals' proposal and dynamics, the cluster
-    validity, the events, births and losses, and the estimate.
+    validity, the events, births and losses, the estimate and the background model. Raises InputError if foreground_time
+    is shorter than background_time.
     """
 
     tracker: ClassVar[str] = "joint"
@@ -84,6 +86,21 @@ class JointConfig(Config):
     )
     velocity_noise: float = param(0.3, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
     point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")
+    pixel_noise: float = param(
+        0.15,
+        (0.005, 2.0),
+        "m",
+        "from pixels: standard deviation of the centre of a blob, per axis (ours)",
+        "log",
+        sees="pixels",
+    )
+    most_foreground: float = param(
+        0.6,
+        (0.05, 1.0),
+        "share",
+        "from pixels: a frame with a larger share of foreground is ignored (ours)",
+        sees="pixels",
+    )
 
     validity_rate: float = param(
         20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"

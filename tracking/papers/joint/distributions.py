@@ -26,12 +26,13 @@ class FrameModel:
     X is (N_x, K, 4 L): the states of the last L frames, the newest first, L frames being the lag. Z is (N_x, N_z, K),
     labels as partition_kernels has them.
 
-    config; dt: s; z (K, 2): measured places, m, nan for a person who was not measured; motion, choices, events: the
-    random streams of step 4 (normals and uniforms) and of step 7.
+    config; dt: s; noise: standard deviation of a measured place, m; z (K, 2): measured places, m, nan for a person who
+    was not measured; motion, choices, events: the random streams of step 4 (normals and uniforms) and of step 7.
     """
 
     config: JointConfig
     dt: float
+    noise: float
     z: Array
     motion: np.random.Generator
     choices: np.random.Generator
@@ -47,7 +48,7 @@ class FrameModel:
         c, old = self.config, _states(x)
         shape = x.shape[0], x.shape[1]
         normals, uniforms = self.motion.standard_normal((*shape, STATE)), self.choices.random(shape)
-        proposal = Proposal(self.sigma, c.point_noise, self.dt, c.alpha, c.proposal == "informed")
+        proposal = Proposal(self.sigma, self.noise, self.dt, c.alpha, c.proposal == "informed")
         new, log_w = proposal.draw(old, self.z, normals, uniforms)
         if c.individuals == "measured":
             new, log_w = self._known(x, old), np.zeros(shape)

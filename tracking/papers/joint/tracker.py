@@ -19,8 +19,8 @@ Readings of the paper: label 0 is nobody's group: it is left out of eq. 5, each 
 validity, and nobody votes for it. Eq. 4 is used as printed, as an energy. VAR1 has the constant velocity of eq. 3.
 
 Departures, all ours:
-- Detections are points, associated with people once for all particles; p(y | x) is normal. Births, confirmation and
-  losses.
+- Detections are points, or blobs, associated with people once for all particles; p(y | x) is normal. Births,
+  confirmation and losses.
 - The proposal is a mixture for each person, not of products. Its second part is p(x' | x, y), the product of dynamics
   and likelihood. Sigma is made of two noises per root second.
 - Each person is resampled by the own part of the weight, and the particles by the rest.
@@ -40,6 +40,7 @@ import numpy as np
 from sim.rng import rng
 from sim.truth.identity import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
+from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.grouping import reported_groups
 from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
@@ -56,15 +57,16 @@ MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)
 
 
 class Joint:
-    """The tracker `joint`: people and the groups they form, from points.
+    """The tracker `joint`: people and the groups they form, from points or from pixels.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
     particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; together (K, K):
     probability that each pair is in one group, in the last frame; health: how many particles the weights are worth;
-    draws, the random streams; plane, "ground" or "image"; context. All but config exist after `reset` only.
+    draws, the random streams; pixels: detector of blobs, None from points; shown (K, 4): boxes of the people reported
+    last, px; plane, "ground" or "image"; context. All but config exist after `reset` only.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("points",)
+    needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
     config_class: ClassVar[type[JointConfig]] = JointConfig
 
     def __init__(self, config: JointConfig | None = None) -> None:
@@ -73,9 +75,16 @@ class Joint:
     def reset(self, context: Context, seed: int) -> None:
         """Forget everything and start a sequence. seed: of all random numbers.
 
-        Until the first detections `plane` is "image" with a scale but no camera, else "ground".
+        With a background sample in the context pixels are tracked, else points. Until the first detections `plane` is
+        "image" from pixels, or with a scale but no camera, else "ground". If pixels are tracked, raises InputError if
+        the scale px_per_m is zero or negative, or neither known nor learned from the sample, or if the sample cannot be
+        used.
         """
-        c, self.context = self.config, context
+        c, self.pixels, self.shown = self.config, None, np.zeros((0, 4))
+        if context.background is not None:
+            self.pixels = ForegroundBlobs(c, c.most_foreground, context)
+            context = context.replace(px_per_m=self.pixels.scale)
+        self.context = context
         self.frames = max(1, round(c.lag * context.fps))
         shape = (c.particles, c.partitions)
         self.nested = Nested(
@@ -86,14 +95,20 @@ class Joint:
         self.together = np.zeros((0, 0))
         self.health = ParticleHealth(c.particles, context.fps)
         self.draws = [rng(seed, "tracker", key) for key in range(PLACING + 1)]
-        self.plane: Plane = "image" if context.camera is None and context.px_per_m > 0 else "ground"
+        flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
+        self.plane: Plane = "image" if flat else "ground"
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Return the people of the frame and their groups as Tracks; updates all particles.
 
-        `detections.pos` is used (x, y). None is a frame without information: nobody counts as missed. Raises InputError
-        if points are in the image and the context has no scale above 0.
+        From points `detections.pos` is used (x, y), from pixels `frame.image`. In a frame without them (None), and from
+        pixels in one with too much foreground, nobody counts as missed. Raises InputError if points are in the image
+        and the context has no scale above 0, or if the picture's size or dtype is not the background sample's.
         """
+        if self.pixels is not None:
+            if self.pixels.settings is not self.config:
+                self.pixels.follow(self.config, self.config.most_foreground)
+            detections = self.pixels.detections(frame, self.shown)
         points, sizes = self._points(detections)
         rows, columns = self._associate(points)
         z = np.full((len(self.people.id), 2), np.nan)
@@ -113,6 +128,17 @@ class Joint:
     def dt(self) -> float:
         """Time between frames, s."""
         return 1.0 / self.context.fps
+
+    @property
+    def px_per_m(self) -> float:
+        """Scale of the image in px per metre: the context's, or, from pixels, learned from its background sample; nan
+        if unknown."""
+        return self.context.px_per_m
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a measured position, per axis, m."""
+        return self.config.point_noise if self.pixels is None else self.config.pixel_noise
 
     @property
     def unit(self) -> float:
@@ -140,14 +166,14 @@ class Joint:
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
         mean, cov = estimate.moments(ahead, weights)
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
-        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, c.point_noise, c.largest_distance)
+        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, c.largest_distance)
 
     def _filter(self, z: Array) -> None:
         """Steps 4 to 7, 1 and 3; z (K, 2): measured places, nan for none."""
         if not len(z):
             return
         draws = self.draws
-        model = FrameModel(self.config, self.dt, z, draws[MOTION], draws[CHOICES], draws[EVENTS])
+        model = FrameModel(self.config, self.dt, self.noise, z, draws[MOTION], draws[CHOICES], draws[EVENTS])
         self.nested = decentralised_filter.advance(self.nested, model, draws[PARTITIONS].random(self.config.particles))
 
     def _resample(self) -> None:
@@ -186,8 +212,8 @@ class Joint:
         """Follow people who are not confirmed, with the points (M, 2) of nobody; add those who are confirmed."""
         c, new = self.config, self.newcomers
         new.predict(self.dt)
-        free = new.measure(points, sizes, c.point_noise, c.largest_distance)
-        new.start(points[free], None if sizes is None else sizes[free], c.point_noise, c.speed_prior)
+        free = new.measure(points, sizes, self.noise, c.largest_distance)
+        new.start(points[free], None if sizes is None else sizes[free], self.noise, c.speed_prior)
         sure = (new.age >= c.confirm_time - 1e-9) & (new.missed == 0)
         if sure.any():
             self._add(sure)
@@ -226,6 +252,7 @@ class Joint:
         mean, cov = estimate.moments(n.x[..., :STATE], weights)
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
         box = reported_groups.boxes(pos, self.people.size) if self.plane == "image" else None
+        self.shown = np.zeros((0, 4)) if box is None else box
         group = reported_groups.group_ids(self.identities, frame.index, id, self._groups(joint))
         groups = reported_groups.no_groups(group)
         score, cov = np.ones(len(id)), cov * self.unit**2

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.truth.identity import Identities
-from sim.types import Array, Groups, Ints
+from sim.types import Array, Ints
 from tracking.grouping.belief_partition import partition
 from tracking.papers.relational import transition_kernels
 from tracking.papers.relational.particle_set import ParticleSet
@@ -38,33 +37,3 @@ def groups_of_pairs(together: Array, group: Ints, least: float, inertia: float) 
     log_odds += np.where((group[a] >= 0) & (group[a] == group[b]), inertia, -inertia)
     _, person, group = partition(np.zeros_like(a), a, b, log_odds, -1.0)
     return [person[group == g] for g in np.unique(group)]
-
-
-def group_ids(identities: Identities, frame: int, ids: Ints, groups: list[Ints]) -> Ints:
-    """Return the id of each person's group, (N,), -1 for a person alone; `identities` goes on to this frame.
-
-    frame: number, ascending from call to call. ids (N,): of the reported people; groups: rows of the members of each
-    group. The ids follow the identity rule of the truth (sim.truth.identity).
-    """
-    parts = [frozenset(ids[rows].tolist()) for rows in groups]
-    identities.step(frame, frozenset(ids.tolist()), parts)
-    return known_groups(identities, ids)
-
-
-def known_groups(identities: Identities, ids: Ints) -> Ints:
-    """Return the id of each person's group, (N,), as `identities` has it, -1 for a person alone; ids (N,)."""
-    group_of = {person: group for group, people in identities.groups.items() for person in people}
-    return np.array([group_of.get(person, -1) for person in ids.tolist()], np.int64)
-
-
-def no_groups(group: Ints) -> Groups | None:
-    """Return empty Groups if nobody is in a group, which says so; else None: hulls are derived from the group ids."""
-    return Groups.none() if (group < 0).all() else None
-
-
-def boxes(pos: Array, size: Array) -> Array | None:
-    """Return boxes (N, 4) left, top, width, height in px with the centres pos (N, 2) px; None if a size is unknown.
-
-    size (N, 2): width, height, px, nan if unknown.
-    """
-    return np.concatenate([pos - size / 2, size], axis=1) if np.isfinite(size).all() else None

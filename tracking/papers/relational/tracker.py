@@ -41,10 +41,11 @@ import numpy as np
 from sim.rng import rng
 from sim.truth.identity import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Plane, Tracks
+from tracking.detect.foreground_blobs import ForegroundBlobs
+from tracking.grouping import reported_groups
 from tracking.image_scale import required
 from tracking.papers.relational import report, sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
-from tracking.papers.relational.from_pixels import ForegroundBlobs
 from tracking.papers.relational.occluders import hidden_share
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.slots import Slots
@@ -80,7 +81,9 @@ class Particle:
         """
         self.context = context
         self.shown: Tracks | None = None
-        self.pixels = None if context.background is None else ForegroundBlobs(self.config, context)
+        self.pixels = None
+        if context.background is not None:
+            self.pixels = ForegroundBlobs(self.config, self.config.most_foreground, context)
         if self.pixels is not None:
             self.context = context = context.replace(px_per_m=self.pixels.scale)
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
@@ -100,8 +103,8 @@ class Particle:
         dtype is not the background sample's.
         """
         if self.pixels is not None:
-            if self.pixels.config is not self.config:
-                self.pixels.follow(self.config)
+            if self.pixels.settings is not self.config:
+                self.pixels.follow(self.config, self.config.most_foreground)
             known = None if self.shown is None else self.shown.box
             detections = self.pixels.detections(frame, np.zeros((0, 4)) if known is None else known)
         self._forecast()
@@ -211,7 +214,7 @@ class Particle:
         pos, vel, cov, score, id = pos[rows], vel[rows], cov[rows], np.minimum(exist[rows], 1.0), self.slots.id[rows]
         if self.plane == "image":
             pos, vel, cov = pos * self.unit, vel * self.unit, cov * self.unit**2
-        box = report.boxes(pos, self.slots.size[rows]) if self.plane == "image" else None
+        box = reported_groups.boxes(pos, self.slots.size[rows]) if self.plane == "image" else None
         group, groups = self._groups(frame.index, id, np.flatnonzero(rows))
         return Tracks(frame.index, frame.t, self.plane, "person", id, group, pos, vel, cov, box, score, groups)
 
@@ -257,7 +260,7 @@ class Relational(Particle):
         """Returns the group (N,) of each reported person, -1 for alone, and empty Groups if there is none."""
         p = self.particles
         self.together = transition_kernels.pairs_together(p.labels(), p.exist, p.weights, p.cluster)
-        c, before = self.config, report.known_groups(self.identities, id)
+        c, before = self.config, reported_groups.known_groups(self.identities, id)
         found = report.groups_of_pairs(self.together[np.ix_(rows, rows)], before, c.together, c.inertia)
-        group = report.group_ids(self.identities, frame, id, found)
-        return group, report.no_groups(group)
+        group = reported_groups.group_ids(self.identities, frame, id, found)
+        return group, reported_groups.no_groups(group)

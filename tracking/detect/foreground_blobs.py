@@ -1,4 +1,4 @@
-"""From a picture to the detections of `relational` and `particle`: each foreground blob is one detection (ours).
+"""From a picture to the detections of trackers of points: each foreground blob is one detection.
 
 The foreground comes from tracking.detect.foreground. A blob that holds several people is one detection, so people who
 share a blob are missed but for one.
@@ -9,36 +9,37 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Context, Detections, Frame
+from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.foreground import Foreground, convex_areas
 from tracking.detect.person_size import PersonSize
 from tracking.image_scale import required
-from tracking.papers.relational.config import ParticleConfig
 
 
 class ForegroundBlobs:
     """Foreground blobs as detections in the image.
 
-    State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
+    State: settings; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
     is nan, learned from lone people in its background sample.
 
     The context must have a background sample (else AssertionError). Raises InputError if the scale is neither known nor
     learned, if it is zero or negative, or if the sample cannot be used.
     """
 
-    def __init__(self, config: ParticleConfig, context: Context) -> None:
+    def __init__(self, settings: BackgroundSettings, most_foreground: float, context: Context) -> None:
+        """Train the background model; most_foreground: largest plausible share of foreground, 0 to 1."""
         assert context.background is not None
-        self.config = config
-        self.foreground = Foreground(context, config, config.most_foreground)
+        self.settings = settings
+        self.foreground = Foreground(context, settings, most_foreground)
         if np.isnan(context.px_per_m):
             size = PersonSize(context)
             self.foreground.learn_person_size(size, context.background)
             self.foreground.px_per_m = size.px_per_m
         self.scale = self.foreground.px_per_m = required(self.foreground.px_per_m)
 
-    def follow(self, config: ParticleConfig) -> None:
-        """Replace the config: settings of the background model change; what the model learned and the scale stay."""
-        self.config = config
-        self.foreground.follow(config, config.most_foreground)
+    def follow(self, settings: BackgroundSettings, most_foreground: float) -> None:
+        """Replace the settings of the background model; what the model learned and the scale stay."""
+        self.settings = settings
+        self.foreground.follow(settings, most_foreground)
 
     def detections(self, frame: Frame, people: Array) -> Detections | None:
         """Return the blobs of the frame's picture as detections; None without a picture, or if more of it is foreground

@@ -1,0 +1,258 @@
+"""`joint`: the paper's Table 2, recordings, the event classifier, accuracy and speed over the numbers of particles.
+
+    python -m benchmarks.joint MODE [--seeds a:b] [--filter-seeds a:b] [--set k=v]… [--only A,B]
+
+table2      friends-meet: the paper's columns for full, VAR1, VAR2, VAR3 and .2, and beside them the preset paper,
+            group-pda, relational and the default grouping over blob; differences of variants, paired
+recordings  seq_hotel, zara01 and Meet_WalkTogether1 from labelled positions with noise 0.1 m and 5 % misses: the
+            columns of Table 3b and pairwise F1, beside relational and the default grouping over particle (--data)
+classifier  the event classifier: confusion matrix, log loss, expected events per minute where nothing happens
+particles   friends-meet: accuracy and frames/s over N_x and N_z
+
+A row of table2 holds a sequence's scores, means over filter seeds. Group scores are pooled over the frames of all
+sequences together, strict and core; differences are of the means over sequences, with 95 % intervals. Detections are
+the points of the simulated detector; `.2` has true positions, as in the paper.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from benchmarks.support import tables
+from benchmarks.support.options import (
+    HOTEL,
+    WALK_TOGETHER,
+    ZARA,
+    add_data,
+    add_seeds,
+    new_parser,
+    one_thread,
+    seed_range,
+    seeds_text,
+)
+from scenarios.errors import FlockscopeError
+from scenarios.loading.resolve import resolve
+from sim.io.source import open_source
+from sim.sequence import simulate
+from sim.types import DetectionMode
+from sim.types import Sequence as Recording
+from tracking.fitting.joint_events import CLASSES, NONE, EventRows, event_rows, event_scores, log_probabilities
+from tracking.papers.joint.config import FITTED, JointConfig
+from tracking.run import track
+from tracking.scoring import evaluate
+from tracking.stats import paired
+
+Row = dict[str, float]
+SHARES = ("1-FP", "1-FN", "GDSR", "MOTA")
+PAPER = {
+    "full": ("93.7", "82.9", "79.7", "57.3"),
+    "VAR1": ("93.8", "81.9", "78.3", "56.0"),
+    "VAR2": ("82.1", "51.6", "48.1", "33.5"),
+    "VAR3": ("65.1", "24.6", "18.9", "4.9"),
+}
+"""Table 2 of the paper, on its own 28 sequences, %: 1-FP, 1-FN, GDSR, MOTA."""
+COMPARED = ("GDSR", "MOTA", "1-FN", "1-FP")
+PX_PER_M = 40.0
+COUNTS = (10, 25, 50, 100, 200)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A tracker, its parameters and its detections; seeds: False if its seed has no effect."""
+
+    name: str
+    tracker: str = "joint"
+    params: Mapping[str, object] = field(default_factory=dict)
+    detections: DetectionMode = "file"
+    seeds: bool = True
+
+
+VARIANTS = (
+    Variant("full"),
+    Variant("VAR1", params={"variant": "VAR1"}),
+    Variant("VAR2", params={"variant": "VAR2"}),
+    Variant("VAR3", params={"variant": "VAR3"}),
+    Variant(".2", params={"individuals": "measured"}, detections="truth"),
+    Variant("preset paper", params=JointConfig.preset("paper").as_dict()),
+    Variant("relational", "relational"),
+    Variant("group-pda", "group-pda", seeds=False),
+    Variant("blob + default grouping", "blob", seeds=False),
+)
+
+
+def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settings: Sequence[str] = ()) -> list[Row]:
+    """Returns the scores of a variant for each filter seed, with frames/s and the tracker's diagnostics."""
+    params: object = variant.params
+    if variant.tracker == "joint":
+        params = JointConfig.from_dict(dict(variant.params)).with_set(*settings)
+    rows = []
+    for seed in list(seeds)[: None if variant.seeds else 1]:
+        run = track(variant.tracker, sequence, params=params, detections=variant.detections, seed=seed)
+        own = {k: v for k, v in run.info.get("diagnostics", {}).items() if v is not None}
+        rows.append({**evaluate(sequence.truth, run), **own, "speed": run.info["frames_per_second"]})
+    return rows
+
+
+def mean_row(rows: Sequence[Row]) -> Row:
+    """Returns the mean of each score over filter seeds; nan where a seed has none."""
+    return {key: float(np.mean([row.get(key, np.nan) for row in rows])) for key in rows[0]}
+
+
+def sequences(seeds: Iterable[int]) -> Iterable[Recording]:
+    """Yields the sequences of friends-meet; entries whose script is not fulfilled for a seed are named and left out."""
+    for entry in resolve("suite:friends-meet"):
+        for seed in seeds:
+            try:
+                made = simulate(entry.scenario, seed, entry.repeat, ())
+                assert made.truth is not None
+            except FlockscopeError as error:
+                print(f"{entry.name}, seed {seed}, left out: {error.line()}", flush=True)
+                continue
+            yield made
+
+
+def pooled(rows: Sequence[Row], end: str) -> list[str]:
+    """Returns cells of 1-FP, 1-FN, GDSR and MOTA of the frames of all sequences together, %, and MOTP, px."""
+
+    def total(name: str) -> float:
+        return float(np.nansum([row[f"group_{name}{end}"] for row in rows]))
+
+    there = total("TP") + total("FN")
+    found = [(r[f"group_TP{end}"], r[f"group_FN{end}"], r[f"group_GDSR{end}"], r[f"group_MOTP{end}"]) for r in rows]
+    success = sum((tp + fn) * gdsr for tp, fn, gdsr, _ in found if tp + fn)
+    place = sum(tp * motp for tp, _, _, motp in found if tp) / max(total("TP"), 1)
+    wrong = total("FP") + total("FN") + total("IDSW")
+    shares = 1 - total("FP") / there, total("TP") / there, success / there, 1 - wrong / there
+    return [*(f"{100 * x:.1f}" for x in shares), f"{PX_PER_M * place:.1f}"]
+
+
+def others(rows: Sequence[Row]) -> list[str]:
+    """Returns cells of event F1, latency, pairwise F1, HOTA, effective shares, ancestors and frames/s: means."""
+
+    def mean(key: str) -> str:
+        values = [row.get(key, np.nan) for row in rows]
+        return tables.number(float(np.nanmean(values)) if np.isfinite(values).any() else np.nan)
+
+    latency = [row["event_latency"] for row in rows if np.isfinite(row["event_latency"])]
+    keys = ("pairwise_F1", "HOTA", "effective_particles", "effective_particles_of_a_person", "distinct_ancestors")
+    median = tables.number(float(np.median(latency))) if latency else "–"
+    return [mean("event_F1"), median, *(mean(key) for key in keys), mean("speed").partition(".")[0]]
+
+
+OTHERS = (
+    "event F1", "latency, s (median)", "pairwise F1", "HOTA", "effective share", "of the least person", "ancestors",
+    "frames/s",
+)  # fmt: skip
+
+
+def table2(given: argparse.Namespace) -> None:
+    """Prints the table of variants and the paired differences."""
+    chosen = [v for v in VARIANTS if not given.only or v.name in given.only.split(",")]
+    rows: dict[str, list[Row]] = {v.name: [] for v in chosen}
+    for sequence in sequences(given.seeds):
+        for v in chosen:
+            rows[v.name].append(mean_row(measured(sequence, v, given.filter_seeds, given.set)))
+    title = f"{len(rows[chosen[0].name])} sequences, seeds {seeds_text(given.seeds)}, "
+    title += f"filter seeds {seeds_text(given.filter_seeds)}"
+    for part, end in (("strict", ""), ("core", "_core")):
+        cells = {name: [*pooled(found, end), " / ".join(PAPER.get(name, ()))] for name, found in rows.items()}
+        columns = [*(f"{name}, %" for name in SHARES), "MOTP, px", "paper: 1-FP / 1-FN / GDSR / MOTA"]
+        tables.table(f"{part}: {title}", "variant", columns, cells)
+    tables.table(f"other scores: {title}", "variant", OTHERS, {name: others(found) for name, found in rows.items()})
+    cells = {}
+    for first, second in (("full", "VAR1"), ("VAR1", "VAR2"), ("full", "VAR2"), ("VAR2", "VAR3"), (".2", "full")):
+        if first in rows and second in rows:
+            cells[f"{first} − {second}"] = [difference(rows[first], rows[second], f"group_{k}") for k in COMPARED]
+    if cells:
+        tables.table("differences of means over sequences, strict", "", COMPARED, cells)
+
+
+def difference(first: Sequence[Row], second: Sequence[Row], key: str) -> str:
+    """Returns the cell of the paired difference of a score, first minus second."""
+    a, b = (np.array([row[key] for row in rows]) for rows in (first, second))
+    both = np.isfinite(a) & np.isfinite(b)
+    return tables.signed(*map(float, paired(b[both], a[both])))
+
+
+def recordings(given: argparse.Namespace) -> None:
+    """Prints a table for each recording."""
+    noisy = {"detect_prob": 0.95, "noise_m": 0.1}
+    compared = [Variant("full"), *(Variant(n, params={"variant": n}) for n in ("VAR1", "VAR3")), VARIANTS[6]]
+    compared.append(Variant("particle + default grouping", "particle"))
+    for path in (HOTEL, ZARA, WALK_TOGETHER):
+        (sequence,) = open_source(given.data / path)
+        sensor = noisy if sequence.truth is not None and sequence.truth.pos is not None else {"detect_prob": 0.95}
+        cells = {}
+        for v in compared:
+            params = JointConfig.from_dict(dict(v.params)).with_set(*given.set) if v.tracker == "joint" else None
+            rows = []
+            for seed in given.filter_seeds:
+                run = track(v.tracker, sequence, params=params, detections="truth", sensor=sensor, seed=seed)
+                rows.append({**evaluate(sequence.truth, run), "speed": run.info["frames_per_second"]})
+            mean = mean_row(rows)
+            shares = [f"{100 * mean[f'group_{k}']:.1f}" for k in SHARES]
+            cells[v.name] = [*shares, tables.number(mean["group_MOTP"], 2), tables.number(mean["pairwise_F1"])]
+        title = f"{path}: sensor {sensor}, filter seeds {seeds_text(given.filter_seeds)}, means"
+        tables.table(title, "tracker", [*(f"{k}, %" for k in SHARES), "MOTP", "pairwise F1"], cells)
+
+
+def classifier(given: argparse.Namespace) -> None:
+    """Prints the scores of the event classifier on true partitions of unseen seeds."""
+    lag = JointConfig().lag
+    parts: dict[bool, list[EventRows]] = {True: [], False: []}
+    for k, sequence in enumerate(sequences(given.seeds)):
+        assert sequence.truth is not None
+        rows = event_rows(sequence.truth, lag, k)
+        parts[bool((rows.event != NONE).any())].append(rows)
+    rows = EventRows.joined([*parts[True], *parts[False]])
+    scores = event_scores(rows, FITTED)
+    tables.table(
+        f"friends-meet, seeds {seeds_text(given.seeds)}",
+        "score",
+        ["value"],
+        {k: [f"{v:.4g}"] for k, v in scores.items()},
+    )
+    p = np.exp(log_probabilities(rows, FITTED))
+    most = p.argmax(axis=1)
+    cells = {
+        name: [str(int(((rows.event == k) & (most == j)).sum())) for j in range(len(CLASSES))]
+        for k, name in enumerate(CLASSES)
+    }
+    tables.table("confusion: rows true, columns the most probable event", "", CLASSES, cells)
+    quiet = EventRows.joined(parts[False])
+    if quiet.seconds:
+        per_row = 1 - np.exp(log_probabilities(quiet, FITTED)[:, NONE])
+        rate = per_row.sum() * 0.2 / lag / (quiet.seconds / 60)
+        print(f"\nexpected events per minute in {len(parts[False])} sequences without one: {rate:.3f}")
+
+
+def particles(given: argparse.Namespace) -> None:
+    """Prints a table over N_x and N_z."""
+    made = list(sequences(given.seeds))
+    tables.head(["N_x", "N_z", "GDSR, %", "MOTA, %", *OTHERS])
+    for n_x, n_z in [(n, 50) for n in COUNTS] + [(50, n) for n in COUNTS if n != 50]:
+        v = Variant("", params={"particles": n_x, "partitions": n_z})
+        rows = [mean_row(measured(s, v, given.filter_seeds, given.set)) for s in made]
+        tables.row([str(n_x), str(n_z), *pooled(rows, "")[2:4], *others(rows)])
+
+
+def main() -> None:
+    parser = new_parser(__doc__)
+    modes = {"table2": table2, "recordings": recordings, "classifier": classifier, "particles": particles}
+    parser.add_argument("mode", choices=modes)
+    add_seeds(parser, "20000:20001")
+    parser.add_argument("--filter-seeds", type=seed_range, default="0:5", metavar="A:B", help="seeds of the filters")
+    parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of joint")
+    parser.add_argument("--only", help="table2: variants, separated by commas")
+    add_data(parser)
+    given = parser.parse_args()
+    modes[given.mode](given)
+
+
+if __name__ == "__main__":
+    one_thread()
+    main()
