@@ -8,13 +8,13 @@ members.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
-from sim.truth.identity import Identities, PersonSet
+from sim.truth.identity import GroupChange, Identities, PersonSet
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.proximity import stretches
 from sim.types import Array, GroupEvent, Ints
@@ -24,12 +24,12 @@ from tracking.grouping.merge_split_events import LinkSwitch, event_of_change
 
 
 @dataclass
-class _LinkedPeople:
-    """Who is present and linked to whom at one moment. People are numbers of columns of arrays, from 0.
+class LinkedPeople:
+    """Who is present and linked to whom at one moment. People are numbers, as columns of arrays or ids of tracks.
 
-    present: dict by person (column): the frame (from 0) since which the person has been present; a person who is missed
-    stays present for `memory` s (of LinkRule). linked: dict by person, the set of people with a link to the person,
-    present or not. identities: the groups of the last step, with members (columns) and ids (from 1).
+    present: dict by person: the frame since which the person has been present; the caller decides how long a person who
+    is missed stays present. linked: dict by person, the set of people with a link to the person, present or not.
+    identities: the groups of the last step, with members (people) and ids (from 1).
     """
 
     present: dict[int, int] = field(default_factory=dict)
@@ -37,8 +37,8 @@ class _LinkedPeople:
     identities: Identities = field(default_factory=Identities)
 
     def components(self) -> list[PersonSet]:
-        """Returns the connected components of the present people under their links, as sets of columns, in order of
-        least column.
+        """Returns the connected components of the present people under their links, as sets of people, in order of
+        the least person.
 
         People alone are left out. Links to people who are not present do not count. No links give an empty list.
         """
@@ -53,9 +53,19 @@ class _LinkedPeople:
             found += [frozenset(part)] if len(part) > 1 else []
         return found
 
+    def step(self, t: int, switched: Sequence[LinkSwitch], arrival: int) -> list[GroupChange]:
+        """Switch links in frame t and return what changes in the groups, as `Identities.step`; updates `identities`.
+
+        switched: (a, b, on, since) of the links. arrival: frames; people who are linked so soon after they came enter
+        with their group instead of joining it later. `present` is brought up to date before.
+        """
+        for a, b, on, _ in switched:
+            self.switch(a, b, on)
+        entered = _entered(self, switched, arrival)
+        return self.identities.step(t, frozenset(self.present), self.components(), entered)
+
     def switch(self, a: int, b: int, on: bool) -> None:
-        """Set (`on` True) or remove the link between two people, columns a and b of arrays; no effect if it is so
-        already."""
+        """Set (`on` True) or remove the link between two people a and b; no effect if it is so already."""
         for p, q in ((a, b), (b, a)):
             partners = self.linked.setdefault(p, set())
             (partners.add if on else partners.discard)(q)
@@ -76,7 +86,7 @@ def label_people(
     enter within `rule.arrival` s of the first frame have no event.
     """
     spells = _spells(frame, column, frames_of(rule.memory, fps), len(pos))
-    state, events = _LinkedPeople(), []
+    state, events = LinkedPeople(), []
     group = np.full(pos.shape[:2], -1, np.int64)
     arrival = frames_of(rule.arrival, fps)
     cuts = np.searchsorted(links.frame, np.arange(len(pos) + 1))
@@ -85,10 +95,7 @@ def label_people(
             _come_or_go(state, p, since)
         now = slice(int(cuts[t]), int(cuts[t + 1]))
         switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on", "since")), strict=True))
-        for a, b, on, _ in switched:
-            state.switch(a, b, on)
-        entered = _entered(state, switched, arrival)
-        changes = state.identities.step(t, frozenset(state.present), state.components(), entered)
+        changes = state.step(t, switched, arrival)
         for g, people in state.identities.groups.items():
             group[t:until, sorted(people)] = g
         events += [e for c in changes if (e := event_of_change(c, t, switched, pos, arrival)) is not None]
@@ -112,15 +119,15 @@ def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, li
     return found
 
 
-def _come_or_go(state: _LinkedPeople, p: int, since: int | None) -> None:
+def _come_or_go(state: LinkedPeople, p: int, since: int | None) -> None:
     if since is None:
         state.present.pop(p, None)
     else:
         state.present[p] = since
 
 
-def _entered(state: _LinkedPeople, switched: Iterable[LinkSwitch], arrival: int) -> PersonSet:
-    """Returns the people (columns) who count as entering with their group instead of joining it later.
+def _entered(state: LinkedPeople, switched: Iterable[LinkSwitch], arrival: int) -> PersonSet:
+    """Returns the people who count as entering with their group instead of joining it later.
 
     They are present and in no group yet, and a link of theirs that is set in this frame began at most `arrival` frames
     after the frame since which they have been present. switched: (a, b, on, since) of the links switched in this frame:

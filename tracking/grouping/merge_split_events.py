@@ -42,10 +42,7 @@ def event_of_change(
     alone; a dissolve leaves all alone. At enter and leave a whole group comes or goes, at most one of it excepted, who
     is alone before or after.
     """
-    people = set(change.members)
-    joins = change.kind in ("merge", "form", "enter")
-    onsets = [since for a, b, on, since in switched if on == joins and a in people and b in people]
-    start = min(onsets, default=t)
+    start = onset_of_change(change, t, switched)
     if change.kind == "leave":
         seen = np.isfinite(pos[: t + 1, change.members, 0]).sum(axis=1)
         start = int(np.flatnonzero(seen >= min(seen.max(), 2))[-1])
@@ -53,6 +50,17 @@ def event_of_change(
         return None
     end = start if change.kind in ("enter", "leave") else t
     return _event(change, start, end, t, pos)
+
+
+def onset_of_change(change: GroupChange, t: int, switched: Iterable[LinkSwitch]) -> int:
+    """Return the first onset among the switches that caused the change of groups in frame t; t if there is none.
+
+    They are the links set (merge, form, enter) or removed (split, dissolve, leave) between two of its people. switched:
+    the links switched in frame t, as (a, b, True if set, first frame of the cause).
+    """
+    people = set(change.members)
+    joins = change.kind in ("merge", "form", "enter")
+    return min((since for a, b, on, since in switched if on == joins and a in people and b in people), default=t)
 
 
 def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:

@@ -93,11 +93,24 @@ class ParticleConfig(BackgroundSettings):
         "log",
         sees="pixels",
     )
+    outlier_share: float = param(
+        0.05,
+        (0.0, 0.5),
+        "share",
+        "measured positions that are displaced, as by partial occlusion; 0: none (ours)",
+    )
+    outlier_noise: float = param(
+        0.4,
+        (0.05, 3.0),
+        "m",
+        "standard deviation of a displaced position, per axis, at least that of a position (ours)",
+        "log",
+    )
     detect_prob: float = param(
         0.95, (0.3, 1.0), "probability", "that a person who was measured in the last frame is measured (ours)"
     )
     hidden_time: float = param(
-        0.3, (0.05, 20.0), "s", "mean time until a person who is not measured is measured again (ours)", "log"
+        2.0, (0.05, 20.0), "s", "mean time until a person who is not measured is measured again (ours)", "log"
     )
     clutter_density: float = param(
         0.002, (0.0, 1.0), "1/m^2", "false alarms per frame and square metre; 0: none (ours)"
@@ -179,6 +192,12 @@ class RelationalConfig(ParticleConfig):
     together: float = param(
         0.5, (0.05, 0.95), "probability", "two people are in one group if they walk together with at least this (ours)"
     )
-    inertia: float = param(
-        1.0, (0.0, 6.0), "", "log odds beyond `together` that are needed to join or leave a group (ours)"
+    join_rate: float = param(
+        0.01, (1e-6, 10.0), "1/s", "rate at which strangers join a group: the smaller, the later a merge (ours)", "log"
+    )
+    part_rate: float = param(
+        0.05, (1e-6, 10.0), "1/s", "rate at which members leave a group: the smaller, the later a split (ours)", "log"
+    )
+    patience: float = param(
+        2.0, (0.0, 6.0), "s", "a link breaks after the two have been in different groups for so long (ours)"
     )

@@ -28,19 +28,19 @@ Departures, all ours:
 - A detection that is probably nobody's starts a person, who has no weight until the next frame.
 - People who share no detection and do not walk together have weights of their own (factorised); particles are
   resampled if they are worth few.
-- Groups are the consistent partition of the pairs' probabilities against `together`; ids by the identity rule.
+- Groups are a consistent partition of the pairs by their probabilities, with inertia; see walking_groups.
 The preset `paper` switches off what has a parameter.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from sim.rng import rng
-from sim.truth.identity import Identities
-from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Plane, Tracks
+from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.grouping import reported_groups
 from tracking.image_scale import required
@@ -49,6 +49,7 @@ from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.occluders import hidden_share
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.slots import Slots
+from tracking.papers.relational.walking_groups import PeopleNow, WalkingGroups
 
 MOTION, BIRTHS, RESAMPLING, RELATIONS, JOINING = range(5)
 """Keys of the random streams. Relations have streams of their own, so that they change no other draw."""
@@ -58,7 +59,7 @@ class Particle:
     """The tracker `particle`: a joint particle filter of people who do not know of each other.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
-    the people; hidden (K,): probability that each person is behind a known pillar or wall; identities, the groups;
+    the people; hidden (K,): probability that each person is behind a known pillar or wall;
     pixels: detector of blobs, None from points; shown: the tracks that were reported last, None before; plane, "ground"
     or "image"; context; draws, the random streams; vanished: number of frames in which all weights were
     0; effective: least effective number of particles of any person in the last measured frame. All but config exist
@@ -87,7 +88,6 @@ class Particle:
         if self.pixels is not None:
             self.context = context = context.replace(px_per_m=self.pixels.scale)
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
-        self.identities = Identities()
         self.draws = [rng(seed, "tracker", key) for key in range(JOINING + 1)]
         flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
         self.plane: Plane = "image" if flat else "ground"
@@ -140,7 +140,7 @@ class Particle:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        transition_kernels.move(p.pos, p.vel, p.exist, p.labels(), noise, c.speed_table(self.dt), self.dt)
+        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, c.speed_table(self.dt), self.dt)
         ground = self.plane == "ground"
         self.hidden = hidden_share(p.pos, p.weights, self.context.camera if ground else None, self.context.scene)
         if not c.certain_sensor:
@@ -160,7 +160,8 @@ class Particle:
         points = np.ascontiguousarray(detections.pos[order, :2] / self.unit)
         image_boxes = self.plane == "image" and detections.box is not None
         sizes = detections.box[order, 2:] if image_boxes and detections.box is not None else None
-        said = sensor.weigh(self.particles, points, self._detection_probability(), self.noise, self.config)
+        missed = self.slots.missed > 0
+        said = sensor.weigh(self.particles, points, self._detection_probability(), missed, self.noise, self.config)
         self.vanished += said.vanished
         self.effective = float(self.particles.effective().min(initial=self.particles.count))
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
@@ -184,8 +185,12 @@ class Particle:
         c = self.config
         keep = (self.particles.existence >= c.least_existence) & (self.slots.missed <= c.time_window + 1e-9)
         if not keep.all():
-            self.particles.keep(keep)
-            self.slots.keep(keep)
+            self._keep(keep)
+
+    def _keep(self, rows: Bools) -> None:
+        """Remove all slots but those where `rows` (K,) is True."""
+        self.particles.keep(rows)
+        self.slots.keep(rows)
 
     def _start(self, point: Array, size: Array) -> None:
         """Add a person at a detection (secs. 2.1.1, 3.2): point (2,) m; size (2,): of the box, px, nan without.
@@ -208,30 +213,39 @@ class Particle:
     def _report(self, frame: Frame) -> Tracks:
         """Returns the Tracks of the frame: people who exist with at least `report_existence`, on the ground in m, in
         the image in px."""
-        pos, vel, cov, exist = report.estimates(self.particles)
+        place, velocity, cov, exist = report.estimates(self.particles)
         rows = exist >= self.config.report_existence
         self.slots.name(rows)
-        pos, vel, cov, score, id = pos[rows], vel[rows], cov[rows], np.minimum(exist[rows], 1.0), self.slots.id[rows]
+        pos, vel, cov = place[rows], velocity[rows], cov[rows]
+        score, id = np.minimum(exist[rows], 1.0), self.slots.id[rows]
         if self.plane == "image":
             pos, vel, cov = pos * self.unit, vel * self.unit, cov * self.unit**2
         box = reported_groups.boxes(pos, self.slots.size[rows]) if self.plane == "image" else None
-        group, groups = self._groups(frame.index, id, np.flatnonzero(rows))
-        return Tracks(frame.index, frame.t, self.plane, "person", id, group, pos, vel, cov, box, score, groups)
+        found = Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
+        return self._with_groups(found, rows, (place, velocity))
 
-    def _groups(self, frame: int, id: Ints, rows: Ints) -> tuple[Ints, Groups | None]:
-        """Returns the group (N,) of each reported person, and Groups or None; `particle` reports none."""
-        return np.full(len(id), -1), None
+    def _with_groups(self, tracks: Tracks, rows: Bools, means: tuple[Array, Array]) -> Tracks:
+        """Returns the tracks with groups and events; `particle` has none.
+
+        rows (K,): the slots that are reported; means: places (K, 2), m, and velocities (K, 2), m/s.
+        """
+        return tracks
 
 
 class Relational(Particle):
     """The tracker `relational`: the particle filter of `particle` with the relation "walking together" in it.
 
-    together (K, K): probability that each pair walks together, in the last frame, by slots; 1 on the diagonal. The rest
-    of the state is that of Particle.
+    together (K, K): probability that each pair walks together, in the last frame, by slots; 1 on the diagonal. groups:
+    the groups made of it. The rest of the state is that of Particle.
     """
 
     config_class: ClassVar[type[ParticleConfig]] = RelationalConfig
     config: RelationalConfig
+
+    def reset(self, context: Context, seed: int) -> None:
+        """Forget everything and start a sequence, as `Particle.reset`."""
+        super().reset(context, seed)
+        self.groups = WalkingGroups()
 
     @property
     def _rules(self) -> Array:
@@ -256,11 +270,18 @@ class Relational(Particle):
         )  # fmt: skip
         return np.asarray(label == group[:, None])
 
-    def _groups(self, frame: int, id: Ints, rows: Ints) -> tuple[Ints, Groups | None]:
-        """Returns the group (N,) of each reported person, -1 for alone, and empty Groups if there is none."""
+    def _keep(self, rows: Bools) -> None:
+        super()._keep(rows)
+        self.groups.keep(rows)
+
+    def _start(self, point: Array, size: Array) -> None:
+        super()._start(point, size)
+        self.groups.add()
+
+    def _with_groups(self, tracks: Tracks, rows: Bools, means: tuple[Array, Array]) -> Tracks:
         p = self.particles
-        self.together = transition_kernels.pairs_together(p.labels(), p.exist, p.weights, p.cluster)
-        c, before = self.config, reported_groups.known_groups(self.identities, id)
-        found = report.groups_of_pairs(self.together[np.ix_(rows, rows)], before, c.together, c.inertia)
-        group = reported_groups.group_ids(self.identities, frame, id, found)
-        return group, reported_groups.no_groups(group)
+        self.together = transition_kernels.pairs_together(p.related, p.exist, p.weights, p.cluster)
+        now = PeopleNow(tracks.index, self.slots.id, *means, self.together, rows, self.slots.missed == 0)
+        group, events = self.groups.step(now, self.context.fps, self.config)
+        scaled = tuple(replace(e, pos=(e.pos[0] * self.unit, e.pos[1] * self.unit)) for e in events)
+        return tracks.replace(group=group[rows], groups=reported_groups.no_groups(group[rows]), events=scaled)

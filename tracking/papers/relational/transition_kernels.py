@@ -53,31 +53,32 @@ def group_labels(related: Bools, label: Ints) -> None:
 
 
 @njit(cache=True)
-def move(pos: Array, vel: Array, exist: Array, label: Ints, noise: Array, table: Array, dt: float) -> None:  # fmt: skip
+def move(pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, table: Array, dt: float) -> None:
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
-    pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; label (P, K): the groups of old
-    relations; noise (P, K, 2): standard normals; table (5, 3): the speed table of the step.
+    pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; related (P, K, K): old relations;
+    noise (P, K, 2): standard normals; table (5, 3): the speed table of the step.
 
-    v_i = u - B u / |u| + C noise, with u the mean velocity of the person's group, and B, C of the table's row for |u|
-    (Table 3). x_i = x_i + v_i dt. The mean weights people by their existence (ours); u of a person alone is the own
-    velocity.
+    v_i = u - B u / |u| + C noise, with u the mean velocity of the person and of those who walk together with the
+    person, and B, C of the table's row for |u| (Table 3). x_i = x_i + v_i dt. The mean weights people by their
+    existence (ours); u of a person alone is the own velocity.
     """
     particles, n, _ = pos.shape
-    sum_x, sum_y, weight, size = np.empty(n), np.empty(n), np.empty(n), np.empty(n, np.int64)
+    old = np.empty((n, 2))
     for p in range(particles):
-        sum_x[:], sum_y[:], weight[:], size[:] = 0.0, 0.0, 0.0, 0
+        old[:] = vel[p]
         for i in range(n):
-            g = label[p, i]
-            sum_x[g] += exist[p, i] * vel[p, i, 0]
-            sum_y[g] += exist[p, i] * vel[p, i, 1]
-            weight[g] += exist[p, i]
-            size[g] += 1
-        for i in range(n):
-            g = label[p, i]
-            x, y = vel[p, i, 0], vel[p, i, 1]
-            if size[g] > 1 and weight[g] > 0:
-                x, y = sum_x[g] / weight[g], sum_y[g] / weight[g]
+            x, y, weight, partners = exist[p, i] * old[i, 0], exist[p, i] * old[i, 1], exist[p, i], 0
+            for j in range(n):
+                if related[p, i, j]:
+                    x += exist[p, j] * old[j, 0]
+                    y += exist[p, j] * old[j, 1]
+                    weight += exist[p, j]
+                    partners += 1
+            if partners > 0 and weight > 0:
+                x, y = x / weight, y / weight
+            else:
+                x, y = old[i, 0], old[i, 1]
             speed = math.sqrt(x * x + y * y)
             row = 0
             while speed > table[row, SPEED]:
@@ -173,28 +174,33 @@ def join(pos: Array, exist: Array, label: Ints, place: Array, share: float, unif
 
 
 @njit(cache=True)
-def pairs_together(label: Ints, exist: Array, weights: Array, cluster: Ints) -> Array:
-    """Return the probability (K, K) that i and j are in one group, given that both exist; 1 on the diagonal.
+def pairs_together(related: Bools, exist: Array, weights: Array, cluster: Ints) -> Array:
+    """Return the probability (K, K) that i and j walk together, given that both exist; 1 on the diagonal.
 
-    label (P, K): groups; exist (P, K): probabilities of existence; weights (P, K): of the particles; cluster (K,):
-    people with equal numbers have one weight, others the product of theirs. 0 for a pair that does not exist.
+    related (P, K, K): relations; exist (P, K): probabilities of existence; weights (P, K): of the particles; cluster
+    (K,): people with equal numbers have one weight, others the product of theirs. 0 for a pair that does not exist.
     """
-    particles, n = label.shape
-    both, same = np.zeros((n, n)), np.zeros((n, n))
-    for p in range(particles):
-        for i in range(n):
-            for j in range(i):
-                w = weights[p, i] * exist[p, i] * exist[p, j]
-                if cluster[i] != cluster[j]:
-                    w *= weights[p, j]
-                both[i, j] += w
-                if label[p, i] == label[p, j]:
-                    same[i, j] += w
+    particles, n = exist.shape
     out = np.eye(n)
     for i in range(n):
         for j in range(i):
-            if both[i, j] > 0:
-                out[i, j] = out[j, i] = same[i, j] / both[i, j]
+            some = False
+            for p in range(particles):
+                if related[p, i, j]:
+                    some = True
+                    break
+            if not some:
+                continue
+            both, same = 0.0, 0.0
+            for p in range(particles):
+                w = weights[p, i] * exist[p, i] * exist[p, j]
+                if cluster[i] != cluster[j]:
+                    w *= weights[p, j]
+                both += w
+                if related[p, i, j]:
+                    same += w
+            if both > 0:
+                out[i, j] = out[j, i] = same / both
     return out
 
 

@@ -8,7 +8,7 @@ import pytest
 from tracking.papers.relational import sensor
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.report import estimates, groups_of_pairs
+from tracking.papers.relational.report import estimates
 
 
 def three(count=400, seed=0):
@@ -85,8 +85,8 @@ def test_weights_of_clusters_multiply_to_the_joint_weight():
     """Far from each other, the joint likelihood is the product of the clusters' likelihoods."""
     points = np.array([[0.02, 0.05], [0.45, -0.02], [8.1, 0.0]])
     joint, apart = three(), three()
-    sensor.weigh(joint, points, np.full(3, 0.9), 0.08, ParticleConfig(weights="joint"))
-    sensor.weigh(apart, points, np.full(3, 0.9), 0.08, ParticleConfig())
+    sensor.weigh(joint, points, np.full(3, 0.9), np.zeros(3, bool), 0.08, ParticleConfig(weights="joint"))
+    sensor.weigh(apart, points, np.full(3, 0.9), np.zeros(3, bool), 0.08, ParticleConfig())
     assert joint.cluster.tolist() == [0, 0, 0]
     assert apart.cluster.tolist() == [0, 0, 2]
     product = apart.weights[:, 0] * apart.weights[:, 2]
@@ -98,7 +98,10 @@ def test_people_who_walk_together_share_a_cluster_without_a_common_detection():
     """A hidden partner in another cluster would lose its help."""
     particles = three()
     particles.related[:, 0, 2] = particles.related[:, 2, 0] = True
-    sensor.weigh(particles, np.zeros((0, 2)), np.full(3, 0.9), 0.08, RelationalConfig())
+    sensor.weigh(particles, np.zeros((0, 2)), np.full(3, 0.9), np.zeros(3, bool), 0.08, RelationalConfig())
+    assert particles.cluster.tolist() == [0, 1, 2], "everybody was measured"
+    missed = np.array([False, False, True])
+    sensor.weigh(particles, np.zeros((0, 2)), np.full(3, 0.9), missed, 0.08, RelationalConfig())
     assert particles.cluster.tolist() == [0, 1, 0]
 
 
@@ -107,7 +110,7 @@ def test_existence_by_bayes():
     particles = three()
     far = np.array([[0.0, 0.0]])
     particles.pos[:, 0], particles.pos[:, 1] = far[0], [5.0, 0.0]
-    sensor.weigh(particles, far, np.full(3, 0.8), 0.08, ParticleConfig(clutter_density=1e-9))
+    sensor.weigh(particles, far, np.full(3, 0.8), np.zeros(3, bool), 0.08, ParticleConfig(clutter_density=1e-9))
     np.testing.assert_allclose(particles.exist[:, 2], 0.9 * 0.2 / (1 - 0.9 * 0.8), rtol=1e-12)
     np.testing.assert_allclose(particles.exist[:, 0], 1.0, atol=1e-6)
 
@@ -120,15 +123,3 @@ def test_moments_are_weighted_by_existence():
     np.testing.assert_allclose(np.concatenate([pos[0], vel[0]]), kept.mean(axis=0), rtol=1e-9)
     np.testing.assert_allclose(cov[0], np.cov(kept.T, bias=True), rtol=1e-9)
     assert exist[0] == pytest.approx(0.45)
-
-
-def test_groups_need_inertia_to_change():
-    together = np.array([[1.0, 0.6, 0.0], [0.6, 1.0, 0.0], [0.0, 0.0, 1.0]])
-
-    def found(group, inertia):
-        return [rows.tolist() for rows in groups_of_pairs(together, np.array(group), 0.5, inertia)]
-
-    assert found([-1, -1, -1], 0.0) == [[0, 1]]
-    assert found([-1, -1, -1], 1.0) == []
-    assert found([4, 4, -1], 1.0) == [[0, 1]]
-    assert found([4, 4, 4], 1.0) == [[0, 1]]

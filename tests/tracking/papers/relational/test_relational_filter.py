@@ -147,16 +147,15 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
     truth, velocity = np.zeros(2), np.zeros(2)
     for _ in range(steps):
         noise = rng.standard_normal((count, 2, 2))
-        label = particles.labels()
         transition_kernels.move(
-            particles.pos, particles.vel, particles.exist, label, noise, config.speed_table(1.0), 1.0
+            particles.pos, particles.vel, particles.exist, particles.related, noise, config.speed_table(1.0), 1.0
         )
         velocity = 0.7 * velocity + rng.standard_normal(2)
         truth = truth + velocity
         points = (truth + r * rng.standard_normal(2))[None] if seen else np.zeros((0, 2))
         particles.pos[:, 1] = 1e6  # never near the detection
         if seen:
-            sensor.weigh(particles, points, np.array([0.9, 0.0]), r, config)
+            sensor.weigh(particles, points, np.array([0.9, 0.0]), np.array([False, True]), r, config)
             particles.resample(1.0, "residual", rng)
         out.append(particles.vel[:, 1].var(axis=0).mean())
     return np.array(out)
@@ -192,7 +191,7 @@ def test_without_information_weights_stay_and_people_go_straight_on():
 @pytest.mark.parametrize("detect", [np.zeros(2), np.full(2, 0.9)])
 def test_people_who_are_equal_in_all_particles_change_no_weight(detect):
     particles = placed(50, [[0, 0], [3, 0]])
-    sensor.weigh(particles, np.zeros((0, 2)), detect, 0.08, ParticleConfig())
+    sensor.weigh(particles, np.zeros((0, 2)), detect, np.zeros(2, bool), 0.08, ParticleConfig())
     np.testing.assert_allclose(particles.weights, 1 / 50, rtol=1e-12)
 
 
@@ -297,7 +296,7 @@ def test_diffusion_is_that_of_any_frame_rate(related):
         config = ParticleConfig()
         for _ in range(round(fps)):
             noise = rng.standard_normal((20_000, 2, 2))
-            args = particles.pos, particles.vel, particles.exist, particles.labels(), noise
+            args = particles.pos, particles.vel, particles.exist, particles.related, noise
             transition_kernels.move(*args, config.speed_table(1 / fps), 1 / fps)
         mean = particles.vel.mean(axis=1) if related else particles.vel[:, 0]
         place = particles.pos.mean(axis=1) if related else particles.pos[:, 0]
