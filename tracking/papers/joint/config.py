@@ -82,7 +82,7 @@ class JointConfig(BackgroundSettings):
     )
     alpha: float = param(0.1, (0.0, 1.0), "share", "of the dynamics in the individuals' proposal")
     place_noise: float = param(
-        0.15, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma; the paper gives no Sigma", "log"
+        0.3, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma; the paper gives no Sigma", "log"
     )
     velocity_noise: float = param(0.3, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
     point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")

@@ -80,7 +80,7 @@ def candidates(points: Array) -> Ints:
 
 @njit(cache=True)
 def place_newcomer(points: Array, label: Ints, person: int, uniforms: Array, sharpness: float, scales: Array) -> None:
-    """Draw whether a person who is alone joins the nearest cluster, in all partitions (ours).
+    """Draw whether a person joins the nearest cluster, in all partitions in which the person is alone (ours).
 
     points (N_x, K, D): m; label (N_x, N_z, K): changed in place; uniforms (N_x, N_z). The probabilities of apart and
     together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one.
@@ -93,7 +93,7 @@ def place_newcomer(points: Array, label: Ints, person: int, uniforms: Array, sha
             if j == 0 or not same_row(label[i, j], before):
                 before[:] = label[i, j]
                 count = clusters(before, cluster, head)
-                other = _nearest_to(points[i], cluster, count, person)
+                other = _nearest_to(points[i], cluster, count, person) if before[person] == 0 else -1
                 if other >= 0:
                     join = _join_probability(points[i], cluster, other, person, sharpness, scales)
             if other < 0 or uniforms[i, j] >= join:

@@ -170,3 +170,10 @@ def test_a_newcomer_joins_a_whole_group_and_nobody_else_changes():
     assert {tuple(d) for d in drawn.tolist()} == {(1, 1, 0, 0), (1, 1, 0, 1)}
     assert share(drawn, [1, 1, 0, 1]) > 0.5
     assert not placed([[1, 1]], [0]).any()
+
+
+def test_a_newcomer_who_was_joined_by_another_stays():
+    """The second of two newcomers is in a group already where the first one has joined; it leaves nobody behind."""
+    label = [1, 1, 0, 4, 4]
+    drawn = placed([[0, 0], [0.7, 0], [9, 9], [0.2, 0.8], [0.5, 0.5]], label, count=200)
+    assert (drawn == label).all()

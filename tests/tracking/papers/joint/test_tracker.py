@@ -68,7 +68,14 @@ def kalman(tracker, points, config):
 def test_people_alone_have_the_kalman_filter(weights):
     """Z all alone, no validity, exact association, locally optimal proposal (E2)."""
     config = JointConfig(
-        particles=1000, partitions=1, weights=weights, alpha=0.0, validity_rate=0.0, newcomers="alone", **QUIET
+        particles=1000,
+        partitions=1,
+        place_noise=0.15,
+        weights=weights,
+        alpha=0.0,
+        validity_rate=0.0,
+        newcomers="alone",
+        **QUIET,
     )
     points = walk([[0, 0], [20, 0], [40, 5]], [1.2, 0.3], 25, noise=0.08)
     runs = [stepped(Joint(config), points, seed) for seed in range(6)]
