@@ -31,7 +31,7 @@ def split(group: SpaceGroup, points: SpacePoints, part: Ints, motion: Motion3D, 
     if t - group.apart_since < motion.config.split_time - 1e-9:
         return []
     away = [float(np.linalg.norm(points.pos[part == k].mean(0) - group.pos)) for k in range(count)]
-    largest = int(np.lexsort((away, -np.bincount(part[part >= 0])))[0])
+    largest = int(np.lexsort((np.array(away), -np.bincount(part[part >= 0])))[0])
     born = [newborn(points.at(part == k), motion, t) for k in range(count)]
     for child in born:
         child.ekf.x[VEL] = group.ekf.x[VEL]
