@@ -153,7 +153,7 @@ def test_one_function_makes_paths_of_names():
 def test_papers_do_not_lean_on_each_other():
     """One package a paper; nothing goes from one to another."""
     papers = sorted({name.split(".")[2] for name in of("tracking.papers") if name != "tracking.papers"})
-    assert {"blob", "group_pda"} <= set(papers)
+    assert {"blob", "group_pda", "stereo"} <= set(papers)
     for paper in papers:
         others = [f"tracking.papers.{other}" for other in papers if other != paper]
         assert offences(of(f"tracking.papers.{paper}"), *others) == []

@@ -27,6 +27,7 @@ REGISTRY = {
     "relational": "tracking.papers.relational.tracker:Relational",
     "particle": "tracking.papers.relational.tracker:Particle",
     "joint": "tracking.papers.joint.tracker:Joint",
+    "stereo": "tracking.papers.stereo.tracker:Stereo",
 }
 NEEDS = ("pixels", "stereo", "boxes", "points")
 

@@ -17,6 +17,11 @@ from tracking.tracker_registry import find, names
 
 POINTS = ["camera.fps=5", "duration=4", "sensor.detect_prob=0.9", "sensor.clutter_rate=1"]
 PIXELS = ["camera.fps=5", "duration=2", "camera.image=[160,120]"]
+PAIRS = [
+    "camera.fps=10", "duration=2", "camera.image=[240,180]", "camera.focal_px=200", "camera.height=6",
+    "camera.crop=true", "camera.baseline=0.3",
+]  # fmt: skip
+"""People are so near that a stereo pair tells their distance."""
 TRAINED = ("detection_rate", "dark", "bright")
 """By these the background sample was looked through already."""
 
@@ -29,6 +34,16 @@ def points():
 @pytest.fixture(scope="module")
 def pixels():
     return simulate(load("cross", PIXELS), 3, 0, ("left", "background"))
+
+
+@pytest.fixture(scope="module")
+def pairs():
+    return simulate(load("cross", PAIRS), 3, 0, ("left", "right", "background"))
+
+
+def pictures_for(name, request):
+    """Pictures that this tracker can work with."""
+    return request.getfixturevalue("pixels" if "pixels" in find(name).needs else "pairs")
 
 
 def answers(name, sequence, mode, configs):
@@ -97,13 +112,14 @@ def test_each_parameter_changed_after_the_reset_is_as_if_reset_with(name, points
 
 
 @pytest.mark.parametrize("name", names())
-def test_from_pixels_too(name, pixels):
+def test_from_pixels_too(name, request):
+    pixels = pictures_for(name, request)
     kind, rng = find(name).config_class, np.random.default_rng(5)
     space = tuple(p for p in kind.space(online=True) if p.name not in TRAINED)
     plain = answers(name, pixels, "image", {})
     for _ in range(4):
         action = rng.uniform(-0.5, 0.5, len(space))
-        config = decode(space, action, kind(), lambda c: find(name)(c).reset(Context(5.0, 40.0), 0))
+        config = decode(space, action, kind(), lambda c: find(name)(c).reset(Context(pixels.fps, 40.0), 0))
         reset = answers(name, pixels, "image", {0: config})
         same(reset, answers(name, pixels, "image", {1: config}))
         assert differ(plain, reset)
@@ -124,7 +140,8 @@ def test_any_change_between_any_frames(name, sequence, mode, request):
     """Random parameters in every other frame: those that cannot be are refused before anything is changed."""
     kind, rng = find(name).config_class, np.random.default_rng(5)
     space = kind.space(online=True)
-    ready = prepare(name, request.getfixturevalue(sequence), detections=mode)
+    source = pictures_for(name, request) if mode == "image" else request.getfixturevalue(sequence)
+    ready = prepare(name, source, detections=mode)
     ready.reset(0)
     for frame in ready.frames():
         before = ready.tracker.config

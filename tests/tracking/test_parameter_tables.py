@@ -14,6 +14,7 @@ from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.relational.config import RelationalConfig
+from tracking.papers.stereo.config import StereoConfig
 
 REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
 
@@ -25,6 +26,7 @@ PAGES = [
     (GroupPdaConfig, "trackers/group-pda.md"),
     (RelationalConfig, "trackers/relational.md"),
     (JointConfig, "trackers/joint.md"),
+    (StereoConfig, "trackers/stereo.md"),
 ]
 
 

@@ -37,7 +37,7 @@ def forbidden_truth() -> Truth:
 @cache
 def recorded(scenario: str, mode: str) -> tuple[Sequence, tuple[Frame, ...]]:
     """The sequence of a scenario without its truth, and its first frames, made once for all trackers."""
-    streams = ("left", "background") if mode == "image" else ()
+    streams = ("left", "right", "background") if mode == "image" else ()
     settings = [f"camera.fps={FPS}"] + (["camera.image=[160,120]"] if mode == "image" else [])
     sequence = simulate(load(scenario, settings), 40_001, 0, streams)
     return replace(sequence, load_truth=forbidden_truth), tuple(islice(sequence, LENGTHS[mode]))

@@ -336,8 +336,27 @@ def seen_scene():
 
 
 @cache
+def paired_scene():
+    """Pairs of pictures of people near enough that the disparity tells their distance: groups meet, part and cross."""
+    from scenarios.loading.resolve import resolve
+    from sim.crowd.world import run as simulate
+    from sim.sequence import observe
+
+    entries = {e.name: e for e in resolve("subtraction-stereo", ["camera.fps=10", "duration=8"])}
+    scene = entries["stereo-crowded"].scenario
+    sequence = observe(scene, simulate(scene, 40_003), check=False, streams=("left", "right"))
+    frames = list(sequence)
+    covered = frames[50].image.copy()
+    covered[:, :250] = (60, 120, 220)
+    frames[50] = dataclasses.replace(frames[50], image=covered)
+    sample = sequence.background()
+    return dataclasses.replace(sequence, frames=lambda: iter(frames), load_background=lambda: sample, load_truth=None)
+
+
+@cache
 def answers(name: str, pictures: bool = False, **values: object) -> dict[str, bytes]:
-    source = seen_scene() if pictures else hard_scene()
+    paired = "pixels" not in tracker_registry.find(name).needs
+    source = (paired_scene() if paired else seen_scene()) if pictures else hard_scene()
     run = track(name, source, params=values)
     assert run.info["detections"] == ("image" if pictures else "file")
     return {n: b for n, b in tracks_files(run, fps=source.fps).items() if n != "run.json"}

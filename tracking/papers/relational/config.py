@@ -193,10 +193,10 @@ class RelationalConfig(ParticleConfig):
         0.5, (0.05, 0.95), "probability", "two people are in one group if they walk together with at least this (ours)"
     )
     join_rate: float = param(
-        0.01, (1e-6, 10.0), "1/s", "rate at which strangers join a group: the smaller, the later a merge (ours)", "log"
+        1.0, (1e-6, 10.0), "1/s", "rate at which strangers join a group: the smaller, the later a merge (ours)", "log"
     )
     part_rate: float = param(
-        0.05, (1e-6, 10.0), "1/s", "rate at which members leave a group: the smaller, the later a split (ours)", "log"
+        1.0, (1e-6, 10.0), "1/s", "rate at which members leave a group: the smaller, the later a split (ours)", "log"
     )
     patience: float = param(
         2.0, (0.0, 6.0), "s", "a link breaks after the two have been in different groups for so long (ours)"

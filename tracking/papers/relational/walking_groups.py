@@ -104,7 +104,7 @@ class WalkingGroups:
         self._decide(now, 1 / fps, config)
         switched = self._switches(now, frames_of(config.patience, fps), frames_of(BRIDGED, fps))
         changes = self.people.step(now.frame, switched, arrival)
-        events = [self._event(c, now.frame, switched, arrival) for c in changes]
+        events = [self._event(c, now, switched, arrival) for c in changes]
         gone = self.last.keys() - self.people.present.keys()
         self.last = {person: seen for person, seen in self.last.items() if person not in gone}
         return self._labels(now), tuple(e for e in events if e is not None)
@@ -159,20 +159,40 @@ class WalkingGroups:
         self.linked = (self.linked | joined) & ~left
         return switched
 
-    def _event(self, change: GroupChange, frame: int, switched: list[LinkSwitch], arrival: int) -> GroupEvent | None:
+    def _event(
+        self, change: GroupChange, now: PeopleNow, switched: list[LinkSwitch], arrival: int
+    ) -> GroupEvent | None:
         """Return the event of a change of groups; None for a group that was there from the beginning."""
-        start = onset_of_change(change, frame, switched)
+        start = onset_of_change(change, now.frame, switched)
+        if change.kind in ("split", "dissolve"):
+            start = self._parted(change, now)
         if change.kind == "leave":
             start = sorted(self.last[person][0] for person in change.members)[-2]
         if change.kind == "enter" and start <= arrival + 1:
             return None
-        end = start if change.kind in ("enter", "leave") else frame
+        end = start if change.kind in ("enter", "leave") else now.frame
         x, y = np.mean([self.last[person][1] for person in change.members], axis=0).tolist()
-        return GroupEvent(change.kind, start, end, frame, change.before, change.after, change.members, (x, y))
+        return GroupEvent(change.kind, start, end, now.frame, change.before, change.after, change.members, (x, y))
+
+    def _parted(self, change: GroupChange, now: PeopleNow) -> int:
+        """Return the frame since which the nearest people of two parts of a group have been apart; now if they are not.
+
+        A removed link alone does not tell it: the parts may have been held together by a person who is gone.
+        """
+        rows = np.flatnonzero(np.isin(now.id, change.members))
+        group = self._group(now)[rows]
+        part = np.where(group < 0, -1 - np.arange(len(rows)), group)
+        i, j = np.nonzero(part[:, None] != part)
+        begun = self.begun[FAR][rows[i], rows[j]]
+        return int(begun.max()) if len(begun) and begun.min() > NEVER else now.frame
+
+    def _group(self, now: PeopleNow) -> Ints:
+        """Return the group of each slot (K,), of people who are not reported, too."""
+        group_of = {person: g for g, people in self.people.identities.groups.items() for person in people}
+        return np.array([group_of.get(person, -1) for person in now.id.tolist()], np.int64)
 
     def _labels(self, now: PeopleNow) -> Ints:
         """Return the group of each slot (K,)."""
-        group_of = {person: g for g, people in self.people.identities.groups.items() for person in people}
-        group = np.array([group_of.get(person, -1) for person in now.id.tolist()], np.int64)
+        group = self._group(now)
         known, count = np.unique(group[now.shown], return_counts=True)
         return np.where(np.isin(group, known[count > 1]), group, -1)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.papers.relational import sensor
+from tracking.papers.relational import sensor, sensor_kernels
+from tracking.papers.relational.association_sums_kernels import sparse_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.report import estimates
@@ -123,3 +124,38 @@ def test_moments_are_weighted_by_existence():
     np.testing.assert_allclose(np.concatenate([pos[0], vel[0]]), kept.mean(axis=0), rtol=1e-9)
     np.testing.assert_allclose(cov[0], np.cov(kept.T, bias=True), rtol=1e-9)
     assert exist[0] == pytest.approx(0.45)
+
+
+def test_sums_of_people_alone_are_those_of_all_mappings():
+    """People who share no detection are summed by themselves: the same as the sums over all mappings."""
+    rng = np.random.default_rng(4)
+    pos, points = rng.normal(0, 2, (20, 6, 2)), rng.normal(0, 2, (5, 2))
+    exist, detect = rng.uniform(0.2, 1, (20, 6)), rng.uniform(0.5, 1, 6)
+    pairs = np.array([[0, 0], [1, 1], [1, 2], [2, 2], [3, 3], [3, 4]])
+    density = sensor_kernels.densities(pos, points, pairs, np.array([0.5, 1.0, 0.1]), np.inf)
+    cluster, logs, found = np.array([0, 1, 1, 3, 4, 0]), np.empty((20, 6)), np.empty((20, 6, 5))
+    sensor_kernels.particle_sums(density, pairs, exist, detect, 0.01, cluster, logs, found)
+    for p in range(20):
+        seen, W = exist[p] * detect, np.zeros((6, 5))
+        W[pairs[:, 0], pairs[:, 1]] = seen[pairs[:, 0]] * density[p] / 0.01
+        log, marginals = np.empty(6), np.empty((6, 5))
+        sparse_sum(W, 1 - seen, np.ones(5), cluster, log, marginals)
+        np.testing.assert_allclose(logs[p, [0, 1, 3, 4]], log[[0, 1, 3, 4]], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(found[p], marginals, rtol=1e-12, atol=1e-15)
+
+
+def test_a_displaced_point_is_the_persons_only_if_points_may_be_displaced():
+    displaced, found = np.array([[0.7, 0.0]]), []
+    for share in (0.0, 0.1):
+        particles = placed_alone(np.zeros(2))
+        config = ParticleConfig(outlier_share=share, outlier_noise=0.4)
+        said = sensor.weigh(particles, displaced, np.array([0.9]), np.zeros(1, bool), 0.08, config)
+        found.append(float(said.nobody[0]))
+    assert found[0] > 0.999
+    assert found[1] < 0.5
+
+
+def placed_alone(place):
+    particles = ParticleSet.empty(200)
+    particles.add(np.tile(place, (200, 1)), np.zeros((200, 2)), 1.0, np.zeros((200, 0), bool))
+    return particles

@@ -1,0 +1,168 @@
+"""Errors of `relational` and `particle`: Fig. 7 of the paper on simulated scenes, and a hidden partner."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from benchmarks.support import chart, tables
+from scenarios.loading.resolve import resolve
+from sim.sequence import simulate
+from sim.types import Array, Context, Detections, Frame, Sequence, Tracks, Truth
+from tracking.filters.assignment import optimal
+from tracking.papers.relational.config import ParticleConfig
+from tracking.prepare import prepare
+from tracking.stats import mean_interval, paired
+from tracking.tracker_registry import find
+
+FILTERS = ("particle", "relational")
+NOISES = (1.5, 3.0, 6.0)
+"""Values of noise_scale from which the baseline's best is taken for each number of particles."""
+TRAINING = range(700, 703)
+"""Seeds on which it is taken."""
+HIDDEN = 0.2
+"""People who are less visible are never detected: `sensor.min_visibility`."""
+CUT = 2.0
+"""Largest error of a person, and cost of a missing track, m."""
+LENGTHS = (0.2, 0.5, 1.0, 2.0, 3.0)
+"""Lengths of the occlusion in mode hidden, s."""
+FPS, SEEN, NOISE = 10.0, 4.0, 0.05
+"""Mode hidden: frames per second, s before the occlusion, standard deviation of a detection, m."""
+
+
+def errors(truth: Truth, tracks: list[Tracks]) -> Array:
+    """Returns the error of each person and frame of the truth, (R,), m."""
+    out = np.full(len(truth.id), CUT)
+    assert truth.pos is not None
+    for t in tracks:
+        rows = truth.rows(t.index)
+        away = np.hypot(*(truth.pos[rows][:, None] - t.pos[None, :, :2]).transpose(2, 0, 1))
+        people, found = optimal(away, CUT)
+        out[np.arange(rows.start, rows.stop)[people]] = away[people, found]
+    return out
+
+
+def config_of(name: str, count: int, given: argparse.Namespace) -> ParticleConfig:
+    """Returns the config of a filter: the preset or the defaults, and the settings; those of relations alone are left
+    out for `particle`."""
+    kind = find(name).config_class
+    config = kind.load(given.params) if given.params else kind()
+    known = [text for text in given.set if name == "relational" or text.partition("=")[0] in kind.params()]
+    return config.with_set(f"particles={count}", *known)
+
+
+def run(name: str, config: ParticleConfig, seed: int, sequence: Sequence) -> tuple[list[Tracks], int]:
+    """Returns the tracks of a filter whose seed is that of the scene, and the frames with all weights 0."""
+    ready = prepare(name, sequence, params=config, detections="file")
+    ready.reset(seed)
+    return [ready.step(frame) for frame in ready.frames()], ready.tracker.vanished
+
+
+def particles(given: argparse.Namespace) -> None:
+    """Prints a table for each scene: rows are numbers of particles, columns both filters and their difference."""
+    for entry in (e for e in resolve("suite:occlusion") if given.entry in (None, e.name)):
+        train = [(seed, simulate(entry.scenario, seed, 0, ())) for seed in TRAINING]
+        test = [(seed, simulate(entry.scenario, seed, 0, ())) for seed in given.seeds]
+        print(f"\n{entry.name}: error per person and frame, m; seeds {given.seeds.start}:{given.seeds.stop}\n")
+        tables.head(
+            ["particles", "noise of the baseline", "particle, RMSE", "relational, RMSE", *FILTERS,
+             "relational − particle", "the same, hidden people", "difference of sums, m"]
+        )  # fmt: skip
+        for count in given.counts:
+            base = config_of("particle", count, given)
+            tried = {
+                noise: float(np.mean([_mean_error(base.with_set(f"noise_scale={noise}"), *scene) for scene in train]))
+                for noise in NOISES
+            }
+            noise = min(tried, key=tried.__getitem__)
+            _compare(count, noise, test, given)
+
+
+def _mean_error(config: ParticleConfig, seed: int, sequence: Sequence) -> float:
+    return float(errors(sequence.truth, run("particle", config, seed, sequence)[0]).mean())
+
+
+def _compare(count: int, noise: float, test: list[tuple[int, Sequence]], given: argparse.Namespace) -> None:
+    mean, square, hidden, total = ({name: [] for name in FILTERS} for _ in range(4))
+    for seed, sequence in test:
+        assert sequence.truth.visibility is not None
+        away = sequence.truth.visibility < HIDDEN
+        for name in FILTERS:
+            config = config_of(name, count, given)
+            config = config.with_set(f"noise_scale={noise}") if name == "particle" else config
+            found = errors(sequence.truth, run(name, config, seed, sequence)[0])
+            mean[name].append(found.mean())
+            square[name].append((found**2).mean())
+            total[name].append(found.sum())
+            hidden[name].append(found[away].mean() if away.any() else np.nan)
+    gone = np.isfinite(hidden["particle"])
+    tables.row(
+        [str(count), f"{noise:g}", *(f"{np.sqrt(np.mean(square[n])):.3f}" for n in FILTERS),
+         *(tables.interval(*map(float, mean_interval(np.array(mean[n])))) for n in FILTERS),
+         _difference(mean), _difference({n: np.array(hidden[n])[gone] for n in FILTERS}), _difference(total)]
+    )  # fmt: skip
+
+
+def _difference(values: dict[str, Any]) -> str:
+    before, after = (np.array(values[name]) for name in FILTERS)
+    return tables.signed(*map(float, paired(before, after)))
+
+
+def _row(first: str, mean: dict[str, list[float]]) -> None:
+    values = {name: np.array(x) for name, x in mean.items()}
+    cells = [tables.interval(*map(float, mean_interval(values[name]))) for name in FILTERS]
+    tables.row([first, *cells, _difference(values)])
+
+
+def pair(seed: int, length: float) -> tuple[Array, Iterator[Frame]]:
+    """Returns the places (T, 2, 2) of two people who walk together, and the frames of a detector.
+
+    Their common velocity wanders; the second is not detected from SEEN s on, for `length` s. The walk and the errors of
+    a seed do not depend on the length.
+    """
+    rng, dt = np.random.default_rng(seed), 1 / FPS
+    count = round((SEEN + max(LENGTHS) + 1) * FPS)
+    velocity = np.array([1.3, 0.0]) + np.cumsum(rng.normal(0, 0.25 * dt**0.5, (count, 2)), axis=0)
+    middle = np.cumsum(velocity * dt, axis=0)
+    sway = 0.05 * np.sin(2 * np.pi * np.arange(count)[:, None, None] * dt / 2 + rng.uniform(0, 6, (1, 2, 2)))
+    pos = middle[:, None] + np.array([[0, 0.35], [0, -0.35]]) + sway
+    seen = pos + rng.normal(0, NOISE, pos.shape)
+    first, last = round(SEEN * FPS), round((SEEN + length) * FPS)
+
+    def frames() -> Iterator[Frame]:
+        for k in range(last):
+            points = seen[k, :1] if k >= first else seen[k]
+            found = Detections(k + 1, k * dt, "ground", points, None, None, np.ones(len(points)))
+            yield Frame(k + 1, k * dt, detections=found)
+
+    return pos, frames()
+
+
+def hidden(given: argparse.Namespace) -> None:
+    """Prints a table: rows are lengths of the occlusion, columns the error of the hidden person in its last frame."""
+    print("\nerror of the hidden one of two people in the last frame of the occlusion, m, at most 2\n")
+    tables.head(["occlusion, s", *FILTERS, "relational − particle"])
+    curves: dict[str, list[Array]] = {name: [] for name in FILTERS}
+    for length in LENGTHS:
+        mean = {name: [] for name in FILTERS}
+        for seed in given.seeds:
+            for name in FILTERS:
+                tracker = find(name)(config_of(name, given.counts[0], given))
+                tracker.reset(Context(FPS, float("nan")), seed)
+                pos, frames = pair(seed, length)
+                for frame in frames:
+                    tracks = tracker.step(frame, frame.detections)
+                true = pos[frame.index - 1]
+                away = np.hypot(*(true[:, None] - tracks.pos[None]).transpose(2, 0, 1))
+                people, found = optimal(away, CUT)
+                mean[name].append(dict(zip(people.tolist(), away[people, found], strict=True)).get(1, CUT))
+        _row(f"{length:g}", mean)
+        for name in FILTERS:
+            curves[name].append(np.array(mean_interval(np.array(mean[name]))))
+    if given.chart:
+        shown = {name: tuple(np.array(values).T) for name, values in curves.items()}
+        title = "error of a hidden partner, m"
+        chart.lines([chart.Panel(title, LENGTHS, shown, "length of the occlusion, s", y_range=(0, 1.6))], given.chart)

@@ -1,0 +1,172 @@
+"""Groups and events of `relational`, its probabilities of pairs, its departures one by one, and its speed."""
+
+from __future__ import annotations
+
+import argparse
+import time
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+
+import tracking
+from benchmarks.relational.errors import config_of, errors
+from benchmarks.support import tables
+from scenarios.loading.resolve import resolve
+from sim.sequence import simulate
+from sim.types import Array, Context, Detections, Frame, Sequence, Tracks, Truth
+from tracking.filters.assignment import optimal
+from tracking.grouping.belief import default_belief
+from tracking.grouping.grouped_tracks import with_groups, without_groups
+from tracking.grouping.pair_probabilities import pair_probabilities
+from tracking.papers.relational.tracker import Relational
+from tracking.prepare import prepare
+from tracking.stats import mean_interval
+from tracking.tracker_registry import find
+
+COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
+DEPARTURES = (
+    "", "outlier_share=0", "hidden_time=0.3", "noise_scale=1", "weights=joint", "resample_share=1",
+    "resampling=systematic", "newcomer_share=0", "least_existence=0", "join_rate=10 part_rate=10", "patience=0",
+)  # fmt: skip
+"""Settings of the ablation; the first one is the defaults."""
+NEAR = 1.0
+"""m: a track farther than this from a person is not this person's."""
+BINS = 5
+
+
+def _sequences(given: argparse.Namespace, suite: str) -> Iterator[tuple[str, int, Sequence]]:
+    for entry in resolve(f"suite:{suite}"):
+        for seed in given.seeds:
+            yield entry.name, seed, simulate(entry.scenario, seed, 0, ())
+
+
+def _tracked(name: str, seed: int, sequence: Sequence, given: argparse.Namespace) -> list[Tracks]:
+    config = None if name == "blob" else config_of(name, given.counts[0], given)
+    ready = prepare(name, sequence, params=config, detections="file")
+    ready.reset(seed)
+    return [ready.step(frame) for frame in ready.frames()]
+
+
+def scores(given: argparse.Namespace) -> None:
+    """Prints a table: rows are trackers and groupings, columns mean scores, and merges and splits of all sequences."""
+    warnings.simplefilter("ignore")
+    values: dict[str, list[dict[str, float]]] = {}
+    for _, seed, q in _sequences(given, given.suite):
+        found = {name: _tracked(name, seed, q, given) for name in ("blob", "particle", "relational")}
+        rows = {f"{name}, rule": with_groups(without_groups(t), q.fps, q.px_per_m) for name, t in found.items()}
+        for name in ("particle", "relational"):
+            bare = without_groups(found[name])
+            rows[f"{name}, belief"] = with_groups(bare, q.fps, q.px_per_m, default_belief())
+        rows["relational, own groups"] = with_groups(found["relational"], q.fps, q.px_per_m)
+        for label, tracks in rows.items():
+            values.setdefault(label, []).append(tracking.evaluate(q.truth, tracks))
+    count = len(next(iter(values.values())))
+    print(f"\nsuite {given.suite}, {count} sequences, {given.counts[0]} particles\n")
+    tables.head(["tracks, groups", *COLUMNS, "merge F1", "split F1"])
+    for label, scored in values.items():
+        means = [f"{np.nanmean([s.get(key, np.nan) for s in scored]):.3f}" for key in COLUMNS]
+        tables.row([label, *means, *(_pooled(scored, kind) for kind in ("merge", "split"))])
+
+
+def _pooled(scored: list[dict[str, float]], kind: str) -> str:
+    """Returns the F1 of a kind of events, pooled over sequences, with hits, false alarms and misses."""
+    hit, false, missed = (
+        int(np.nansum([s.get(f"{kind}_{key}", np.nan) for s in scored])) for key in ("TP", "FP", "FN")
+    )
+    return f"{2 * hit / max(2 * hit + false + missed, 1):.3f} ({hit}, {false}, {missed})"
+
+
+def reliability(given: argparse.Namespace) -> None:
+    """Prints a table: rows are probabilities of pairs, columns how often these belong together, and F1 at 1/2."""
+    rows: dict[str, list[Array]] = {"relational": [], "belief on particle": []}
+    for _, seed, q in _sequences(given, given.suite):
+        config = config_of("relational", given.counts[0], given)
+        ready = prepare("relational", q, params=config, detections="file")
+        ready.reset(seed)
+        tracker = ready.tracker
+        assert isinstance(tracker, Relational)
+        for frame in ready.frames():
+            tracks = ready.step(frame)
+            place = {int(i): k for k, i in enumerate(tracker.slots.id) if i >= 0}
+            true = _people_of(q.truth, tracks)
+            pairs = [(a, b) for a in true for b in true if a < b]
+            known = [(tracker.together[place[a], place[b]], _same(true[a], true[b])) for a, b in pairs]
+            rows["relational"].append(np.array(known).reshape(-1, 2))
+        bare = _tracked("particle", seed, q, given)
+        found = pair_probabilities(bare, q.fps, q.px_per_m, default_belief())
+        people = {t.index: _people_of(q.truth, t) for t in bare}
+        joined = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), found.probability.tolist(), strict=True)
+        known = [(p, _same(people[f][a], people[f][b])) for f, a, b, p in joined if a in people[f] and b in people[f]]
+        rows["belief on particle"].append(np.array(known).reshape(-1, 2))
+    tables.head(["pairs", *(f"{k / BINS:g} to {(k + 1) / BINS:g}" for k in range(BINS)), "F1 at 1/2", "mean gap"])
+    for label, parts in rows.items():
+        p, same = np.concatenate(parts).T
+        k = np.minimum((p * BINS).astype(int), BINS - 1)
+        cells = [f"{same[k == b].mean():.2f} ({(k == b).sum()})" if (k == b).any() else "" for b in range(BINS)]
+        gap = sum(abs(same[k == b].mean() - p[k == b].mean()) * (k == b).mean() for b in range(BINS) if (k == b).any())
+        hit, said = (same[p > 0.5]).sum(), (p > 0.5).sum()
+        tables.row([label, *cells, f"{2 * hit / max(said + same.sum(), 1):.3f}", f"{gap:.3f}"])
+
+
+def _people_of(truth: Truth, tracks: Tracks) -> dict[int, int]:
+    """Returns the true group, -1 - person for a person alone, of each track that is a person's, by id of the track."""
+    assert truth.pos is not None
+    rows = truth.rows(tracks.index)
+    away = np.hypot(*(truth.pos[rows][:, None] - tracks.pos[None, :, :2]).transpose(2, 0, 1))
+    group, person = truth.group[rows], truth.id[rows]
+    unit = np.where(group >= 0, group, -1 - person)
+    return {int(tracks.id[j]): int(unit[i]) for i, j in zip(*optimal(away, NEAR), strict=True)}
+
+
+def _same(a: int, b: int) -> float:
+    return float(a == b)
+
+
+def ablation(given: argparse.Namespace) -> None:
+    """Prints a table: rows are settings, columns the error and scores on the suite occlusion, means over sequences."""
+    warnings.simplefilter("ignore")
+    sequences = list(_sequences(given, "occlusion"))
+    print(f"\nsuite occlusion, {len(sequences)} sequences, {given.counts[0]} particles\n")
+    tables.head(["setting", "error, m", *COLUMNS])
+    for setting in DEPARTURES:
+        changed = argparse.Namespace(**{**vars(given), "set": [*given.set, *setting.split()]})
+        rows = []
+        for _, seed, q in sequences:
+            tracks = _tracked("relational", seed, q, changed)
+            scored = tracking.evaluate(q.truth, with_groups(tracks, q.fps, q.px_per_m))
+            rows.append([errors(q.truth, tracks).mean(), *(scored.get(key, np.nan) for key in COLUMNS)])
+        means = np.nanmean(np.array(rows), axis=0)
+        tables.row([setting or "defaults", *(f"{value:.3f}" for value in means)])
+
+
+def speed(given: argparse.Namespace) -> None:
+    """Prints a table: rows are numbers of people in pairs, columns frames per second of CPU time of both filters."""
+    tables.head(["people", "particle", "relational"])
+    for people in (2, 5, 10, 20, 50):
+        cells = []
+        for name in ("particle", "relational"):
+            tracker = find(name)(config_of(name, given.counts[0], given))
+            rates = []
+            for seed in given.seeds:
+                frames = list(_walkers(people, seed))
+                tracker.reset(Context(10.0, float("nan")), seed)
+                for frame in frames[:20]:
+                    tracker.step(frame, frame.detections)
+                begun = time.process_time()
+                for frame in frames[20:]:
+                    tracker.step(frame, frame.detections)
+                rates.append((len(frames) - 20) / (time.process_time() - begun))
+            cells.append(tables.interval(*map(float, mean_interval(np.array(rates)))))
+        tables.row([str(people), *cells])
+
+
+def _walkers(people: int, seed: int) -> Iterator[Frame]:
+    """Yields 80 frames of people who walk in pairs, the pairs 3 m apart, with misses and no false alarms."""
+    rng = np.random.default_rng(seed)
+    k = np.arange(people)
+    start = np.stack([k // 2 % 5 * 3.0, k // 10 * 3.0 + k % 2 * 0.7], axis=1)
+    for t in range(80):
+        pos = start + np.array([0.12 * t, 0.0]) + rng.normal(0, 0.05, (people, 2))
+        pos = pos[rng.random(people) < 0.95]
+        yield Frame(t + 1, t / 10, detections=Detections(t + 1, t / 10, "ground", pos, None, None, np.ones(len(pos))))

@@ -1,0 +1,48 @@
+"""`stereo`: the paper's scenes, its decisions one by one, honest pictures, cost of matching.
+
+    python -m benchmarks.stereo MODE [--seeds a:b] [--only cross,merge,…] [--json FILE]
+
+pictures   OpenCV's StereoSGBM and the tracker's own matcher against the true disparity
+scenes     the paper's scenes: position errors (bias and scatter apart), group scores, events
+decisions  each decision of the tracker switched off: paired differences of F1 and of the position error
+cost       time of matching inside the foreground over dense matching, against the foreground's share; frames per second
+
+The docstrings of pictures.py, scenes.py and cost.py in this folder say what the columns mean.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from benchmarks.stereo import cost, pictures, scenes
+from benchmarks.support.options import add_seeds, new_parser, one_thread, seeds_text
+
+MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
+    "pictures": pictures.pictures,
+    "scenes": scenes.scenes,
+    "decisions": scenes.decisions,
+    "cost": cost.cost,
+}
+
+
+def main() -> None:
+    parser = new_parser(__doc__)
+    parser.add_argument("mode", choices=MODES)
+    add_seeds(parser, "20000:20030")
+    parser.add_argument("--only", help="scenes, separated by commas: cross, merge, stairs, crowded")
+    parser.add_argument("--options", help="decisions: parameters, separated by commas")
+    parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")
+    args = parser.parse_args()
+    one_thread()
+    found = MODES[args.mode](args)
+    if args.json is not None:
+        content = {"mode": args.mode, "seeds": seeds_text(args.seeds), "found": found}
+        args.json.write_text(json.dumps(content), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

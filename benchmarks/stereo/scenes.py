@@ -1,0 +1,204 @@
+"""The paper's scenes (sec. 4, Table 1) for `stereo`: position errors of groups, group scores, events.
+
+A true group with two members or more, at most 8 m deep, is compared with the nearest reported group if that is at most
+1.5 m away. `error`: mean distance of centroids on the ground, and standard deviation, as in Table 1; `along`: mean and
+standard deviation of the error along the horizontal line of sight, positive away from the camera; `across`: standard
+deviation of the error across it. `found`: share of those true groups that have a reported group so near. The mean is
+over frames, and then over sequences. `group F1`, `merge F1`: of the catalogue; `extra`: merges and splits reported by
+sequence where the truth has none. 95 % intervals over sequences are Student's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from unittest import mock
+
+import numpy as np
+
+from benchmarks.support.in_memory import in_memory
+from benchmarks.support.tables import interval, number, signed, table
+from scenarios.errors import FlockscopeError
+from scenarios.loading.resolve import Entry, resolve
+from sim.sequence import simulate
+from sim.types import Sequence as Recording
+from sim.types import Tracks
+from tracking.detect import background
+from tracking.detect.background_training import Trained, train
+from tracking.papers.stereo.config import StereoConfig
+from tracking.run import track
+from tracking.scoring import evaluate
+from tracking.stats import mean_interval
+
+SUITE, DEEPEST, NEAR = "subtraction-stereo", 8.0, 1.5
+PAPER = {"cross": "0.119 ± 0.077", "stairs": "0.105 ± 0.076"}
+"""Table 1: average error and standard deviation, m."""
+COLUMNS = (
+    "error, m", "± sd", "paper", "along", "± sd", "across ± sd", "found", "group F1", "merge F1", "extra", "frames/s"
+)  # fmt: skip
+ABLATIONS: Mapping[str, Mapping[str, object]] = {
+    "surface_offset": {"surface_offset": 0.0},
+    "area_weights": {"area_weights": False},
+    "point_covariance": {"point_covariance": False},
+    "attach": {"attach": False},
+    "memory": {"memory": 0.0},
+    "count_weight": {"count_weight": 0.0},
+    "velocity_weight": {"velocity_weight": 0.0},
+    "back_check": {"back_check": 5.0},
+    "left_right": {"left_right": False},
+    "spread_weight": {"spread_weight": 0.1},
+    "merge_time": {"merge_time": 0.0},
+    "split": {"split": False},
+    "person or not": {"least_height": 0.0, "least_width": 0.0, "most_height": 10.0},
+}
+Row = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A set of parameters with a name."""
+
+    name: str
+    params: Mapping[str, object] = field(default_factory=dict)
+
+
+def entries(only: str | None) -> dict[str, Entry]:
+    """Returns the scenes of the suite by name, without its prefix; only: names, separated by commas."""
+    wanted = None if only is None else set(only.split(","))
+    found = {e.name.removeprefix("stereo-"): e for e in resolve(SUITE)}
+    return {name: e for name, e in found.items() if wanted is None or name in wanted}
+
+
+def recordings(entry: Entry, seeds: range) -> Iterator[tuple[int, Recording]]:
+    """Yields the pairs of pictures of each seed, kept in memory; a seed that cannot be simulated is printed and left
+    out."""
+    for seed in seeds:
+        try:
+            live = simulate(entry.scenario, seed, entry.repeat, streams=("left", "right"))
+            assert live.truth is not None
+        except FlockscopeError as error:
+            print(f"{entry.name}, seed {seed}, left out: {error.line()}", file=sys.stderr)
+            continue
+        yield seed, in_memory(live)
+
+
+def row_of(sequence: Recording, variant: Variant) -> Row:
+    """Returns position errors and scores of one sequence."""
+    run = track("stereo", sequence, params=variant.params or None, detections="image")
+    truth = sequence.truth
+    assert truth is not None
+    scores = evaluate(truth, run)
+    kinds = [e.kind for t in run for e in t.events]
+    true = [e.kind for e in truth.events or ()]
+    extra = sum(max(kinds.count(kind) - true.count(kind), 0) for kind in ("merge", "split"))
+    own = {"extra": float(extra), "frames/s": float(run.info["frames_per_second"])}
+    return {**position_errors(sequence, run), **scores, **own}
+
+
+def position_errors(sequence: Recording, tracks: object) -> Row:
+    """Returns mean and standard deviation of the errors of group positions of one sequence, nan without any."""
+    truth, camera = sequence.truth, sequence.camera
+    assert truth is not None
+    assert truth.groups is not None
+    assert camera is not None
+    found, seen = [], 0
+    for t in tracks:  # type: ignore[attr-defined]
+        found_here = _errors_of_frame(t, truth.groups[t.index - 1], camera)
+        seen += len(found_here)
+        found += [e for e in found_here if e is not None]
+    e = np.array(found).reshape(-1, 2)
+    size = np.linalg.norm(e, axis=1)
+    keys = ("error", "sd", "along", "along sd", "across sd")
+    values = (size.mean(), size.std(), e[:, 0].mean(), e[:, 0].std(), e[:, 1].std()) if len(e) else [np.nan] * 5
+    return {**dict(zip(keys, map(float, values), strict=True)), "found": len(e) / seen if seen else np.nan}
+
+
+def _errors_of_frame(t: Tracks, groups: object, camera: object) -> list[np.ndarray | None]:
+    """Returns the error along and across the line of sight of each true group of a frame; None for one not found."""
+    made: list[np.ndarray | None] = []
+    for pos, members in zip(groups.pos, groups.members, strict=True):  # type: ignore[attr-defined]
+        depth = (np.append(pos, 1.0) - camera.position) @ camera.rotation[2]  # type: ignore[attr-defined]
+        if len(members) < 2 or depth > DEEPEST:
+            continue
+        away = t.pos[:, :2] - pos
+        k = np.linalg.norm(away, axis=1).argmin() if len(away) else -1
+        if k < 0 or np.linalg.norm(away[k]) > NEAR:
+            made.append(None)
+            continue
+        sight = pos - camera.position[:2]  # type: ignore[attr-defined]
+        sight = sight / np.linalg.norm(sight)
+        made.append(np.array([away[k] @ sight, away[k] @ [-sight[1], sight[0]]]))
+    return made
+
+
+def measured(args: argparse.Namespace, variants: tuple[Variant, ...]) -> dict[str, dict[str, dict[int, Row]]]:
+    """Returns the rows by scene, variant and seed. All variants share the training on a background sample."""
+    made: dict[str, dict[str, dict[int, Row]]] = {}
+    for name, entry in entries(args.only).items():
+        made[name] = {v.name: {} for v in variants}
+        for seed, sequence in recordings(entry, args.seeds):
+            known: dict[tuple[float, bool], Trained] = {}
+
+            def once(sample, rate, follow_gain, known=known):  # type: ignore[no-untyped-def]
+                if (rate, follow_gain) not in known:
+                    known[rate, follow_gain] = train(sample, rate, follow_gain)
+                return known[rate, follow_gain]
+
+            with mock.patch.object(background, "train", once):
+                for v in variants:
+                    made[name][v.name][seed] = row_of(sequence, v)
+            print(f"{name} {seed}", file=sys.stderr, flush=True)
+    return made
+
+
+def scenes(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
+    """Prints the table of scenes, for the defaults and the preset `paper`, and returns the rows."""
+    variants = (Variant("stereo"), Variant("preset paper", StereoConfig.preset("paper").as_dict()))
+    made = measured(args, variants)
+    rows = {f"{name}, {v}": _cells(name, list(of.values())) for name, by in made.items() for v, of in by.items()}
+    table("Scenes of the paper", "scene", COLUMNS, rows)
+    return made
+
+
+def _mean(values: np.ndarray) -> tuple[float, float, float]:
+    mean, low, high = mean_interval(values[:, None])
+    return float(mean[0]), float(low[0]), float(high[0])
+
+
+def _cells(name: str, rows: list[Row]) -> list[str]:
+    def mean(key: str, digits: int = 3) -> str:
+        values = np.array([r.get(key, np.nan) for r in rows])
+        return number(float(np.nanmean(values)), digits) if np.isfinite(values).any() else "–"
+
+    def with_interval(key: str) -> str:
+        values = np.array([r.get(key, np.nan) for r in rows])
+        values = values[np.isfinite(values)]
+        return interval(*_mean(values)) if len(values) else "–"
+
+    return [
+        with_interval("error"), mean("sd"), PAPER.get(name, "–"), mean("along"), mean("along sd"), mean("across sd"),
+        mean("found"), with_interval("group_F1_hull"), mean("merge_F1"), mean("extra", 2), mean("frames/s", 0),
+    ]  # fmt: skip
+
+
+def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
+    """Prints, for each decision switched off, the paired difference over all scenes, and returns the rows."""
+    wanted = ABLATIONS if args.options is None else {k: ABLATIONS[k] for k in args.options.split(",")}
+    made = measured(args, (Variant("stereo"), *(Variant(name, params) for name, params in wanted.items())))
+    rows = {}
+    for name in wanted:
+        cells = []
+        for key in ("group_F1_hull", "error"):
+            pairs = [
+                (by[name][s].get(key, np.nan), by["stereo"][s].get(key, np.nan))
+                for by in made.values()
+                for s in by[name]
+            ]
+            off = np.array([a - b for a, b in pairs])
+            off = off[np.isfinite(off)]
+            cells.append(signed(*_mean(off)) if len(off) else "–")
+        rows[name] = cells
+    table("Each decision switched off: difference to the defaults", "decision", ("group F1", "error, m"), rows)
+    return made

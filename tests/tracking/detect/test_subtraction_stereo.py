@@ -1,0 +1,140 @@
+"""Matching inside the foreground: the disparities of the whole picture, at less cost; persons by their size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.scene.stereo import project_pair
+from tests.sim.scene.test_stereo import rig
+from tracking.detect import blobs
+from tracking.detect.stereo_people import PersonLimits, person_mask, sizes
+from tracking.detect.subtraction_stereo import SubtractionStereo, sampled, windows
+
+HIGH, WIDE = 120, 200
+
+
+def pair(shift: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """A textured picture, and the same as seen from the right: moved to the left by `shift` px."""
+    import cv2
+
+    r = np.random.default_rng(seed)
+    wide = cv2.GaussianBlur(r.uniform(0, 255, (HIGH, WIDE + 60)), (0, 0), 1.2)
+    wide = 128 + 2.5 * (wide - wide.mean())
+    x = np.arange(WIDE, dtype=np.float32)
+    rows = np.repeat(np.arange(HIGH, dtype=np.float32)[:, None], WIDE, 1)
+
+    def view(offset: float) -> np.ndarray:
+        columns = np.repeat((x + 30 + offset)[None], HIGH, 0).astype(np.float32)
+        return np.clip(cv2.remap(wide.astype(np.float32), columns, rows, cv2.INTER_CUBIC), 0, 255).astype(np.uint8)
+
+    return view(0.0), view(shift)
+
+
+def three_regions() -> np.ndarray:
+    mask = np.zeros((HIGH, WIDE), bool)
+    mask[20:60, 40:55] = mask[50:90, 100:112] = mask[30:70, 105:125] = True
+    return mask
+
+
+def same(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return (a == b) | (np.isnan(a) & np.isnan(b))
+
+
+@pytest.mark.parametrize("shift", [3.0, 6.4, 11.7])
+def test_it_finds_the_shift_to_a_part_of_a_pixel(shift: float) -> None:
+    found = SubtractionStereo(14.0, 9).match(*pair(shift), three_regions())
+    assert np.isfinite(found.disparity[three_regions()]).mean() > 0.95
+    assert np.isnan(found.disparity[~three_regions()]).all()
+    assert np.nanmedian(np.abs(found.disparity - shift)) < 0.1
+
+
+def test_inside_the_mask_it_is_bit_equal_to_dense_matching() -> None:
+    left, right = pair(5.3)
+    for check, most in ((False, 0.0), (True, 1e-3)):
+        stereo, mask = SubtractionStereo(14.0, 9, check), three_regions()
+        some, dense = stereo.match(left, right, mask), stereo.dense(left, right)
+        assert (~same(some.disparity, dense.disparity))[mask].mean() <= most
+        assert some.evaluated < 0.6 * dense.evaluated
+
+
+def test_what_is_compared_is_the_area_of_the_windows_times_the_disparities() -> None:
+    left, right = pair(5.3)
+    stereo, mask = SubtractionStereo(14.0, 9), three_regions()
+    _, found = windows(mask, stereo.margins)
+    area = sum((x1 - x0 - 16) * (y1 - y0) for x0, y0, x1, y1 in found.tolist())
+    assert stereo.match(left, right, mask).evaluated == 16 * area
+    assert stereo.match(left, right, np.ones_like(mask)).evaluated == 16 * HIGH * (WIDE - 16)
+    nothing = stereo.match(left, right, np.zeros_like(mask))
+    assert nothing.evaluated == 0
+    assert np.isnan(nothing.disparity).all()
+
+
+def test_windows_cover_the_mask_and_join_only_where_that_saves() -> None:
+    mask, margins = three_regions(), np.array([20, 4, 4, 4])
+    boxes, wide = windows(mask, margins)
+    covered = np.zeros_like(mask)
+    for x0, y0, x1, y1 in boxes.tolist():
+        covered[y0:y1, x0:x1] = True
+    assert covered[mask].all()
+    assert len(boxes) == 2
+    assert (wide[:, :2] <= boxes[:, :2]).all()
+    assert (wide >= 0).all()
+    assert (wide[:, 2:] <= [WIDE, HIGH]).all()
+
+
+def test_the_disparity_at_a_point_is_the_median_of_what_is_known() -> None:
+    d = np.full((10, 10), np.nan, np.float32)
+    d[4, 4:7] = [2.0, 8.0, 3.0]
+    assert sampled(d, np.array([[5.5, 4.5], [0.5, 0.5], [6.5, 5.5]]), 1).tolist() == pytest.approx(
+        [3.0, np.nan, 5.5], nan_ok=True
+    )
+    assert sampled(d, np.zeros((0, 2)), 1).shape == (0,)
+
+
+LIMITS = PersonLimits(0.5, 3.0, 0.1, (0.3, 0.3, 0.02))
+
+
+def region(camera, foot, width: float, height: float, noise: float = 0.02, mask=None, d=None):
+    """Mask and disparities of an upright board facing the camera."""
+    r = np.random.default_rng(0)
+    mask = np.zeros((240, 320), bool) if mask is None else mask
+    d = np.full((240, 320), np.nan, np.float32) if d is None else d
+    s, t = np.meshgrid(np.linspace(-width / 2, width / 2, 90), np.linspace(0, height, 200))
+    X = np.column_stack([foot[0] + s.ravel(), np.full(s.size, foot[1]), t.ravel()])
+    uvd = project_pair(camera, X)
+    u, v = np.floor(uvd[:, :2]).astype(int).T
+    inside = (u >= 0) & (u < 320) & (v >= 0) & (v < 240)
+    mask[v[inside], u[inside]] = True
+    d[v[inside], u[inside]] = uvd[inside, 2] + noise * r.standard_normal(inside.sum())
+    return mask, d
+
+
+@pytest.mark.parametrize("tilt", [10.0, 40.0])
+def test_height_and_width_are_those_of_the_body(tilt: float) -> None:
+    camera = rig(tilt, height=4.0, baseline=0.5)
+    for noise in (0.0, 0.4):
+        mask, d = region(camera, (1.2, 6.0), 0.45, 1.7, noise=noise)
+        height, width, error = sizes(blobs.find(mask, 4), d, camera, (0.0, 0.0, noise))
+        assert np.sqrt(height[0] ** 2 - error[0] ** 2) == pytest.approx(1.7, abs=0.2)
+        assert width[0] == pytest.approx(0.45, abs=0.1)
+
+
+def test_persons_are_told_by_size_and_truncated_ones_are_kept() -> None:
+    camera = rig(20.0, height=4.0, baseline=0.5)
+    mask, d = region(camera, (0.0, 6.0), 0.45, 1.7)
+    region(camera, (2.0, 6.0), 0.4, 0.3, mask=mask, d=d)  # a dog
+    region(camera, (1.0, 9.0), 0.04, 1.7, mask=mask, d=d)  # a pole
+    region(camera, (-1.8, 9.0), 0.8, 3.6, mask=mask, d=d)  # a bus stop
+    found = blobs.find(mask, 4)
+    assert len(found) == 4
+    assert not found.cut().any()
+    kept = person_mask(found, d, camera, LIMITS)
+    u, v = project_pair(camera, np.array([[0.0, 6.0, 1.0]]))[0, :2].astype(int)
+    assert kept[v, u]
+    assert len(blobs.find(kept, 4)) == 1
+    low, d = region(camera, (1.0, 2.05), 0.45, 0.4)
+    height, _, _ = sizes(blobs.find(low, 4), d, camera, LIMITS.deviations)
+    assert height[0] < LIMITS.least_height
+    assert blobs.find(low, 4).cut().all()
+    assert person_mask(blobs.find(low, 4), d, camera, LIMITS).any()

@@ -1,0 +1,181 @@
+"""Groups of points in space: grouping by spheres, association by velocity, merging, splitting, lost pictures."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.types import Context, Frame
+from tests.sim.scene.test_stereo import rig
+from tracking.detect.features import SpacePoints
+from tracking.papers.stereo.config import StereoConfig
+from tracking.papers.stereo.initial_grouping import sphere_groups
+from tracking.papers.stereo.measurement import POS, PairMeasurement
+from tracking.papers.stereo.merging import pooled
+from tracking.papers.stereo.picture_points import stereo_camera
+from tracking.papers.stereo.tracker import Stereo
+
+FPS = 30.0
+PICTURE = np.zeros((4, 4, 3), np.uint8)
+
+
+def scripted(steps, config: StereoConfig | None = None, camera=None):
+    """The tracks that the tracker makes of points that stand in for features; None is a lost picture."""
+    camera = camera or rig(40.0, focal=1000.0, baseline=0.5)
+    tracker = Stereo(config)
+    tracker.reset(Context(FPS, 30.0, camera=camera), 0)
+    given = iter(steps)
+    tracker.measurement, tracker.plane = PairMeasurement(camera), "space"
+    tracker.pictures = SimpleNamespace(
+        config=tracker.config, camera=camera, points=lambda *_: next(given),
+        features=SimpleNamespace(forget=lambda: next(given)),
+    )  # fmt: skip
+    tracks = []
+    for k, points in enumerate(steps):
+        image = None if points is None else PICTURE
+        tracks.append(tracker.step(Frame(k + 1, k / FPS, image, image), None))
+    return tracker, tracks
+
+
+def walkers(seed: int, count: int, start, velocity, frames: int, first: int = 1, sd: float = 0.25, keep: bool = True):
+    """Features of one group, (pos, vel, id) in each frame; without `keep` they have new ids in each frame."""
+    r = np.random.default_rng(seed)
+    offset = sd * r.standard_normal((count, 3)) * [1, 1, 1.5]
+    velocity = np.asarray(velocity, float)
+    for k in range(frames):
+        pos = np.asarray(start) + offset + velocity * k / FPS + 0.02 * r.standard_normal((count, 3))
+        vel = velocity + 0.1 * r.standard_normal((count, 3))
+        yield pos, vel, np.arange(first, first + count) + (0 if keep else 1000 * k)
+
+
+def together(*groups) -> list[SpacePoints]:
+    made = []
+    for parts in zip(*groups, strict=True):
+        pos, vel, id = (np.concatenate([p[a] for p in parts]) for a in range(3))
+        cov = np.repeat(4e-4 * np.eye(3)[None], len(pos), 0)
+        made.append(SpacePoints(id, pos, cov, vel, 25 * cov))
+    return made
+
+
+def kinds(tracks) -> list[str]:
+    return [e.kind for t in tracks for e in t.events]
+
+
+@pytest.mark.parametrize("radius", [0.5, 1.0])
+def test_spheres_overlap_up_to_two_radii(radius: float) -> None:
+    pos = np.array([[0.0, 0, 0], [2 * radius, 0, 0], [2 * radius, 0, 2 * radius], [9, 9, 9]])
+    assert sphere_groups(pos, radius, 1).tolist() == [0, 0, 0, 1]
+    pos[1, 0] += 1e-9
+    assert sphere_groups(pos, radius, 1).tolist() == [0, 1, 1, 2]
+    assert sphere_groups(pos, radius, 2).tolist() == [-1, 0, 0, -1]
+    assert sphere_groups(np.zeros((0, 3)), radius, 1).shape == (0,)
+
+
+def test_two_points_do_not_update_a_group() -> None:
+    steps = together(walkers(0, 12, [1, 5, 1], [1, 0, 0], 30))
+    tracker, _ = scripted(steps)
+    before = tracker.groups[0]
+    expected = (tracker.motion.Phi @ before.ekf.x, tracker.motion.Phi @ before.ekf.P @ tracker.motion.Phi.T)
+    for count, same in ((2, True), (3, False)):
+        again, _ = scripted([*steps, steps[-1].at(np.arange(count))])
+        assert np.array_equal(again.groups[0].ekf.x, expected[0]) == same
+        assert np.array_equal(again.groups[0].ekf.P, expected[1] + tracker.motion.Q) == same
+
+
+def test_a_lost_picture_is_a_prediction() -> None:
+    steps = together(walkers(0, 12, [1, 5, 1], [1, 0, 0], 30))
+    tracker, tracks = scripted([*steps, None])
+    x = scripted(steps)[0].groups[0].ekf.x
+    assert np.array_equal(tracker.groups[0].ekf.x, tracker.motion.Phi @ x)
+    assert len(tracks[-1].id) == 1
+
+
+def test_a_group_is_found_with_its_place_and_velocity() -> None:
+    tracker, tracks = scripted(together(walkers(3, 20, [1, 5, 1], [1, 0.5, 0], 60)))
+    assert kinds(tracks) == ["enter"]
+    last = tracks[-1]
+    assert last.plane == "space"
+    assert last.pos.shape == (1, 3)
+    assert last.vel[0] == pytest.approx([1, 0.5, 0], abs=0.1)
+    assert tracker.groups[0].count == 20
+
+
+def crossing(seed: int, **params: object) -> bool:
+    """Whether both of two groups that walk through each other have their ids afterwards."""
+    frames = 100
+    a = walkers(seed, 20, [-1.5, 5.0, 1], [1.0, 0, 0], frames, keep=False)
+    b = walkers(seed + 100, 20, [1.8, 5.0, 1], [-1.0, 0, 0], frames, first=500, keep=False)
+    _, tracks = scripted(together(a, b), StereoConfig.from_dict(params))
+    last = dict(zip(tracks[-1].id.tolist(), tracks[-1].pos[:, 0].tolist(), strict=True))
+    return kinds(tracks) == ["enter", "enter"] and len(last) == 2 and last[1] > 1 and last[2] < -1
+
+
+def test_velocity_keeps_crossing_groups_apart() -> None:
+    kept = sum(crossing(seed) for seed in range(6))
+    without = sum(crossing(seed, velocity_weight=0.0, attach=False) for seed in range(6))
+    assert kept == 6
+    assert without < 4
+
+
+def test_groups_of_one_velocity_merge_and_opposite_ones_never() -> None:
+    a = walkers(0, 15, [-2.2, 5, 1], [0.5, 0.5, 0], 120)
+    b = walkers(1, 25, [2.2, 5, 1], [-0.5, 0.5, 0], 120, first=100)
+    meet = together(a, b)
+    still = together(walkers(0, 15, [-0.2, 7, 1], [0, 0.5, 0], 60), walkers(1, 25, [0.2, 7, 1], [0, 0.5, 0], 60, 100))
+    tracker, tracks = scripted([*meet, *still])
+    assert "merge" in kinds(tracks)
+    event = next(e for t in tracks for e in t.events if e.kind == "merge")
+    assert event.before == (1, 2)
+    assert event.after == (2,), "the group with more points keeps its id"
+    assert len(tracker.groups) == 1
+    for y in (5.0, 5.3, 5.6):
+        a = walkers(4, 20, [-1.5, 5.0, 1], [1.0, 0, 0], 100)
+        b = walkers(5, 20, [1.8, y, 1], [-1.0, 0, 0], 100, first=100)
+        assert "merge" not in kinds(scripted(together(a, b), StereoConfig(merge_time=0.0))[1])
+
+
+def test_a_merged_group_has_the_moments_of_all_points() -> None:
+    r = np.random.default_rng(0)
+    parts = [r.standard_normal((n, 6)) + shift for n, shift in ((10, 0.0), (30, 1.0), (5, -2.0))]
+    X, S = pooled(
+        np.stack([p.mean(0) for p in parts]), np.stack([np.cov(p.T, bias=True) for p in parts]), np.array([10, 30, 5.0])
+    )
+    every = np.concatenate(parts)
+    assert pytest.approx(every.mean(0)) == X
+    assert pytest.approx(np.cov(every.T, bias=True)) == S
+
+
+def test_a_group_whose_points_part_splits() -> None:
+    a = walkers(0, 20, [0.0, 5, 1], [0.8, 0, 0], 150)
+    b = walkers(1, 12, [-0.1, 5, 1], [-0.8, 0, 0], 150, first=100)
+    _, tracks = scripted(together(a, b), StereoConfig(velocity_weight=0.0))
+    event = next(e for t in tracks for e in t.events if e.kind == "split")
+    assert event.before == (1,)
+    assert event.after == (1, 2)
+    assert len(tracks[-1].id) == 2
+    last = dict(zip(tracks[-1].id.tolist(), tracks[-1].pos[:, 0].tolist(), strict=True))
+    assert last[1] > 2, "the part with more points keeps the id"
+    assert "split" not in kinds(scripted(together(walkers(0, 20, [0, 5, 1], [0.8, 0, 0], 150)))[1])
+
+
+def test_a_group_that_is_gone_is_deleted() -> None:
+    steps = together(walkers(0, 12, [1, 5, 1], [1, 0, 0], 30))
+    tracker, tracks = scripted([*steps, *[SpacePoints.none()] * 60])
+    assert kinds(tracks) == ["enter", "leave"]
+    assert tracker.groups == []
+
+
+def test_the_tilt_of_the_camera_changes_nothing_but_the_noise() -> None:
+    steps = together(walkers(3, 20, [1, 6, 1], [1, 0.5, 0], 60))
+    found = [scripted(steps, camera=rig(tilt, focal=1000.0, baseline=0.5))[0].groups[0] for tilt in (20.0, 60.0)]
+    off = (found[0].ekf.x - found[1].ekf.x)[POS, 0]
+    assert np.abs(off).max() < 0.02
+
+
+@pytest.mark.parametrize("camera", [None, rig(40.0, baseline=0.0), rig(40.0).replace(radial=0.1)])
+def test_a_camera_that_is_no_pair_is_refused(camera) -> None:
+    with pytest.raises(InputError, match="baseline"):
+        stereo_camera(camera)

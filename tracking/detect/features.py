@@ -1,0 +1,200 @@
+"""Features: corners of people, followed from frame to frame by KLT, as 3-D points with velocities (Hoshikawa et al.
+2011, sec. 3.1).
+
+KLT is OpenCV's pyramidal Lucas-Kanade tracker on corners of Shi and Tomasi. A feature is followed forwards and
+backwards; it ends where it does not come back to its place, and where it leaves the foreground. Each feature keeps its
+world points of the last frames. Its velocity is the slope of the line of least squares through those of the time
+window. Features that have not lived through the time window are not used (Fig. 3).
+
+Each point has a covariance of its own, C = J^-1 R J^-T with the Jacobian J of the pair (sim.scene.stereo) and R of
+(u, v, d): along the line of sight it grows with the squared depth. Of n measurements at times t_k the slope has the
+covariance C / sum (t_k - mean t)^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import cv2
+import numpy as np
+
+from sim.arrays import no_ids
+from sim.scene.stereo import back_project, point_covariances
+from sim.types import Array, Bools, Camera, Image, Ints
+from tracking.detect.subtraction_stereo import Disparities, sampled
+
+WINDOW = (9, 9)
+"""px: width and height of the patch that KLT compares."""
+LEVELS = 2
+"""Levels of the picture pyramid above the picture itself."""
+QUALITY = 0.005
+"""Least quality of a corner, relative to the best one (Shi and Tomasi)."""
+BORDER = 1
+"""px: new corners keep away from the edge of their region by so much, as the ground shows through there."""
+SAMPLE = 1
+"""px: a feature's disparity is the median in a square of 2 SAMPLE + 1 px."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpacePoints:
+    """M measured points in space.
+
+    id (M,): the same number in each frame in which a point is measured. pos (M, 3): world x, y, z, m; cov (M, 3, 3):
+    covariance of a measured position. vel (M, 3): m/s; vel_cov (M, 3, 3): covariance of a measured velocity.
+    """
+
+    id: Ints
+    pos: Array
+    cov: Array
+    vel: Array
+    vel_cov: Array
+
+    def __len__(self) -> int:
+        return len(self.pos)
+
+    def at(self, rows: Ints | Bools) -> SpacePoints:
+        """Return the points of some rows: indices, or flags (M,)."""
+        return SpacePoints(self.id[rows], self.pos[rows], self.cov[rows], self.vel[rows], self.vel_cov[rows])
+
+    @classmethod
+    def none(cls) -> SpacePoints:
+        """Return M = 0 points."""
+        two, three = np.zeros((0, 3)), np.zeros((0, 3, 3))
+        return cls(no_ids(), two, three, two, three)
+
+
+@dataclass(frozen=True)
+class FeatureRules:
+    """How features are found and measured.
+
+    window_time: s that a feature must have lived; spacing: least distance of two features, px; back: largest distance
+    from its place after following it forwards and backwards, px; deviations (3,): standard deviations of u, v and d,
+    px; most: largest number of features.
+    """
+
+    window_time: float
+    spacing: float
+    back: float
+    deviations: tuple[float, float, float]
+    most: int
+
+
+class Features:
+    """The features of a left camera, followed from frame to frame.
+
+    State of N features: id (N,), from 1, none given twice; uv (N, 2) px; world (N, K, 3) their points in the last K
+    frames, m, nan where they were not measured; age (N,): frames since they were found. grey (H, W): the last picture,
+    None before the first.
+    """
+
+    def __init__(self, camera: Camera, fps: float) -> None:
+        self.camera, self.fps = camera, fps
+        self.grey: Image | None = None
+        self.id, self.next_id = no_ids(), 1
+        self.uv, self.world, self.age = np.zeros((0, 2), np.float32), np.zeros((0, 2, 3)), np.zeros(0, np.int64)
+
+    def step(self, grey: Image, mask: Bools, disparity: Disparities, rules: FeatureRules) -> SpacePoints:
+        """Follow the features into the next picture, find new ones, and return those that lived through the window.
+
+        grey (H, W) uint8: left picture. mask (H, W): where features may be, the foreground of people. disparity (H, W):
+        px, nan where unknown. A point without disparity in this frame is not returned.
+        """
+        self._resize(max(round(rules.window_time * self.fps), 1) + 1)
+        if self.grey is not None and len(self.uv):
+            self._follow(self.grey, grey, mask, rules)
+        self._thin(rules.spacing)
+        self._find(grey, mask, rules)
+        self.grey, self.age = grey, self.age + 1
+        d = sampled(disparity, self.uv, SAMPLE)
+        here = back_project(self.camera, np.column_stack([self.uv, d]))
+        self.world = np.concatenate([self.world[:, 1:], here[:, None]], 1)
+        return self._measured(rules)
+
+    def forget(self) -> None:
+        """Drop all features, after a lost picture for instance; returns nothing."""
+        self.grey = None
+        self._keep(np.zeros(len(self.uv), bool))
+
+    def _resize(self, frames: int) -> None:
+        """Makes room for the points of `frames` frames: drops the oldest, or adds frames without points before them."""
+        have = self.world.shape[1]
+        if have > frames:
+            self.world = self.world[:, have - frames :]
+        elif have < frames:
+            missing = np.full((len(self.world), frames - have, 3), np.nan)
+            self.world = np.concatenate([missing, self.world], 1)
+
+    def _keep(self, kept: Bools) -> None:
+        self.id, self.uv = self.id[kept], self.uv[kept]
+        self.world, self.age = self.world[kept], self.age[kept]
+
+    def _follow(self, before: Image, now: Image, mask: Bools, rules: FeatureRules) -> None:
+        """Moves the features from one picture to the next; drops those that are lost, or not in the mask any more."""
+        start: Any = self.uv[:, None]
+        follow: Any = partial(cv2.calcOpticalFlowPyrLK, winSize=WINDOW, maxLevel=LEVELS)
+        found, there, _ = follow(before, now, start, None)
+        again, back, _ = follow(now, before, found, None)
+        off = np.abs(again - start)[:, 0].max(1)
+        self.uv = found[:, 0]
+        high, wide = mask.shape
+        inside = (self.uv >= 0).all(1) & (self.uv < [wide, high]).all(1)
+        good = inside & (there[:, 0] == 1) & (back[:, 0] == 1) & (off <= rules.back)
+        cell = np.floor(np.where(good[:, None], self.uv, 0)).astype(int)
+        self._keep(good & mask[cell[:, 1], cell[:, 0]])
+
+    def _thin(self, spacing: float) -> None:
+        """Keeps the oldest feature in each square cell of half the spacing (px) in width."""
+        cell = np.floor(self.uv / max(spacing / 2, 1.0)).astype(np.int64)
+        order = np.argsort(-self.age, kind="stable")
+        _, first = np.unique(cell[order], axis=0, return_index=True)
+        kept = np.zeros(len(self.uv), bool)
+        kept[order[first]] = True
+        self._keep(kept)
+
+    def _find(self, grey: Image, mask: Bools, rules: FeatureRules) -> None:
+        """Adds corners in the mask that keep the spacing from the features."""
+        room = rules.most - len(self.uv)
+        if room <= 0:
+            return
+        size = 2 * BORDER + 1
+        free: Any = cv2.erode(mask.astype(np.uint8), np.ones((size, size), np.uint8))
+        taken = np.ones(mask.shape, np.uint8)
+        cell = np.floor(self.uv).astype(int)
+        taken[cell[:, 1], cell[:, 0]] = 0
+        reach = 2 * int(np.ceil(rules.spacing)) - 1
+        free = free & cv2.erode(taken, np.ones((reach, reach), np.uint8))
+        if not free.any():
+            return
+        found = cv2.goodFeaturesToTrack(grey, room, QUALITY, max(rules.spacing, 1.0), mask=free, blockSize=3)
+        new = np.zeros((0, 2), np.float32) if found is None else found[:, 0]
+        self.id = np.concatenate([self.id, np.arange(self.next_id, self.next_id + len(new))])
+        self.next_id += len(new)
+        self.uv = np.concatenate([self.uv, new])
+        self.world = np.concatenate([self.world, np.full((len(new), *self.world.shape[1:]), np.nan)])
+        self.age = np.concatenate([self.age, np.zeros(len(new), np.int64)])
+
+    def _measured(self, rules: FeatureRules) -> SpacePoints:
+        """Returns the points of the features that have lived through the time window and have a disparity now."""
+        frames = self.world.shape[1]
+        known = np.isfinite(self.world[..., 0])
+        old = (self.age >= frames) & known[:, -1] & (known.sum(1) > frames / 2)
+        world, known = self.world[old], known[old]
+        pos = world[:, -1]
+        cov = point_covariances(self.camera, pos, np.square(rules.deviations))
+        vel, spread = slopes(world, known, np.arange(frames) / self.fps)
+        return SpacePoints(self.id[old], pos, cov, vel, cov / spread[:, None, None])
+
+
+def slopes(points: Array, known: Bools, times: Array) -> tuple[Array, Array]:
+    """Return the velocities (M, 3) of least squares of M points over K frames, and sum (t - mean t)^2 (M,), s^2.
+
+    points (M, K, 3): nan where not `known` (M, K); times (K,): s. The covariance of a slope is that of one point over
+    the sum. Each row needs two known points at least.
+    """
+    count = np.maximum(known.sum(1), 1)
+    t = np.where(known, times - (known @ times / count)[:, None], 0.0)
+    spread = np.square(t).sum(1)
+    slope = np.einsum("mk,mkd->md", t, np.where(known[..., None], points, 0.0)) / spread[:, None]
+    return slope, spread

@@ -1,0 +1,75 @@
+"""Births, confirmation and deletion of `stereo`'s groups (ours, except for the initial grouping).
+
+A new group is tentative, without an id, until it has been measured for `confirm_time`. A group that has not been
+measured for `coast_time`, a tentative one for `confirm_time`, is deleted.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Ints
+from tracking.detect.features import SpacePoints
+from tracking.papers.stereo.config import StereoConfig
+from tracking.papers.stereo.report import SpaceEvent
+from tracking.papers.stereo.space_group import NO_ID, Motion3D, SpaceGroup, newborn
+
+
+class SpaceIds:
+    """Gives group ids, counted from 1. State: next, the id that is given next."""
+
+    def __init__(self) -> None:
+        self.next = 1
+
+    def new(self) -> int:
+        """Return the next id, which was never returned before."""
+        self.next += 1
+        return self.next - 1
+
+
+def born(points: SpacePoints, group: Ints, former: Ints, motion: Motion3D, t: float) -> list[SpaceGroup]:
+    """Return the tentative groups that free points form (sec. 3.4).
+
+    group (M,): number of each point's group by eq. 12, -1 for none; former (M,): id of the confirmed group that had
+    the point in the last frame, NO_ID for none. t: s. A group most of whose points another group had
+    is its child (ours).
+    """
+    made = []
+    for k in range(int(group.max(initial=-1)) + 1):
+        mine = group == k
+        new = newborn(points.at(mine), motion, t)
+        ids, count = np.unique(former[mine], return_counts=True)
+        new.parent = int(ids[count.argmax()])
+        made.append(new)
+    return made
+
+
+def confirm(groups: list[SpaceGroup], config: StereoConfig, t: float, ids: SpaceIds) -> list[SpaceEvent]:
+    """Give ids to tentative groups that have been measured for `confirm_time`, and return the events.
+
+    An event is a split if the group is a child of a group that exists, else an enter; its onset is when the group was
+    first seen.
+    """
+    events, alive = [], {g.id for g in groups if g.confirmed}
+    for g in groups:
+        if g.confirmed or g.last_seen < t or g.measured_time < config.confirm_time - 1e-9:
+            continue
+        g.id = ids.new()
+        pos = (float(g.pos[0]), float(g.pos[1]))
+        if g.parent in alive:
+            events.append(SpaceEvent("split", g.first_seen, (g.parent,), tuple(sorted((g.parent, g.id))), pos))
+        else:
+            events.append(SpaceEvent("enter", g.first_seen, (), (g.id,), pos))
+    return events
+
+
+def remove_lost(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[SpaceEvent]:
+    """Delete groups without measurements for too long, in place, and return the leave events of confirmed ones."""
+    events, kept = [], []
+    for g in groups:
+        if t - g.last_seen <= (config.coast_time if g.confirmed else config.confirm_time) + 1e-9:
+            kept.append(g)
+        elif g.id != NO_ID:
+            events.append(SpaceEvent("leave", t, (g.id,), (), (float(g.pos[0]), float(g.pos[1]))))
+    groups[:] = kept
+    return events

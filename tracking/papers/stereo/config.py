@@ -1,0 +1,157 @@
+"""The parameters of `stereo`. Lengths are metres, except where a px of the sensor is meant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from tracking.config import param
+from tracking.detect.background_settings import BackgroundSettings
+
+
+@dataclass(frozen=True)
+class StereoConfig(BackgroundSettings):
+    """The parameters of the tracker `stereo`, with those of the background model; each field states default, range and
+    unit.
+
+    They are matching, person or not, features, association, filter, grouping, merging, splitting and reporting. Raises
+    InputError if a value is not allowed or foreground_time is shorter than background_time.
+    """
+
+    tracker: ClassVar[str] = "stereo"
+
+    nearest: float = param(
+        2.5, (0.5, 20.0), "m", "from pixels: depth of the nearest people; sets the largest disparity", "log",
+        sees="pixels",
+    )  # fmt: skip
+    block: float = param(
+        0.27, (0.1, 1.0), "m", "from pixels: width of the block that is compared in matching", "log", sees="pixels"
+    )
+    left_right: bool = param(
+        True, (True, False), "", "from pixels: left and right matches must agree within 1 px", "categorical",
+        sees="pixels",
+    )  # fmt: skip
+    least_height: float = param(
+        0.5, (0.0, 1.5), "m", "from pixels: a lower foreground region is no person (sec. 2)", sees="pixels"
+    )
+    most_height: float = param(
+        3.0, (1.0, 10.0), "m", "from pixels: a higher foreground region is no person (sec. 2)", sees="pixels"
+    )
+    least_width: float = param(
+        0.1, (0.0, 1.0), "m", "from pixels: a narrower foreground region is no person (sec. 2)", sees="pixels"
+    )
+    window_time: float = param(
+        0.33,
+        (0.05, 2.0),
+        "s",
+        "time window: features that lived shorter are not used; their velocity is the slope in it",
+    )
+    feature_spacing: float = param(
+        0.09, (0.03, 0.5), "m", "from pixels: least distance of two features in the image", "log", sees="pixels"
+    )
+    back_check: float = param(
+        0.7, (0.05, 5.0), "px",
+        "from pixels: a feature ends if it is farther from its place after following it forwards and backwards (ours)",
+        "log", sees="pixels",
+    )  # fmt: skip
+    most_features: int = param(
+        400, (20, 2000), "", "from pixels: largest number of features", "int", sees="pixels", tunable=False
+    )
+    disparity_noise: float = param(
+        0.15, (0.02, 2.0), "px", "from pixels: standard deviation of a feature's disparity", "log", sees="pixels"
+    )
+    pixel_noise: float = param(
+        0.3, (0.02, 3.0), "px", "from pixels: standard deviation of a feature's u and v", "log", sees="pixels"
+    )
+    surface_offset: float = param(
+        0.14, (0.0, 0.4), "m",
+        "from pixels: people's middle lies so far behind their visible surface; all points are moved by it (ours)",
+        sees="pixels",
+    )  # fmt: skip
+    point_noise: float = param(
+        0.06, (0.005, 1.0), "m", "from points: standard deviation of a measured coordinate", "log", sees="points"
+    )
+
+    gate: float = param(11.34, (5.0, 30.0), "", "gamma: squared Mahalanobis radius of the search region (eq. 8)")
+    position_weight: float = param(
+        1.0, (0.0, 3.0), "", "k_p of eq. 9 as an exponent: as a factor it has no effect (ours)"
+    )
+    velocity_weight: float = param(
+        1.0, (0.0, 3.0), "", "k_v of eq. 10 as an exponent: as a factor it has no effect (ours)"
+    )
+    count_weight: float = param(
+        1.0, (0.0, 2.0), "", "exponent of the number of a group's points in its association probability (ours)"
+    )
+    memory: float = param(
+        2.0, (0.0, 10.0), "", "log odds for the group that had the same feature in the last frame (ours)"
+    )
+    attach: bool = param(
+        True, (True, False), "",
+        "points in no region whose sphere overlaps that of a group's point, with a velocity in the region of the "
+        "group's velocities, are the group's (ours)",
+        "categorical",
+    )  # fmt: skip
+    point_covariance: bool = param(
+        True, (True, False), "",
+        "points have covariances of their own, which count in regions and probabilities and not in the spread (ours)",
+        "categorical",
+    )  # fmt: skip
+    person_spread: float = param(
+        0.3, (0.05, 1.0), "m", "standard deviation of positions that a group's spread is shrunk to (ours)", "log"
+    )
+    velocity_spread: float = param(
+        0.25, (0.02, 2.0), "m/s", "standard deviation of velocities that a group's spread is shrunk to (ours)", "log"
+    )
+    spread_weight: float = param(10.0, (0.1, 200.0), "points", "weight of both, in points (ours)", "log")
+    spread_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the spread, alpha_s of eq. 7", "log")
+    accel_noise: float = param(
+        0.5, (0.05, 5.0), "m/s^1.5", "process noise: white acceleration per root second (eq. 2)", "log"
+    )
+    centroid_noise: float = param(
+        0.1, (0.005, 1.0), "m",
+        "measurement noise of a group's mean beside that of its points, as points come and go (ours)", "log",
+    )  # fmt: skip
+    area_weights: bool = param(
+        True, (True, False), "", "from pixels: a feature counts in the mean by its squared depth (ours)", "categorical",
+        before=False, sees="pixels",
+    )  # fmt: skip
+    speed_prior: float = param(
+        1.3, (0.1, 10.0), "m/s", "standard deviation of people's velocities, for newborn groups (ours)", "log"
+    )
+
+    radius: float = param(
+        0.8, (0.1, 2.0), "m", "from pixels: radius of a feature's sphere; features 2 r apart are linked (eq. 12)",
+        sees="pixels",
+    )  # fmt: skip
+    point_radius: float = param(
+        0.75, (0.1, 2.0), "m", "from points: radius of a point's sphere; points 2 r apart are linked (eq. 12)",
+        sees="points",
+    )  # fmt: skip
+    least_group: int = param(
+        5, (1, 50), "", "from pixels: least number of linked features that form a group", "int", sees="pixels"
+    )
+    least_features: int = param(
+        3, (1, 20), "", "from pixels: least number of features that update a group (sec. 4)", "int", sees="pixels"
+    )
+    merge_gate: float = param(
+        9.0, (0.5, 30.0), "", "squared Mahalanobis radius of the six-dimensional regions of merging (eq. 13)"
+    )
+    merge_time: float = param(
+        0.5, (0.0, 3.0), "s", "time for which the regions must overlap before groups merge (ours)"
+    )
+    split: bool = param(True, (True, False), "", "groups whose points are unlinked parts split (ours)", "categorical")
+    split_time: float = param(
+        0.5, (0.0, 3.0), "s", "time for which a group's points must be unlinked parts before it splits (ours)"
+    )
+    split_speed: float = param(
+        0.5, (0.0, 3.0), "m/s", "standard deviation of a child's velocity about its parent's (ours)"
+    )
+    confirm_time: float = param(0.3, (0.0, 3.0), "s", "a new group is confirmed after so long with measurements (ours)")
+    coast_time: float = param(1.5, (0.0, 10.0), "s", "a group is deleted after so long without measurements (ours)")
+    report_coast: float = param(
+        0.5, (0.0, 5.0), "s", "time after the last measurement for which a group is reported (ours)"
+    )
+    most_foreground: float = param(
+        0.6, (0.05, 1.0), "share", "from pixels: a frame with a larger share of foreground is ignored (ours)",
+        sees="pixels",
+    )  # fmt: skip

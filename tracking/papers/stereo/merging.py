@@ -1,0 +1,110 @@
+"""Merging of `stereo`'s groups: regions of the full state that overlap (eqs 13 to 15, sec. 3.5).
+
+    x_i R x_j  if MR_i and MR_j overlap                                              (13)
+    X = sum of n_i X_i,   Sigma = sum of n_i {Sigma_i + (X_i - X)(X_i - X)'}         (14), (15)
+MR_i is the ellipsoid (x - X_i)' (Sigma_i + P_i)^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
+Two ellipsoids are tested exactly (tracking.filters.ellipsoid_overlap).
+
+Departures: P_i, the covariance of the state, is added to Sigma_i; regions must overlap for `merge_time`; only confirmed
+groups merge. The paper does not say what P of a merged group is: here it is that of a
+weighted mean, sum of n_i^2 P_i. The group with most points keeps its id.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from sim.types import Array
+from tracking.filters.ellipsoid_overlap import separation
+from tracking.papers.stereo.config import StereoConfig
+from tracking.papers.stereo.report import SpaceEvent
+from tracking.papers.stereo.space_group import SpaceGroup
+
+SETTLED = 1.0
+"""s: a group that was there for a shorter time before the onset enters with the other one; that is no merge (ours)."""
+
+
+class SpaceMerging:
+    """Merges groups whose regions overlap for long enough.
+
+    State: since, a dict by pair of ids, the smaller first: the time, s, since which their regions have overlapped.
+    """
+
+    def __init__(self) -> None:
+        self.since: dict[tuple[int, int], float] = {}
+
+    def step(self, groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[SpaceEvent]:
+        """Merge groups of the list, in place, at time t (s) and return the events: merge, or enter.
+
+        An event is an enter if at most one of the groups was there for 1 s before the onset.
+        """
+        able = sorted((g for g in groups if g.confirmed), key=lambda g: g.id)
+        near = {(a.id, b.id) for a, b in _close_pairs(able, config.merge_gate) if overlap(a, b, config.merge_gate)}
+        self.since = {pair: self.since.get(pair, t) for pair in near}
+        due = [pair for pair in sorted(near) if t - self.since[pair] >= config.merge_time - 1e-9]
+        events = []
+        for part in _connected(able, due):
+            onset = min(self.since[pair] for pair in due if pair[0] in {g.id for g in part})
+            events.append(_merge(groups, part, onset))
+        self.since = {pair: s for pair, s in self.since.items() if pair not in due}
+        return events
+
+
+def overlap(a: SpaceGroup, b: SpaceGroup, gate: float) -> bool:
+    """Return True if the regions MR of two groups have a common point (eq. 13); gate: squared Mahalanobis radius."""
+    d = (b.ekf.x - a.ekf.x)[:, 0]
+    return separation(d, a.spread + a.ekf.P, b.spread + b.ekf.P) <= gate
+
+
+def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[SpaceGroup, SpaceGroup]]:
+    """Returns the pairs of groups whose regions may overlap: f(1/2) <= gate in tracking.filters.ellipsoid_overlap."""
+    i, j = np.triu_indices(len(groups), 1)
+    if not len(i):
+        return []
+    x = np.stack([g.ekf.x for g in groups])
+    A = np.stack([g.spread + g.ekf.P for g in groups])
+    d = x[j] - x[i]
+    half = (d * np.linalg.solve(A[i] + A[j], d)).sum((1, 2)) / 2
+    return [(groups[i[k]], groups[j[k]]) for k in np.flatnonzero(half <= gate).tolist()]
+
+
+def pooled(states: Array, spreads: Array, counts: Array) -> tuple[Array, Array]:
+    """Return the state (D,) and Sigma (D, D) of a merged group (eqs 14, 15).
+
+    states (K, D), spreads (K, D, D), counts (K,): X_i, Sigma_i and N_i of the K groups.
+    """
+    n = counts / counts.sum()
+    X = n @ states
+    away = states - X
+    return X, np.einsum("k,kij->ij", n, spreads + away[:, :, None] * away[:, None])
+
+
+def _connected(able: Sequence[SpaceGroup], due: list[tuple[int, int]]) -> list[list[SpaceGroup]]:
+    """Returns the sets of two or more groups that are connected by the pairs of ids `due`."""
+    row = {g.id: k for k, g in enumerate(able)}
+    i, j = np.array([[row[a], row[b]] for a, b in due], np.int64).reshape(-1, 2).T
+    label = connected_components(coo_array((np.ones(len(i)), (i, j)), (len(able), len(able))), directed=False)[1]
+    return [[able[k] for k in np.flatnonzero(label == c).tolist()] for c in np.unique(label[i]).tolist()]
+
+
+def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], onset: float) -> SpaceEvent:
+    """Replaces the parts by their union in the list, and returns the event. The group with most points survives."""
+    kept = max(parts, key=lambda g: (g.count, -g.id))
+    counts = np.array([g.count for g in parts])
+    n, old = counts / counts.sum(), [g.pos for g in parts]
+    X, kept.spread = pooled(np.stack([g.ekf.x[:, 0] for g in parts]), np.stack([g.spread for g in parts]), counts)
+    kept.ekf.x, kept.ekf.P = X[:, None], np.einsum("k,kij->ij", n**2, np.stack([g.ekf.P for g in parts]))
+    kept.members = np.concatenate([g.members + p for g, p in zip(parts, old, strict=True)]) - kept.pos
+    kept.count, settled = float(counts.sum()), [g for g in parts if g.first_seen <= onset - SETTLED]
+    kept.first_seen, kept.last_seen = min(g.first_seen for g in parts), max(g.last_seen for g in parts)
+    kept.measured_time, kept.apart_since = max(g.measured_time for g in parts), float("nan")
+    before = tuple(sorted(g.id for g in parts))
+    groups[:] = [g for g in groups if g is kept or g not in parts]
+    x, y = kept.pos[:2].tolist()
+    if len(settled) < 2:
+        return SpaceEvent("enter", onset, (), (kept.id,), (x, y))
+    return SpaceEvent("merge", onset, before, (kept.id,), (x, y))

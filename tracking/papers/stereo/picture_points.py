@@ -1,0 +1,87 @@
+"""Points of `stereo` from pairs of pictures: foreground, subtraction stereo, people, features (secs. 2, 3.1)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import Array, Camera, Context, Image
+from tracking.detect.blobs import odd
+from tracking.detect.features import FeatureRules, Features, SpacePoints
+from tracking.detect.foreground import Foreground
+from tracking.detect.stereo_people import PersonLimits, person_mask
+from tracking.detect.subtraction_stereo import SubtractionStereo
+from tracking.papers.stereo.config import StereoConfig
+
+
+class PicturePoints:
+    """From a pair of pictures to points in space on people.
+
+    State: config; camera; foreground, the pipeline of the left picture; stereo, the matcher; features. Raises
+    InputError if there is no camera with a baseline, or the background sample cannot be used; AssertionError without a
+    sample.
+    """
+
+    def __init__(self, config: StereoConfig, context: Context) -> None:
+        self.camera = stereo_camera(context.camera)
+        self.foreground = Foreground(context, config, config.most_foreground)
+        self.features = Features(self.camera, context.fps)
+        self.follow(config)
+
+    def follow(self, config: StereoConfig) -> None:
+        """Replace the config: the matcher is made anew; features and what the background model learned stay."""
+        self.config = config
+        self.foreground.follow(config, config.most_foreground)
+        largest = self.camera.focal_px[0] * self.camera.baseline / config.nearest
+        block = odd(config.block * self.foreground.scale, 5)
+        self.stereo = SubtractionStereo(largest, block, config.left_right)
+
+    def points(self, image: Image, right: Image) -> SpacePoints | None:
+        """Return the features of people as points in space; None if more is foreground than `most_foreground`.
+
+        image, right (H, W, 3) BGR uint8. The background model learns from the left picture except where people are.
+        Points are moved by `surface_offset` away from the camera, horizontally. Raises InputError if the left picture's
+        size or dtype is not the background sample's, or the right one's size is another.
+        """
+        if right.shape != image.shape:
+            expected = f"the left picture's shape {image.shape}"
+            raise InputError(place="right picture", got=str(right.shape), expected=expected, remedy="give a pair")
+        seen = self.foreground.segment(image)
+        if not seen.plausible:
+            self.features.forget()
+            return None
+        c, left = self.config, grey(image)
+        blobs = self.foreground.person_blobs(seen.mask)
+        disparity = self.stereo.match(left, grey(right), blobs.label > 0).disparity
+        deviations = (c.pixel_noise, c.pixel_noise, c.disparity_noise)
+        limits = PersonLimits(c.least_height, c.most_height, c.least_width, deviations)
+        people = person_mask(blobs, disparity, self.camera, limits)
+        self.foreground.adapt(seen, people)
+        spacing = c.feature_spacing * self.foreground.scale
+        rules = FeatureRules(c.window_time, spacing, c.back_check, deviations, c.most_features)
+        found = self.features.step(left, people, disparity, rules)
+        return SpacePoints(found.id, self._moved(found.pos), found.cov, found.vel, found.vel_cov)
+
+    def _moved(self, pos: Array) -> Array:
+        """Returns the points (M, 3) moved away from the camera, horizontally, by `surface_offset`, m."""
+        away = pos[:, :2] - self.camera.position[:2]
+        shift = self.config.surface_offset * away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
+        return np.column_stack([pos[:, :2] + shift, pos[:, 2]])
+
+
+def stereo_camera(camera: Camera | None) -> Camera:
+    """Return the camera of a rectified pair unchanged. Raises InputError if it is None, has no baseline or distorts."""
+    if camera is not None and camera.kind == "pinhole" and camera.baseline > 0 and not camera.radial:
+        return camera
+    got = "no camera" if camera is None else f"{camera.kind}, baseline {camera.baseline:g}, radial {camera.radial:g}"
+    remedy = "give --camera FILE of a rectified pair, with its baseline"
+    expected = "a pinhole camera with a baseline, without lens distortion"
+    raise InputError(place="context.camera", got=got, expected=expected, remedy=remedy)
+
+
+def grey(image: Image) -> Any:
+    """Return the grey values (H, W) uint8 of a picture (H, W, 3) BGR."""
+    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)

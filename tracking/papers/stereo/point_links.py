@@ -1,0 +1,77 @@
+"""Points of `stereo` from detections: each detection is one point in space, linked from frame to frame (ours).
+
+The links stand in for KLT: they give points ids and velocities. A detection continues the point whose predicted place
+is near; pairs have the least total distance. A point on the ground has z = 0; a point in the image is u, v over the
+scale, m. The covariance of a point is point_noise^2 in each coordinate.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.arrays import no_ids
+from sim.types import Array
+from tracking.detect.features import SpacePoints, slopes
+from tracking.filters.assignment import optimal
+from tracking.papers.stereo.config import StereoConfig
+
+FASTEST = 2.0
+"""m/s: a point moves no faster than this relative to its prediction."""
+
+
+class PointLinks:
+    """Detections as points with ids and velocities.
+
+    State of the N points of the last frame: id (N,), from 1; world (N, K, 3): their places in the last K frames, m, nan
+    before they were first seen.
+    """
+
+    def __init__(self, fps: float) -> None:
+        self.fps = fps
+        self.id, self.next_id, self.world = no_ids(), 1, np.zeros((0, 2, 3))
+
+    def step(self, xyz: Array, config: StereoConfig) -> SpacePoints:
+        """Return the detections xyz (M, 3), m, of the next frame as points in space, in the same order.
+
+        The velocity is the slope over the time window. Without an earlier place it is 0, with a standard deviation of
+        speed_prior.
+        """
+        frames, M = max(round(config.window_time * self.fps), 1) + 1, len(xyz)
+        past = self._past(frames)
+        cost = np.linalg.norm(self._predicted(past)[:, None] - xyz, axis=2)
+        cost[cost > FASTEST / self.fps + 3 * config.point_noise] = np.inf
+        rows, columns = optimal(cost, 1e6)
+        world, id = np.full((M, frames, 3), np.nan), np.full(M, -1)
+        world[columns, :-1], id[columns] = past[rows, 1:], self.id[rows]
+        world[:, -1] = xyz
+        new = np.flatnonzero(id < 0)
+        id[new] = np.arange(self.next_id, self.next_id + len(new))
+        self.next_id += len(new)
+        self.id, self.world = id, world
+        return self._points(config)
+
+    def _past(self, frames: int) -> Array:
+        """Returns the places (N, frames, 3) of the last frames; frames that are not kept are nan."""
+        kept = self.world[:, -frames:]
+        return np.concatenate([np.full((len(kept), frames - kept.shape[1], 3), np.nan), kept], 1)
+
+    def _predicted(self, past: Array) -> Array:
+        known = np.isfinite(past[..., 0])
+        moving = known.sum(1) > 1
+        place = past[:, -1].copy()
+        if moving.any():
+            times = np.arange(past.shape[1]) / self.fps
+            place[moving] += slopes(past[moving], known[moving], times)[0] / self.fps
+        return place
+
+    def _points(self, config: StereoConfig) -> SpacePoints:
+        M, unit = len(self.id), np.eye(3)
+        known = np.isfinite(self.world[..., 0])
+        moving = known.sum(1) > 1
+        vel, vel_cov = np.zeros((M, 3)), np.repeat(config.speed_prior**2 * unit[None], M, 0)
+        if moving.any():
+            times = np.arange(self.world.shape[1]) / self.fps
+            vel[moving], spread = slopes(self.world[moving], known[moving], times)
+            vel_cov[moving] = config.point_noise**2 / spread[:, None, None] * unit
+        cov = np.repeat(config.point_noise**2 * unit[None], M, 0)
+        return SpacePoints(self.id, self.world[:, -1].copy(), cov, vel, vel_cov)

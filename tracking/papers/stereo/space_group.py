@@ -1,0 +1,173 @@
+"""A group of `stereo`: its extended Kalman filter, its spread, and the clocks of its life.
+
+    X_k+1 = Phi X_k + noise                                  constant velocity (eqs 2, 3)
+    Z = f(X_k) + noise                                       (u, v, d) of the mean of the group's points (eqs 4 to 6)
+    Sigma <- alpha_s Sigma + (1 - alpha_s) C_y               covariance of its points' positions and velocities (eq. 7)
+
+The filter is filterpy's. The paper's Phi has a step of 1 frame; here times are seconds. Departures: C_y is without the
+points' own covariances and is shrunk to a prior, as few points have no covariance in six dimensions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sim.types import Array
+from tracking.detect.features import SpacePoints
+from tracking.papers.stereo.config import StereoConfig
+from tracking.papers.stereo.measurement import POS, VEL, Measurement, measured_state, state_jacobian
+
+if TYPE_CHECKING:
+    from filterpy.kalman import ExtendedKalmanFilter
+
+NO_ID = -1
+"""Id of a tentative group."""
+LEAST_VARIANCE = 1e-6
+"""m^2, m^2/s^2: least eigenvalue of a spread."""
+
+
+@dataclass
+class SpaceGroup:
+    """A group.
+
+    ekf: filter with the state x (6, 1), order x, x', y, y', z, z', and its covariance P. spread (6, 6): Sigma, in the
+    same order. count: N, number of its points in its last measured frame. id: NO_ID while tentative. first_seen,
+    last_seen: s; measured_time: s. parent: id of the group that had its points, or NO_ID. members (K, 3): its points
+    relative to its position, m, when it was measured last. apart_since: s since when its points have been unlinked
+    parts, nan if they are not.
+    """
+
+    ekf: ExtendedKalmanFilter
+    spread: Array
+    count: float
+    id: int
+    first_seen: float
+    last_seen: float
+    measured_time: float
+    parent: int = NO_ID
+    members: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    apart_since: float = float("nan")
+
+    @property
+    def pos(self) -> Array:
+        """Position (3,), m."""
+        return np.asarray(self.ekf.x[POS, 0])
+
+    @property
+    def vel(self) -> Array:
+        """Velocity (3,), m/s."""
+        return np.asarray(self.ekf.x[VEL, 0])
+
+    @property
+    def confirmed(self) -> bool:
+        """True if the group has an id."""
+        return self.id != NO_ID
+
+
+@dataclass(frozen=True, eq=False)
+class Motion3D:
+    """The model of motion for a step of dt s: Phi (6, 6) (eq. 3) and the process noise Q (6, 6) of a white acceleration
+    of `config`."""
+
+    config: StereoConfig
+    dt: float
+    Phi: Array
+    Q: Array
+
+
+def motion_model(config: StereoConfig, dt: float) -> Motion3D:
+    """Return the model of motion for a step of dt s, with filterpy's Q_continuous_white_noise."""
+    from filterpy.common import Q_continuous_white_noise
+
+    Phi = np.kron(np.eye(3), np.array([[1.0, dt], [0.0, 1.0]]))
+    return Motion3D(config, dt, Phi, Q_continuous_white_noise(2, dt, config.accel_noise**2, block_size=3))
+
+
+def predict(group: SpaceGroup, motion: Motion3D) -> None:
+    """Predict a group to the next frame, in place: X = Phi X, P = Phi P Phi' + Q (eq. 2)."""
+    group.ekf.F, group.ekf.Q = motion.Phi, motion.Q
+    group.ekf.predict()
+
+
+def newborn(points: SpacePoints, motion: Motion3D, t: float) -> SpaceGroup:
+    """Return a tentative group of M points, M at least 1, with their mean position, velocity and covariance (sec. 3.4).
+
+    t: time of the frame, s. The mean velocity is combined with a prior of mean 0 and standard deviation speed_prior
+    (ours), as the depth velocity of features is hardly known.
+    """
+    from filterpy.kalman import ExtendedKalmanFilter
+
+    config, n = motion.config, len(points)
+    ekf = ExtendedKalmanFilter(dim_x=6, dim_z=3)
+    ekf.P = np.zeros((6, 6))
+    noise = points.vel_cov.mean(0) / n + config.velocity_spread**2 / n * np.eye(3)
+    prior = config.speed_prior**2 * np.eye(3)
+    gain = prior @ np.linalg.inv(prior + noise)
+    ekf.x[POS, 0], ekf.x[VEL, 0] = points.pos.mean(0), gain @ points.vel.mean(0)
+    ekf.P[np.ix_(POS, POS)] = mean_covariance(points, config)
+    P_vel = prior - gain @ prior
+    ekf.P[np.ix_(VEL, VEL)] = (P_vel + P_vel.T) / 2
+    group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt)
+    group.members = points.pos - group.pos
+    return group
+
+
+def mean_position(points: SpacePoints, measurement: Measurement, config: StereoConfig) -> Array:
+    """Return the mean position (3,), m, of M points.
+
+    With `area_weights` each counts by the area on people that it stands for (ours): a person who is near shows more
+    features than one far away, by the squared depth.
+    """
+    weights = measurement.areas(points.pos) if config.area_weights else None
+    return np.asarray(np.average(points.pos, axis=0, weights=weights))
+
+
+def mean_covariance(points: SpacePoints, config: StereoConfig) -> Array:
+    """Return the covariance (3, 3), m^2, of the mean of M points as a measurement of their group's position.
+
+    It is that of the mean of the points' errors, and centroid_noise^2 in each coordinate.
+    """
+    return np.asarray(points.cov.mean(0) / len(points) + config.centroid_noise**2 * np.eye(3))
+
+
+def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
+    """Return C_y (6, 6): covariance of the positions and velocities of M points, order x, x', y, y', z, z' (eq. 7).
+
+    Ours: with `point_covariance` the mean of the points' own covariances is subtracted; negative eigenvalues become 0.
+    The result is shrunk to a diagonal prior worth `spread_weight` points.
+    """
+    n = len(points)
+    both = np.zeros((n, 6))
+    both[:, POS], both[:, VEL] = points.pos, points.vel
+    C = np.cov(both.T, bias=True) if n > 1 else np.zeros((6, 6))
+    if config.point_covariance:
+        C[np.ix_(POS, POS)] -= points.cov.mean(0)
+        C[np.ix_(VEL, VEL)] -= points.vel_cov.mean(0)
+        values, U = np.linalg.eigh(C)
+        C = (U * np.maximum(values, 0.0)) @ U.T
+    w = config.spread_weight
+    prior = np.square(np.tile([config.person_spread, config.velocity_spread], 3))
+    return np.asarray((n * C + w * np.diag(prior)) / (n + w)) + LEAST_VARIANCE * np.eye(6)
+
+
+def measure(group: SpaceGroup, points: SpacePoints, measurement: Measurement, motion: Motion3D, t: float) -> None:
+    """Update a group, in place, by its M points of the frame at t s: state (eqs 4 to 6), Sigma (eq. 7) and N.
+
+    Z is the measurement of the mean position; its covariance is that of the mean, by the Jacobian at
+    the mean.
+    """
+    config, mean = motion.config, mean_position(points, measurement, motion.config)
+    J = measurement.jacobian(mean)
+    R = J @ mean_covariance(points, config) @ J.T
+    group.ekf.update(
+        measurement.z(mean), state_jacobian, measured_state, R, args=(measurement,), hx_args=(measurement,)
+    )
+    group.ekf.P = (group.ekf.P + group.ekf.P.T) / 2
+    keep = np.exp(-motion.dt / config.spread_time)
+    group.spread = keep * group.spread + (1 - keep) * spread_of(points, config)
+    group.count, group.last_seen = float(len(points)), t
+    group.measured_time += motion.dt
+    group.members = points.pos - group.pos

@@ -1,0 +1,45 @@
+"""Splitting of `stereo`'s groups (ours: the paper has no split).
+
+A group splits if its points are two or more groups by eq. 12 for `split_time`. The part with most points (then the one
+nearest to the group's position) keeps the id; the others are its children: newborn from their points, with the parent's
+velocity.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Ints
+from tracking.detect.features import SpacePoints
+from tracking.papers.stereo.measurement import VEL
+from tracking.papers.stereo.space_group import NO_ID, Motion3D, SpaceGroup, newborn
+
+
+def split(group: SpaceGroup, points: SpacePoints, part: Ints, motion: Motion3D, t: float) -> list[SpaceGroup]:
+    """Return the children of a group whose M points have been in parts for `split_time`, [] if it does not split.
+
+    part (M,): number of the part of each point, from 0, -1 for none. t: time of the frame, s. The
+    clock `apart_since` of the group is kept here. When it splits, the group itself becomes its part with most points,
+    in place. Children have no id yet; they were first seen when the parts separated.
+    """
+    count = int(part.max(initial=-1)) + 1
+    if count < 2:
+        group.apart_since = float("nan")
+        return []
+    if np.isnan(group.apart_since):
+        group.apart_since = t
+    if t - group.apart_since < motion.config.split_time - 1e-9:
+        return []
+    away = [float(np.linalg.norm(points.pos[part == k].mean(0) - group.pos)) for k in range(count)]
+    largest = int(np.lexsort((np.array(away), -np.bincount(part[part >= 0])))[0])
+    born = [newborn(points.at(part == k), motion, t) for k in range(count)]
+    for child in born:
+        child.ekf.x[VEL] = group.ekf.x[VEL]
+        child.ekf.P[np.ix_(VEL, VEL)] = group.ekf.P[np.ix_(VEL, VEL)] + motion.config.split_speed**2 * np.eye(3)
+        child.first_seen, child.measured_time = group.apart_since, group.measured_time
+    own = born.pop(largest)
+    group.ekf, group.spread, group.count, group.members = own.ekf, own.spread, own.count, own.members
+    group.apart_since = float("nan")
+    for child in born:
+        child.parent = group.id if group.id != NO_ID else child.parent
+    return born

@@ -1,0 +1,162 @@
+"""Groups of people tracked in space by a stereo camera: the tracker `stereo`.
+
+Y. Hoshikawa, Y. Hashimoto, A. Moro, K. Terabayashi, K. Umeda: "Tracking of Human Groups Using Subtraction Stereo", SICE
+Journal of Control, Measurement, and System Integration 4 (3), 2011, sections 2 and 3. Lengths are m, times s.
+
+State of a group: an extended Kalman filter of position and velocity, X = (x, x', y, y', z, z'); Sigma, the covariance
+of its points' positions and velocities; N, the number of its points.
+
+    X_k+1 = Phi X_k + noise                                eqs 2, 3            space_group
+    Z = (u, v, d) = f(X) + noise                           eqs 4 to 6          measurement, sim.scene.stereo
+    Sigma <- alpha Sigma + (1 - alpha) C_y                 eq. 7               space_group
+    (y - xi)' S^-1 (y - xi) < gamma                        eq. 8               association
+    m_total = p(y)^k_p p(lambda)^k_v, the largest wins     eqs 9 to 11         association
+    new groups: points whose spheres overlap               eq. 12              initial_grouping
+    merging by the full state, weighted by N               eqs 13 to 15        merging
+
+The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in tracking.detect. Departures, all ours:
+docs/reference/trackers/stereo.md lists them with their parameters.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from sim.geometry.footprints import FOOTPRINT
+from sim.types import Context, Detections, Frame, Ints, Plane, Tracks
+from tracking.detect.features import SpacePoints
+from tracking.image_scale import required
+from tracking.papers.stereo.association import associated
+from tracking.papers.stereo.births_and_losses import SpaceIds, born, confirm, remove_lost
+from tracking.papers.stereo.config import StereoConfig
+from tracking.papers.stereo.initial_grouping import sphere_groups
+from tracking.papers.stereo.measurement import POS, Measurement, PairMeasurement, PlaceMeasurement
+from tracking.papers.stereo.merging import SpaceMerging
+from tracking.papers.stereo.picture_points import PicturePoints
+from tracking.papers.stereo.point_links import PointLinks
+from tracking.papers.stereo.report import ShownFrame, expected_places, space_tracks
+from tracking.papers.stereo.space_group import NO_ID, SpaceGroup, measure, motion_model, predict
+from tracking.papers.stereo.splitting import split
+
+FEATURE_OUTLINE = 0.5
+"""Share of a person's footprint that a feature covers, as features lie all over the body."""
+
+
+class Stereo:
+    """The tracker `stereo`: groups of people in space, from pairs of pictures or from points.
+
+    State: config, which may be replaced between two frames; groups, a list; ids; merging, the times since which pairs
+    overlap; pictures: from pictures to points, None from points; links: from detections to points; motion: the model of
+    a step; had: ids of the points of the last frame and of the confirmed groups that had them; plane; context. All but
+    config exist after `reset` only.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("stereo", "points")
+    config_class: ClassVar[type[StereoConfig]] = StereoConfig
+
+    def __init__(self, config: StereoConfig | None = None) -> None:
+        self.config = config or StereoConfig()
+
+    def reset(self, context: Context, seed: int) -> None:
+        """Forget everything and start a sequence. With a background sample in the context pairs of pictures are
+        tracked, else points.
+
+        `seed` has no effect: nothing is random. From pictures, raises InputError if the context has no pinhole camera
+        with a baseline and without lens distortion, or if the sample cannot be used.
+        """
+        del seed
+        self.context = context
+        self.groups: list[SpaceGroup] = []
+        self.ids, self.merging = SpaceIds(), SpaceMerging()
+        self.pictures = None if context.background is None else PicturePoints(self.config, context)
+        self.links, self.motion = PointLinks(context.fps), motion_model(self.config, 1 / context.fps)
+        self.measurement: Measurement = (
+            PlaceMeasurement() if self.pictures is None else PairMeasurement(self.pictures.camera)
+        )
+        self.had: tuple[Ints, Ints] = (np.zeros(0, np.int64), np.zeros(0, np.int64))
+        flat = context.camera is None and context.px_per_m > 0
+        self.plane: Plane = "space" if self.pictures is not None else "image" if flat else "ground"
+        self.scale = 1.0
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        """Return the groups and events of the frame, as Tracks with unit "group"; updates all groups.
+
+        From pictures `frame.image` and `frame.right` are used and the plane is "space"; from points `detections.pos`,
+        whose plane is kept. A frame without them, and from pictures one with too much foreground, is predicted only. A
+        config that has replaced `config` since the last frame holds from this frame on; the groups stay.
+
+        Raises InputError if points are in the image and the context has no scale above 0, or if a picture's size or
+        dtype is wrong.
+        """
+        if self.pictures is not None and self.pictures.config is not self.config:
+            self.pictures.follow(self.config)
+        if self.motion.config is not self.config:
+            self.motion = motion_model(self.config, 1 / self.context.fps)
+        points, t = self._points(frame, detections), frame.t
+        for group in self.groups:
+            predict(group, self.motion)
+        if points is not None:
+            self._measure(points, t)
+        events = self.merging.step(self.groups, self.config, t)
+        events += confirm(self.groups, self.config, t, self.ids)
+        events += remove_lost(self.groups, self.config, t)
+        outline = FOOTPRINT * (FEATURE_OUTLINE if self.pictures is not None else 1.0)
+        shown = ShownFrame(frame.index, t, self.context.fps, self.plane, self.scale, outline, self.pictures is None)
+        return space_tracks(self.groups, events, self.config.report_coast, shown)
+
+    def _points(self, frame: Frame, detections: Detections | None) -> SpacePoints | None:
+        """Returns the points of the frame in m; None without information. Sets the plane, from points."""
+        if self.pictures is not None:
+            if frame.image is None or frame.right is None:
+                self.pictures.features.forget()
+                return None
+            return self.pictures.points(frame.image, frame.right)
+        if detections is None:
+            return None
+        self.plane = detections.plane
+        self.scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
+        xyz = np.zeros((len(detections.pos), 3))
+        xyz[:, : detections.pos.shape[1]] = detections.pos / self.scale
+        return self.links.step(xyz, self.config)
+
+    def _measure(self, points: SpacePoints, t: float) -> None:
+        """Associate the points (sec. 3.3), update and split the groups, and add new ones (sec. 3.4)."""
+        c, motion = self.config, self.motion
+        radius, least, update = (
+            (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.least_group, c.least_features)
+        )
+        former = self._former(points.id)
+        row = {g.id: k for k, g in enumerate(self.groups) if g.confirmed}
+        had = np.array([row.get(id, -1) for id in former.tolist()], np.int64)
+        owner = associated(self.groups, points, had, c, radius)
+        children: list[SpaceGroup] = []
+        for k, group in enumerate(self.groups):
+            mine = points.at(owner == k)
+            if len(mine) < update:
+                continue
+            measure(group, mine, self.measurement, motion, t)
+            if c.point_covariance:
+                flat = group.spread[np.ix_(POS, POS)]
+                group.members = expected_places(group.members, mine.cov, flat)
+            if c.split:
+                children += split(group, mine, sphere_groups(mine.pos, radius, least), motion, t)
+        self._remember(points, owner)
+        free = owner < 0
+        loose = points.at(free)
+        children += born(loose, sphere_groups(loose.pos, radius, least), former[free], motion, t)
+        self.groups += children
+
+    def _former(self, id: Ints) -> Ints:
+        """Returns for each point the id of the confirmed group that had it in the last frame, (M,), or NO_ID."""
+        known, group = self.had
+        if not len(known):
+            return np.full(len(id), NO_ID)
+        place = np.minimum(np.searchsorted(known, id), len(known) - 1)
+        return np.where(known[place] == id, group[place], NO_ID)
+
+    def _remember(self, points: SpacePoints, owner: Ints) -> None:
+        ids = np.array([*(g.id for g in self.groups), NO_ID], np.int64)
+        order = np.argsort(points.id)
+        self.had = points.id[order], ids[owner][order]
