@@ -3,7 +3,8 @@
     python -m benchmarks.belief recordings [--data FOLDER]
     python -m benchmarks.belief suites [--scenes standard friends-meet …] [--seeds 20000:20003] [--rough]
     python -m benchmarks.belief rates [--scenes street crowd party mixed] [--seeds 20000:20003]
-    python -m benchmarks.belief calibration [--scenes streets] [--seeds 20000:20001]
+    python -m benchmarks.belief calibration [--scenes streets] [--seeds 20000:20001] [--out CHART.svg]
+    python -m benchmarks.belief decisions [--scenes standard friends-meet …] [--seeds 10000:10001]
     python -m benchmarks.belief ablation --train standard streets … [--seeds 30000:30002] [--check 20000:20001]
     python -m benchmarks.belief cost [--people 100]
 
@@ -14,7 +15,9 @@ velocities.
 suites: pairwise F1, group F1, event F1, merges that are wrong or missed, and seconds until a merge is reported; means
 over sequences with 95 % intervals, and the paired difference. --rough: positions err by 0.1 m, 5 % are missed.
 rates: pairwise F1 from the same motion at 2.5, 10 and 25 frames/s.
-calibration: probability and share of mates by bin, expected calibration error, all scenes weighing the same.
+calibration: probability and share of mates by bin, expected calibration error, all scenes weighing the same; --out:
+the same as a reliability plot.
+decisions: the scores of suites with numbers of the belief's file changed.
 ablation: the fit without each quantity: log loss and F1 on --check seeds, and F1 on the recordings.
 cost: CPU time per frame of a walking crowd, of the belief and of the rule.
 --grouping FILE.toml: another belief.
@@ -25,6 +28,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,20 +37,22 @@ from scipy.sparse.csgraph import connected_components
 
 from benchmarks.belonging.transfer import f1
 from benchmarks.grouping import linked_pairs, pairs_in_frames
+from benchmarks.support.chart import Panel, lines
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser, seed_range
 from benchmarks.support.tables import head, interval, number, row, signed, table
 from scenarios.loading.resolve import resolve
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Truth
-from tracking.fitting.belief import USED, fit_belief, log_odds_of, sample_of
+from tracking.fitting.belief import USED, fit_belief, sample_of
 from tracking.fitting.belief_scores import BINS, belief_scores, reliability
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouped_tracks import derive
-from tracking.grouping.grouping_choice import grouping_of
+from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
+from tracking.grouping.pair_evidence import QUANTITIES, TIMES
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals, mean_interval
 
@@ -119,24 +125,54 @@ def _truth(path: Path) -> Truth:
     return truth
 
 
+COLUMNS = ["pairwise F1", "group F1", "event F1", "merge reported after, s", "merges right, wrong, missed"]
+
+
+def scores_of(name: str, seeds: range, groupings: Mapping[str, Grouping], erring: bool) -> dict[str, tuple[Array, str]]:
+    """Returns for each grouping the scores `KEYS` of each sequence of a suite, (S, 4), and its merges as text."""
+    found: dict[str, list[list[float]]] = {key: [] for key in groupings}
+    merges = {key: np.zeros(3) for key in groupings}
+    for entry in resolve(name):
+        for seed in seeds:
+            truth = simulated(entry, seed)
+            people = people_as_tracks(rough(truth, seed) if erring else truth)
+            for key, grouping in groupings.items():
+                scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m, grouping))
+                found[key].append([scores[k] for k in KEYS])
+                merges[key] += np.nan_to_num([scores[f"merge_{k}"] for k in ("TP", "FP", "FN")])
+    return {key: (np.array(rows), ", ".join(f"{n:.0f}" for n in merges[key])) for key, rows in found.items()}
+
+
 def suites(names: Sequence[str], seeds: range, belief: Belief, erring: bool) -> None:
-    columns = ["pairwise F1", "group F1", "event F1", "merge reported after, s", "merges right, wrong, missed"]
     for name in names:
-        found: dict[str, list[list[float]]] = {"rule": [], "belief": []}
-        merges = {key: np.zeros(3) for key in found}
-        for entry in resolve(name):
-            for seed in seeds:
-                truth = simulated(entry, seed)
-                people = people_as_tracks(rough(truth, seed) if erring else truth)
-                for key, grouping in (("rule", LinkRule()), ("belief", belief)):
-                    scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m, grouping))
-                    found[key].append([scores[k] for k in KEYS])
-                    merges[key] += np.nan_to_num([scores[f"merge_{k}"] for k in ("TP", "FP", "FN")])
-        values = {key: np.array(rows) for key, rows in found.items()}
-        cells = {key: [*_cells(interval, x), ", ".join(f"{n:.0f}" for n in merges[key])] for key, x in values.items()}
-        cells["belief minus rule"] = [*_cells(signed, values["belief"] - values["rule"]), ""]
-        title = f"{Path(name).stem}, seeds {seeds.start}:{seeds.stop}, {len(values['rule'])} sequences"
-        table(title, "", columns, cells)
+        found = scores_of(name, seeds, {"rule": LinkRule(), "belief": belief}, erring)
+        cells = {key: [*_cells(interval, values), text] for key, (values, text) in found.items()}
+        cells["belief minus rule"] = [*_cells(signed, found["belief"][0] - found["rule"][0]), ""]
+        title = f"{Path(name).stem}, seeds {seeds.start}:{seeds.stop}, {len(found['rule'][0])} sequences"
+        table(title, "", COLUMNS, cells)
+
+
+CHANGES: Mapping[str, Mapping[str, float]] = {
+    "belief": {}, "stay = 0": {"stay": 0.0}, "come = 0": {"come": 0.0}, "stay = come = 0": {"stay": 0.0, "come": 0.0},
+    "evidence_time = 0.25 s": {"evidence_time": 0.25}, "evidence_time = 1 s": {"evidence_time": 1.0},
+    "join, part × 4": {"join": 0.04, "part": 0.2}, "join, part × 20": {"join": 0.2, "part": 1.0},
+    "arrival = 0": {"arrival": 0.0},
+}  # fmt: skip
+
+
+def decisions(names: Sequence[str], seeds: range, belief: Belief) -> None:
+    groupings = {key: replace(belief, **changes) for key, changes in CHANGES.items()}
+    for name in names:
+        found = scores_of(name, seeds, groupings, False)
+        base = found["belief"][0]
+        cells = {
+            key: [*_cells(interval if key == "belief" else signed, values if key == "belief" else values - base), text]
+            for key, (values, text) in found.items()
+        }
+        title = (
+            f"{Path(name).stem}, seeds {seeds.start}:{seeds.stop}, {len(base)} sequences; differences from the belief"
+        )
+        table(title, "", COLUMNS, cells)
 
 
 def _cells(write: object, values: Array) -> list[str]:
@@ -170,22 +206,29 @@ def _f1_every(truth: Truth, every: int, belief: Belief) -> tuple[float, float]:
     return 2.0 * float((same & found).sum()) * every, float(same.sum() + found.sum()) * every
 
 
-def calibration(names: Sequence[str], seeds: range, belief: Belief) -> None:
+def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | None) -> None:
+    panels = []
     for name in names:
         sample = sample_of(list(pair_scenes([name], seeds)))
-        log_odds = log_odds_of(belief, sample)
-        scores = belief_scores(sample, log_odds)
+        log_odds = belief.log_odds(sample.values)
+        scores, bins = belief_scores(sample, log_odds), reliability(log_odds, sample.together, sample.weight)
         print(f"\n{Path(name).stem}: " + ", ".join(f"{key} {value:.4g}" for key, value in scores.items()) + "\n")
         head(["probability", "share of rows", "mean probability", "share of mates"])
-        for k, (share, mean, mates) in enumerate(reliability(log_odds, sample.together, sample.weight)):
+        for k, (share, mean, mates) in enumerate(bins):
             row([f"{k / BINS:.2f}–{(k + 1) / BINS:.2f}", number(share, 4), number(mean), number(mates)])
+        known = bins[bins[:, 0] > 0]
+        curves = {"belief": known[:, 2], "as it should be": known[:, 1]}
+        title = f"{Path(name).stem}: calibration error {scores['calibration error']:.3f}"
+        panels.append(Panel(title, known[:, 1].tolist(), curves, "probability", "share of mates", (0.0, 1.0)))
+    if out is not None:
+        lines(panels, out)
 
 
 FAMILIES: Mapping[str, tuple[str, ...]] = {
-    "distance": ("distance",), "velocity difference": ("velocity difference",), "share near": ("share near",),
-    "sideways, lengthwise": ("sideways", "lengthwise"), "others, stream (chance)": ("others", "stream"),
-    "speed": ("speed",), "arrival": ("arrival gap", "first distance"), "means over 5 s": ("5 s",),
+    **{name: (name,) for name in ("distance", *QUANTITIES)}, "arrival": ("arrival gap", "first distance"),
+    **{f"means over {time:g} s": (f"{time:g} s",) for time in TIMES[1:]},
 }  # fmt: skip
+"""Words of the names of tables that are left out together."""
 
 
 def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> None:
@@ -195,7 +238,7 @@ def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> No
     for family, words in {"": (), **FAMILIES}.items():
         used = [name for name in USED if not {*name.split(", ")} & {*words}]
         belief = fit_belief(train, used)
-        scores = belief_scores(test, log_odds_of(belief, test))
+        scores = belief_scores(test, belief.log_odds(test.values))
         real = []
         for truth in truths.values():
             i, j, same = pairs_in_frames(truth)
@@ -239,7 +282,9 @@ def cost(people: int, belief: Belief) -> None:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["recordings", "suites", "rates", "calibration", "ablation", "cost"])
+    parser.add_argument(
+        "mode", choices=["recordings", "suites", "rates", "calibration", "decisions", "ablation", "cost"]
+    )
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="scenarios, suites or *.toml files")
     parser.add_argument("--train", nargs="+", metavar="NAME", help="ablation: to fit to", default=["standard"])
     parser.add_argument("--rough", action="store_true", help="suites: positions err and rows are missing")
@@ -247,6 +292,7 @@ def main() -> None:
     parser.add_argument("--people", type=int, default=100, help="cost: number of people")
     add_seeds(parser, "20000:20001")
     parser.add_argument("--check", type=seed_range, default="20000:20001", metavar="A:B", help="ablation: test seeds")
+    parser.add_argument("--out", type=Path, metavar="CHART.svg", help="calibration: reliability plot")
     add_data(parser)
     args = parser.parse_args()
     belief = grouping_of(args.grouping)
@@ -262,7 +308,9 @@ def _run(args: argparse.Namespace, belief: Belief) -> None:
     elif args.mode == "rates":
         rates(args.scenes or ["street", "crowd", "party", "mixed"], args.seeds, belief)
     elif args.mode == "calibration":
-        calibration(args.scenes or ["standard"], args.seeds, belief)
+        calibration(args.scenes or ["standard"], args.seeds, belief, args.out)
+    elif args.mode == "decisions":
+        decisions(args.scenes or ["standard", "friends-meet"], args.seeds, belief)
     elif args.mode == "ablation":
         ablation(args.train, args.seeds, args.check, args.data)
     else:

@@ -51,6 +51,7 @@ from tracking.detect.background import Background
 from tracking.detect.person_size import PersonSize
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.link_rule import LinkRule, find_links
+from tracking.grouping.merge_split_events import TrackedMotion
 from tracking.papers.blob import new_people
 from tracking.papers.blob.update_from_pixels import PixelUpdater
 from tracking.prepare import PreparedTracker, prepare
@@ -257,7 +258,7 @@ def groups(args: argparse.Namespace) -> None:
     }
     baseline = {
         "links": lambda: find_links(frame, column, *places, frames, FPS, rule),
-        "labels": lambda: label_people(frame, column, pos, links, FPS, rule),
+        "labels": lambda: label_people(frame, column, TrackedMotion(pos, vel, FPS), links, rule),
     }
     for title, works in (("truth", truth), ("baseline rule", baseline)):
         head([title, "CPU s"])

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-TIMES = (0.8, 2.0, 5.0)
+TIMES = (0.8, 5.0, 15.0)
 
 
 def evidence(pos, seconds):
@@ -48,14 +48,26 @@ def instant(pos, vel, a, b, seen):
     side, along = distance, math.nan
     if pace >= 0.3:
         side, along = abs(apart[0] * m[1] - apart[1] * m[0]) / pace, abs(apart @ m) / pace
-    around = [sum(np.hypot(*(pos[q] - pos[p])) < 3.0 for q in seen if q not in (a, b)) for p in (a, b)]
-    within = [q_p for p in (a, b) for q in seen if q not in (a, b) and np.hypot(*(pos[q] - pos[p])) < 4.0
-              for q_p in [np.hypot(*(vel[q] - vel[p])) < 0.5]]  # fmt: skip
+    third = [q for q in seen if q not in (a, b)]
+
+    def far(p, q):
+        return np.hypot(*(pos[q] - pos[p]))
+
+    def differ(p, q):
+        return np.hypot(*(vel[q] - vel[p]))
+
+    around = [sum(far(p, q) < 3.0 for q in third) for p in (a, b)]
+    within = [differ(p, q) < 0.5 for p in (a, b) for q in third if far(p, q) < 4.0]
+    speeds = [np.hypot(*vel[p]) for p in (a, b)]
+    turn = math.nan
+    if min(speeds) >= 0.3:
+        turn = math.acos(min(max(vel[a] @ vel[b] / speeds[0] / speeds[1], -1.0), 1.0))
     return {
-        "distance": distance, "velocity difference": np.hypot(*(vel[b] - vel[a])), "share near": float(distance < 1.2),
-        "sideways": side, "lengthwise": along, "others": sum(around) / 2,
-        "stream": sum(within) / len(within) if within else math.nan,
-        "speed": (np.hypot(*vel[a]) + np.hypot(*vel[b])) / 2,
+        "velocity difference": differ(a, b), "sideways": side, "lengthwise": along, "others": sum(around) / 2,
+        "stream": sum(within) / len(within) if within else math.nan, "speed": sum(speeds) / 2,
+        "rank": sum(far(p, q) < distance for p in (a, b) for q in third) / 2,
+        "growth": apart @ (vel[b] - vel[a]) / max(distance, 0.1), "turn": turn,
+        "common": sum(all(far(p, q) < 1.5 and differ(p, q) < 0.7 for p in (a, b)) for q in third),
     }  # fmt: skip
 
 
@@ -68,25 +80,25 @@ def beliefs(pos, seconds, belief):
     """dict from (step, a, b) to (log-odds, decision)."""
     found, state = {}, {}
     for (t, a, b), row in evidence(pos, seconds).items():
-        speed = row["speed, 2 s"]
+        speed = row["speed, 5 s"]
         stands = 0.0 if math.isnan(speed) else min(max((0.6 - speed) / 0.4, 0.0), 1.0)
-        target = belief.bias
+        many = min(max((row["others, 5 s"] - 1) / 5, 0.0), 1.0)
+        log_odds = belief.bias
         for table in belief.tables:
             x = row[table.name]
             if not math.isnan(x):
-                walk, stand = (np.interp(x, table.at, y) for y in (table.walking, table.standing))
-                target += (1 - stands) * walk + stands * stand
-        log_odds = decision = target
+                walk, stand, walk_many, stand_many = (np.interp(x, table.at, y) for y in table.log_odds)
+                log_odds += (1 - many) * ((1 - stands) * walk + stands * stand)
+                log_odds += many * ((1 - stands) * walk_many + stands * stand_many)
+        decision = log_odds
         if (a, b) in state:
-            s, old, before = state[a, b]
-            gap = (t - s) * seconds
-            time = belief.walking_time ** (1 - stands) * belief.standing_time**stands
-            stay = math.exp(-gap / time)
-            log_odds = stay * old + (1 - stay) * target
+            s, before = state[a, b]
             usual = belief.join / (belief.join + belief.part)
-            share = usual + (1 / (1 + math.exp(-before)) - usual) * math.exp(-(belief.join + belief.part) * gap)
-            decision = math.log(share / (1 - share)) + seconds * log_odds
-        state[a, b] = t, log_odds, decision
+            share = usual + (1 / (1 + math.exp(-before)) - usual) * math.exp(
+                -(belief.join + belief.part) * (t - s) * seconds
+            )
+            decision = math.log(share / (1 - share)) + seconds / belief.evidence_time * log_odds
+        state[a, b] = t, decision
         found[t, a, b] = log_odds, decision
     return found
 

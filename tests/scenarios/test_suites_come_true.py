@@ -39,8 +39,7 @@ def test_harder_entries_stand_beside_the_others() -> None:
 def test_strangers_of_the_hard_suite_are_near_and_alike_for_seconds() -> None:
     for name in ("abreast", "beside", "converge", "brush", "door", "lag"):
         entries = [e for e in HARD if e.name.startswith(f"friends-{name}-")]
-        seeds = range(90_001, 90_007)  # the first that suffices ends the search
-        truths = (simulate(e.scenario, seed, e.repeat, streams=()).truth for seed in seeds for e in entries)
+        truths = (simulate(e.scenario, 90_001, e.repeat, streams=()).truth for e in entries)
         assert any((t.near.end - t.near.start).max(initial=0) > 30 for t in truths if t and t.near), name
 
 

@@ -1,7 +1,7 @@
 """`fit_belief`: fits the belief of who belongs together to simulated scenes, by penalised maximum likelihood.
 
-Every scene weighs the same. The penalty is on the squared log-odds, on the difference of the tables for walking and
-standing, and on the curvature of the tables.
+Every scene weighs the same. The penalty is on the squared log-odds, on their differences between the situations
+(walking or standing, among few or many), and on the curvature of the tables.
 """
 
 from __future__ import annotations
@@ -16,33 +16,28 @@ from scenarios.errors import InputError
 from sim.types import Array, Bools
 from tracking.fitting.belief_kernels import loss_and_gradient
 from tracking.fitting.grouping_scenes import PairScene
-from tracking.grouping.belief import Belief, Table, stands
-from tracking.grouping.pair_evidence import NAMES, TIMES
+from tracking.grouping.belief import SITUATIONS, Belief, Table, situations
+from tracking.grouping.pair_evidence import NAMES
 
-USED = (
-    *(f"{name}, {time:g} s" for name in ("distance", "velocity difference", "share near", "sideways")
-      for time in TIMES),
-    "lengthwise, 2 s", "lengthwise, 5 s", "others, 2 s", "stream, 2 s", "speed, 2 s", "distance", "arrival gap",
-    "first distance",
-)  # fmt: skip
-"""Quantities that get a table."""
+USED = tuple(name for name in NAMES if name != "velocity difference")
+"""Quantities that get a table: those now and those of `QUANTITIES` over all times."""
 KNOTS = 10
 """Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %."""
 CURVED, LARGE = 3e-4, 1e-4
-"""Weights of the penalties: of curvature; of size, and of the difference of walking and standing."""
+"""Weights of the penalties: of curvature; of squared log-odds, and, twice, of their differences between situations."""
 STEPS = 200
 """Most iterations."""
 
 
 @dataclass(frozen=True)
 class PairSample:
-    """Rows of scenes, one after the other, sorted by pair and step: values (R, len(NAMES)); gap (R,): s since the
-    pair's row before, -1 in its first; together (R,); weight (R,), of sum 1, equal for all scenes."""
+    """Rows of scenes, one after the other: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all
+    scenes. pairs: number of pairs."""
 
     values: np.ndarray
-    gap: Array
     together: Bools
     weight: Array
+    pairs: int
 
 
 def sample_of(scenes: Sequence[PairScene]) -> PairSample:
@@ -50,12 +45,9 @@ def sample_of(scenes: Sequence[PairScene]) -> PairSample:
     if not scenes:
         remedy = "name scenarios with people who meet"
         raise InputError(place="fit grouping", got="no two people within 4 m", expected="pairs", remedy=remedy)
-    gaps = [np.where(np.diff(s.pair, prepend=-1) == 0, np.diff(s.step, prepend=0) * s.seconds, -1.0) for s in scenes]
     weight = np.concatenate([np.full(len(s.pair), 1 / len(s.pair) / len(scenes)) for s in scenes])
-    return PairSample(
-        np.concatenate([s.values for s in scenes]), np.concatenate(gaps),
-        np.concatenate([s.together for s in scenes]), weight,
-    )  # fmt: skip
+    values, together = (np.concatenate([getattr(s, name) for s in scenes]) for name in ("values", "together"))
+    return PairSample(values, together, weight, sum(len(np.unique(s.pair)) for s in scenes))
 
 
 def fit_belief(sample: PairSample, used: Sequence[str] = USED) -> Belief:
@@ -64,49 +56,23 @@ def fit_belief(sample: PairSample, used: Sequence[str] = USED) -> Belief:
     knots_of = {name: at for name, at in knots_of.items() if len(at) > 1}
     at, columns = list(knots_of.values()), [NAMES.index(name) for name in knots_of]
     place, part = _places(sample.values[:, columns], at)
-    curves, knots = _curvature(at), sum(map(len, at))
-    standing, log_odds = stands(sample.values), np.empty(len(sample.gap))
+    curves, count = _curvature(at), len(SITUATIONS)
+    bends, mix = curves.T @ curves, situations(sample.values)
 
     def objective(x: Array) -> tuple[float, Array]:
-        walk, stand, rest = x[:knots], x[knots : 2 * knots], x[2 * knots :]
-        gradient = np.zeros_like(x)
-        loss = loss_and_gradient(
-            place, part, standing, sample.gap, sample.together, sample.weight, walk, stand, rest, log_odds, gradient
-        )
-        for own, slope in ((walk, gradient[:knots]), (stand, gradient[knots : 2 * knots])):
-            bent = curves @ own
-            loss += float(CURVED * bent @ bent + LARGE * own @ own)
-            slope += 2 * CURVED * curves.T @ bent + 2 * LARGE * own
-        differ = 2 * LARGE * (walk - stand)
-        gradient[:knots] += differ
-        gradient[knots : 2 * knots] -= differ
-        times = rest[1:]
-        gradient[2 * knots + 1 :] += 2 * LARGE * times
-        return loss + LARGE * float(times @ times + (walk - stand) @ (walk - stand)), gradient
+        heights, slopes = x[:-1].reshape(count, -1), np.zeros_like(x)
+        gradient = slopes[:-1].reshape(count, -1)
+        loss, slopes[-1] = loss_and_gradient(place, part, mix, sample.together, sample.weight, heights, x[-1], gradient)
+        differ = heights - heights.mean(axis=0)
+        gradient += 2 * CURVED * heights @ bends + 2 * LARGE * heights + 4 * LARGE * differ
+        penalty = CURVED * float(((heights @ bends) * heights).sum())
+        return loss + penalty + LARGE * float((heights**2).sum() + 2 * (differ**2).sum()), slopes
 
-    start = np.concatenate([np.zeros(2 * knots), [-2.0, -1.0, 0.0]])
-    bounds = [(None, None)] * (2 * knots + 1) + [(np.log(0.05), np.log(60.0))] * 2
-    found = minimize(
-        objective, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": STEPS, "maxcor": 20}
-    ).x
-    cuts = np.cumsum([len(k) for k in at])[:-1]
-    walking, standing_ = (np.split(found[n * knots : (n + 1) * knots], cuts) for n in (0, 1))
-    tables = tuple(Table(*row) for row in zip(knots_of, at, walking, standing_, strict=True))
-    bias, walk_time, stand_time = found[2 * knots :]
-    return Belief(tables, float(bias), float(np.exp(walk_time)), float(np.exp(stand_time)))
-
-
-def log_odds_of(belief: Belief, sample: PairSample) -> Array:
-    """Returns the belief (R,) of each row of a sample."""
-    place, part = _places(sample.values[:, [NAMES.index(t.name) for t in belief.tables]], [t.at for t in belief.tables])
-    walk, stand = (np.concatenate([getattr(t, name) for t in belief.tables]) for name in ("walking", "standing"))
-    rest = np.array([belief.bias, np.log(belief.walking_time), np.log(belief.standing_time)])
-    out = np.empty(len(sample.gap))
-    loss_and_gradient(
-        place, part, stands(sample.values), sample.gap, sample.together, sample.weight, walk, stand, rest, out,
-        np.zeros(2 * len(walk) + 3),
-    )  # fmt: skip
-    return out
+    start = np.append(np.zeros(count * sum(map(len, at))), -2.0)
+    found = minimize(objective, start, jac=True, method="L-BFGS-B", options={"maxiter": STEPS, "maxcor": 20}).x
+    cuts = np.cumsum([len(knots) for knots in at])[:-1]
+    heights = np.split(found[:-1].reshape(count, -1), cuts, axis=1)
+    return Belief(tuple(Table(*row) for row in zip(knots_of, at, heights, strict=True)), float(found[-1]))
 
 
 def _knots(values: Array) -> Array:

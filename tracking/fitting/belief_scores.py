@@ -22,7 +22,7 @@ def belief_scores(sample: PairSample, log_odds: Array) -> dict[str, float]:
     bins = reliability(log_odds, true, weight)
     hits, count = int((true & (log_odds > 0)).sum()), int(true.sum() + (log_odds > 0).sum())
     return {
-        "pairs": float((sample.gap < 0).sum()),
+        "pairs": float(sample.pairs),
         "log loss": float(weight @ loss),
         "calibration error": float(np.abs(bins[:, 0] * (bins[:, 1] - bins[:, 2]))[bins[:, 0] > 0].sum()),
         "F1": 2 * hits / count if count else float("nan"),

@@ -1,9 +1,10 @@
-"""The belief that two people belong together: log-odds of each pair over time, from fitted tables of evidence.
+"""The belief that two people belong together: log-odds of each pair from fitted tables of evidence, and the decision.
 
-The evidence of a row (`pair_evidence`) is a sum of tables, read off by linear interpolation: one value for people who
-walk, one for people who stand, mixed by the pair's speed over 2 s. The belief follows the evidence with a delay, longer
-for people who stand: L(t) = e L(t - dt) + (1 - e) evidence(t), e = exp(-dt / time). `flockscope fit grouping` fits the
-tables to simulated scenes and writes them as a text file; belief.toml beside this module is the default.
+The belief of a row (`pair_evidence`) is a sum of tables, read off by linear interpolation. Each has four columns, for
+people who walk and who stand, among few others and among many, mixed by the pair's speed and its others over 5 s. The
+decision is the log-odds of a two-state Markov relation to which the beliefs of successive steps are added. `flockscope
+fit grouping` fits the tables to simulated scenes and writes them as a text file; belief.toml beside this module is the
+default.
 """
 
 from __future__ import annotations
@@ -26,53 +27,52 @@ from tracking.grouping.pair_evidence import NAMES, PairRows, evidence, frames_pe
 FROZEN = Path(__file__).with_name("belief.toml")
 """The default belief."""
 KIND = "belief"
+UNSEEN = -4.0
+"""Decision about two people who are too far apart for a row: log-odds."""
 STANDS, WALKS = 0.2, 0.6
 """m/s: a pair counts as standing below the first, as walking above the second, in between in proportion."""
-SPEED = NAMES.index("speed, 2 s")
-NUMBERS = ("bias", "walking_time", "standing_time", "join", "part", "unseen", "patience", "memory", "arrival")
+FEW, MANY = 1.0, 6.0
+"""Other people within 3 m: a pair counts as among few at the first, among many at the second."""
+SPEED, OTHERS = NAMES.index("speed, 5 s"), NAMES.index("others, 5 s")
+SITUATIONS = ("walking", "standing", "walking_among_many", "standing_among_many")
+"""Columns of a table."""
+NUMBERS = ("bias", "join", "part", "evidence_time", "stay", "come", "memory", "arrival")
 """Numbers of `Belief` in its file."""
+RATE = (1e-6, "a number of 0.000001 or above")
+LEAST = {"bias": (-math.inf, "a number"), **dict.fromkeys(("join", "part", "evidence_time"), RATE)}
+"""Least values of numbers that may not be 0, or may be below it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
     """Evidence from one quantity, in log-odds: piecewise linear, constant beyond the ends, 0 where it is unknown.
 
-    name: one of `NAMES`. at (K,): ascending values of the quantity. walking, standing (K,): log-odds at these values,
-    for people who walk and who stand.
+    name: one of `NAMES`. at (K,): ascending values of the quantity. log_odds (4, K): at these values, for `SITUATIONS`.
     """
 
     name: str
     at: Array
-    walking: Array
-    standing: Array
-
-    def evidence(self, value: Array, standing: Array) -> Array:
-        """Returns the log-odds (R,) of values (R,), nan for unknown; standing (R,): how far the pair stands, 0 to 1."""
-        found, some = np.interp(value, self.at, self.walking), standing > 0
-        found[some] += standing[some] * (np.interp(value[some], self.at, self.standing) - found[some])
-        return np.asarray(np.where(np.isnan(value), 0.0, found))
+    log_odds: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Belief:
     """A fitted belief: its tables, and how beliefs of pairs become groups.
 
-    bias: log-odds added to the tables. walking_time, standing_time: s with which the belief follows the evidence.
-    join, part: times per second that strangers become mates, and mates strangers; the decision who is in one group
-    assumes them, and needs the longer to change the smaller they are. unseen: log-odds of two members of a group
-    without a row. patience (s): a link breaks after the two have been in different groups for so long. memory (s): a
-    missed member stays so long in the group. arrival (s): a link that began so soon after a track's first frame is no
-    merge.
+    bias: log-odds added to the tables. join, part: times per second that strangers become mates, and mates strangers.
+    evidence_time (s): the decision adds the belief once in such a time. stay, come: added to the decisions of pairs
+    that were in one group a step before, and taken from those of all other pairs: groups change the later the greater
+    they are. memory (s): a missed member stays so long in the group. arrival (s): people who were together so soon
+    after a first frame arrived together: no merge.
     """
 
     tables: tuple[Table, ...]
     bias: float
-    walking_time: float
-    standing_time: float
     join: float = 0.01
     part: float = 0.05
-    unseen: float = -4.0
-    patience: float = 2.0
+    evidence_time: float = 0.5
+    stay: float = 4.0
+    come: float = 2.0
     memory: float = 1.0
     arrival: float = 1.0
 
@@ -96,9 +96,9 @@ class Belief:
         if unknown := sorted(content.keys() - set(NUMBERS)):
             _refuse(path, unknown[0], "an unknown key", "one of " + ", ".join(NUMBERS))
         for name in NUMBERS:
-            low = -math.inf if name in ("bias", "unseen") else 0.0
+            low, expected = LEAST.get(name, (0.0, "a number of 0 or above"))
             if not is_number(content.get(name), low, math.inf):
-                _refuse(path, name, content.get(name, "nothing"), "a number" + (" of 0 or above" if low == 0 else ""))
+                _refuse(path, name, content.get(name, "nothing"), expected)
         return cls(tuple(_table(path, k, row) for k, row in enumerate(rows, 1)), **content)
 
     def toml_text(self, comment: str = "") -> str:
@@ -106,35 +106,39 @@ class Belief:
         lines = [*(f"# {line}" for line in comment.splitlines()), f'grouping = "{KIND}"']
         lines += [f"{name} = {toml_value(round(float(getattr(self, name)), 4))}" for name in NUMBERS]
         for table in self.tables:
-            columns = {key: np.round(getattr(table, key), 4).tolist() for key in ("at", "walking", "standing")}
+            rows = {"at": table.at, **dict(zip(SITUATIONS, table.log_odds, strict=True))}
             lines += ["", "[[table]]", f"name = {toml_value(table.name)}"]
-            lines += [f"{key} = {toml_value(values)}" for key, values in columns.items()]
+            lines += [f"{key} = {toml_value(np.round(values, 4).tolist())}" for key, values in rows.items()]
         return "\n".join([*lines, ""])
 
-    def evidence(self, values: Array) -> Array:
-        """Returns the log-odds (R,) of rows of quantities (R, len(NAMES)) alone, without the past beliefs."""
-        standing = stands(values)
-        found = (t.evidence(values[:, NAMES.index(t.name)], standing) for t in self.tables)
-        return np.asarray(sum(found, np.full(len(values), self.bias)))
+    def log_odds(self, values: Array) -> Array:
+        """Returns the beliefs (R,) of rows of quantities (R, len(NAMES)), in log-odds."""
+        from tracking.grouping.belief_kernels import table_sums
 
-    def times(self, values: Array) -> Array:
-        """Returns the times (R,), s, with which the beliefs of rows (R, len(NAMES)) follow the evidence."""
-        standing = stands(values)
-        return np.asarray(self.walking_time ** (1 - standing) * self.standing_time**standing)
+        column = np.array([NAMES.index(table.name) for table in self.tables])
+        cut = np.cumsum([0, *(len(table.at) for table in self.tables)])
+        at = np.concatenate([table.at for table in self.tables])
+        heights = np.concatenate([table.log_odds for table in self.tables], axis=1)
+        return table_sums(values, situations(values), self.bias, column, cut, at, heights)
 
 
-def stands(values: Array) -> Array:
-    """Returns how far each pair stands, (R,), from 0 to 1; 0 where the speed is unknown. values (R, len(NAMES))."""
-    speed = values[:, SPEED]
-    return np.where(np.isnan(speed), 0.0, np.clip((WALKS - speed) / (WALKS - STANDS), 0.0, 1.0))
+def situations(values: Array) -> Array:
+    """Returns how far each of `SITUATIONS` holds for rows of quantities (R, len(NAMES)), (R, 4), of sum 1.
+
+    Pairs whose speed is unknown count as walking.
+    """
+    speed, others = values[:, SPEED], values[:, OTHERS]
+    stand = np.where(np.isnan(speed), 0.0, np.clip((WALKS - speed) / (WALKS - STANDS), 0.0, 1.0))
+    many = np.clip((others - FEW) / (MANY - FEW), 0.0, 1.0)
+    return np.column_stack([(1 - stand) * (1 - many), stand * (1 - many), (1 - stand) * many, stand * many])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairBeliefs:
     """Log-odds that two people belong together, one row per pair and step in which both were seen within 4 m.
 
-    step (R,): from 0, ascending; a, b (R,): columns, a < b; log_odds (R,). distance (m), differ (m/s) (R,): distance,
-    and difference of velocities.
+    step (R,): from 0, ascending; a, b (R,): columns, a < b; log_odds (R,): beliefs; decision (R,): log-odds of the
+    Markov relation.
     """
 
     step: Ints
@@ -142,8 +146,6 @@ class PairBeliefs:
     b: Ints
     log_odds: Array
     decision: Array
-    distance: Array
-    differ: Array
 
 
 def pair_beliefs(pos: Array, seconds: float, belief: Belief) -> PairBeliefs:
@@ -154,59 +156,36 @@ def pair_beliefs(pos: Array, seconds: float, belief: Belief) -> PairBeliefs:
     memory = PairMemory(belief, seconds)
     parts = []
     for rows in evidence(pos, seconds):
-        near = (rows.values[:, NAMES.index(name)] for name in ("distance", "velocity difference"))
-        parts.append((rows.step, rows.a, rows.b, *memory.follow(rows), *near))
+        parts.append((rows.step, rows.a, rows.b, *memory.follow(rows)))
     if not parts:
         nobody, none = np.zeros(0, np.int64), np.zeros(0)
-        return PairBeliefs(nobody, nobody, nobody, none, none, none, none)
+        return PairBeliefs(nobody, nobody, nobody, none, none)
     return PairBeliefs(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 class PairMemory:
-    """The beliefs of pairs while time goes on.
+    """The decisions of pairs while time goes on.
 
-    State, by pair (K,): last, the step of the pair's last row; log_odds, the belief after it; decision, the log-odds of
-    the Markov relation. K grows with the pairs.
+    State, by pair (K,): last, the step of the pair's last row; decision, the log-odds of the Markov relation after it.
+    K grows with the pairs.
     """
 
     def __init__(self, belief: Belief, seconds: float) -> None:
         """seconds: length of a step, s."""
         self.belief, self.seconds = belief, seconds
-        self.last, self.log_odds, self.decision = np.zeros(0, np.int64), np.zeros(0), np.zeros(0)
+        self.last, self.decision = np.zeros(0, np.int64), np.zeros(0)
 
     def follow(self, rows: PairRows) -> tuple[Array, Array]:
         """Takes the next rows, in order, and returns the belief and the decision after each, (R,), (R,)."""
-        self._grow(int(rows.pair.max(initial=-1)) + 1)
-        target, time = self.belief.evidence(rows.values), self.belief.times(rows.values)
-        out = np.empty((2, len(target)))
-        for r in np.split(np.arange(len(target)), np.flatnonzero(np.diff(rows.step)) + 1):
-            k, now = rows.pair[r], target[r]
-            new = np.isnan(self.log_odds[k])
-            late = np.asarray((rows.step[r] - self.last[k]) * self.seconds, float)
-            stay = np.exp(-late / time[r])
-            log_odds = now + stay * (np.where(new, now, self.log_odds[k]) - now)
-            decision = changed(self.decision[k], self.belief.join, self.belief.part, late) + self.seconds * log_odds
-            decision = np.where(new, log_odds, decision)
-            out[:, r] = log_odds, decision
-            self.last[k], self.log_odds[k], self.decision[k] = rows.step[r], log_odds, decision
-        return out[0], out[1]
+        from tracking.grouping.belief_kernels import decisions
 
-    def _grow(self, pairs: int) -> None:
-        more = max(pairs - len(self.last), 0)
+        more = max(int(rows.pair.max(initial=-1)) + 1 - len(self.last), 0)
         self.last = np.append(self.last, np.zeros(more, np.int64))
-        self.log_odds, self.decision = (np.append(x, np.full(more, np.nan)) for x in (self.log_odds, self.decision))
-
-
-def changed(log_odds: Array, join: float, part: float, seconds: Array) -> Array:
-    """Returns the log-odds (R,) of a relation after `seconds` (R,) without evidence.
-
-    log_odds (R,): before. Strangers join `join` times, mates part `part` times per second.
-    """
-    usual = join / (join + part)
-    odds = np.exp(-np.abs(log_odds))
-    share = np.where(log_odds > 0, 1.0, odds) / (1 + odds)
-    share = usual + (share - usual) * np.exp(-(join + part) * seconds)
-    return np.asarray(np.log(share / (1 - share)))
+        self.decision = np.append(self.decision, np.full(more, np.nan))
+        log_odds, b = self.belief.log_odds(rows.values), self.belief
+        share = self.seconds / b.evidence_time
+        state = self.last, self.decision
+        return log_odds, decisions(rows.step, rows.pair, log_odds, self.seconds, share, b.join, b.part, *state)
 
 
 def beliefs_of_tracks(frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief) -> PairBeliefs:
@@ -229,20 +208,21 @@ def default_belief() -> Belief:
 def _table(path: str | Path, number: int, row: Any) -> Table:
     """Returns a table of a file; number: its place among the tables, from 1. Raises InputError if it is wrong."""
     place = f"table {number}"
-    if not isinstance(row, dict) or set(row) != {"name", "at", "walking", "standing"}:
-        _refuse(path, place, sorted(row) if isinstance(row, dict) else row, "name, at, walking, standing")
+    keys = ("name", "at", *SITUATIONS)
+    if not isinstance(row, dict) or set(row) != set(keys):
+        _refuse(path, place, sorted(row) if isinstance(row, dict) else row, ", ".join(keys))
     if row["name"] not in NAMES:
         _refuse(path, f"{place}: name", row["name"], "one of " + "; ".join(NAMES))
     columns = []
-    for key in ("at", "walking", "standing"):
+    for key in keys[1:]:
         values = row[key]
         if not isinstance(values, list) or not all(is_number(v, -math.inf, math.inf) for v in values):
             _refuse(path, f"{place}: {key}", values, "a list of numbers")
         columns.append(np.array(values, float))
-    at, walking, standing = columns
-    if len(at) < 2 or not len(at) == len(walking) == len(standing) or (np.diff(at) <= 0).any():
-        _refuse(path, f"{place}: at", row["at"], "ascending numbers, two or more, as many as walking and standing")
-    return Table(row["name"], at, walking, standing)
+    at = columns[0]
+    if len(at) < 2 or any(len(c) != len(at) for c in columns) or (np.diff(at) <= 0).any():
+        _refuse(path, f"{place}: at", row["at"], "ascending numbers, two or more, as many as log-odds in each column")
+    return Table(row["name"], at, np.array(columns[1:]))
 
 
 def _refuse(path: str | Path, place: str, got: object, expected: str) -> None:

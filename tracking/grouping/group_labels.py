@@ -14,13 +14,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.truth.identity import GroupChange, Identities, PersonSet
+from sim.truth.identity import GroupChange, Identities, Members, PersonSet
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.proximity import stretches
-from sim.types import Array, GroupEvent, Ints
+from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.link_rule import LinkRule, Links
-from tracking.grouping.merge_split_events import LinkSwitch, event_of_change
+from tracking.grouping.merge_split_events import LinkSwitch, Parts, TrackedMotion, event_of_change
 
 
 @dataclass
@@ -72,34 +72,63 @@ class LinkedPeople:
 
 
 def label_people(
-    frame: Ints, column: Ints, pos: Array, links: Links, fps: float, rule: LinkRule | Belief
+    frame: Ints, column: Ints, motion: TrackedMotion, links: Links, rule: LinkRule | Belief
 ) -> tuple[Ints, list[GroupEvent]]:
     """Return the group id of each row (R,), -1 for a person alone, and the membership events in order of `emitted`.
 
-    A row is one person in one frame. frame (R,): from 0, sorted; column (R,): the person, from 0; pos (T, P, 2):
-    positions in m by frame and column, nan where absent; links: all switches of links of the sequence; fps: frames per
-    second.
+    A row is one person in one frame. frame (R,): from 0, sorted; column (R,): the person, from 0; motion: of all people
+    by frame and column; links: all switches of links of the sequence.
 
     Ids count from 1 and last as long as the group. A member who is not seen stays in the group for `rule.memory` s. In
     a frame in which only one member of a group is seen, that member's label is -1. Kinds of events: merge, split, form,
     dissolve, enter, leave. In them members are columns + 1, positions are in m and frames count from 1. Groups that
     enter within `rule.arrival` s of the first frame have no event.
     """
-    spells = _spells(frame, column, frames_of(rule.memory, fps), len(pos))
+    length = len(motion.pos)
+    spells = _spells(frame, column, frames_of(rule.memory, motion.fps), length)
     state, events = LinkedPeople(), []
-    group = np.full(pos.shape[:2], -1, np.int64)
-    arrival = frames_of(rule.arrival, fps)
-    cuts = np.searchsorted(links.frame, np.arange(len(pos) + 1))
-    for t, until in pairwise([*sorted({*spells, *links.frame.tolist()}), len(pos)]):
+    group = np.full(motion.pos.shape[:2], -1, np.int64)
+    arrival = frames_of(rule.arrival, motion.fps)
+    cuts = np.searchsorted(links.frame, np.arange(length + 1))
+    for t, until in pairwise([*sorted({*spells, *links.frame.tolist()}), length]):
         for p, since in spells.get(t, ()):
             _come_or_go(state, p, since)
         now = slice(int(cuts[t]), int(cuts[t + 1]))
-        switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on", "since")), strict=True))
-        changes = state.step(t, switched, arrival)
+        switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on")), strict=True))
+        old = state.identities.groups
+        changes = state.step(t, _dated(state, t, switched, motion), arrival)
         for g, people in state.identities.groups.items():
             group[t:until, sorted(people)] = g
-        events += [e for c in changes if (e := event_of_change(c, t, switched, pos, arrival)) is not None]
+        found = (event_of_change(c, t, _parts(c, old, state), motion, arrival) for c in changes)
+        events += [e for e in found if e is not None]
     return _without_singles(frame, group[frame, column]), events
+
+
+def _dated(
+    state: LinkedPeople, t: int, switched: Iterable[tuple[int, int, bool]], motion: TrackedMotion
+) -> list[LinkSwitch]:
+    """Returns the links (a, b, on) switched in frame t with the frame in which the two came together.
+
+    Only links that are set and have a person in no group need it, as only these may enter; the others have t.
+    """
+    grouped = {p for people in state.identities.groups.values() for p in people}
+    return [
+        (a, b, on, motion.onset(frozenset([a]), frozenset([b]), t, joins=True) if on and not {a, b} <= grouped else t)
+        for a, b, on in switched
+    ]
+
+
+def _parts(change: GroupChange, old: Members, state: LinkedPeople) -> Parts:
+    """Returns the groups and people alone that a change joined, or into which it divided a group.
+
+    old: members of the groups before the change; state: after it. People who are absent are left out.
+    """
+    divides = change.kind in ("split", "dissolve")
+    groups, names = (state.identities.groups, change.after) if divides else (old, change.before)
+    people = state.present.keys() & set(change.members)
+    parts = [part for g in names if g >= 0 and (part := groups[g] & people)]
+    parts += [frozenset([p]) for p in sorted(people.difference(*parts))]
+    return Parts(parts, max((min(state.present[p] for p in part) for part in parts), default=0))
 
 
 def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, list[tuple[int, int | None]]]:

@@ -29,7 +29,7 @@ from sim.truth.queue_detection import ADVANCE_TIME, QUEUE_TIME, queues
 from sim.types import EVENT_KINDS, Bools, GroupEvent, Groups, Tracks
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouping_choice import Grouping, default_grouping, links_of
-from tracking.grouping.merge_split_events import events_of_labels
+from tracking.grouping.merge_split_events import TrackedMotion, events_of_labels
 from tracking.grouping.tracks_table import TracksTable, boxes_of_rows, tabulate
 
 MEMBERSHIP_KINDS = frozenset(EVENT_KINDS) - {"cross", "queue"}
@@ -125,14 +125,15 @@ def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tup
     """Returns the table with group ids filled in, and the membership events (people are columns + 1, frames count from
     1).
 
-    named: the tracker reports groups itself. Its groups are kept. If they equal those of the rule, the rule's events
-    are used, as their onsets are exact. Else the events follow from the changes of the tracker's labels. If it reports
+    named: the tracker reports groups itself. Its groups are kept. If they equal those of the grouping, its events are
+    used, as their onsets are dated back. Else the events follow from the changes of the tracker's labels. If it reports
     groups but none of its people has one, the table is returned as it is, without events. fps: frames per second.
     """
     if named and (table.group < 0).all():
         return table, []
     links = links_of(table, fps, rule)
-    group, events = label_people(table.frame, table.column, table.positions(), links, fps, rule)
+    motion = TrackedMotion(table.positions(), table.velocities(), fps)
+    group, events = label_people(table.frame, table.column, motion, links, rule)
     if named and not np.array_equal(group, table.group):
         return table, events_of_labels(table.labels(), table.positions())
     return replace(table, group=group), events

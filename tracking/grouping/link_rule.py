@@ -103,7 +103,6 @@ class Links:
     a: Ints
     b: Ints
     on: Bools
-    since: Ints
 
 
 def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: LinkRule) -> Links:
@@ -135,10 +134,10 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
         kept = pairs[np.minimum(place, len(pairs) - 1)] == pair[rows]
         rows, place = rows[kept], place[kept]
         found.append(_switches(frame[i[rows]], place, near[rows], within[rows], pairs, present, fps, rule))
-    columns = [np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in range(4)]
+    columns = [np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in range(3)]
     order = np.lexsort((columns[1], columns[0]))
-    t, pair, on, since = (c[order] for c in columns)
-    return Links(t, pair // people, pair % people, on.astype(bool), since)
+    t, pair, on = (c[order] for c in columns)
+    return Links(t, pair // people, pair % people, on.astype(bool))
 
 
 def _portions(pairs: Ints, size: int) -> Iterator[Ints]:
@@ -149,15 +148,14 @@ def _portions(pairs: Ints, size: int) -> Iterator[Ints]:
 
 def _switches(
     frame: Ints, place: Ints, near: Bools, within: Bools, pairs: Ints, present: Bools, fps: float, rule: LinkRule
-) -> tuple[Ints, Ints, Ints, Ints]:
+) -> tuple[Ints, Ints, Ints]:
     """Returns the switches of links of K pairs, (S,) each: frame (from 0), pair (the value a * P + b), on (1)
-    or off (0), since (frame from 0).
+    or off (0).
 
     pairs (K,): a * P + b, with a < b columns of people. frame, place, near, within (Q,): a row for each pair and frame
     in which the two are close; place is the index in `pairs`; near: they are near and move alike; within: they are not
     apart. present (T, P): True where a person is seen. fps: frames per second; rule: share and times that decide.
-    `since` is the first frame of the stretch (of being near, or of being apart) that caused the switch. Sorted by
-    frame, then pair.
+    Sorted by frame, then pair.
     """
     people = present.shape[1]
     both = present[:, pairs // people] & present[:, pairs % people]
@@ -174,9 +172,7 @@ def _switches(
     state = (last >= 0) & np.take_along_axis(on, np.maximum(last, 0), axis=0)
     before = np.concatenate([np.zeros_like(state[:1]), state[:-1]])
     when, which = np.nonzero(state != before)
-    turned_on = state[when, which]
-    since = np.where(turned_on, _onset(together, window)[when, which], when - frames_of(rule.patience, fps) + 1)
-    return when, pairs[which], turned_on.astype(np.int64), since
+    return when, pairs[which], state[when, which].astype(np.int64)
 
 
 def _recent(flags: Bools, frames: int) -> Ints:
@@ -188,15 +184,3 @@ def _recent(flags: Bools, frames: int) -> Ints:
     late = np.zeros_like(total)
     late[frames:] = total[:-frames] if frames < len(total) else 0
     return np.asarray(total - late)
-
-
-def _onset(together: Bools, window: int) -> Ints:
-    """Returns the first frame (T, K), from 0, with a True flag among the last `window` frames, the present one
-    included.
-
-    together (T, K): flags by frame and pair. Without a True flag in the window it is the next frame with one, or T, the
-    number of frames, if there is none.
-    """
-    t = np.arange(len(together))[:, None]
-    after = np.minimum.accumulate(np.where(together, t, len(together))[::-1], axis=0)[::-1]
-    return np.asarray(np.take_along_axis(after, np.maximum(t - window + 1, 0) + np.zeros_like(after), axis=0))

@@ -1,59 +1,114 @@
 """Merge, split, form, dissolve, enter and leave events of groups of tracked people: from changes of their groups.
 
-Two sources: links that the baseline rule switched (`event_of_change`, exact onsets), or labels that a tracker gave
-(`events_of_labels`). What a change is called follows from sim.truth.identity.lineage, the same rule as in the truth.
-People are columns of arrays, frames count from 0; in the returned events people are columns + 1, frames count from 1.
+Two sources: links that a grouping switched (`event_of_change`), or labels that a tracker gave (`events_of_labels`).
+What a change is called follows from sim.truth.identity.lineage, the same rule as in the truth. People are columns of
+arrays, frames count from 0; in the returned events people are columns + 1, frames count from 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from sim.truth.identity import GroupChange, PersonSet, lineage
-from sim.types import Array, GroupEvent, Ints
+from sim.truth.merge_split_rules import HOLD_TIME, frames_of, separation
+from sim.truth.proximity import stretches
+from sim.types import Array, Bools, GroupEvent, Ints
 
 ABSENT = -2
 """Label of a person who is absent; -1 is a person alone."""
+LinkSwitch = tuple[int, int, bool, int]
+"""A switched link: its people a, b, True if switched on, first frame of the stretch that caused it."""
+SEARCHED = 20.0
+"""s before the report in which the onset of a change is looked for."""
+BRIDGED = 0.5
+"""s: gaps in a stretch that do not end it."""
 LOOK_BACK = 20
 """Frames before an event's start in which its position is looked for."""
 
-LinkSwitch = tuple[int, int, bool, int]
-"""A switched link: its people (columns a, b), True if switched on, first frame of the stretch that caused it."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedMotion:
+    """The motion of tracked people in T frames. pos, vel (T, P, 2): m, m/s by frame and column, nan where absent or
+    unknown. fps: frames per second."""
+
+    pos: Array
+    vel: Array
+    fps: float
+
+    def onset(self, a: PersonSet, b: PersonSet, t: int, *, joins: bool) -> int:
+        """Returns the frame (from 0) in which two parts, sets of columns, came together, or parted, as known in frame
+        t.
+
+        It is the first frame, of the last 20 s, in which the truth's merge rule held between them since its split rule
+        last held (joins), or the reverse; t if there is none. A rule holds in stretches of 2 s or more, with gaps up to
+        0.5 s, or until t.
+        """
+        first = max(0, t + 1 - frames_of(SEARCHED, self.fps))
+        found = separation(self.pos[first : t + 1], self.vel[first : t + 1], *(np.array(sorted(x)) for x in (a, b)))
+        rules = [self._lasting(holds) for holds in (found.split_rule(), found.merge_rule())]
+        before, after = rules if joins else rules[::-1]
+        begin = int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
+        held = np.flatnonzero(after[begin:])
+        return first + begin + int(held[0]) if len(held) else t
+
+    def _lasting(self, holds: Bools) -> Bools:
+        """Returns `holds` (N,) with gaps up to 0.5 s filled, without stretches shorter than 2 s that end earlier."""
+        frame, gap = np.flatnonzero(holds), frames_of(BRIDGED, self.fps)
+        out = np.zeros_like(holds)
+        for _, low, high in zip(*stretches(np.zeros_like(frame), frame, 1, gap + 1), strict=True):
+            out[low : high + 1] = high + 1 - low >= frames_of(HOLD_TIME, self.fps) or high + 1 + gap >= len(holds)
+        return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Parts:
+    """What a change joined, or divided into: sets of columns, groups and people alone. since: frame (from 0) from which
+    on a person of each has been present."""
+
+    sets: Sequence[PersonSet]
+    since: int
 
 
 def event_of_change(
-    change: GroupChange, t: int, switched: Iterable[LinkSwitch], pos: Array, arrival: int
+    change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, arrival: int
 ) -> GroupEvent | None:
     """Return the event of one change of groups that became known in frame t (from 0), or None.
 
-    change: of a group; its members are columns. switched: the links switched in frame t, as (a, b, True if set, first
-    frame of the cause). pos (T, P, 2): x, y in m by frame and column, nan where absent. arrival: frames. In the event
-    people are columns + 1, frames count from 1, the position is in m.
+    change: of a group; its members are columns. parts: what was joined (merge, form, enter) or what the group divided
+    into (split, dissolve). arrival: frames. In the event people are columns + 1, frames count from 1, the position is
+    in m.
 
-    `start` is the first onset among the switches that caused the change: links set (merge, form, enter) or removed
-    (split, dissolve, leave) between two of its people; t if there is none. For a leave it is the last frame in which
-    two of its people were seen, or one if there is none. `end` equals `start` for enter and leave, else t. Returns
-    None for an enter that starts in frame `arrival` (from 0) or before: that group was there from the beginning. Raises
-    ValueError if no member was seen from 20 frames before the start to t.
+    `start` is the first onset (`TrackedMotion.onset`) between two of the parts; t if there is one part. For a leave it
+    is the last frame in which two of its people were seen, or one if there is none. `end` equals `start` for enter and
+    leave, else t. Returns None for an enter that starts in frame `arrival` (from 0) or before, as that group was there
+    from the beginning, and for a merge or form that starts at most `arrival` frames after `parts.since`, as those
+    people were together when they were first seen. Raises ValueError if no member was seen from 20 frames before the
+    start to t.
 
     Kinds: a merge joins groups, or groups and people alone; a split is its reverse. A form joins people who were all
     alone; a dissolve leaves all alone. At enter and leave a whole group comes or goes, at most one of it excepted, who
     is alone before or after.
     """
-    start = onset_of_change(change, t, switched)
     if change.kind == "leave":
-        seen = np.isfinite(pos[: t + 1, change.members, 0]).sum(axis=1)
+        seen = np.isfinite(motion.pos[: t + 1, change.members, 0]).sum(axis=1)
         start = int(np.flatnonzero(seen >= min(seen.max(), 2))[-1])
-    if change.kind == "enter" and start <= arrival:
+    else:
+        joins = change.kind not in ("split", "dissolve")
+        start = min((motion.onset(a, b, t, joins=joins) for a, b in combinations(parts.sets, 2)), default=t)
+    known = {"enter": arrival, "merge": parts.since + arrival, "form": parts.since + arrival}
+    if start <= known.get(change.kind, -1):
         return None
     end = start if change.kind in ("enter", "leave") else t
-    return _event(change, start, end, t, pos)
+    return _event(change, start, end, t, motion.pos)
 
 
 def onset_of_change(change: GroupChange, t: int, switched: Iterable[LinkSwitch]) -> int:
-    """Return the first onset among the switches that caused the change of groups in frame t; t if there is none.
+    """Return the first onset among the switches of links that caused the change of groups in frame t; t if there is
+    none.
 
     They are the links set (merge, form, enter) or removed (split, dissolve, leave) between two of its people. switched:
     the links switched in frame t, as (a, b, True if set, first frame of the cause).

@@ -1,7 +1,7 @@
 """What tells whether two people belong together: distances, motion and surroundings of pairs over time, in steps.
 
 `step_positions` averages positions over steps of at most 0.4 s, and `evidence` returns one row per pair and step with
-the quantities of `QUANTITIES` averaged over the past (`TIMES`), and `ARRIVAL`. Nothing looks ahead. Only positions are
+the quantities of `QUANTITIES` averaged over the past (`TIMES`), and `NOW`. Nothing looks ahead. Only positions are
 used: velocities are chords of positions over 0.8 s. Lengths are in m.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.truth.merge_split_rules import MERGE_VELOCITY
+from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_VELOCITY
 from sim.truth.proximity import close_pairs
 from sim.types import Array, Ints
 
@@ -22,20 +22,20 @@ CHORD = 0.8
 """s over which velocities are measured: two frames of a recording with 2.5 frames/s."""
 REACH = 4.0
 """m: pairs farther apart have no evidence."""
-NEAR = 1.2
-"""m."""
 AROUND = 3.0
 """m: others nearer than this to one of the pair are counted."""
 STANDING = 0.3
 """m/s."""
-TIMES = (0.8, 2.0, 5.0)
+TOUCHING = 0.1
+"""m: least distance by which the growth of the distance is divided."""
+TIMES = (0.8, 5.0, 15.0)
 """s: means over the past have weights exp(-age / time)."""
 QUANTITIES = (
-    "distance", "velocity difference", "share near", "sideways", "lengthwise", "others", "stream", "speed",
+    "velocity difference", "sideways", "lengthwise", "others", "stream", "speed", "rank", "growth", "turn", "common",
 )  # fmt: skip
 """Averaged quantities: see `evidence`."""
-ARRIVAL = ("distance", "velocity difference", "arrival gap", "first distance")
-NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *ARRIVAL)
+NOW = ("distance", "velocity difference", "arrival gap", "first distance")
+NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *NOW)
 """Names of the columns of `PairRows.values`."""
 PORTION = 100_000
 """Rows worked on together: bounds memory."""
@@ -94,12 +94,14 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
 
     pos (S, P, 2): m by step and person (`step_positions`), nan where not seen. seconds: length of a step, s.
 
-    Averaged over the pair's rows, with weights exp(-age / time): distance (m); velocity difference (m/s), of vectors;
-    share near: of rows in which the distance is below 1.2 m; sideways and lengthwise (m): parts of the distance across
-    and along the mean velocity of the two, where that is at least 0.3 m/s, else the whole distance and nan; others:
-    mean of the two numbers of other people within 3 m; stream: of the people other than the pair within 4 m of one of
-    them, the share whose velocity differs from that person's by less than 0.5 m/s, nan without others; speed (m/s):
-    mean of the two.
+    Averaged over the pair's rows, with weights exp(-age / time): velocity difference (m/s), of vectors; sideways and
+    lengthwise (m): parts of the distance across and along the mean velocity of the two, where that is at least 0.3 m/s,
+    else the whole distance and nan; others: mean of the two numbers of other people within 3 m; stream: of the people
+    other than the pair within 4 m of one of them, the share whose velocity differs from that person's by less than 0.5
+    m/s, nan without others; speed (m/s): mean of the two; rank: how many other people are nearer to the one than the
+    other is, mean of both; growth (m/s): of the distance, below 0 if they approach; turn: angle between the two
+    velocities, rad, nan if one is slower than 0.3 m/s; common: number of third people who are less than 1.5 m from both
+    and whose velocities differ from both by less than 0.7 m/s.
 
     Not averaged: distance (m) and velocity difference (m/s) of the row; arrival gap (s): between the steps in which the
     two were first seen, nan if one was seen in step 0; first distance (m): in the first step in which both had been
@@ -115,31 +117,33 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
     count = int(pair.max(initial=-1)) + 1
     order = np.lexsort((pair, step[i]))
     i, j, pair = i[order], j[order], pair[order]
-    now = _instant(place, motion, i, j)
     first = np.full(people, len(pos), np.int64)
     np.minimum.at(first, column, step)
     came = np.stack([first[column[i]], first[column[j]]])
     late = came.max(axis=0)
     apart = np.hypot(*(pos[late, column[i]] - pos[late, column[j]]).T)
-    arrival = [
-        now[:, 0],
-        now[:, 1],
-        np.where(came.min(axis=0) > 0, np.abs(came[0] - came[1]) * seconds, np.nan),
-        np.where(late > 0, apart, np.nan),
-    ]
+    gap = np.where(came.min(axis=0) > 0, np.abs(came[0] - came[1]) * seconds, np.nan)
+    apart = np.where(late > 0, apart, np.nan)
     means = ExponentialMeans(count, len(QUANTITIES), seconds)
     for r in _portions(step[i]):
-        values = np.column_stack([means.add(step[i[r]], pair[r], now[r]), *(x[r] for x in arrival)])
+        distance, quantities = _instant(place, motion, i[r], j[r])
+        averaged = means.add(step[i[r]], pair[r], quantities)
+        values = np.column_stack([averaged, distance, quantities[:, 0], gap[r], apart[r]])
         yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values)
 
 
-def _instant(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
-    """Returns the quantities of `QUANTITIES` of each pair of rows i, j at its own step, (R, 8).
+def _instant(pos: Array, vel: Array, i: Ints, j: Ints) -> tuple[Array, Array]:
+    """Returns the distance (R,) and the quantities of `QUANTITIES` of each pair of rows i, j at its own step, (R, 10).
 
-    pos, vel (N, 2): m, m/s, one row per person and step. i, j (R,): all pairs within 4 m.
+    pos, vel (N, 2): m, m/s, one row per person and step. i, j (R,): all pairs within 4 m in some steps.
     """
-    apart, mean = pos[j] - pos[i], (vel[i] + vel[j]) / 2
-    distance, differ, pace = (np.hypot(*x.T) for x in (apart, vel[j] - vel[i], mean))
+    from tracking.grouping.pair_evidence_kernels import common_neighbours
+
+    low = int(min(i.min(), j.min()))
+    i, j, pos, vel = i - low, j - low, pos[low : int(max(i.max(), j.max())) + 1], vel[low:]
+    vel = vel[: len(pos)]
+    apart, change, mean = pos[j] - pos[i], vel[j] - vel[i], (vel[i] + vel[j]) / 2
+    distance, differ, pace = (np.hypot(*x.T) for x in (apart, change, mean))
     walks = pace >= STANDING  # False where nan
     unit = mean / np.where(walks, pace, 1.0)[:, None]
     across = np.abs(apart[:, 0] * unit[:, 1] - apart[:, 1] * unit[:, 0])
@@ -149,15 +153,35 @@ def _instant(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
     others = within[i] + within[j] - 2
     stream = np.full(len(i), np.nan)
     np.divide(same[i] + same[j] - 2 * alike, others, out=stream, where=others > 0)
-    return np.column_stack([
-        distance, differ, distance < NEAR, np.where(walks, across, distance), np.where(walks, along, np.nan),
-        (near[i] + near[j]) / 2 - around, stream, (np.hypot(*vel[i].T) + np.hypot(*vel[j].T)) / 2,
+    speed = np.hypot(*vel.T)
+    both = (speed[i] >= STANDING) & (speed[j] >= STANDING)
+    cosine = (vel[i] * vel[j]).sum(axis=1) / np.where(both, speed[i] * speed[j], 1.0)
+    linked = (distance < MERGE_DISTANCE) & (differ < SPLIT_VELOCITY)
+    return distance, np.column_stack([
+        differ, np.where(walks, across, distance), np.where(walks, along, np.nan), (near[i] + near[j]) / 2 - around,
+        stream, (speed[i] + speed[j]) / 2, _rank(i, j, distance),
+        (apart * change).sum(axis=1) / np.maximum(distance, TOUCHING),
+        np.where(both, np.arccos(np.clip(cosine, -1.0, 1.0)), np.nan), common_neighbours(i, j, linked, len(pos)),
     ])  # fmt: skip
 
 
 def _per_row(i: Ints, j: Ints, flag: Array, rows: int) -> Array:
     """Returns for each row the number of its pairs (i, j) (R,) whose flag (R,) is True, (rows,)."""
     return np.asarray(np.bincount(i[flag], minlength=rows) + np.bincount(j[flag], minlength=rows))
+
+
+def _rank(i: Ints, j: Ints, distance: Array) -> Array:
+    """Returns for each pair of rows i, j (R,) how many other rows are nearer to i than j is, and to j than i is, as the
+    mean of both, (R,). distance (R,)."""
+    centre, far = np.concatenate([i, j]), np.concatenate([distance, distance])
+    order = np.lexsort((far, centre))
+    centre, far = centre[order], far[order]
+    other = np.ones(len(order), bool)
+    other[1:] = (np.diff(centre) != 0) | (np.diff(far) > 0)
+    nearest = np.maximum.accumulate(np.where(other, np.arange(len(order)), 0))
+    rank = np.empty(len(order))
+    rank[order] = nearest - np.searchsorted(centre, centre)
+    return np.asarray((rank[: len(i)] + rank[len(i) :]) / 2)
 
 
 def _portions(step: Ints) -> Iterator[slice]:
@@ -186,14 +210,8 @@ class ExponentialMeans:
 
         step (R,): ascending, not before the last one added; pair (R,): once in a step; values (R, V): nan is left out.
         """
-        out = np.full((*values.shape, len(self.times)), np.nan)
-        for rows in np.split(np.arange(len(step)), np.flatnonzero(np.diff(step)) + 1):
-            k, x = pair[rows], values[rows, :, None]
-            age = (step[rows] - self.last[k]) * self.seconds
-            fade, known = np.exp(-age[:, None] / self.times)[:, None], np.isfinite(x)
-            weight = self.weight[k] * fade + known
-            total = self.total[k] * fade + np.where(known, x, 0.0)
-            self.weight[k], self.total[k], self.last[k] = weight, total, step[rows]
-            mean = np.full_like(total, np.nan)
-            out[rows] = np.divide(total, weight, out=mean, where=weight > 0)
+        from tracking.grouping.pair_evidence_kernels import add_to_means
+
+        out = np.empty((*values.shape, len(self.times)))
+        add_to_means(step, pair, values, self.times / self.seconds, self.total, self.weight, self.last, out)
         return out.reshape(len(step), values.shape[1] * len(self.times))

@@ -64,6 +64,30 @@ def test_partition_equals_average_linkage_one_join_at_a_time(seed):
         assert found == slow.groups(range(people), table, -4.0)
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_partition_remembers_the_step_before(seed):
+    """Average linkage of log-odds to which `stay` is added in groups of the step before, `come` taken elsewhere."""
+    r = np.random.default_rng(seed)
+    steps, people, unseen, stay, come = 5, 9, -4.0, 2.5, 1.5
+    step, a, b = (x.ravel() for x in np.meshgrid(range(steps), range(people), range(people), indexing="ij"))
+    kept = (a < b) & (r.random(len(a)) < 0.7)
+    step, a, b = step[kept], a[kept], b[kept]
+    log_odds = r.normal(0.5, 3, len(a))
+    t, person, group = partition(step, a, b, log_odds, unseen, stay, come)
+    before, differ = set(), 0
+    for s in range(steps):
+        known = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
+        table = {
+            (i, j): known.get((i, j), unseen) + (stay if any({i, j} <= g for g in before) else -come)
+            for i in range(people) for j in range(i + 1, people)
+        }  # fmt: skip
+        found = {frozenset(person[(t == s) & (group == g)].tolist()) for g in set(group[t == s].tolist())}
+        assert found == slow.groups(range(people), table, unseen)
+        differ += found != slow.groups(range(people), known, unseen)
+        before = found
+    assert differ
+
+
 def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
     pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
     a, b = np.array(pairs).T
@@ -106,9 +130,10 @@ def test_the_file_is_read_as_written(tmp_path):
         ('grouping = "belief"', 'grouping = "rule"', "grouping"),
         ("bias = ", "bias = nan # ", "bias"),
         ("memory = ", "memory = -", "memory"),
-        ("unseen", "unknown", "unknown"),
-        ('name = "distance, 2 s"', 'name = "distance, 3 s"', "table 2: name"),
+        ("stay", "wait", "wait"),
+        ('name = "sideways, 5 s"', 'name = "sideways, 3 s"', "table 5: name"),
         ("walking = [", "walking = [1, ", "table 1: at"),
+        ("join = ", "join = 0 # ", "join"),
         ("at = [", "at = [9, ", "table 1: at"),
         ("standing = [", 'standing = ["x", ', "table 1: standing"),
         ("standing = [", "sitting = [", "table 1"),

@@ -13,6 +13,7 @@ from sim.geometry.footprints import footprint_hulls
 from sim.geometry.polygons import convex_hull, iou_matrix
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.link_rule import LinkRule, find_links
+from tracking.grouping.merge_split_events import TrackedMotion
 from tracking.objective import derived_outlines_kernels as kernels
 from tracking.objective.derived_outlines import flat_convex_hulls, flat_footprint_hulls
 from tracking.objective.hull_overlaps import FLAT
@@ -57,7 +58,7 @@ def test_partitions_are_those_of_the_rule(seed):
     pos, rule, fps = walk[frame, column], LinkRule(window=0.6, patience=0.4, acquaintance=0.2, memory=0.3), 10.0
     links = find_links(frame, column, pos, np.zeros_like(pos), length, fps, rule)
     places = np.where(seen[..., None], walk, np.nan)
-    expected = label_people(frame, column, places, links, fps, rule)[0]
+    expected = label_people(frame, column, TrackedMotion(places, np.zeros_like(places), fps), links, rule)[0]
     made = kernels.connected_people(frame, column, length, people, 3, links.frame, links.a, links.b, links.on)
     for t in range(length):
         here = frame == t

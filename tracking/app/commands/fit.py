@@ -80,7 +80,7 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     people come near each other. Raises WorkError if a script cannot be fulfilled or the disk is full.
     """
     from sim.io.files.atomic import write_file
-    from tracking.fitting.belief import fit_belief, log_odds_of, sample_of
+    from tracking.fitting.belief import fit_belief, sample_of
     from tracking.fitting.belief_scores import belief_scores
     from tracking.fitting.grouping_scenes import pair_scenes
 
@@ -89,7 +89,7 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     seeds = {key: option_parsing.seeds(text, option) for key, (option, text) in asked.items() if text is not None}
     samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
     belief = fit_belief(samples["fitted"])
-    scores = {key: belief_scores(sample, log_odds_of(belief, sample)) for key, sample in samples.items()}
+    scores = {key: belief_scores(sample, belief.log_odds(sample.values)) for key, sample in samples.items()}
     words = " ".join(["flockscope fit grouping", *options.names, f"--seeds {options.seeds}"])
     lines = [
         f"{key}, seeds {numbers.start}:{numbers.stop}: "

@@ -1,7 +1,7 @@
 """From the probability that two people walk together, in each frame, to groups with ids and events (ours).
 
 The links, group ids and events are those of tracking.grouping, one frame after the other:
-    decision   log odds of a Markov relation whose evidence is the log odds of the pair     belief.changed
+    decision   log odds of a Markov relation whose evidence is the log odds of the pair     belief_kernels.changed
     groups     consistent partition by the mean decision over pairs                         belief_partition.partition
     links      between any two members of a group; they break after a patience              WalkingGroups
     ids        identity rule                                                                group_labels.LinkedPeople
@@ -25,11 +25,11 @@ from sim.truth.merge_split_rules import (
     frames_of,
 )  # fmt: skip
 from sim.types import Array, Bools, GroupEvent, Ints
-from tracking.grouping.belief import changed
-from tracking.grouping.belief_partition import BRIDGED, partition
+from tracking.grouping.belief_kernels import changed
+from tracking.grouping.belief_partition import partition
 from tracking.grouping.group_labels import LinkedPeople
 from tracking.grouping.link_rule import ARRIVAL
-from tracking.grouping.merge_split_events import LinkSwitch, onset_of_change
+from tracking.grouping.merge_split_events import BRIDGED, LinkSwitch, onset_of_change
 from tracking.papers.relational.config import RelationalConfig
 
 SURE = 0.01

@@ -1,0 +1,130 @@
+"""Numba kernels of the partition of people into groups: average linkage in each step, with a memory of the last."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.compiler import njit
+from sim.types import Array, Ints
+
+
+@njit(cache=True)
+def linked_groups(
+    cut: Ints, a: Ints, b: Ints, log_odds: Array, unseen: float, stay: float, come: float, label: Ints
+) -> None:
+    """Finds the groups of each of S steps by average linkage.
+
+    cut (S + 1,): where the rows of each step begin in a, b, log_odds (R,): two people and their log-odds. unseen:
+    log-odds of pairs without a row. stay, come: added for pairs that were in one group in the step before, taken from
+    all others. label (S, P): filled with a number of each person's group, its member in the lowest column; -1, as
+    given, where a person is alone.
+    """
+    steps, people = label.shape
+    root, place = np.arange(people), np.full(people, -1, np.int64)
+    for s in range(steps):
+        before = label[max(s - 1, 0)]
+        rows = range(cut[s], cut[s + 1])
+        found = np.empty(2 * len(rows), np.int64)
+        count = 0
+        for r in rows:
+            if log_odds[r] + _memory(before, a[r], b[r], stay, come) > 0:
+                for p in (a[r], b[r]):
+                    if place[p] < 0:
+                        found[count], place[p] = p, 0
+                        count += 1
+                i, j = _root(root, a[r]), _root(root, b[r])
+                root[max(i, j)] = min(i, j)
+        node = np.sort(found[:count])
+        size, start, total = np.zeros(people, np.int64), np.full(people, -1, np.int64), 0
+        for p in node:
+            i = _root(root, p)
+            place[p] = size[i]
+            size[i] += 1
+        for p in node:
+            if root[p] == p:
+                start[p] = total
+                total += size[p] ** 2
+        table, member = np.full(total, unseen), np.empty(count, np.int64)
+        for r in rows:
+            i = _root(root, a[r])
+            if start[i] >= 0 and i == _root(root, b[r]):
+                table[start[i] + place[a[r]] * size[i] + place[b[r]]] = log_odds[r]
+                table[start[i] + place[b[r]] * size[i] + place[a[r]]] = log_odds[r]
+        for i in node:
+            if root[i] == i:
+                m = 0
+                for p in node:
+                    if _root(root, p) == i:
+                        member[m] = p
+                        m += 1
+                x = table[start[i] : start[i] + m * m].reshape(m, m)
+                for u in range(m):
+                    for v in range(m):
+                        x[u, v] += _memory(before, member[u], member[v], stay, come)
+                group = _average_linkage(x)
+                for u in range(m):
+                    alone = True
+                    for v in range(m):
+                        alone &= v == u or group[v] != group[u]
+                    if not alone:
+                        label[s, member[u]] = member[group[u]]
+        for p in node:
+            root[p], place[p] = p, -1
+
+
+@njit(cache=True)
+def _memory(before: Ints, p: int, q: int, stay: float, come: float) -> float:
+    """Returns what is added to the log-odds of two people; before (P,): labels of the step before."""
+    return stay if before[p] >= 0 and before[p] == before[q] else -come
+
+
+@njit(cache=True)
+def _root(root: Ints, p: int) -> int:
+    """Returns the lowest person of p's component; root (P,): a lower person of the same component, or oneself."""
+    while root[p] != p:
+        root[p] = root[root[p]]
+        p = root[p]
+    return p
+
+
+@njit(cache=True)
+def _average_linkage(x: Array) -> Ints:
+    """Returns the group (M,) of each of M people, its lowest member.
+
+    x (M, M): symmetric log-odds of pairs, changed in place; the diagonal is not read. The two groups with the highest
+    mean are joined while it is above 0. Each group remembers its best partner, so that most joins cost M operations.
+    """
+    count = len(x)
+    size, group, best = np.ones(count), np.arange(count), np.empty(count, np.int64)
+    for u in range(count):
+        best[u] = _best_partner(x, size, u)
+    while True:
+        u = -1
+        for p in range(count):
+            if size[p] > 0 and best[p] >= 0 and (u < 0 or x[p, best[p]] > x[u, best[u]]):
+                u = p
+        if u < 0 or x[u, best[u]] <= 0:
+            return group
+        u, v = min(u, best[u]), max(u, best[u])
+        for q in range(count):
+            if size[q] > 0 and q != u and q != v:
+                x[u, q] = x[q, u] = (size[u] * x[u, q] + size[v] * x[v, q]) / (size[u] + size[v])
+        size[u], size[v] = size[u] + size[v], 0.0
+        for q in range(count):
+            if group[q] == v:
+                group[q] = u
+            if size[q] > 0:
+                if q == u or best[q] == u or best[q] == v:
+                    best[q] = _best_partner(x, size, q)
+                elif best[q] >= 0 and x[q, u] > x[q, best[q]]:
+                    best[q] = u
+
+
+@njit(cache=True)
+def _best_partner(x: Array, size: Array, u: int) -> int:
+    """Returns the group with the highest mean log-odds with group u, the lowest of equals; -1 if there is none."""
+    found = -1
+    for q in range(len(x)):
+        if q != u and size[q] > 0 and (found < 0 or x[u, q] > x[u, found]):
+            found = q
+    return found
