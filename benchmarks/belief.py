@@ -153,9 +153,8 @@ def suites(names: Sequence[str], seeds: range, belief: Belief, erring: bool) -> 
 
 
 CHANGES: Mapping[str, Mapping[str, float]] = {
-    "belief": {}, "stay = 0": {"stay": 0.0}, "come = 0": {"come": 0.0}, "stay = come = 0": {"stay": 0.0, "come": 0.0},
-    "evidence_time = 0.25 s": {"evidence_time": 0.25}, "evidence_time = 1 s": {"evidence_time": 1.0},
-    "join, part × 4": {"join": 0.04, "part": 0.2}, "join, part × 20": {"join": 0.2, "part": 1.0},
+    "belief": {}, "stay = come = 0": {"stay": 0.0, "come": 0.0}, "stay = 0": {"stay": 0.0}, "come = 0": {"come": 0.0},
+    "come = 2": {"come": 2.0}, "stay = 8": {"stay": 8.0}, "memory = 0": {"memory": 0.0},
     "arrival = 0": {"arrival": 0.0},
 }  # fmt: skip
 

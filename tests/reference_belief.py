@@ -77,8 +77,8 @@ def mean(rows, name, t, time, seconds):
 
 
 def beliefs(pos, seconds, belief):
-    """dict from (step, a, b) to (log-odds, decision)."""
-    found, state = {}, {}
+    """dict from (step, a, b) to log-odds."""
+    found = {}
     for (t, a, b), row in evidence(pos, seconds).items():
         speed = row["speed, 5 s"]
         stands = 0.0 if math.isnan(speed) else min(max((0.6 - speed) / 0.4, 0.0), 1.0)
@@ -90,16 +90,7 @@ def beliefs(pos, seconds, belief):
                 walk, stand, walk_many, stand_many = (np.interp(x, table.at, y) for y in table.log_odds)
                 log_odds += (1 - many) * ((1 - stands) * walk + stands * stand)
                 log_odds += many * ((1 - stands) * walk_many + stands * stand_many)
-        decision = log_odds
-        if (a, b) in state:
-            s, before = state[a, b]
-            usual = belief.join / (belief.join + belief.part)
-            share = usual + (1 / (1 + math.exp(-before)) - usual) * math.exp(
-                -(belief.join + belief.part) * (t - s) * seconds
-            )
-            decision = math.log(share / (1 - share)) + seconds / belief.evidence_time * log_odds
-        state[a, b] = t, decision
-        found[t, a, b] = log_odds, decision
+        found[t, a, b] = log_odds
     return found
 
 

@@ -1,10 +1,9 @@
-"""The belief that two people belong together: log-odds of each pair from fitted tables of evidence, and the decision.
+"""The belief that two people belong together: log-odds of each pair from fitted tables of evidence.
 
 The belief of a row (`pair_evidence`) is a sum of tables, read off by linear interpolation. Each has four columns, for
-people who walk and who stand, among few others and among many, mixed by the pair's speed and its others over 5 s. The
-decision is the log-odds of a two-state Markov relation to which the beliefs of successive steps are added. `flockscope
-fit grouping` fits the tables to simulated scenes and writes them as a text file; belief.toml beside this module is the
-default.
+people who walk and who stand, among few others and among many, mixed by the pair's speed and its others over 5 s.
+`flockscope fit grouping` fits the tables to simulated scenes and writes them as a text file; belief.toml beside this
+module is the default.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ from scenarios.errors import InputError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import parse, toml_value
 from sim.types import Array, Ints
-from tracking.grouping.pair_evidence import NAMES, PairRows, evidence, frames_per_step, step_positions
+from tracking.grouping.pair_evidence import NAMES, evidence, frames_per_step, step_positions
 
 FROZEN = Path(__file__).with_name("belief.toml")
 """The default belief."""
 KIND = "belief"
 UNSEEN = -4.0
-"""Decision about two people who are too far apart for a row: log-odds."""
+"""Belief about two people who are too far apart for a row: log-odds."""
 STANDS, WALKS = 0.2, 0.6
 """m/s: a pair counts as standing below the first, as walking above the second, in between in proportion."""
 FEW, MANY = 1.0, 6.0
@@ -36,11 +35,8 @@ FEW, MANY = 1.0, 6.0
 SPEED, OTHERS = NAMES.index("speed, 5 s"), NAMES.index("others, 5 s")
 SITUATIONS = ("walking", "standing", "walking_among_many", "standing_among_many")
 """Columns of a table."""
-NUMBERS = ("bias", "join", "part", "evidence_time", "stay", "come", "memory", "arrival")
+NUMBERS = ("bias", "stay", "come", "memory", "arrival")
 """Numbers of `Belief` in its file."""
-RATE = (1e-6, "a number of 0.000001 or above")
-LEAST = {"bias": (-math.inf, "a number"), **dict.fromkeys(("join", "part", "evidence_time"), RATE)}
-"""Least values of numbers that may not be 0, or may be below it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,20 +55,15 @@ class Table:
 class Belief:
     """A fitted belief: its tables, and how beliefs of pairs become groups.
 
-    bias: log-odds added to the tables. join, part: times per second that strangers become mates, and mates strangers.
-    evidence_time (s): the decision adds the belief once in such a time. stay, come: added to the decisions of pairs
-    that were in one group a step before, and taken from those of all other pairs: groups change the later the greater
-    they are. memory (s): a missed member stays so long in the group. arrival (s): people who were together so soon
-    after a first frame arrived together: no merge.
+    bias: log-odds added to the tables. stay, come: log-odds added for pairs that were in one group a step before, and
+    taken from all others: groups change the later the greater they are. memory (s): a missed member stays so long in
+    the group. arrival (s): people who were together so soon after a first frame arrived together: no merge.
     """
 
     tables: tuple[Table, ...]
     bias: float
-    join: float = 0.01
-    part: float = 0.05
-    evidence_time: float = 0.5
-    stay: float = 4.0
-    come: float = 2.0
+    stay: float = 5.0
+    come: float = 1.3
     memory: float = 1.0
     arrival: float = 1.0
 
@@ -96,9 +87,9 @@ class Belief:
         if unknown := sorted(content.keys() - set(NUMBERS)):
             _refuse(path, unknown[0], "an unknown key", "one of " + ", ".join(NUMBERS))
         for name in NUMBERS:
-            low, expected = LEAST.get(name, (0.0, "a number of 0 or above"))
+            low = -math.inf if name == "bias" else 0.0
             if not is_number(content.get(name), low, math.inf):
-                _refuse(path, name, content.get(name, "nothing"), expected)
+                _refuse(path, name, content.get(name, "nothing"), "a number" + (" of 0 or above" if low == 0 else ""))
         return cls(tuple(_table(path, k, row) for k, row in enumerate(rows, 1)), **content)
 
     def toml_text(self, comment: str = "") -> str:
@@ -137,15 +128,13 @@ def situations(values: Array) -> Array:
 class PairBeliefs:
     """Log-odds that two people belong together, one row per pair and step in which both were seen within 4 m.
 
-    step (R,): from 0, ascending; a, b (R,): columns, a < b; log_odds (R,): beliefs; decision (R,): log-odds of the
-    Markov relation.
+    step (R,): from 0, ascending; a, b (R,): columns, a < b; log_odds (R,).
     """
 
     step: Ints
     a: Ints
     b: Ints
     log_odds: Array
-    decision: Array
 
 
 def pair_beliefs(pos: Array, seconds: float, belief: Belief) -> PairBeliefs:
@@ -153,39 +142,11 @@ def pair_beliefs(pos: Array, seconds: float, belief: Belief) -> PairBeliefs:
 
     pos (S, P, 2): m by step and person (`step_positions`), nan where not seen. seconds: length of a step, s.
     """
-    memory = PairMemory(belief, seconds)
-    parts = []
-    for rows in evidence(pos, seconds):
-        parts.append((rows.step, rows.a, rows.b, *memory.follow(rows)))
+    parts = [(rows.step, rows.a, rows.b, belief.log_odds(rows.values)) for rows in evidence(pos, seconds)]
     if not parts:
-        nobody, none = np.zeros(0, np.int64), np.zeros(0)
-        return PairBeliefs(nobody, nobody, nobody, none, none)
+        nobody = np.zeros(0, np.int64)
+        return PairBeliefs(nobody, nobody, nobody, np.zeros(0))
     return PairBeliefs(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-class PairMemory:
-    """The decisions of pairs while time goes on.
-
-    State, by pair (K,): last, the step of the pair's last row; decision, the log-odds of the Markov relation after it.
-    K grows with the pairs.
-    """
-
-    def __init__(self, belief: Belief, seconds: float) -> None:
-        """seconds: length of a step, s."""
-        self.belief, self.seconds = belief, seconds
-        self.last, self.decision = np.zeros(0, np.int64), np.zeros(0)
-
-    def follow(self, rows: PairRows) -> tuple[Array, Array]:
-        """Takes the next rows, in order, and returns the belief and the decision after each, (R,), (R,)."""
-        from tracking.grouping.belief_kernels import decisions
-
-        more = max(int(rows.pair.max(initial=-1)) + 1 - len(self.last), 0)
-        self.last = np.append(self.last, np.zeros(more, np.int64))
-        self.decision = np.append(self.decision, np.full(more, np.nan))
-        log_odds, b = self.belief.log_odds(rows.values), self.belief
-        share = self.seconds / b.evidence_time
-        state = self.last, self.decision
-        return log_odds, decisions(rows.step, rows.pair, log_odds, self.seconds, share, b.join, b.part, *state)
 
 
 def beliefs_of_tracks(frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief) -> PairBeliefs:

@@ -57,7 +57,7 @@ def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float,
     order = np.argsort(step, kind="stable")
     row, step = row[order], step[order]
     t, person, group = partition(
-        step, found.a[row], found.b[row], found.decision[row], UNSEEN, belief.stay, belief.come
+        step, found.a[row], found.b[row], found.log_odds[row], UNSEEN, belief.stay, belief.come
     )
     i, j = runs(np.arange(len(group)) + 1, np.searchsorted(group, group, side="right"))
     low, high = np.minimum(person[i], person[j]), np.maximum(person[i], person[j])

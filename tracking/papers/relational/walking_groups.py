@@ -1,7 +1,7 @@
 """From the probability that two people walk together, in each frame, to groups with ids and events (ours).
 
 The links, group ids and events are those of tracking.grouping, one frame after the other:
-    decision   log odds of a Markov relation whose evidence is the log odds of the pair     belief_kernels.changed
+    decision   log odds of a Markov relation whose evidence is the log odds of the pair     changed
     groups     consistent partition by the mean decision over pairs                         belief_partition.partition
     links      between any two members of a group; they break after a patience              WalkingGroups
     ids        identity rule                                                                group_labels.LinkedPeople
@@ -25,7 +25,6 @@ from sim.truth.merge_split_rules import (
     frames_of,
 )  # fmt: skip
 from sim.types import Array, Bools, GroupEvent, Ints
-from tracking.grouping.belief_kernels import changed
 from tracking.grouping.belief_partition import partition
 from tracking.grouping.group_labels import LinkedPeople
 from tracking.grouping.link_rule import ARRIVAL
@@ -196,3 +195,13 @@ class WalkingGroups:
         group = self._group(now)
         known, count = np.unique(group[now.shown], return_counts=True)
         return np.where(np.isin(group, known[count > 1]), group, -1)
+
+
+def changed(log_odds: Array, join: float, part: float, seconds: Array) -> Array:
+    """Return the log-odds (K, K) of a two-state Markov relation after `seconds` (K, K) without evidence.
+
+    log_odds (K, K): before. Strangers become mates `join` times, mates strangers `part` times per second.
+    """
+    usual = join / (join + part)
+    share = usual + (1 / (1 + np.exp(-log_odds)) - usual) * np.exp(-(join + part) * seconds)
+    return np.asarray(np.log(share / (1 - share)))
