@@ -6,7 +6,7 @@
     python -m benchmarks.belief calibration [--scenes streets] [--seeds 20000:20001] [--out CHART.svg]
     python -m benchmarks.belief decisions [--scenes standard friends-meet …] [--seeds 10000:10001]
     python -m benchmarks.belief ablation --train standard streets … [--seeds 30000:30002] [--check 20000:20001]
-    python -m benchmarks.belief cost [--people 100]
+    python -m benchmarks.belief cost [--scenes station-rush]
 
 recordings: pairwise F1 on seq_hotel and zara01 from labelled positions, with intervals by blocks of frames; then from
 positions that err by 0.1 m, with 5 % missed, mean over 10 draws. CAVIAR's Meet_WalkTogether1 at its own scale. SPENCER
@@ -19,14 +19,13 @@ calibration: probability and share of mates by bin, expected calibration error, 
 the same as a reliability plot.
 decisions: the scores of suites with numbers of the belief's file changed.
 ablation: the fit without each quantity: log loss and F1 on --check seeds, and F1 on the recordings.
-cost: CPU time per frame of a walking crowd, of the belief and of the rule.
+cost: CPU time per frame of `blob` (with the rule), of the belief and of the rule, on an entry of the suite streets.
 --grouping FILE.toml: another belief.
 """
 
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -40,19 +39,22 @@ from benchmarks.grouping import linked_pairs, pairs_in_frames
 from benchmarks.support.chart import Panel, lines
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser, seed_range
 from benchmarks.support.tables import head, interval, number, row, signed, table
+from benchmarks.support.timing import best_times
 from scenarios.loading.resolve import resolve
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Truth
+from tracking import track
 from tracking.fitting.belief import USED, fit_belief, sample_of
 from tracking.fitting.belief_scores import BINS, belief_scores, reliability
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouped_tracks import derive
-from tracking.grouping.grouping_choice import Grouping, grouping_of
+from tracking.grouping.grouping_choice import Grouping, grouping_of, links_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.pair_evidence import QUANTITIES, TIMES
+from tracking.grouping.tracks_table import tabulate
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals, mean_interval
 
@@ -246,37 +248,20 @@ def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> No
         row([family or "–", *(f"{scores[k]:.4f}" for k in ("log loss", "calibration error", "F1")), *real])
 
 
-def crowd_tracks(people: int, frames: int, fps: float) -> tuple[Ints, Ints, Array]:
-    """Returns frame, column and positions of people who walk in pairs, 0.1 people per m², as one array each."""
-    r = np.random.default_rng(0)
-    side = (people / 0.1) ** 0.5
-    heading = r.uniform(0, 2 * np.pi, people // 2)
-    start = r.uniform(0, side, (people // 2, 2))
-    t = np.arange(frames)[:, None, None] / fps
-    middle = start + 1.3 * t * np.column_stack([np.cos(heading), np.sin(heading)])
-    both = np.concatenate([middle, middle + 0.7], axis=1)
-    pos = np.abs(both % (2 * side) - side) + r.normal(0, 0.02, both.shape)
-    frame, column = np.nonzero(np.ones(pos.shape[:2], bool))
-    return frame, column, pos[frame, column]
-
-
-def cost(people: int, belief: Belief) -> None:
-    from tracking.grouping.belief_partition import belief_links
-    from tracking.grouping.link_rule import find_links
-
-    fps, frames = 10.0, 600
-    frame, column, pos = crowd_tracks(people, frames, fps)
-    vel = np.zeros_like(pos)
-    for name, work in {
-        "belief": lambda: belief_links(frame, column, pos, frames, fps, belief),
-        "rule": lambda: find_links(frame, column, pos, vel, frames, fps, LinkRule()),
-    }.items():
-        spent = []
-        for _ in range(3):
-            begun = time.process_time()
-            work()
-            spent.append(time.process_time() - begun)
-        print(f"{name}: {1000 * min(spent) / frames:.3f} ms per frame with {people} people")
+def cost(scene: str, belief: Belief) -> None:
+    (entry,) = [e for e in resolve("streets") if e.name == scene]
+    sequence = simulate(entry.scenario, 20000, entry.repeat, streams=())
+    truth = sequence.truth
+    assert truth is not None
+    table_ = tabulate(people_as_tracks(truth), truth.fps, truth.px_per_m)
+    works = {
+        "blob with the rule": lambda: track("blob", sequence, detections="file"),
+        "belief": lambda: links_of(table_, truth.fps, belief),
+        "rule": lambda: links_of(table_, truth.fps, LinkRule()),
+    }
+    head([f"{scene}, {len(truth.frame) / truth.length:.0f} people", "CPU time, ms per frame"])
+    for name, work in works.items():
+        row([name, number(1000 * best_times(work, 3)[0] / truth.length)])
 
 
 def main() -> None:
@@ -288,7 +273,6 @@ def main() -> None:
     parser.add_argument("--train", nargs="+", metavar="NAME", help="ablation: to fit to", default=["standard"])
     parser.add_argument("--rough", action="store_true", help="suites: positions err and rows are missing")
     parser.add_argument("--grouping", default="belief", metavar="FILE.toml", help="another belief")
-    parser.add_argument("--people", type=int, default=100, help="cost: number of people")
     add_seeds(parser, "20000:20001")
     parser.add_argument("--check", type=seed_range, default="20000:20001", metavar="A:B", help="ablation: test seeds")
     parser.add_argument("--out", type=Path, metavar="CHART.svg", help="calibration: reliability plot")
@@ -313,7 +297,7 @@ def _run(args: argparse.Namespace, belief: Belief) -> None:
     elif args.mode == "ablation":
         ablation(args.train, args.seeds, args.check, args.data)
     else:
-        cost(args.people, belief)
+        cost((args.scenes or ["station-rush"])[0], belief)
 
 
 if __name__ == "__main__":
