@@ -27,7 +27,7 @@ from tracking.tracker_registry import find
 COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
 DEPARTURES = (
     "", "outlier_share=0", "hidden_time=0.3", "noise_scale=1", "weights=joint", "resample_share=1",
-    "resampling=systematic", "newcomer_share=0", "least_existence=0", "join_rate=10 part_rate=10", "patience=0",
+    "resampling=systematic", "newcomer_share=0", "least_existence=0", "join_rate=10 part_rate=10",
 )  # fmt: skip
 """Settings of the ablation; the first one is the defaults."""
 NEAR = 1.0

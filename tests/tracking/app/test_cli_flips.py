@@ -513,9 +513,9 @@ ELSEWHERE = {
     ("track", "grouping"),  # tests/tracking/tuning/test_rule.py
     ("track", "step_timeout"),  # tests/tracking/test_time_limit.py
 }
-OWN = ("group", "grouping", "replay", "sensor", "tune")
+OWN = ("group", "grouping", "joint", "relational", "replay", "sensor", "tune")
 """Commands whose options are tested one by one in files of their own: commands/test_group.py, test_replay.py,
-test_fit.py, test_tune.py."""
+test_fit.py, test_tune.py, and in tests/tracking/fitting."""
 
 
 def commands(group) -> list[tuple[str, list[str]]]:

@@ -198,6 +198,3 @@ class RelationalConfig(ParticleConfig):
     part_rate: float = param(
         1.0, (1e-6, 10.0), "1/s", "rate at which members leave a group: the smaller, the later a split (ours)", "log"
     )
-    patience: float = param(
-        2.0, (0.0, 6.0), "s", "a link breaks after the two have been in different groups for so long (ours)"
-    )

@@ -3,7 +3,7 @@
 The links, group ids and events are those of tracking.grouping, one frame after the other:
     decision   log odds of a Markov relation whose evidence is the log odds of the pair     changed
     groups     consistent partition by the mean decision over pairs                         belief_partition.partition
-    links      between any two members of a group; they break after a patience              WalkingGroups
+    links      between any two members of a group                                           WalkingGroups
     ids        identity rule                                                                group_labels.LinkedPeople
     events     changes of groups                                                            merge_split_events
 A link is set only while the two are near and move alike, and removed only while they are apart, by the distances of
@@ -62,15 +62,13 @@ class WalkingGroups:
     """Groups of people over time; arrays have a row and a column for each of K slots.
 
     decision (K, K): log odds that two people are in one group, nan for a new pair. linked (K, K): pairs with a link.
-    same (K, K): last frame in which the pair was in one group of the partition. begun (2, K, K): first frame of the
-    present or last stretch in which the pair was near and alike (NEAR), or apart (FAR); lasted (2, K, K): last frame of
-    this stretch. Gaps of up to 0.5 s do not end it. last: dict by id of the last frame and place, m, in which the
-    person was reported. people: ids, links and groups.
+    begun (2, K, K): first frame of the present or last stretch in which the pair was near and alike (NEAR), or apart
+    (FAR); lasted (2, K, K): last frame of this stretch. Gaps of up to 0.5 s do not end it. last: dict by id of the last
+    frame and place, m, in which the person was reported. people: ids, links and groups.
     """
 
     decision: Array = field(default_factory=lambda: np.zeros((0, 0)))
     linked: Bools = field(default_factory=lambda: np.zeros((0, 0), bool))
-    same: Ints = field(default_factory=lambda: np.zeros((0, 0), np.int64))
     begun: Ints = field(default_factory=lambda: np.zeros((2, 0, 0), np.int64))
     lasted: Ints = field(default_factory=lambda: np.zeros((2, 0, 0), np.int64))
     last: dict[int, tuple[int, Array]] = field(default_factory=dict)
@@ -81,13 +79,12 @@ class WalkingGroups:
         grow = ((0, 1), (0, 1))
         self.decision = np.pad(self.decision, grow, constant_values=np.nan)
         self.linked = np.pad(self.linked, grow)
-        self.same = np.pad(self.same, grow, constant_values=NEVER)
         self.begun, self.lasted = (np.pad(x, ((0, 0), *grow), constant_values=NEVER) for x in (self.begun, self.lasted))
 
     def keep(self, rows: Bools) -> None:
         """Remove all slots but those where `rows` (K,) is True."""
         some = np.ix_(rows, rows)
-        self.decision, self.linked, self.same = self.decision[some], self.linked[some], self.same[some]
+        self.decision, self.linked = self.decision[some], self.linked[some]
         self.begun, self.lasted = self.begun[:, rows][:, :, rows], self.lasted[:, rows][:, :, rows]
 
     def step(self, now: PeopleNow, fps: float, config: RelationalConfig) -> tuple[Ints, tuple[GroupEvent, ...]]:
@@ -101,7 +98,7 @@ class WalkingGroups:
         self._present(now)
         self._follow_stretches(now, frames_of(BRIDGED, fps))
         self._decide(now, 1 / fps, config)
-        switched = self._switches(now, frames_of(config.patience, fps), frames_of(BRIDGED, fps))
+        switched = self._switches(now, frames_of(BRIDGED, fps))
         changes = self.people.step(now.frame, switched, arrival)
         events = [self._event(c, now, switched, arrival) for c in changes]
         gone = self.last.keys() - self.people.present.keys()
@@ -140,17 +137,17 @@ class WalkingGroups:
         decision = np.where(now.seen[:, None] & now.seen, decision, self.decision)
         self.decision = np.where(np.isnan(self.decision), evidence, decision)
 
-    def _switches(self, now: PeopleNow, patience: int, bridge: int) -> list[LinkSwitch]:
+    def _switches(self, now: PeopleNow, bridge: int) -> list[LinkSwitch]:
         """Return the links that are set or removed in this frame, as (id, id, on, first frame of the cause)."""
         named = np.flatnonzero(now.id >= 0)
         a, b = (named[k] for k in np.triu_indices(len(named), 1))
         _, person, group = partition(np.zeros_like(a), a, b, self.decision[a, b], 0.0)
         part = -1 - np.arange(len(now.id))
         part[person] = group
-        self.same[part[:, None] == part] = now.frame
+        same = part[:, None] == part
         lasts = now.frame - self.lasted <= bridge
-        joined = ~self.linked & lasts[NEAR] & (self.same == now.frame)
-        left = self.linked & lasts[FAR] & (now.frame - self.same >= patience)
+        joined = ~self.linked & lasts[NEAR] & same
+        left = self.linked & lasts[FAR] & ~same
         switched: list[LinkSwitch] = []
         for kind, pairs in ((NEAR, joined), (FAR, left)):
             for i, j in np.argwhere(np.triu(pairs, 1)).tolist():

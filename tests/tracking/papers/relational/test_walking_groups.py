@@ -67,7 +67,7 @@ def test_inertia_delays_the_decision():
 
 
 def test_a_link_lasts_while_people_are_near():
-    """A low probability alone parts nobody; being apart does, after the patience."""
+    """A low probability alone parts nobody; being apart does."""
     labels, events = run([(NEAR, pair(0.95))] * 30 + [(NEAR, pair(0.02))] * 100)
     assert labels[-1] == [1, 1]
     labels, events = run([(NEAR, pair(0.95))] * 30 + [(APART, pair(0.02))] * 100)
