@@ -45,7 +45,7 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Truth
 from tracking import track
-from tracking.fitting.belief import USED, fit_belief, sample_of
+from tracking.fitting.belief import fit_belief, sample_of
 from tracking.fitting.belief_scores import BINS, belief_scores, reliability
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
 from tracking.grouping.belief import Belief
@@ -53,7 +53,7 @@ from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.grouping_choice import Grouping, grouping_of, links_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.pair_evidence import QUANTITIES, TIMES
+from tracking.grouping.pair_evidence import NAMES, QUANTITIES, TIMES
 from tracking.grouping.tracks_table import tabulate
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals, mean_interval
@@ -237,7 +237,7 @@ def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> No
     truths = {Path(folder).name: _truth(data / folder) for folder in (HOTEL, ZARA)}
     head(["without", "log loss", "calibration error", "F1", *truths])
     for family, words in {"": (), **FAMILIES}.items():
-        used = [name for name in USED if not {*name.split(", ")} & {*words}]
+        used = [name for name in NAMES if not {*name.split(", ")} & {*words}]
         belief = fit_belief(train, used)
         scores = belief_scores(test, belief.log_odds(test.values))
         real = []

@@ -26,7 +26,6 @@ def evidence(pos, seconds):
                     for name in past[a, b][0][1]
                     for time in TIMES
                 }
-                row["velocity difference"] = past[a, b][-1][1]["velocity difference"]
                 late = max(first[a], first[b])
                 row["distance"] = np.hypot(*(pos[t, b] - pos[t, a]))
                 row["arrival gap"] = abs(first[a] - first[b]) * seconds if min(first[a], first[b]) > 0 else math.nan

@@ -44,7 +44,7 @@ def holds_for(holds: Bools, frames: int) -> Bools:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Separation:
-    """How far apart two parts of a crowd are in each of T frames.
+    """How far apart two parts of a crowd are in each of T frames; or pairs of parts, arrays of any shape.
 
     distance (T,): m between the nearest members. velocity_difference (T,): length in m/s of the difference of the mean
     velocities. Both are inf in frames in which a part is absent.

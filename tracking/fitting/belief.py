@@ -19,8 +19,6 @@ from tracking.fitting.grouping_scenes import PairScene
 from tracking.grouping.belief import SITUATIONS, Belief, Table, situations
 from tracking.grouping.pair_evidence import NAMES
 
-USED = tuple(name for name in NAMES if name != "velocity difference")
-"""Quantities that get a table: those now and those of `QUANTITIES` over all times."""
 KNOTS = 10
 """Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %."""
 CURVED, LARGE = 3e-4, 1e-4
@@ -50,7 +48,7 @@ def sample_of(scenes: Sequence[PairScene]) -> PairSample:
     return PairSample(values, together, weight, sum(len(np.unique(s.pair)) for s in scenes))
 
 
-def fit_belief(sample: PairSample, used: Sequence[str] = USED) -> Belief:
+def fit_belief(sample: PairSample, used: Sequence[str] = NAMES) -> Belief:
     """Returns the belief with the least penalised log loss on a sample. used: names of the quantities with a table."""
     knots_of = {name: _knots(sample.values[:, NAMES.index(name)]) for name in used}
     knots_of = {name: at for name, at in knots_of.items() if len(at) > 1}

@@ -146,10 +146,10 @@ def log_probabilities(rows: EventRows, weights: dict[str, float]) -> Array:
 
 
 def _log_probabilities(design: Array, weights: Array, possible: Bools) -> Array:
+    from scipy.special import log_softmax
+
     scores = np.concatenate([design @ weights.T, np.zeros((len(design), 1))], axis=1)
-    scores = np.where(possible, scores, -np.inf)
-    top = scores.max(axis=1, keepdims=True)
-    return np.asarray(scores - top - np.log(np.exp(scores - top).sum(axis=1, keepdims=True)))
+    return np.asarray(log_softmax(np.where(possible, scores, -np.inf), axis=1))
 
 
 def event_scores(rows: EventRows, weights: dict[str, float]) -> dict[str, float]:

@@ -7,7 +7,7 @@ arrays, frames count from 0; in the returned events people are columns + 1, fram
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -104,18 +104,6 @@ def event_of_change(
         return None
     end = start if change.kind in ("enter", "leave") else t
     return _event(change, start, end, t, motion.pos)
-
-
-def onset_of_change(change: GroupChange, t: int, switched: Iterable[LinkSwitch]) -> int:
-    """Return the first onset among the switches of links that caused the change of groups in frame t; t if there is
-    none.
-
-    They are the links set (merge, form, enter) or removed (split, dissolve, leave) between two of its people. switched:
-    the links switched in frame t, as (a, b, True if set, first frame of the cause).
-    """
-    people = set(change.members)
-    joins = change.kind in ("merge", "form", "enter")
-    return min((since for a, b, on, since in switched if on == joins and a in people and b in people), default=t)
 
 
 def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:

@@ -34,7 +34,7 @@ QUANTITIES = (
     "velocity difference", "sideways", "lengthwise", "others", "stream", "speed", "rank", "growth", "turn", "common",
 )  # fmt: skip
 """Averaged quantities: see `evidence`."""
-NOW = ("distance", "velocity difference", "arrival gap", "first distance")
+NOW = ("distance", "arrival gap", "first distance")
 NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *NOW)
 """Names of the columns of `PairRows.values`."""
 PORTION = 100_000
@@ -103,7 +103,7 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
     velocities, rad, nan if one is slower than 0.3 m/s; common: number of third people who are less than 1.5 m from both
     and whose velocities differ from both by less than 0.7 m/s.
 
-    Not averaged: distance (m) and velocity difference (m/s) of the row; arrival gap (s): between the steps in which the
+    Not averaged: distance (m) of the row; arrival gap (s): between the steps in which the
     two were first seen, nan if one was seen in step 0; first distance (m): in the first step in which both had been
     seen, nan if that is step 0.
     Unknown velocities leave nan out of the means.
@@ -128,7 +128,7 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
     for r in _portions(step[i]):
         distance, quantities = _instant(place, motion, i[r], j[r])
         averaged = means.add(step[i[r]], pair[r], quantities)
-        values = np.column_stack([averaged, distance, quantities[:, 0], gap[r], apart[r]])
+        values = np.column_stack([averaged, distance, gap[r], apart[r]])
         yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values)
 
 
@@ -140,8 +140,8 @@ def _instant(pos: Array, vel: Array, i: Ints, j: Ints) -> tuple[Array, Array]:
     from tracking.grouping.pair_evidence_kernels import common_neighbours
 
     low = int(min(i.min(), j.min()))
-    i, j, pos, vel = i - low, j - low, pos[low : int(max(i.max(), j.max())) + 1], vel[low:]
-    vel = vel[: len(pos)]
+    rows = slice(low, int(max(i.max(), j.max())) + 1)
+    i, j, pos, vel = i - low, j - low, pos[rows], vel[rows]
     apart, change, mean = pos[j] - pos[i], vel[j] - vel[i], (vel[i] + vel[j]) / 2
     distance, differ, pace = (np.hypot(*x.T) for x in (apart, change, mean))
     walks = pace >= STANDING  # False where nan

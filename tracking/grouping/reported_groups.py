@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.truth.identity import Identities
-from sim.types import Array, Groups, Ints
+from sim.types import Groups, Ints
 
 
 def group_ids(identities: Identities, frame: int, ids: Ints, groups: list[Ints]) -> Ints:
@@ -28,11 +28,3 @@ def known_groups(identities: Identities, ids: Ints) -> Ints:
 def no_groups(group: Ints) -> Groups | None:
     """Return empty Groups if nobody is in a group, which says so; else None: hulls are derived from the group ids."""
     return Groups.none() if (group < 0).all() else None
-
-
-def boxes(pos: Array, size: Array) -> Array | None:
-    """Return boxes (N, 4) left, top, width, height in px with the centres pos (N, 2) px; None if a size is unknown.
-
-    size (N, 2): width, height, px, nan if unknown.
-    """
-    return np.concatenate([pos - size / 2, size], axis=1) if np.isfinite(size).all() else None

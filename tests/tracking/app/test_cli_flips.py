@@ -311,6 +311,16 @@ def hard_scene():
     return dataclasses.replace(sequence, load_truth=None)
 
 
+def with_a_covered_picture(sequence):
+    """The sequence in memory, without truth; something bright covers the left of its 51st picture."""
+    frames = list(sequence)
+    covered = frames[50].image.copy()
+    covered[:, :250] = (60, 120, 220)
+    frames[50] = dataclasses.replace(frames[50], image=covered)
+    sample = sequence.background()
+    return dataclasses.replace(sequence, frames=lambda: iter(frames), load_background=lambda: sample, load_truth=None)
+
+
 @cache
 def seen_scene():
     """A few seconds of it as pictures: people share blobs, shadows fall, the light jumps, a hand is before the lens."""
@@ -327,12 +337,7 @@ def seen_scene():
     ]
     scene = load("cross", ["group.passers.repeat=6", *size, *light])
     sequence = observe(scene, simulate(scene, 11), check=False, streams=("left",))
-    frames = list(sequence)
-    covered = frames[50].image.copy()
-    covered[:, :250] = (60, 120, 220)
-    frames[50] = dataclasses.replace(frames[50], image=covered)
-    sample = sequence.background()
-    return dataclasses.replace(sequence, frames=lambda: iter(frames), load_background=lambda: sample, load_truth=None)
+    return with_a_covered_picture(sequence)
 
 
 @cache
@@ -345,12 +350,7 @@ def paired_scene():
     entries = {e.name: e for e in resolve("subtraction-stereo", ["camera.fps=10", "duration=8"])}
     scene = entries["stereo-crowded"].scenario
     sequence = observe(scene, simulate(scene, 40_003), check=False, streams=("left", "right"))
-    frames = list(sequence)
-    covered = frames[50].image.copy()
-    covered[:, :250] = (60, 120, 220)
-    frames[50] = dataclasses.replace(frames[50], image=covered)
-    sample = sequence.background()
-    return dataclasses.replace(sequence, frames=lambda: iter(frames), load_background=lambda: sample, load_truth=None)
+    return with_a_covered_picture(sequence)
 
 
 @cache

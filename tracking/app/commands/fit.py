@@ -11,6 +11,7 @@ from scenarios.printable import printable
 from sim.types import Sequence as Recording
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.fitted_scores import fit_and_check_seeds, score_lines
 from tracking.app.fit_options import FitGroupingOptions, FitSensorOptions
 
 CHECK_SEEDS = range(30_000, 30_008)
@@ -85,17 +86,12 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     from tracking.fitting.grouping_scenes import pair_scenes
 
     out = option_parsing.output_file(options.out, ".toml")
-    asked = {"fitted": ("--seeds", options.seeds), "checked": ("--check", options.check)}
-    seeds = {key: option_parsing.seeds(text, option) for key, (option, text) in asked.items() if text is not None}
+    seeds = fit_and_check_seeds(options.seeds, options.check)
     samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
     belief = fit_belief(samples["fitted"])
     scores = {key: belief_scores(sample, belief.log_odds(sample.values)) for key, sample in samples.items()}
     words = " ".join(["flockscope fit grouping", *options.names, f"--seeds {options.seeds}"])
-    lines = [
-        f"{key}, seeds {numbers.start}:{numbers.stop}: "
-        + ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
-        for key, numbers in seeds.items()
-    ]  # fmt: skip
+    lines = score_lines(seeds, scores)
     write_file(out, belief.toml_text("\n".join([words, *lines])).encode())
     text = "\n".join([*lines, f"→ {out}: use it as --grouping {out}"])
     return CommandResult({"file": out, **scores}, text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.fitted_scores import fit_and_check_seeds, score_lines
 from tracking.app.fit_options import FitJointOptions
 
 
@@ -24,8 +25,7 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
     from tracking.papers.joint.config import JointConfig
 
     out = option_parsing.output_file(options.out, ".toml")
-    asked = {"fitted": ("--seeds", options.seeds), "checked": ("--check", options.check)}
-    seeds = {key: option_parsing.seeds(text, option) for key, (option, text) in asked.items() if text is not None}
+    seeds = fit_and_check_seeds(options.seeds, options.check)
     entries, lag = [entry for name in options.names for entry in resolve(name)], JointConfig().lag
     rows = {
         key: EventRows.joined(event_rows(simulated(e, seed), lag, seed) for e in entries for seed in numbers)
@@ -34,11 +34,7 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
     weights = fit_events(rows["fitted"])
     scores = {key: event_scores(part, weights) for key, part in rows.items()}
     words = " ".join(["flockscope fit joint", *options.names, f"--seeds {options.seeds}"])
-    lines = [
-        f"{key}, seeds {numbers.start}:{numbers.stop}: "
-        + ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
-        for key, numbers in seeds.items()
-    ]  # fmt: skip
+    lines = score_lines(seeds, scores)
     body = [f"{name} = {value}" for name, value in weights.items()]
     text = "\n".join([*(f"# {line}" for line in (words, *lines)), 'tracker = "joint"', "", "[params]", *body, ""])
     write_file(out, text.encode())

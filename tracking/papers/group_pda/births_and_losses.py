@@ -3,7 +3,7 @@
 A new group is tentative (without id). It is confirmed, and gets an id, once it has been measured long enough. A group
 without measurements for too long is lost; recapture gives its id to a newborn group that fits.
 
-Each function changes the bank of groups in place. Events of confirmed groups are returned as `BankEvent`s.
+Each function changes the bank of groups in place. Events of confirmed groups are returned as `WholeGroupEvent`s.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition
+from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association import walking_reach
-from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, GroupIds, alike_velocities, newborn
-from tracking.papers.group_pda.report import BankEvent
+from tracking.papers.group_pda.group_bank import GroupBank, alike_velocities, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 RECAPTURE_GATE = 13.28
@@ -89,7 +89,7 @@ def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: Scal
         born.P[k, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * scaled.config.split_speed) ** 2 * np.eye(2)
 
 
-def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[BankEvent]:
+def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[WholeGroupEvent]:
     """Give ids to tentative groups that were measured for longer than `confirm_time`; yield their events. t: s.
 
     A group that fits a confirmed group not measured in this frame takes over its id and age, without an event, if
@@ -112,9 +112,11 @@ def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) 
             id, parent = int(bank.id[row]), int(bank.parent[row])
             if parent != NO_ID and (bank.id == parent).any():
                 place = tuple(bank.origin[row].tolist())
-                yield BankEvent("split", float(bank.first_seen[row]), (parent,), tuple(sorted((parent, id))), place)
+                yield WholeGroupEvent(
+                    "split", float(bank.first_seen[row]), (parent,), tuple(sorted((parent, id))), place
+                )
             else:
-                yield BankEvent("enter", float(bank.first_seen[row]), (), (id,), place)
+                yield WholeGroupEvent("enter", float(bank.first_seen[row]), (), (id,), place)
 
 
 def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters) -> Iterator[tuple[int, int]]:
@@ -139,7 +141,7 @@ def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters)
         d2[i], d2[:, j] = np.inf, np.inf
 
 
-def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[BankEvent]:
+def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
     """Remove the groups that were not measured for too long, at time t (s); yield a leave event for each confirmed one.
 
     Too long is `confirm_time` for a tentative group, `coast_time` for a confirmed one, or `recapture_time` if that is
@@ -152,6 +154,6 @@ def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator
     for row in np.flatnonzero(dead & bank.confirmed).tolist():
         last_seen = float(bank.last_seen[row])
         place = bank.x[row, :2] - (t - last_seen) * bank.x[row, 2:]
-        yield BankEvent("leave", last_seen, (int(bank.id[row]),), (), tuple(place.tolist()))
+        yield WholeGroupEvent("leave", last_seen, (int(bank.id[row]),), (), tuple(place.tolist()))
     if dead.any():
         bank.keep(~dead)

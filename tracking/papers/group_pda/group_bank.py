@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.types import Array, Bools, Ints
+from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-NO_ID = -1
-"""Id of a tentative group."""
 LISTS = ("members", "recent_points")
 """Fields of GroupBank that are lists, not arrays."""
 
@@ -33,18 +32,6 @@ class MemberPlaces(NamedTuple):
     offset: Array
     last_seen: Array
     known: Bools
-
-
-class GroupIds:
-    """Gives fresh group ids, counted from 1; no id is given twice. State: next, the id that is given next."""
-
-    def __init__(self) -> None:
-        self.next = 1
-
-    def new(self) -> int:
-        """Return the next id, which was never returned before."""
-        self.next += 1
-        return self.next - 1
 
 
 @dataclass

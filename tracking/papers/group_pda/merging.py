@@ -20,10 +20,10 @@ from sim.truth.merge_split_rules import SPLIT_DISTANCE
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
+from tracking.grouping.whole_groups import NO_ID, WholeGroupEvent
 from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
 from tracking.papers.group_pda.event_onsets import REACH, PairHistory, PairMoment
-from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, MemberPlaces, alike_velocities
-from tracking.papers.group_pda.report import BankEvent
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, alike_velocities
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 HISTORY_TIME = 5.0
@@ -60,7 +60,7 @@ class GroupMerging:
     def __init__(self) -> None:
         self.histories: dict[Pair, PairHistory] = {}
 
-    def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[BankEvent]:
+    def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
         """Merge the groups for which R_x (near, with like velocities) has held for `merge_time`; yield their events. t:
         s.
 
@@ -91,7 +91,7 @@ class GroupMerging:
             heir = int(union.id[0])
             bank.parent[np.isin(bank.parent, ids)] = heir
             kind = "merge" if len(present) > 1 else "enter"
-            yield BankEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
+            yield WholeGroupEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
 
     def _extended(self, pair: NearPair) -> PairHistory:
         """Returns the pair's history with this frame's moment added and moments older than 5 s dropped; stores nothing.

@@ -1,7 +1,7 @@
 """What `group-pda` reports in a frame: the confirmed groups with their hulls, and the events.
 
 Input: the bank of groups, whose lengths are in the unit of the points (m on the ground or px in the image), and the
-frame's events as `BankEvent`s. Output: the `Tracks` of the frame with unit "group".
+frame's events as `WholeGroupEvent`s. Output: the `Tracks` of the frame with unit "group".
 """
 
 from __future__ import annotations
@@ -11,26 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.geometry.hull_kernels import convex_hulls
-from sim.types import Array, GroupEvent, Groups, Plane, Tracks
+from sim.types import Array, Groups, Plane, Tracks
+from tracking.grouping.whole_groups import WholeGroupEvent, reported_event
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
-
-
-@dataclass(frozen=True)
-class BankEvent:
-    """A change of the set of confirmed groups.
-
-    kind: "merge", "split", "enter" or "leave". onset: time, s, when it began. before, after: ids (tuples) of the groups
-    concerned before and after the change, sorted; () before an enter of one group and after a leave. pos: x, y in the
-    unit of the points (m or px).
-    """
-
-    kind: str
-    onset: float
-    before: tuple[int, ...]
-    after: tuple[int, ...]
-    pos: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -49,7 +34,9 @@ class ReportFrame:
     outline: Array
 
 
-def report_tracks(bank: GroupBank, events: list[BankEvent], scaled: ScaledParameters, frame: ReportFrame) -> Tracks:
+def report_tracks(
+    bank: GroupBank, events: list[WholeGroupEvent], scaled: ScaledParameters, frame: ReportFrame
+) -> Tracks:
     """Return Tracks with unit "group", sorted by id, of the confirmed groups measured within the last `report_coast` s.
 
     Positions, velocities and covariances are those of the centroids, in m or px and s. The reported size is N, the
@@ -71,7 +58,7 @@ def report_tracks(bank: GroupBank, events: list[BankEvent], scaled: ScaledParame
     )
     return Tracks(
         frame.index, frame.t, frame.plane, "group", id, id.copy(), x[:, :2].copy(), x[:, 2:].copy(), bank.P[rows],
-        None, np.ones(len(rows)), groups, tuple(_group_event(e, frame) for e in events),
+        None, np.ones(len(rows)), groups, tuple(reported_event(e, frame.index, frame.t, frame.fps) for e in events),
     )  # fmt: skip
 
 
@@ -80,8 +67,3 @@ def _hulls(places: list[Array], outline: Array) -> tuple[Array, ...]:
     all in one unit (m or px)."""
     # The places on their own hull suffice, and are few.
     return convex_hulls([(corner[:, None] + outline).reshape(-1, 2) for corner in convex_hulls(places)])
-
-
-def _group_event(event: BankEvent, frame: ReportFrame) -> GroupEvent:
-    start = min(max(frame.index - round((frame.t - event.onset) * frame.fps), 1), frame.index)
-    return GroupEvent(event.kind, start, frame.index, frame.index, event.before, event.after, (), event.pos)

@@ -13,16 +13,16 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.filters.components import partition
+from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.event_onsets import split_onset
-from tracking.papers.group_pda.group_bank import NO_ID, GroupBank, GroupIds, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, newborn
 from tracking.papers.group_pda.missed_members import thinned
-from tracking.papers.group_pda.report import BankEvent
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 
 def split(
     bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
-) -> BankEvent | None:
+) -> WholeGroupEvent | None:
     """Replace the group in `row` by those that its points (M, 2) form under G_y; return the event of a confirmed group.
 
     G_y: linked points are one group, and such components whose regions overlap. weights (M,): people each point stands
@@ -40,7 +40,7 @@ def split(
         bank.null_time[row] = 0.0
         if group.max(initial=-1) == 0:
             return None
-        leave = BankEvent("leave", t, (int(bank.id[row]),), (), tuple(bank.x[row, :2].tolist()))
+        leave = WholeGroupEvent("leave", t, (int(bank.id[row]),), (), tuple(bank.x[row, :2].tolist()))
         bank.remove(row)
         return leave if confirmed else None
     parts = children(bank, row, points, weights, group, scaled, t)
@@ -50,7 +50,9 @@ def split(
         parts.id[:] = [bank.id[row] if k == largest else ids.new() for k in range(len(parts))]
     two = [thinned(points[group == k]) for k in (largest, other)]
     onset, place = split_onset(bank.recent_points[row], two, scaled.metres_per_unit, scaled.body_cov, t)
-    event = BankEvent("split", onset, (int(bank.id[row]),), tuple(sorted(parts.id.tolist())), tuple(place.tolist()))
+    event = WholeGroupEvent(
+        "split", onset, (int(bank.id[row]),), tuple(sorted(parts.id.tolist())), tuple(place.tolist())
+    )
     bank.remove(row)
     bank.add(parts)
     return event if confirmed else None

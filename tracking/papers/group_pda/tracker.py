@@ -71,6 +71,7 @@ import numpy as np
 
 from sim.geometry.footprints import FOOTPRINT
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
+from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent
 from tracking.image_scale import required
 from tracking.papers.group_pda.association import (
     PointClaims,
@@ -85,10 +86,10 @@ from tracking.papers.group_pda.colour import colour_bins, colour_log_ratio, upda
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.duplicate_groups import DuplicateGroups
 from tracking.papers.group_pda.from_pixels import ForegroundPoints, sine_tilt
-from tracking.papers.group_pda.group_bank import GroupBank, GroupIds
+from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.merging import GroupMerging
 from tracking.papers.group_pda.missed_members import remember, with_missed_members
-from tracking.papers.group_pda.report import BankEvent, ReportFrame, report_tracks
+from tracking.papers.group_pda.report import ReportFrame, report_tracks
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.papers.group_pda.splitting import split
 
@@ -161,7 +162,7 @@ class GroupPda:
             bank.colour_hist = np.zeros((len(bank), scaled.colour_bins))
         self.innovation = []
         bank.predict(scaled)
-        events: list[BankEvent] = []
+        events: list[WholeGroupEvent] = []
         if points is not None:
             events += self._measure(points, weights, scaled, t)
         self.duplicates.step(bank, scaled, t)
@@ -235,7 +236,7 @@ class GroupPda:
         self.scaled = scale_parameters(self.config, self.context.fps, scale, sine_tilt=sine)
         return self.scaled
 
-    def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> list[BankEvent]:
+    def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> list[WholeGroupEvent]:
         """Gate, associate and update (sec. 4), split, and add newborn groups (sec. 3.3); returns the events of splits.
 
         points (M, 2) in m or px; weights (M,): people each stands for; t: s. The bank and `innovation` are changed. An
@@ -258,7 +259,7 @@ class GroupPda:
         add_newborns(bank, points[free], weights[free], expected, scaled, t)
         return events
 
-    def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> list[BankEvent]:
+    def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> list[WholeGroupEvent]:
         """Split the groups that had no feasible association for `split_time`; returns events.
 
         claims: which points each group may have. mine (G, M) bool: points of each group; t: s. An event may be a split,

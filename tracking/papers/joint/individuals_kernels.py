@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from sim.compiler import njit
@@ -69,14 +67,3 @@ def own_dynamics(new: Array, old: Array, precision: Array, log_scale: float, dt:
                 residual[d] = new[i, k, d] - (old[i, k, d] + dt * old[i, k, d + 2])
                 residual[d + 2] = new[i, k, d + 2] - old[i, k, d + 2]
             out[i, k] = log_normal(residual, precision, log_scale)
-
-
-@njit(cache=True)
-def log_sum_rows(values: Array, out: Array) -> None:
-    """Write log(sum(exp(values))) over the last axis of values (R, N), (R,)."""
-    for r in range(values.shape[0]):
-        top = values[r].max()
-        total = 0.0
-        for k in range(values.shape[1]):
-            total += math.exp(values[r, k] - top)
-        out[r] = top + math.log(total)

@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.types import Array, Bools, Ints
+from tracking.detect.point_detections import followed_sizes
 from tracking.filters import kalman
 from tracking.filters.assignment import optimal
 
-BOX_TIME = 0.5
-"""Time constant with which the size of a person's box follows measured boxes, s."""
 NEWCOMER_NOISE = 1.0
 """Standard deviation of the acceleration of a person who is not confirmed, m/s^2."""
 
@@ -51,8 +50,7 @@ class People:
         self.missed += dt
         self.missed[rows] = 0.0
         if sizes is not None:
-            old = self.size[rows]
-            self.size[rows] = np.where(np.isnan(old), sizes, sizes + (old - sizes) * np.exp(-dt / BOX_TIME))
+            self.size[rows] = followed_sizes(self.size[rows], sizes, dt)
 
 
 @dataclass

@@ -41,6 +41,7 @@ from sim.rng import rng
 from sim.truth.identity import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
+from tracking.detect.point_detections import boxes_at, ordered_points
 from tracking.grouping import reported_groups
 from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
@@ -155,10 +156,7 @@ class Joint:
         if detections is None:
             return np.zeros((0, 2)), None
         self.plane = "image" if detections.plane == "image" else "ground"
-        order = np.lexsort(detections.pos[:, 1::-1].T)
-        boxed = self.plane == "image" and detections.box is not None
-        sizes = detections.box[order, 2:] if boxed and detections.box is not None else None
-        return np.ascontiguousarray(detections.pos[order, :2] / self.unit), sizes
+        return ordered_points(detections, self.unit)
 
     def _associate(self, points: Array) -> tuple[Ints, Ints]:
         """Returns rows and columns (R,) of people and their points (M, 2), m, by predicted means and covariances."""
@@ -251,7 +249,7 @@ class Joint:
         weights = n.component_weights() if c.weights == "people" else np.repeat(joint[:, None], len(id), axis=1)
         mean, cov = estimate.moments(n.x[..., :STATE], weights)
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
-        box = reported_groups.boxes(pos, self.people.size) if self.plane == "image" else None
+        box = boxes_at(pos, self.people.size) if self.plane == "image" else None
         self.shown = np.zeros((0, 4)) if box is None else box
         group = reported_groups.group_ids(self.identities, frame.index, id, self._groups(joint))
         groups = reported_groups.no_groups(group)

@@ -7,9 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-
-BOX_TIME = 0.5
-"""Time constant with which the size of a person's box follows measured boxes, s (ours)."""
+from tracking.detect.point_detections import followed_sizes
 
 
 @dataclass
@@ -47,8 +45,7 @@ class Slots:
             return
         best = pairs.argmax(axis=1)
         sure = pairs[np.arange(len(best)), best] > 0.5
-        old, new = self.size[sure], sizes[best[sure]]
-        self.size[sure] = np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt[sure, None] / BOX_TIME))
+        self.size[sure] = followed_sizes(self.size[sure], sizes[best[sure]], dt[sure, None])
 
     def name(self, rows: Bools) -> None:
         """Give new ids to the people where `rows` (K,) is True who have none."""

@@ -42,6 +42,7 @@ import numpy as np
 from sim.rng import rng
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
+from tracking.detect.point_detections import boxes_at, ordered_points
 from tracking.grouping import reported_groups
 from tracking.image_scale import required
 from tracking.papers.relational import report, sensor, transition_kernels
@@ -153,13 +154,10 @@ class Particle:
     def _measure(self, detections: Detections) -> None:
         """Weigh the particles by a frame's detections; remove people and start new ones.
 
-        Detections are taken in order of x, then y, so that their order has no effect.
+        Sets `plane`.
         """
         self.plane = "image" if detections.plane == "image" else "ground"
-        order = np.lexsort(detections.pos[:, 1::-1].T)
-        points = np.ascontiguousarray(detections.pos[order, :2] / self.unit)
-        image_boxes = self.plane == "image" and detections.box is not None
-        sizes = detections.box[order, 2:] if image_boxes and detections.box is not None else None
+        points, sizes = ordered_points(detections, self.unit)
         missed = self.slots.missed > 0
         said = sensor.weigh(self.particles, points, self._detection_probability(), missed, self.noise, self.config)
         self.vanished += said.vanished
@@ -220,7 +218,7 @@ class Particle:
         score, id = np.minimum(exist[rows], 1.0), self.slots.id[rows]
         if self.plane == "image":
             pos, vel, cov = pos * self.unit, vel * self.unit, cov * self.unit**2
-        box = reported_groups.boxes(pos, self.slots.size[rows]) if self.plane == "image" else None
+        box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
         found = Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
         return self._with_groups(found, rows, (place, velocity))
 

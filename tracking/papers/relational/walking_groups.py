@@ -12,23 +12,18 @@ the truth's merge and split rules. Its onset is the first frame of this stretch.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from sim.truth.identity import GroupChange
-from sim.truth.merge_split_rules import (
-    MERGE_DISTANCE,
-    MERGE_VELOCITY,
-    SPLIT_DISTANCE,
-    SPLIT_VELOCITY,
-    frames_of,
-)  # fmt: skip
+from sim.truth.merge_split_rules import Separation, frames_of
 from sim.types import Array, Bools, GroupEvent, Ints
 from tracking.grouping.belief_partition import partition
 from tracking.grouping.group_labels import LinkedPeople
 from tracking.grouping.link_rule import ARRIVAL
-from tracking.grouping.merge_split_events import BRIDGED, LinkSwitch, onset_of_change
+from tracking.grouping.merge_split_events import BRIDGED, LinkSwitch
 from tracking.papers.relational.config import RelationalConfig
 
 SURE = 0.01
@@ -118,11 +113,9 @@ class WalkingGroups:
 
     def _follow_stretches(self, now: PeopleNow, bridge: int) -> None:
         """Bring `begun` and `lasted` up to date; bridge: frames of a gap that does not end a stretch."""
-        apart, differ = (np.linalg.norm(x[:, None] - x, axis=2) for x in (now.pos, now.vel))
-        near = (apart < MERGE_DISTANCE) & (differ < MERGE_VELOCITY)
+        found = Separation(*(np.linalg.norm(x[:, None] - x, axis=2) for x in (now.pos, now.vel)))
         both = now.seen[:, None] & now.seen
-        far = (apart > SPLIT_DISTANCE) | ((apart > MERGE_DISTANCE) & (differ > SPLIT_VELOCITY))
-        for kind, flag in ((NEAR, near & both), (FAR, far & both)):
+        for kind, flag in ((NEAR, found.merge_rule() & both), (FAR, found.split_rule() & both)):
             new = flag & (now.frame - self.lasted[kind] > bridge)
             self.begun[kind][new] = now.frame
             self.lasted[kind][flag] = now.frame
@@ -192,6 +185,18 @@ class WalkingGroups:
         group = self._group(now)
         known, count = np.unique(group[now.shown], return_counts=True)
         return np.where(np.isin(group, known[count > 1]), group, -1)
+
+
+def onset_of_change(change: GroupChange, t: int, switched: Sequence[LinkSwitch]) -> int:
+    """Return the first onset among the switches of links that caused the change of groups in frame t; t if there is
+    none.
+
+    They are the links set (merge, form, enter) or removed (split, dissolve, leave) between two of its people. switched:
+    the links switched in frame t, as (a, b, True if set, first frame of the cause).
+    """
+    people = set(change.members)
+    joins = change.kind in ("merge", "form", "enter")
+    return min((since for a, b, on, since in switched if on == joins and a in people and b in people), default=t)
 
 
 def changed(log_odds: Array, join: float, part: float, seconds: Array) -> Array:

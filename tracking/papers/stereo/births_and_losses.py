@@ -10,21 +10,9 @@ import numpy as np
 
 from sim.types import Ints
 from tracking.detect.features import SpacePoints
+from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.report import SpaceEvent
-from tracking.papers.stereo.space_group import NO_ID, Motion3D, SpaceGroup, newborn
-
-
-class SpaceIds:
-    """Gives group ids, counted from 1. State: next, the id that is given next."""
-
-    def __init__(self) -> None:
-        self.next = 1
-
-    def new(self) -> int:
-        """Return the next id, which was never returned before."""
-        self.next += 1
-        return self.next - 1
+from tracking.papers.stereo.space_group import Motion3D, SpaceGroup, newborn
 
 
 def born(points: SpacePoints, group: Ints, former: Ints, motion: Motion3D, t: float) -> list[SpaceGroup]:
@@ -44,7 +32,7 @@ def born(points: SpacePoints, group: Ints, former: Ints, motion: Motion3D, t: fl
     return made
 
 
-def confirm(groups: list[SpaceGroup], config: StereoConfig, t: float, ids: SpaceIds) -> list[SpaceEvent]:
+def confirm(groups: list[SpaceGroup], config: StereoConfig, t: float, ids: GroupIds) -> list[WholeGroupEvent]:
     """Give ids to tentative groups that have been measured for `confirm_time`, and return the events.
 
     An event is a split if the group is a child of a group that exists, else an enter; its onset is when the group was
@@ -57,19 +45,19 @@ def confirm(groups: list[SpaceGroup], config: StereoConfig, t: float, ids: Space
         g.id = ids.new()
         pos = (float(g.pos[0]), float(g.pos[1]))
         if g.parent in alive:
-            events.append(SpaceEvent("split", g.first_seen, (g.parent,), tuple(sorted((g.parent, g.id))), pos))
+            events.append(WholeGroupEvent("split", g.first_seen, (g.parent,), tuple(sorted((g.parent, g.id))), pos))
         else:
-            events.append(SpaceEvent("enter", g.first_seen, (), (g.id,), pos))
+            events.append(WholeGroupEvent("enter", g.first_seen, (), (g.id,), pos))
     return events
 
 
-def remove_lost(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[SpaceEvent]:
+def remove_lost(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
     """Delete groups without measurements for too long, in place, and return the leave events of confirmed ones."""
     events, kept = [], []
     for g in groups:
         if t - g.last_seen <= (config.coast_time if g.confirmed else config.confirm_time) + 1e-9:
             kept.append(g)
         elif g.id != NO_ID:
-            events.append(SpaceEvent("leave", t, (g.id,), (), (float(g.pos[0]), float(g.pos[1]))))
+            events.append(WholeGroupEvent("leave", t, (g.id,), (), (float(g.pos[0]), float(g.pos[1]))))
     groups[:] = kept
     return events

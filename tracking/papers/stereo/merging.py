@@ -20,8 +20,8 @@ from scipy.sparse.csgraph import connected_components
 
 from sim.types import Array
 from tracking.filters.ellipsoid_overlap import separation
+from tracking.grouping.whole_groups import WholeGroupEvent
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.report import SpaceEvent
 from tracking.papers.stereo.space_group import SpaceGroup
 
 SETTLED = 1.0
@@ -37,7 +37,7 @@ class SpaceMerging:
     def __init__(self) -> None:
         self.since: dict[tuple[int, int], float] = {}
 
-    def step(self, groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[SpaceEvent]:
+    def step(self, groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
         """Merge groups of the list, in place, at time t (s) and return the events: merge, or enter.
 
         An event is an enter if at most one of the groups was there for 1 s before the onset.
@@ -91,7 +91,7 @@ def _connected(able: Sequence[SpaceGroup], due: list[tuple[int, int]]) -> list[l
     return [[able[k] for k in np.flatnonzero(label == c).tolist()] for c in np.unique(label[i]).tolist()]
 
 
-def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], onset: float) -> SpaceEvent:
+def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], onset: float) -> WholeGroupEvent:
     """Replaces the parts by their union in the list, and returns the event. The group with most points survives."""
     kept = max(parts, key=lambda g: (g.count, -g.id))
     counts = np.array([g.count for g in parts])
@@ -106,5 +106,5 @@ def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], onset: float) -> S
     groups[:] = [g for g in groups if g is kept or g not in parts]
     x, y = kept.pos[:2].tolist()
     if len(settled) < 2:
-        return SpaceEvent("enter", onset, (), (kept.id,), (x, y))
-    return SpaceEvent("merge", onset, before, (kept.id,), (x, y))
+        return WholeGroupEvent("enter", onset, (), (kept.id,), (x, y))
+    return WholeGroupEvent("merge", onset, before, (kept.id,), (x, y))

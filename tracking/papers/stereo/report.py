@@ -13,24 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.geometry.hull_kernels import convex_hulls
-from sim.types import Array, GroupEvent, Groups, Plane, Tracks
+from sim.types import Array, Groups, Plane, Tracks
+from tracking.grouping.whole_groups import WholeGroupEvent, reported_event
 from tracking.papers.stereo.measurement import POS, VEL
 from tracking.papers.stereo.space_group import SpaceGroup
-
-
-@dataclass(frozen=True)
-class SpaceEvent:
-    """A change of the set of confirmed groups.
-
-    kind: "merge", "split", "enter" or "leave". onset: time, s, when it began. before, after: ids of the groups
-    concerned before and after the change, sorted. pos: x, y, m.
-    """
-
-    kind: str
-    onset: float
-    before: tuple[int, ...]
-    after: tuple[int, ...]
-    pos: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -51,7 +37,7 @@ class ShownFrame:
 
 
 def space_tracks(
-    groups: Sequence[SpaceGroup], events: Sequence[SpaceEvent], report_coast: float, shown: ShownFrame
+    groups: Sequence[SpaceGroup], events: Sequence[WholeGroupEvent], report_coast: float, shown: ShownFrame
 ) -> Tracks:
     """Return the Tracks, with unit "group", of the confirmed groups measured within the last `report_coast` s.
 
@@ -74,7 +60,7 @@ def space_tracks(
     found = Groups(id, tuple(np.zeros(0, np.int64) for _ in rows), pos, vel, s**2 * extent, size, hulls)
     return Tracks(
         shown.index, shown.t, shown.plane, "group", id, id.copy(), pos.copy(), vel.copy(), s**2 * P,
-        None, np.ones(len(rows)), found, tuple(_group_event(e, shown) for e in events),
+        None, np.ones(len(rows)), found, tuple(reported_event(e, shown.index, shown.t, shown.fps, s) for e in events),
     )  # fmt: skip
 
 
@@ -84,10 +70,3 @@ def expected_places(offset: Array, cov: Array, spread: Array) -> Array:
     cov (M, 3, 3): covariances of the measured places; spread (3, 3): covariance of the members' places.
     """
     return np.asarray((spread @ np.linalg.solve(spread + cov, offset[..., None]))[..., 0])
-
-
-def _group_event(event: SpaceEvent, shown: ShownFrame) -> GroupEvent:
-    start = min(max(shown.index - round((shown.t - event.onset) * shown.fps), 1), shown.index)
-    x, y = event.pos
-    place = (x * shown.scale, y * shown.scale)
-    return GroupEvent(event.kind, start, shown.index, shown.index, event.before, event.after, (), place)

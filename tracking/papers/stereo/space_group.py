@@ -17,14 +17,13 @@ import numpy as np
 
 from sim.types import Array
 from tracking.detect.features import SpacePoints
+from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.measurement import POS, VEL, Measurement, measured_state, state_jacobian
 
 if TYPE_CHECKING:
     from filterpy.kalman import ExtendedKalmanFilter
 
-NO_ID = -1
-"""Id of a tentative group."""
 LEAST_VARIANCE = 1e-6
 """m^2, m^2/s^2: least eigenvalue of a spread."""
 

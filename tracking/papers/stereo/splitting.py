@@ -11,8 +11,9 @@ import numpy as np
 
 from sim.types import Ints
 from tracking.detect.features import SpacePoints
+from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo.measurement import VEL
-from tracking.papers.stereo.space_group import NO_ID, Motion3D, SpaceGroup, newborn
+from tracking.papers.stereo.space_group import Motion3D, SpaceGroup, newborn
 
 
 def split(group: SpaceGroup, points: SpacePoints, part: Ints, motion: Motion3D, t: float) -> list[SpaceGroup]:

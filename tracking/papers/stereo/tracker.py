@@ -27,9 +27,10 @@ import numpy as np
 from sim.geometry.footprints import FOOTPRINT
 from sim.types import Context, Detections, Frame, Ints, Plane, Tracks
 from tracking.detect.features import SpacePoints
+from tracking.grouping.whole_groups import NO_ID, GroupIds
 from tracking.image_scale import required
 from tracking.papers.stereo.association import associated
-from tracking.papers.stereo.births_and_losses import SpaceIds, born, confirm, remove_lost
+from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import POS, Measurement, PairMeasurement, PlaceMeasurement
@@ -37,7 +38,7 @@ from tracking.papers.stereo.merging import SpaceMerging
 from tracking.papers.stereo.picture_points import PicturePoints
 from tracking.papers.stereo.point_links import PointLinks
 from tracking.papers.stereo.report import ShownFrame, expected_places, space_tracks
-from tracking.papers.stereo.space_group import NO_ID, SpaceGroup, measure, motion_model, predict
+from tracking.papers.stereo.space_group import SpaceGroup, measure, motion_model, predict
 from tracking.papers.stereo.splitting import split
 
 FEATURE_OUTLINE = 0.5
@@ -69,7 +70,7 @@ class Stereo:
         del seed
         self.context = context
         self.groups: list[SpaceGroup] = []
-        self.ids, self.merging = SpaceIds(), SpaceMerging()
+        self.ids, self.merging = GroupIds(), SpaceMerging()
         self.pictures = None if context.background is None else PicturePoints(self.config, context)
         self.links, self.motion = PointLinks(context.fps), motion_model(self.config, 1 / context.fps)
         self.measurement: Measurement = (

@@ -13,12 +13,13 @@ from scipy.stats import chi2
 
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
+from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association import PointClaims, point_log_density, shares
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import GroupBank, GroupIds, MemberPlaces, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.merging import GroupMerging, merged
 from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
 from tracking.papers.group_pda.splitting import split

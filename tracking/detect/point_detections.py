@@ -1,0 +1,43 @@
+"""Detections as places in metres, and boxes of people who are tracked as points.
+
+For trackers of points that report people with boxes: in the image a person keeps the size of the boxes that were
+measured, which follows them slowly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Detections
+
+BOX_TIME = 0.5
+"""Time constant with which the size of a person's box follows measured boxes, s."""
+
+
+def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array | None]:
+    """Return places (M, 2), m, and sizes of boxes (M, 2): width, height, px, None on the ground or without boxes.
+
+    They are in order of x, then y, so that the order of detections has no effect. unit: length of a metre in the unit
+    of the detections' positions.
+    """
+    order = np.lexsort(detections.pos[:, 1::-1].T)
+    sizes = None
+    if detections.plane == "image" and detections.box is not None:
+        sizes = detections.box[order, 2:]
+    return np.ascontiguousarray(detections.pos[order, :2] / unit), sizes
+
+
+def followed_sizes(old: Array, new: Array, dt: Array | float) -> Array:
+    """Return the sizes of boxes (N, 2), px, after boxes of sizes `new` (N, 2) were measured.
+
+    old (N, 2): sizes before, nan if none was measured. dt: s since then, a number or (N, 1).
+    """
+    return np.asarray(np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt / BOX_TIME)))
+
+
+def boxes_at(pos: Array, size: Array) -> Array | None:
+    """Return boxes (N, 4) left, top, width, height in px with the centres pos (N, 2) px; None if a size is unknown.
+
+    size (N, 2): width, height, px, nan if unknown.
+    """
+    return np.concatenate([pos - size / 2, size], axis=1) if np.isfinite(size).all() else None
