@@ -63,7 +63,7 @@ def run(name: str, config: ParticleConfig, seed: int, sequence: Sequence) -> tup
 
 def particles(given: argparse.Namespace) -> None:
     """Prints a table for each scene: rows are numbers of particles, columns both filters and their difference."""
-    for entry in (e for e in resolve("suite:occlusion") if given.entry in (None, e.name)):
+    for entry in (e for e in resolve("suite:occlusion") if not given.entry or e.name in given.entry.split(",")):
         train = [(seed, simulate(entry.scenario, seed, 0, ())) for seed in TRAINING]
         test = [(seed, simulate(entry.scenario, seed, 0, ())) for seed in given.seeds]
         print(f"\n{entry.name}: error per person and frame, m; seeds {given.seeds.start}:{given.seeds.stop}\n")

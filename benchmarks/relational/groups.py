@@ -26,8 +26,9 @@ from tracking.tracker_registry import find
 
 COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
 DEPARTURES = (
-    "", "outlier_share=0", "hidden_time=0.3", "noise_scale=1", "weights=joint", "resample_share=1",
-    "resampling=systematic", "newcomer_share=0", "least_existence=0", "join_rate=10 part_rate=10",
+    "", "weights=joint", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
+    "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
+    "least_existence=0", "birth_doubt=0.9", "survival_time=1000", "clutter_density=0.02",
 )  # fmt: skip
 """Settings of the ablation; the first one is the defaults."""
 NEAR = 1.0
@@ -36,13 +37,14 @@ BINS = 5
 
 
 def _sequences(given: argparse.Namespace, suite: str) -> Iterator[tuple[str, int, Sequence]]:
-    for entry in resolve(f"suite:{suite}"):
+    for entry in (e for e in resolve(f"suite:{suite}") if not given.entry or e.name in given.entry.split(",")):
         for seed in given.seeds:
             yield entry.name, seed, simulate(entry.scenario, seed, 0, ())
 
 
 def _tracked(name: str, seed: int, sequence: Sequence, given: argparse.Namespace) -> list[Tracks]:
-    config = None if name == "blob" else config_of(name, given.counts[0], given)
+    own = ["groups=posterior"] if name == "relational" else []
+    config = None if name == "blob" else config_of(name, given.counts[0], given).with_set(*own)
     ready = prepare(name, sequence, params=config, detections="file")
     ready.reset(seed)
     return [ready.step(frame) for frame in ready.frames()]
@@ -55,7 +57,7 @@ def scores(given: argparse.Namespace) -> None:
     for _, seed, q in _sequences(given, given.suite):
         found = {name: _tracked(name, seed, q, given) for name in ("blob", "particle", "relational")}
         rows = {f"{name}, rule": with_groups(without_groups(t), q.fps, q.px_per_m) for name, t in found.items()}
-        for name in ("particle", "relational"):
+        for name in found:
             bare = without_groups(found[name])
             rows[f"{name}, belief"] = with_groups(bare, q.fps, q.px_per_m, default_belief())
         rows["relational, own groups"] = with_groups(found["relational"], q.fps, q.px_per_m)
@@ -124,17 +126,18 @@ def _same(a: int, b: int) -> float:
 
 
 def ablation(given: argparse.Namespace) -> None:
-    """Prints a table: rows are settings, columns the error and scores on the suite occlusion, means over sequences."""
+    """Prints a table: rows are settings, columns the error and scores on a suite, means; groups by the belief."""
     warnings.simplefilter("ignore")
-    sequences = list(_sequences(given, "occlusion"))
-    print(f"\nsuite occlusion, {len(sequences)} sequences, {given.counts[0]} particles\n")
+    sequences = list(_sequences(given, given.suite))
+    print(f"\nsuite {given.suite}, {len(sequences)} sequences, {given.counts[0]} particles\n")
     tables.head(["setting", "error, m", *COLUMNS])
     for setting in DEPARTURES:
         changed = argparse.Namespace(**{**vars(given), "set": [*given.set, *setting.split()]})
         rows = []
         for _, seed, q in sequences:
             tracks = _tracked("relational", seed, q, changed)
-            scored = tracking.evaluate(q.truth, with_groups(tracks, q.fps, q.px_per_m))
+            bare = without_groups(tracks)
+            scored = tracking.evaluate(q.truth, with_groups(bare, q.fps, q.px_per_m, default_belief()))
             rows.append([errors(q.truth, tracks).mean(), *(scored.get(key, np.nan) for key in COLUMNS)])
         means = np.nanmean(np.array(rows), axis=0)
         tables.row([setting or "defaults", *(f"{value:.3f}" for value in means)])

@@ -99,7 +99,7 @@ def label_people(
         changes = state.step(t, _dated(state, t, switched, motion), arrival)
         for g, people in state.identities.groups.items():
             group[t:until, sorted(people)] = g
-        found = (event_of_change(c, t, _parts(c, old, state), motion, arrival) for c in changes)
+        found = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in changes)
         events += [e for e in found if e is not None]
     return _without_singles(frame, group[frame, column]), events
 
@@ -118,8 +118,8 @@ def _dated(
     ]
 
 
-def _parts(change: GroupChange, old: Members, state: LinkedPeople) -> Parts:
-    """Returns the groups and people alone that a change joined, or into which it divided a group.
+def parts_of_change(change: GroupChange, old: Members, state: LinkedPeople) -> Parts:
+    """Return the groups and people alone that a change joined, or into which it divided a group.
 
     old: members of the groups before the change; state: after it. People who are absent are left out.
     """

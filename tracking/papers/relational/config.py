@@ -45,11 +45,18 @@ class ParticleConfig(BackgroundSettings):
         "residual", ("residual", "systematic"), "", "residual: as in sec. 2.1; systematic: ours", "categorical"
     )
 
+    kernel_width: float = param(
+        1.0,
+        (0.0, 3.0),
+        "",
+        "resampled particles are drawn apart by a kernel of so many optimal widths; 0: none (ours)",
+        before=0.0,
+    )
     weights: str = param(
         "factorised",
         ("factorised", "joint"),
         "",
-        "factorised: people who share no detection and do not walk together have weights of their own (ours); joint: a "
+        "factorised: people whose detections are clear have weights of their own (ours); joint: a "
         "particle has one weight (the paper)",
         "categorical",
         before="joint",
@@ -106,6 +113,13 @@ class ParticleConfig(BackgroundSettings):
         "standard deviation of a displaced position, per axis, at least that of a position (ours)",
         "log",
     )
+    body_radius: float = param(
+        0.25,
+        (0.0, 0.6),
+        "m",
+        "half the width of a body that hides others from a known camera; 0: nobody does (ours)",
+        before=0.0,
+    )
     detect_prob: float = param(
         0.95, (0.3, 1.0), "probability", "that a person who was measured in the last frame is measured (ours)"
     )
@@ -156,6 +170,11 @@ class ParticleConfig(BackgroundSettings):
         return self.detect_prob == 1 and self.clutter_density == 0
 
     @property
+    def one_weight(self) -> bool:
+        """True if a particle has one weight for all people: in joint mode and with the paper's sensor."""
+        return self.weights == "joint" or self.certain_sensor
+
+    @property
     def speed_ends(self) -> Array:
         """The upper ends of the first four rows of the speed table, (4,), m/s."""
         return np.array([self.speed_1, self.speed_2, self.speed_3, self.speed_4])
@@ -189,12 +208,12 @@ class RelationalConfig(ParticleConfig):
     newcomer_share: float = param(
         0.5, (0.0, 1.0), "probability", "that a new person near a group belongs to it (sec. 3.2)"
     )
-    together: float = param(
-        0.5, (0.05, 0.95), "probability", "two people are in one group if they walk together with at least this (ours)"
-    )
-    join_rate: float = param(
-        1.0, (1e-6, 10.0), "1/s", "rate at which strangers join a group: the smaller, the later a merge (ours)", "log"
-    )
-    part_rate: float = param(
-        1.0, (1e-6, 10.0), "1/s", "rate at which members leave a group: the smaller, the later a split (ours)", "log"
+    groups: str = param(
+        "tracks",
+        ("tracks", "posterior"),
+        "",
+        "tracks: groups are derived from the tracks, as for other trackers of people; posterior: from the "
+        "probabilities that two people walk together (ours)",
+        "categorical",
+        before="posterior",
     )

@@ -1,7 +1,8 @@
-"""Whether people are behind the pillars and walls of a known scene: the belief in occlusion of sec. 2.1.1.
+"""Who is hidden from the camera: the belief in occlusion of sec. 2.1.1.
 
-A person is taken as hidden if the line from a pinhole camera to the middle of the body meets a pillar or a wall. People
-do not hide each other here. Without a pinhole camera or a scene nobody is hidden.
+A person is taken as hidden if the line from a pinhole camera to the middle of the body meets a pillar or a wall of a
+known scene, or if the bodies of others leave too little of the own to be seen. Without a pinhole camera nobody is
+hidden.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Camera, Scene
+from tracking.papers.relational import occluder_kernels
+from tracking.papers.relational.particle_set import ParticleSet
 
 MIDDLE = 0.85
 """Height of the middle of a body, m."""
@@ -51,3 +54,22 @@ def _behind_wall(pos: Array, wall: Array, top: float, eye: Array) -> Bools:
 def _height(along: Array, eye: Array) -> Array:
     """Returns the height of the line to the middle of a body at a share `along` of it, m."""
     return np.asarray(eye[2] + along * (MIDDLE - eye[2]))
+
+
+HEIGHT = 1.7
+"""Height of a body, m."""
+LEAST_VISIBLE = 0.2
+"""A person is hidden if a smaller share of the body is visible."""
+
+
+def covered_by_people(particles: ParticleSet, camera: Camera | None, radius: float) -> tuple[Array, Array]:
+    """Return the probabilities (K,) that each person is hidden behind another one, and that the feet are (ours).
+
+    radius: half the width of a body, m; 0: people hide nobody, nor do they without a pinhole camera.
+    """
+    p, hidden, cut = particles, np.zeros(particles.people), np.zeros(particles.people)
+    if camera is not None and camera.kind == "pinhole" and radius > 0:
+        mean = np.einsum("pk,pkd->kd", p.weights, p.pos)
+        body = np.array([HEIGHT, radius, LEAST_VISIBLE])
+        occluder_kernels.cover(p.pos, p.weights, mean, p.existence, camera.position, body, hidden, cut)
+    return hidden, cut

@@ -93,10 +93,11 @@ class ParticleSet:
         """Return the effective number of particles of each slot, (K,)."""
         return np.array([effective_number(self.weights[:, head]) for head in self.cluster.tolist()])
 
-    def resample(self, share: float, scheme: str, draws: np.random.Generator) -> None:
+    def resample(self, share: float, scheme: str, width: float, draws: np.random.Generator) -> None:
         """Resample each cluster whose effective number is at most this share of the particles (sec. 2.1).
 
-        scheme: "residual" or "systematic". draws: of one cluster after the other.
+        scheme: "residual" or "systematic". draws: of one cluster after the other. width: of the kernel from which equal
+        particles are drawn apart, in units of the optimal width; 0: none (the paper).
         """
         for head in self.heads.tolist():
             weights, members = self.weights[:, head], np.flatnonzero(self.cluster == head)
@@ -110,6 +111,25 @@ class ParticleSet:
                 values[:, members] = values[chosen[:, None], members]
             self.related[:, :, members] = self.related[:, members].transpose(0, 2, 1)
             self.weights[:, members] = 1 / self.count
+            if width > 0:
+                self._spread(members, width, draws)
+
+    def _spread(self, members: Ints, width: float, draws: np.random.Generator) -> None:
+        """Draw the states of slots `members`, of equal weights, from kernels about the particles (regularised particle
+        filter, Musso et al. 2001; ours).
+
+        The kernel is normal with h^2 times the covariance of the person's state, of dimension d = 4, and h = width (4 /
+        (P (d + 2)))^(1 / (d + 4)). States are drawn towards their mean before, so that the covariance stays (West
+        1993).
+        """
+        h = min(width * (4 / (self.count * 6)) ** (1 / 8), 1.0)
+        state = np.concatenate([self.pos[:, members], self.vel[:, members]], axis=2)
+        apart = state - state.mean(axis=0)
+        values, vectors = np.linalg.eigh(np.einsum("pkd,pke->kde", apart, apart) / self.count)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
+        noise = np.einsum("kde,pke->pkd", root, draws.standard_normal(state.shape))
+        state += (np.sqrt(1 - h * h) - 1) * apart + h * noise
+        self.pos[:, members], self.vel[:, members] = state[..., :2], state[..., 2:]
 
     def keep(self, slots: Bools) -> None:
         """Remove all slots but those where `slots` (K,) is True."""

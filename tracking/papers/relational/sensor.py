@@ -13,6 +13,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.papers.relational import sensor_kernels
+from tracking.papers.relational.association_sums_kernels import sparse_sum
 from tracking.papers.relational.config import ParticleConfig
 from tracking.papers.relational.particle_set import ParticleSet
 
@@ -22,9 +23,8 @@ are no pair (ours)."""
 UNLIKELY = 1e-3
 """A person and a detection are no pair if it is, among all detections and none, the person's with less than this
 probability (ours)."""
-COUPLED = 0.02
-"""Share of particles in which two people, one of them missed in the last frame, walk together above which they are in
-one cluster (ours)."""
+CONTESTED = 0.02
+"""Probability above which a detection must be each of two people's for them to be in one cluster (ours)."""
 LEAST_LOG = -745.0
 """Log of the smallest float: the paper's weights are 0 below it."""
 
@@ -44,27 +44,46 @@ class Weighing:
     nobody: Array
 
 
-def weigh(
-    particles: ParticleSet, points: Array, detect: Array, missed: Bools, noise: float, config: ParticleConfig
-) -> Weighing:
+@dataclass(frozen=True)
+class Sight:
+    """What is known of K people before a frame's detections.
+
+    detect (K,): probability that each person is measured if existing; missed (K,): True for people who were not
+    measured in the last frame; cut (K,): probability that the feet are hidden behind another person; eye (2,):
+    place of the camera on the ground, m, nan if unknown.
+    """
+
+    detect: Array
+    missed: Bools
+    cut: Array
+    eye: Array
+
+
+def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig) -> Weighing:
     """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say.
 
-    points (M, 2): m; detect (K,): probability that each person is measured if existing; missed (K,): True for people
-    who were not measured in the last frame; noise: standard deviation of a point per axis, m. Clusters, weights and
-    existence of the particles are changed. If all weights vanish, which only the paper's sensor can bring about, they
+    points (M, 2): m; noise: standard deviation of a point per axis, m. Clusters, weights and existence of the particles
+    are changed. If all weights vanish, which only the paper's sensor can bring about, they
     are not.
     """
-    people, certain = particles.people, config.certain_sensor
+    people, detect, certain = particles.people, sight.detect, config.certain_sensor
     if not people:
         return Weighing(False, np.zeros((0, len(points))), np.zeros(0), np.ones(len(points)))
-    pairs, density = _pairs(particles, points, detect, noise, config)
-    particles.regroup(_linked(particles, pairs, missed, config))
+    pairs, density = _pairs(particles, points, sight, noise, config)
+    particles.regroup(_linked(particles, pairs, density, len(points), detect, config))
+    if config.one_weight:
+        free = np.ones((people, len(points)))
+    else:
+        mean, miss = _means(particles, pairs, density, len(points), detect, config)
+        free = sensor_kernels.free_detections(mean, miss, particles.cluster)
     log_sums, marginals = np.empty(particles.exist.shape), np.empty((*particles.exist.shape, len(points)))
     sensor_kernels.particle_sums(
-        density, pairs, particles.exist, detect, config.clutter_density, particles.cluster, log_sums, marginals
+        density, pairs, particles.exist, detect, config.clutter_density, particles.cluster, free, log_sums, marginals
     )
     if certain and log_sums[:, particles.heads].max(axis=0).min() < LEAST_LOG:
         return Weighing(True, np.zeros((people, len(points))), np.zeros(people), np.ones(len(points)))
+    if not config.one_weight:
+        sensor_kernels.partner_factors(particles.related, particles.weights, sight.missed, particles.cluster, log_sums)
     particles.weigh(log_sums)
     measured = marginals.sum(axis=2)
     if not certain:
@@ -77,40 +96,54 @@ def weigh(
 
 
 def _pairs(
-    particles: ParticleSet, points: Array, detect: Array, noise: float, config: ParticleConfig
+    particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig
 ) -> tuple[Ints, Array]:
     """Returns the pairs (N, 2) of a person and a detection that are possible, and their densities (P, N), 1/m^2.
 
     With the paper's sensor all pairs are possible.
     """
     wide = max(config.outlier_noise, noise)
-    densities = np.array([noise, wide, config.outlier_share])
+    certain = config.outlier_share == 0
+    share = np.zeros(particles.people) if certain else config.outlier_share + (1 - config.outlier_share) * sight.cut
     if config.certain_sensor:
         pairs = np.argwhere(np.ones((particles.people, len(points)), bool))
-        return pairs, sensor_kernels.densities(particles.pos, points, pairs, densities, np.inf)
+        return pairs, sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, sight.eye, np.inf)
     displaced = WIDE_REACH * wide if config.outlier_share > 0 else 0.0
     reach = max(REACH * noise, displaced) ** 2
     pairs = np.argwhere(sensor_kernels.near_detections(particles.pos, points, reach))
-    density = sensor_kernels.densities(particles.pos, points, pairs, densities, reach)
+    density = sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, sight.eye, reach)
     person = pairs[:, 0]
     mean = np.einsum("pn,pn->n", (particles.weights * particles.exist)[:, person], density)
-    odds = mean * detect[person] / config.clutter_density
-    total = 1 - particles.existence * detect + np.bincount(person, odds, particles.people)
+    odds = mean * sight.detect[person] / config.clutter_density
+    total = 1 - particles.existence * sight.detect + np.bincount(person, odds, particles.people)
     likely = odds > UNLIKELY * total[person]
     return pairs[likely], density[:, likely]
 
 
-def _linked(particles: ParticleSet, pairs: Ints, missed: Bools, config: ParticleConfig) -> Bools:
-    """Returns which people (K, K) must be in one cluster: all in joint mode and with the paper's sensor; else those who
-    may have a detection in common, or walk together in more than a share COUPLED of the particles while one of them is
-    missed, so that the other tells where.
+def _means(
+    particles: ParticleSet, pairs: Ints, density: Array, count: int, detect: Array, config: ParticleConfig
+) -> tuple[Array, Array]:
+    """Returns the mean weight over the particles of each person and detection, (K, M), and of no detection, (K,)."""
+    person = pairs[:, 0]
+    mean = np.zeros((particles.people, count))
+    found = np.einsum("pn,pn->n", (particles.weights * particles.exist)[:, person], density)
+    mean[person, pairs[:, 1]] = found * detect[person] / config.clutter_density
+    return mean, np.maximum(1 - particles.existence * detect, 0.0)
 
-    pairs (N, 2): a person and a detection that are possible; missed (K,).
+
+def _linked(
+    particles: ParticleSet, pairs: Ints, density: Array, count: int, detect: Array, config: ParticleConfig
+) -> Bools:
+    """Returns which people (K, K) must be in one cluster: all in joint mode and with the paper's sensor; else those who
+    may both have the same detection.
+
+    pairs (N, 2): a person and a detection that are possible; density (P, N); count: M.
     """
     people = particles.people
-    if config.weights == "joint" or config.certain_sensor:
+    if config.one_weight:
         return np.ones((people, people), bool)
-    near = np.zeros((people, int(pairs[:, 1].max(initial=-1)) + 1))
-    near[pairs[:, 0], pairs[:, 1]] = 1.0
-    hidden = missed[:, None] | missed
-    return np.asarray((near @ near.T > 0) | (hidden & (particles.related.mean(axis=0) > COUPLED)))
+    mean, miss = _means(particles, pairs, density, count, detect, config)
+    logs, marginals = np.empty(people), np.empty((people, count))
+    sparse_sum(mean, miss, np.ones(count), np.zeros(people, np.int64), logs, marginals)
+    may = (marginals > CONTESTED).astype(float)
+    return np.asarray(may @ may.T > 0)

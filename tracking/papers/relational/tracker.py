@@ -24,11 +24,12 @@ Departures, all ours:
   drawn: particles with and without each of many newcomers would be few.
 - The sensor has missed people and false alarms. A person not measured in the last frame is measured with a smaller
   probability, as people are hidden for a while.
-- Behind the pillars and walls of a known scene people are not measured, and neither die nor count as missed.
+- Behind the pillars and walls of a known scene, and behind other people, nobody is measured, and nobody dies or counts
+  as missed there. Hidden feet displace a point away from the camera.
 - A detection that is probably nobody's starts a person, who has no weight until the next frame.
-- People who share no detection and do not walk together have weights of their own (factorised); particles are
-  resampled if they are worth few.
-- Groups are a consistent partition of the pairs by their probabilities, with inertia; see walking_groups.
+- People have weights of their own (factorised): sums over mappings in which all others are averaged. A missed person
+  has those of the partners as factors. Particles are resampled if they are worth few, and drawn apart by a kernel.
+- Groups are derived from the tracks, or a consistent partition of the pairs by their probabilities; see walking_groups.
 The preset `paper` switches off what has a parameter.
 """
 
@@ -47,7 +48,7 @@ from tracking.grouping import reported_groups
 from tracking.image_scale import required
 from tracking.papers.relational import report, sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
-from tracking.papers.relational.occluders import hidden_share
+from tracking.papers.relational.occluders import covered_by_people, hidden_share
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.slots import Slots
 from tracking.papers.relational.walking_groups import PeopleNow, WalkingGroups
@@ -113,7 +114,8 @@ class Particle:
             self._measure(detections)
         self.shown = tracks = self._report(frame)
         if detections is not None:
-            self.particles.resample(self.config.resample_share, self.config.resampling, self.draws[RESAMPLING])
+            c = self.config
+            self.particles.resample(c.resample_share, c.resampling, c.kernel_width, self.draws[RESAMPLING])
         return tracks
 
     @property
@@ -142,11 +144,19 @@ class Particle:
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
         transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, c.speed_table(self.dt), self.dt)
-        ground = self.plane == "ground"
-        self.hidden = hidden_share(p.pos, p.weights, self.context.camera if ground else None, self.context.scene)
+        camera = self.context.camera if self.plane == "ground" else None
+        self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
+        behind, self.cut = covered_by_people(p, camera, c.body_radius)
+        self.hidden = 1 - (1 - self.hidden) * (1 - behind)
         if not c.certain_sensor:
             p.exist *= np.exp(-self.dt * (1 - self.hidden) / c.survival_time)
         self._relate()
+
+    @property
+    def eye(self) -> Array:
+        """Place of the camera on the ground, (2,), m; nan if there is none or it looks straight down."""
+        camera = self.context.camera if self.plane == "ground" else None
+        return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
     def _relate(self) -> None:
         """Draw new relations; people of `particle` have none."""
@@ -159,7 +169,8 @@ class Particle:
         self.plane = "image" if detections.plane == "image" else "ground"
         points, sizes = ordered_points(detections, self.unit)
         missed = self.slots.missed > 0
-        said = sensor.weigh(self.particles, points, self._detection_probability(), missed, self.noise, self.config)
+        sight = sensor.Sight(self._detection_probability(), missed, self.cut, self.eye)
+        said = sensor.weigh(self.particles, points, sight, self.noise, self.config)
         self.vanished += said.vanished
         self.effective = float(self.particles.effective().min(initial=self.particles.count))
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
@@ -256,7 +267,7 @@ class Relational(Particle):
         p = self.particles
         if p.people > 1:
             pairs = transition_kernels.near_pairs(p.pos, np.asarray(p.related.any(axis=0)), self._rules)
-            uniforms = self.draws[RELATIONS].random((p.count, len(pairs)))
+            uniforms = self.draws[RELATIONS].random((p.count, p.people, 2))
             transition_kernels.relate(p.pos, p.vel, p.related, pairs, uniforms, self._rules)
 
     def _relations_of_newcomer(self, point: Array) -> Bools:
@@ -279,7 +290,9 @@ class Relational(Particle):
     def _with_groups(self, tracks: Tracks, rows: Bools, means: tuple[Array, Array]) -> Tracks:
         p = self.particles
         self.together = transition_kernels.pairs_together(p.related, p.exist, p.weights, p.cluster)
-        now = PeopleNow(tracks.index, self.slots.id, *means, self.together, rows, self.slots.missed == 0)
-        group, events = self.groups.step(now, self.context.fps, self.config)
+        if self.config.groups == "tracks":
+            return tracks
+        now = PeopleNow(tracks.index, self.slots.id, *means, self.together, rows, self.slots.missed)
+        group, events = self.groups.step(now, self.context.fps)
         scaled = tuple(replace(e, pos=(e.pos[0] * self.unit, e.pos[1] * self.unit)) for e in events)
         return tracks.replace(group=group[rows], groups=reported_groups.no_groups(group[rows]), events=scaled)

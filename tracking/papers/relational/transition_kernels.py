@@ -128,23 +128,23 @@ def near_pairs(pos: Array, related: Bools, rules: Array) -> Ints:
 def relate(pos: Array, vel: Array, related: Bools, pairs: Ints, uniforms: Array, rules: Array) -> None:
     """Draw new relations of pairs: p(s^r_t | s^a_t, s^r_t-1), eq. 7; related (P, K, K) is changed.
 
-    pos (P, K, 2), m, and vel (P, K, 2), m/s: new places and velocities. pairs (N, 2): people i < j; uniforms (P, N) in
-    [0, 1). rules (4,). The paper leaves this distribution open. Ours: each pair is a chain of two states that starts
-    and stops with the hazards rate g and rate (1 - g), g its `belonging`. So a relation is on after dt with the
-    probability g + (on before - g) exp(-rate dt).
+    pos (P, K, 2), m, and vel (P, K, 2), m/s: new places and velocities. pairs (N, 2): people i < j; uniforms (P, K, 2)
+    in [0, 1); rules (4,). The paper leaves this distribution open. Ours: a person reconsiders all relations with the
+    rate / 2, and walks together with those whose `belonging` g is above one uniform number. So each pair is a chain of
+    two states that starts and stops with the hazards rate g and rate (1 - g), and a person leaves or joins a group at
+    once.
     """
-    change = rules[RATE]
+    change = 1.0 - math.sqrt(1.0 - rules[RATE])
     for p in range(len(pos)):
         for k in range(len(pairs)):
             i, j = pairs[k]
-            u, before = uniforms[p, k], related[p, i, j]
-            if u < 1.0 - change if before else u >= change:
-                continue  # whatever the belonging is
-            dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
-            du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
-            g = belonging(math.sqrt(dx * dx + dy * dy), math.sqrt(du * du + dv * dv), rules)
-            on = u < (1.0 - (1.0 - g) * change if before else g * change)
-            related[p, i, j] = related[p, j, i] = on
+            for a in (i, j):
+                if uniforms[p, a, 0] >= change:
+                    continue
+                dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
+                du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
+                g = belonging(math.sqrt(dx * dx + dy * dy), math.sqrt(du * du + dv * dv), rules)
+                related[p, i, j] = related[p, j, i] = uniforms[p, a, 1] < g
 
 
 @njit(cache=True)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sim.types import Camera, Context, Detections, Frame, Scene
-from tracking.papers.relational.occluders import hidden_share
+from tracking.papers.relational.occluders import covered_by_people, hidden_share
+from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.tracker import Particle
 
 CAMERA = Camera("pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([0.0, -10.0, 3.0]), np.eye(3))
@@ -50,3 +51,24 @@ def test_a_person_behind_a_pillar_is_kept(scene, kept):
         found = Detections(k, 0.1 * k, "ground", pos, None, None, np.ones(len(pos)))
         tracks = tracker.step(Frame(k, 0.1 * k), found)
     assert (len(tracks.id) == 1) == kept
+
+
+def people(*places):
+    made = ParticleSet.empty(10)
+    for place in places:
+        made.add(np.tile(place, (10, 1)), np.zeros((10, 2)), 1.0, np.zeros(made.exist.shape, bool))
+    return made
+
+
+def test_people_hide_each_other():
+    """The line of sight over the head of one at 18 m from a camera at 3 m meets another, at 24 m, at 1.27 m."""
+    hidden, cut = covered_by_people(people([0, 0], [0, 0.6], [0.25, 8], [0.1, 14], [3, 3]), CAMERA, 0.25)
+    np.testing.assert_allclose(hidden, [0, 1, 0, 0, 0], rtol=1e-12)
+    np.testing.assert_allclose(cut, [0, 1, 0.722, 0.912, 0], atol=0.01)
+
+
+@pytest.mark.parametrize(("camera", "radius"), [(None, 0.25), (CAMERA, 0.0)])
+def test_without_camera_or_bodies_people_hide_nobody(camera, radius):
+    hidden, cut = covered_by_people(people([0, 0], [0, 0.6]), camera, radius)
+    assert not hidden.any()
+    assert not cut.any()

@@ -12,6 +12,14 @@ from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.report import estimates
 
 
+def sight(detect, missed=None, cut=None, eye=(np.nan, np.nan)):
+    detect = np.asarray(detect, float)
+    none = np.zeros(len(detect))
+    return sensor.Sight(
+        detect, none > 0 if missed is None else missed, none if cut is None else np.array(cut), np.array(eye)
+    )
+
+
 def three(count=400, seed=0):
     """Three people in particles that differ, each a cluster with equal weights."""
     rng, made = np.random.default_rng(seed), ParticleSet.empty(count)
@@ -55,7 +63,7 @@ def test_a_cluster_divides_only_after_resampling():
     particles.regroup(pairs())
     assert particles.cluster.tolist() == [0, 0, 2]
     assert np.array_equal(particles.weights, before)
-    particles.resample(1.0, "residual", np.random.default_rng(0))
+    particles.resample(1.0, "residual", 0.0, np.random.default_rng(0))
     particles.regroup(pairs())
     assert particles.cluster.tolist() == [0, 1, 2]
 
@@ -68,7 +76,7 @@ def test_a_cluster_is_resampled_as_a_whole_and_others_are_left():
     particles.weights[:, 2] = 1 / 400
     old = {tuple(row) for row in particles.pos[:, :2].reshape(400, 4)}
     third = particles.pos[:, 2].copy()
-    particles.resample(0.9, "systematic", np.random.default_rng(0))
+    particles.resample(0.9, "systematic", 0.0, np.random.default_rng(0))
     assert {tuple(row) for row in particles.pos[:, :2].reshape(400, 4)} < old
     assert np.array_equal(particles.pos[:, 2], third)
     assert np.array_equal(particles.related, particles.related.transpose(0, 2, 1))
@@ -84,10 +92,10 @@ def test_removing_a_person_keeps_the_others_together(removed):
 
 def test_weights_of_clusters_multiply_to_the_joint_weight():
     """Far from each other, the joint likelihood is the product of the clusters' likelihoods."""
-    points = np.array([[0.02, 0.05], [0.45, -0.02], [8.1, 0.0]])
+    points = np.array([[0.2, 0.05], [0.22, -0.02], [8.1, 0.0]])
     joint, apart = three(), three()
-    sensor.weigh(joint, points, np.full(3, 0.9), np.zeros(3, bool), 0.08, ParticleConfig(weights="joint"))
-    sensor.weigh(apart, points, np.full(3, 0.9), np.zeros(3, bool), 0.08, ParticleConfig())
+    sensor.weigh(joint, points, sight([0.9] * 3), 0.08, ParticleConfig(weights="joint"))
+    sensor.weigh(apart, points, sight([0.9] * 3), 0.08, ParticleConfig())
     assert joint.cluster.tolist() == [0, 0, 0]
     assert apart.cluster.tolist() == [0, 0, 2]
     product = apart.weights[:, 0] * apart.weights[:, 2]
@@ -95,15 +103,58 @@ def test_weights_of_clusters_multiply_to_the_joint_weight():
     np.testing.assert_allclose(joint.exist, apart.exist, rtol=1e-12)
 
 
-def test_people_who_walk_together_share_a_cluster_without_a_common_detection():
-    """A hidden partner in another cluster would lose its help."""
+def test_weights_of_a_person_are_those_of_the_joint_filter_with_the_others_averaged():
+    """The sum over mappings is linear in each person's weights: so it is exact if people are independent before."""
+    points, count = np.array([[0.02, 0.05], [0.45, -0.02]]), 60
+    rng = np.random.default_rng(3)
+    x, y = rng.normal([0.0, 0.0], 0.1, (count, 2)), rng.normal([0.4, 0.0], 0.1, (count, 2))
+    pos = np.stack([np.repeat(x, count, axis=0), np.tile(y, (count, 1))], axis=1)
+    every, alone = ParticleSet.empty(count * count), ParticleSet.empty(count)
+    for made, places in ((every, pos), (alone, np.stack([x, y], axis=1))):
+        for k in range(2):
+            made.add(places[:, k], np.zeros((made.count, 2)), 0.9, np.zeros(made.exist.shape, bool))
+    sensor.weigh(every, points, sight([0.9] * 2), 0.08, ParticleConfig(weights="joint"))
+    sensor.weigh(alone, points, sight([0.9] * 2), 0.08, ParticleConfig())
+    assert alone.cluster.tolist() == [0, 1]
+    joint = every.weights[:, 0].reshape(count, count)
+    np.testing.assert_allclose(alone.weights[:, 0], joint.sum(axis=1), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(alone.weights[:, 1], joint.sum(axis=0), rtol=1e-6, atol=1e-9)
+
+
+def test_a_missed_person_has_the_weights_of_the_partners():
+    """Where the two walk together in a particle, what is seen of the one tells of the other."""
     particles = three()
-    particles.related[:, 0, 2] = particles.related[:, 2, 0] = True
-    sensor.weigh(particles, np.zeros((0, 2)), np.full(3, 0.9), np.zeros(3, bool), 0.08, RelationalConfig())
-    assert particles.cluster.tolist() == [0, 1, 2], "everybody was measured"
-    missed = np.array([False, False, True])
-    sensor.weigh(particles, np.zeros((0, 2)), np.full(3, 0.9), missed, 0.08, RelationalConfig())
-    assert particles.cluster.tolist() == [0, 1, 0]
+    particles.related[:200, 0, 2] = particles.related[:200, 2, 0] = True
+    points, missed = particles.pos[:1, 0], np.array([False, False, True])
+    sensor.weigh(particles, points, sight([0.9, 0.9, 0.0], missed), 0.08, RelationalConfig())
+    assert particles.cluster.tolist() == [0, 1, 2]
+    own, other = particles.weights[:200, 0], particles.weights[:200, 2]
+    np.testing.assert_allclose(other / other.sum(), own / own.sum(), rtol=1e-9)
+    np.testing.assert_allclose(particles.weights[200:, 2], particles.weights[200, 2], rtol=1e-9)
+
+
+def test_the_kernel_keeps_the_moments_and_draws_equal_particles_apart():
+    particles = three(20_000)
+    particles.pos[:] = particles.pos[np.random.default_rng(5).integers(0, 20, 20_000)]
+    before = [np.cov(particles.pos[:, 0].T), particles.pos[:, 0].mean(axis=0)]
+    particles.resample(1.0, "systematic", 1.0, np.random.default_rng(6))
+    assert len(np.unique(particles.pos[:, 0, 0])) == 20_000
+    np.testing.assert_allclose(particles.pos[:, 0].mean(axis=0), before[1], atol=0.003)
+    np.testing.assert_allclose(np.cov(particles.pos[:, 0].T), before[0], rtol=0.05, atol=3e-4)
+
+
+def test_hidden_feet_displace_a_point_away_from_the_camera():
+    pos, pairs = np.zeros((1, 1, 2)), np.array([[0, 0], [0, 1], [0, 2]])
+    points, eye = np.array([[0.0, 0.8], [0.0, -0.8], [0.8, 0.0]]), np.array([0.0, -10.0])
+    behind, before, beside = sensor_kernels.densities(pos, points, pairs, 0.08, 0.4, np.ones(1), eye, np.inf)[0]
+    assert behind > 0.1
+    assert before == 0.0
+    assert beside < 1e-15
+    grid = np.stack(np.meshgrid(np.arange(-2.99, 3, 0.02), np.arange(-2.99, 3, 0.02)), axis=-1).reshape(-1, 2)
+    every = np.stack([np.zeros(len(grid), int), np.arange(len(grid))], axis=1)
+    for share in (0.0, 0.3):
+        density = sensor_kernels.densities(pos, grid, every, 0.08, 0.4, np.array([share]), eye, np.inf)
+        assert density.sum() * 0.02**2 == pytest.approx(1.0, abs=0.01)
 
 
 def test_existence_by_bayes():
@@ -111,7 +162,7 @@ def test_existence_by_bayes():
     particles = three()
     far = np.array([[0.0, 0.0]])
     particles.pos[:, 0], particles.pos[:, 1] = far[0], [5.0, 0.0]
-    sensor.weigh(particles, far, np.full(3, 0.8), np.zeros(3, bool), 0.08, ParticleConfig(clutter_density=1e-9))
+    sensor.weigh(particles, far, sight([0.8] * 3), 0.08, ParticleConfig(clutter_density=1e-9))
     np.testing.assert_allclose(particles.exist[:, 2], 0.9 * 0.2 / (1 - 0.9 * 0.8), rtol=1e-12)
     np.testing.assert_allclose(particles.exist[:, 0], 1.0, atol=1e-6)
 
@@ -132,9 +183,9 @@ def test_sums_of_people_alone_are_those_of_all_mappings():
     pos, points = rng.normal(0, 2, (20, 6, 2)), rng.normal(0, 2, (5, 2))
     exist, detect = rng.uniform(0.2, 1, (20, 6)), rng.uniform(0.5, 1, 6)
     pairs = np.array([[0, 0], [1, 1], [1, 2], [2, 2], [3, 3], [3, 4]])
-    density = sensor_kernels.densities(pos, points, pairs, np.array([0.5, 1.0, 0.1]), np.inf)
+    density = sensor_kernels.densities(pos, points, pairs, 0.5, 1.0, np.full(6, 0.1), np.full(2, np.nan), np.inf)
     cluster, logs, found = np.array([0, 1, 1, 3, 4, 0]), np.empty((20, 6)), np.empty((20, 6, 5))
-    sensor_kernels.particle_sums(density, pairs, exist, detect, 0.01, cluster, logs, found)
+    sensor_kernels.particle_sums(density, pairs, exist, detect, 0.01, cluster, np.ones((6, 5)), logs, found)
     for p in range(20):
         seen, W = exist[p] * detect, np.zeros((6, 5))
         W[pairs[:, 0], pairs[:, 1]] = seen[pairs[:, 0]] * density[p] / 0.01
@@ -149,7 +200,7 @@ def test_a_displaced_point_is_the_persons_only_if_points_may_be_displaced():
     for share in (0.0, 0.1):
         particles = placed_alone(np.zeros(2))
         config = ParticleConfig(outlier_share=share, outlier_noise=0.4)
-        said = sensor.weigh(particles, displaced, np.array([0.9]), np.zeros(1, bool), 0.08, config)
+        said = sensor.weigh(particles, displaced, sight([0.9]), 0.08, config)
         found.append(float(said.nobody[0]))
     assert found[0] > 0.999
     assert found[1] < 0.5

@@ -52,6 +52,13 @@ def placed(count, pos, vel=None, exist=1.0):
     return made
 
 
+def sight(detect, missed=None):
+    """Nothing is hidden behind another person, and the camera is unknown."""
+    detect = np.asarray(detect, float)
+    none = np.zeros(len(detect))
+    return sensor.Sight(detect, none > 0 if missed is None else np.array(missed), none, np.full(2, np.nan))
+
+
 # E1
 
 
@@ -155,8 +162,8 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         points = (truth + r * rng.standard_normal(2))[None] if seen else np.zeros((0, 2))
         particles.pos[:, 1] = 1e6  # never near the detection
         if seen:
-            sensor.weigh(particles, points, np.array([0.9, 0.0]), np.array([False, True]), r, config)
-            particles.resample(1.0, "residual", rng)
+            sensor.weigh(particles, points, sight([0.9, 0.0], [False, True]), r, config)
+            particles.resample(1.0, "residual", 0.0, rng)
         out.append(particles.vel[:, 1].var(axis=0).mean())
     return np.array(out)
 
@@ -191,7 +198,7 @@ def test_without_information_weights_stay_and_people_go_straight_on():
 @pytest.mark.parametrize("detect", [np.zeros(2), np.full(2, 0.9)])
 def test_people_who_are_equal_in_all_particles_change_no_weight(detect):
     particles = placed(50, [[0, 0], [3, 0]])
-    sensor.weigh(particles, np.zeros((0, 2)), detect, np.zeros(2, bool), 0.08, ParticleConfig())
+    sensor.weigh(particles, np.zeros((0, 2)), sight(detect), 0.08, ParticleConfig())
     np.testing.assert_allclose(particles.weights, 1 / 50, rtol=1e-12)
 
 
@@ -240,15 +247,30 @@ def test_new_relations_depend_on_new_attributes_alone(monkeypatch):
     assert 0 < found[0].mean() < 1
 
 
+def reconsidered(particles, rules, rng):
+    pairs = transition_kernels.near_pairs(particles.pos, particles.related.any(axis=0), rules)
+    uniforms = rng.random((particles.count, particles.people, 2))
+    transition_kernels.relate(particles.pos, particles.vel, particles.related, pairs, uniforms, rules)
+
+
 def test_a_pairs_relation_approaches_its_equilibrium_at_its_rate():
     rules = np.array([-np.expm1(-0.5 * 0.1), 1.0, 1.0, 0.0])
     particles = placed(40_000, [[0, 0], [0.5, 0]])
     g, rng = 1 / (1 + np.exp(0.5 - 1.0)), np.random.default_rng(0)
     for step in range(1, 21):
-        pairs = transition_kernels.near_pairs(particles.pos, particles.related.any(axis=0), rules)
-        uniforms = rng.random((40_000, len(pairs)))
-        transition_kernels.relate(particles.pos, particles.vel, particles.related, pairs, uniforms, rules)
+        reconsidered(particles, rules, rng)
         assert particles.related[:, 0, 1].mean() == pytest.approx(g * (1 - np.exp(-0.05 * step)), abs=0.012)
+
+
+def test_a_person_leaves_a_group_at_once():
+    """Relations of one person end together far more often than by themselves; none ends of people far from it."""
+    rules, rng = np.array([0.05, 3.0, 1.0, 0.0]), np.random.default_rng(1)
+    particles = placed(40_000, [[0, 0], [0.4, 0], [0, 0.4], [0.4, 0.4]])
+    particles.related[:] = ~np.eye(4, dtype=bool)
+    reconsidered(particles, rules, rng)
+    ends = ~particles.related[:, 0, 1:]
+    assert ends[:, 0].mean() == pytest.approx(0.05 * 0.069, abs=0.001)
+    assert ends.all(axis=1).mean() > 0.3 * ends[:, 0].mean()
 
 
 def test_pairs_that_are_far_in_all_particles_and_not_related_are_left_out():
