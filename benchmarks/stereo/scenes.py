@@ -40,7 +40,7 @@ COLUMNS = (
 )  # fmt: skip
 ABLATIONS: Mapping[str, Mapping[str, object]] = {
     "surface_offset": {"surface_offset": 0.0},
-    "area_weights": {"area_weights": False},
+    "density_width": {"density_width": 20.0},
     "point_covariance": {"point_covariance": False},
     "attach": {"attach": False},
     "memory": {"memory": 0.0},

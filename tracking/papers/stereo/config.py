@@ -111,9 +111,11 @@ class StereoConfig(BackgroundSettings):
         0.1, (0.005, 1.0), "m",
         "measurement noise of a group's mean beside that of its points, as points come and go (ours)", "log",
     )  # fmt: skip
-    area_weights: bool = param(
-        True, (True, False), "", "from pixels: a feature counts in the mean by its squared depth (ours)", "categorical",
-        before=False, sees="pixels",
+    density_width: float = param(
+        0.15, (0.05, 20.0), "m",
+        "from pixels: a feature counts in the mean by the inverse of the features' density on the ground, with a "
+        "kernel of this standard deviation; the largest: all features alike (ours)",
+        "log", before=False, sees="pixels",
     )  # fmt: skip
     speed_prior: float = param(
         1.3, (0.1, 10.0), "m/s", "standard deviation of people's velocities, for newborn groups (ours)", "log"

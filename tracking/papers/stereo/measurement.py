@@ -13,9 +13,12 @@ import numpy as np
 
 from sim.scene.stereo import pair_jacobian, project_pair
 from sim.types import Array, Camera
+from tracking.detect.features import SpacePoints
 
 POS, VEL = [0, 2, 4], [1, 3, 5]
 """Entries of the state that are the position and the velocity."""
+LEAST_DENSITY = 0.25
+"""Least density of features that counts, relative to the highest of the group."""
 
 
 class Measurement(Protocol):
@@ -29,8 +32,8 @@ class Measurement(Protocol):
         """Return dZ/d(x, y, z) (3, 3) at a position (3,), m."""
         ...
 
-    def areas(self, xyz: Array) -> Array:
-        """Return the area (M,) on people that a point at each of the places (M, 3), m, stands for, up to a factor."""
+    def weights(self, points: SpacePoints, width: float) -> Array:
+        """Return the weights (M,) of M points in their group's mean position; width: of the kernel of density, m."""
         ...
 
 
@@ -48,9 +51,9 @@ class PairMeasurement:
         """Return d(u, v, d)/d(x, y, z) (3, 3) in px/m."""
         return np.asarray(pair_jacobian(self.camera, xyz[None])[0])
 
-    def areas(self, xyz: Array) -> Array:
-        """Return the squared depths (M,): features keep a distance in the image."""
-        return np.asarray(np.square((xyz - self.camera.position) @ self.camera.rotation[2]))
+    def weights(self, points: SpacePoints, width: float) -> Array:
+        """Return `inverse_densities` (M,): a person may have any number of features."""
+        return inverse_densities(points, width)
 
 
 class PlaceMeasurement:
@@ -65,9 +68,26 @@ class PlaceMeasurement:
         del xyz
         return np.eye(3)
 
-    def areas(self, xyz: Array) -> Array:
+    def weights(self, points: SpacePoints, width: float) -> Array:
         """Return ones (M,): each point is a person."""
-        return np.ones(len(xyz))
+        del width
+        return np.ones(len(points))
+
+
+def inverse_densities(points: SpacePoints, width: float) -> Array:
+    """Return the inverse of the density of M points on the ground at each of them, (M,), up to a factor (ours).
+
+    The density at y_i is the sum over j of exp(-d' S^-1 d / 2), with d = y_j - y_i on the ground and S = width^2 I +
+    C_i + C_j; width: m. People who stand apart then weigh alike, however many features each of them shows. Densities
+    below LEAST_DENSITY of the highest count as that, so that a wrong match alone weighs less than a person. M is at
+    least 1.
+    """
+    d = points.pos[:, None, :2] - points.pos[:, :2]
+    S = points.cov[:, None, :2, :2] + points.cov[:, :2, :2]
+    a, b, c = S[..., 0, 0] + width**2, S[..., 0, 1], S[..., 1, 1] + width**2
+    d2 = (c * d[..., 0] ** 2 - 2 * b * d[..., 0] * d[..., 1] + a * d[..., 1] ** 2) / (a * c - b**2)
+    density = np.exp(-d2 / 2).sum(1)
+    return np.asarray(1 / np.maximum(density, LEAST_DENSITY * density.max()))
 
 
 def measured_state(x: Array, measurement: Measurement) -> Array:

@@ -115,12 +115,11 @@ def newborn(points: SpacePoints, motion: Motion3D, t: float) -> SpaceGroup:
 
 
 def mean_position(points: SpacePoints, measurement: Measurement, config: StereoConfig) -> Array:
-    """Return the mean position (3,), m, of M points.
+    """Return the mean position (3,), m, of M points, with the weights of `measurement` (ours).
 
-    With `area_weights` each counts by the area on people that it stands for (ours): a person who is near shows more
-    features than one far away, by the squared depth.
+    People who are near, or textured, show more features than others. The mean of all features would lie near them.
     """
-    weights = measurement.areas(points.pos) if config.area_weights else None
+    weights = measurement.weights(points, config.density_width)
     return np.asarray(np.average(points.pos, axis=0, weights=weights))
 
 

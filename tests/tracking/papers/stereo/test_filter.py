@@ -66,7 +66,7 @@ def test_a_linear_measurement_makes_it_a_kalman_filter() -> None:
 @pytest.mark.parametrize("depth", [5.0, 10.0, 20.0])
 def test_errors_have_the_stated_covariance(depth: float) -> None:
     """NEES of the state over 60 runs of 2 s: 6 in the mean, within 99 % of chi-square."""
-    camera, config = rig(**FIT), StereoConfig(centroid_noise=0.05, accel_noise=0.5, area_weights=False)
+    camera, config = rig(**FIT), StereoConfig(centroid_noise=0.05, accel_noise=0.5, density_width=20.0)
     measurement, motion, n, runs = PairMeasurement(camera), motion_model(config, DT), 12, 60
     deviations, nees = np.array([0.3, 0.3, 0.25]), []
     for run in range(runs):
@@ -106,7 +106,7 @@ def test_depth_has_no_bias_where_members_stand_at_many_depths() -> None:
     pos = camera.position + z[:, None] * camera.rotation[2]
     d = project_pair(camera, pos)[:, 2]
     assert 246 * 0.12 / d.mean() - 8.0 < -0.1
-    config, measurement = StereoConfig(area_weights=False), PairMeasurement(camera)
+    config, measurement = StereoConfig(density_width=20.0), PairMeasurement(camera)
     motion = motion_model(config, DT)
     points = at_places(pos, point_covariances(camera, pos, np.square([0.3, 0.3, 0.15])))
     group = newborn(points, motion, 0.0)
@@ -116,21 +116,23 @@ def test_depth_has_no_bias_where_members_stand_at_many_depths() -> None:
     assert abs((group.pos - camera.position) @ camera.rotation[2] - 8.0) < 0.02
 
 
-def test_near_members_with_more_features_do_not_draw_the_mean_to_them() -> None:
-    """Two people 2 m apart in depth, with as many features as they are large in the image."""
+def test_members_with_more_features_do_not_draw_the_mean_to_them() -> None:
+    """Two people 2 m apart in depth, one with three times as many features, and a wrong match 4 m behind them."""
     camera = rig(0.0, focal=246.0)
-    z = np.repeat([7.0, 9.0], [81, 49])
-    pos = camera.position + z[:, None] * camera.rotation[2]
-    points, measurement = at_places(pos, np.repeat(np.eye(3)[None], len(z), 0)), PairMeasurement(camera)
 
-    def depth(weighted: bool) -> float:
-        mean = mean_position(points, measurement, StereoConfig(area_weights=weighted))
+    def depth(width: float, *places: tuple[float, int]) -> float:
+        z = np.repeat([z for z, _ in places], [n for _, n in places])
+        pos = camera.position + z[:, None] * camera.rotation[2]
+        points = at_places(pos, np.repeat(0.04 * np.eye(3)[None], len(z), 0))
+        mean = mean_position(points, PairMeasurement(camera), StereoConfig(density_width=width))
+        plain = mean_position(points, PlaceMeasurement(), StereoConfig(density_width=width))
+        assert plain == pytest.approx(pos.mean(0))
         return float((mean - camera.position) @ camera.rotation[2])
 
-    assert depth(True) == pytest.approx(8.0)
-    assert depth(False) < 7.8
-    plain = StereoConfig(area_weights=True)
-    assert mean_position(points, PlaceMeasurement(), plain) == pytest.approx(pos.mean(0))
+    two = (7.0, 60), (9.0, 20)
+    assert depth(0.15, *two) == pytest.approx(8.0, abs=0.02)
+    assert depth(20.0, *two) == pytest.approx(7.5, abs=0.02)
+    assert depth(0.15, *two, (13.0, 1)) < 8.2, "of four places the fourth part of the highest density counts"
 
 
 def test_the_spread_is_that_of_the_members_without_their_errors() -> None:
