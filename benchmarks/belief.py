@@ -1,7 +1,7 @@
 """Who belongs together, by the rule, by the belief and by SPENCER's relations, from labelled people.
 
     python -m benchmarks.belief recordings [--data FOLDER]
-    python -m benchmarks.belief suites [--scenes standard friends-meet …] [--seeds 20000:20003] [--rough]
+    python -m benchmarks.belief suites [--scenes standard friends-meet …] [--people truth|rough|file|image]
     python -m benchmarks.belief rates [--scenes street crowd party mixed] [--seeds 20000:20003]
     python -m benchmarks.belief calibration [--scenes streets] [--seeds 20000:20001] [--out CHART.svg]
     python -m benchmarks.belief decisions [--scenes standard friends-meet …] [--seeds 10000:10001]
@@ -13,7 +13,9 @@ positions that err by 0.1 m, with 5 % missed, mean over 10 draws. CAVIAR's Meet_
 (Linder et al. 2016) relates pairs of each frame by a linear model and takes connected components; it uses labelled
 velocities.
 suites: pairwise F1, group F1, event F1, merges that are wrong or missed, and seconds until a merge is reported; means
-over sequences with 95 % intervals, and the paired difference. --rough: positions err by 0.1 m, 5 % are missed.
+over sequences with 95 % intervals, and the paired difference. --people: labelled people
+(truth), the same with positions that err by 0.1 m and 5 % missed (rough), or the tracks of `blob` from stored
+detections (file) or pictures (image).
 rates: pairwise F1 from the same motion at 2.5, 10 and 25 frames/s.
 calibration: probability and share of mates by bin, expected calibration error, all scenes weighing the same; --out:
 the same as a reliability plot.
@@ -37,19 +39,20 @@ from scipy.sparse.csgraph import connected_components
 from benchmarks.belonging.transfer import f1
 from benchmarks.grouping import linked_pairs, pairs_in_frames
 from benchmarks.support.chart import Panel, lines
+from benchmarks.support.in_memory import in_memory
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser, seed_range
 from benchmarks.support.tables import head, interval, number, row, signed, table
 from benchmarks.support.timing import best_times
-from scenarios.loading.resolve import resolve
+from scenarios.loading.resolve import Entry, resolve
 from sim.io.source import open_source
 from sim.sequence import simulate
-from sim.types import Array, Bools, Ints, Truth
+from sim.types import Array, Bools, Ints, Tracks, Truth
 from tracking import track
 from tracking.fitting.belief import fit_belief, sample_of
 from tracking.fitting.belief_scores import BINS, belief_scores, reliability
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
 from tracking.grouping.belief import Belief
-from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.grouped_tracks import derive, without_groups
 from tracking.grouping.grouping_choice import Grouping, grouping_of, links_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
@@ -130,14 +133,24 @@ def _truth(path: Path) -> Truth:
 COLUMNS = ["pairwise F1", "group F1", "event F1", "merge reported after, s", "merges right, wrong, missed"]
 
 
-def scores_of(name: str, seeds: range, groupings: Mapping[str, Grouping], erring: bool) -> dict[str, tuple[Array, str]]:
+def _people(entry: Entry, seed: int, source: str) -> tuple[Truth, Sequence[Tracks]]:
+    """Returns the truth of a sequence and its people without groups; source: "truth", "rough", "file" or "image"."""
+    if source in ("truth", "rough"):
+        truth = simulated(entry, seed)
+        return truth, people_as_tracks(rough(truth, seed) if source == "rough" else truth)
+    live = simulate(entry.scenario, seed, entry.repeat, streams=("left",) if source == "image" else ())
+    assert live.truth is not None
+    run = track("blob", in_memory(live) if source == "image" else live, detections=source)  # type: ignore[arg-type]
+    return live.truth, without_groups(run)
+
+
+def scores_of(name: str, seeds: range, groupings: Mapping[str, Grouping], source: str) -> dict[str, tuple[Array, str]]:
     """Returns for each grouping the scores `KEYS` of each sequence of a suite, (S, 4), and its merges as text."""
     found: dict[str, list[list[float]]] = {key: [] for key in groupings}
     merges = {key: np.zeros(3) for key in groupings}
     for entry in resolve(name):
         for seed in seeds:
-            truth = simulated(entry, seed)
-            people = people_as_tracks(rough(truth, seed) if erring else truth)
+            truth, people = _people(entry, seed, source)
             for key, grouping in groupings.items():
                 scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m, grouping))
                 found[key].append([scores[k] for k in KEYS])
@@ -145,9 +158,9 @@ def scores_of(name: str, seeds: range, groupings: Mapping[str, Grouping], erring
     return {key: (np.array(rows), ", ".join(f"{n:.0f}" for n in merges[key])) for key, rows in found.items()}
 
 
-def suites(names: Sequence[str], seeds: range, belief: Belief, erring: bool) -> None:
+def suites(names: Sequence[str], seeds: range, belief: Belief, source: str) -> None:
     for name in names:
-        found = scores_of(name, seeds, {"rule": LinkRule(), "belief": belief}, erring)
+        found = scores_of(name, seeds, {"rule": LinkRule(), "belief": belief}, source)
         cells = {key: [*_cells(interval, values), text] for key, (values, text) in found.items()}
         cells["belief minus rule"] = [*_cells(signed, found["belief"][0] - found["rule"][0]), ""]
         title = f"{Path(name).stem}, seeds {seeds.start}:{seeds.stop}, {len(found['rule'][0])} sequences"
@@ -164,7 +177,7 @@ CHANGES: Mapping[str, Mapping[str, float]] = {
 def decisions(names: Sequence[str], seeds: range, belief: Belief) -> None:
     groupings = {key: replace(belief, **changes) for key, changes in CHANGES.items()}
     for name in names:
-        found = scores_of(name, seeds, groupings, False)
+        found = scores_of(name, seeds, groupings, "truth")
         base = found["belief"][0]
         cells = {
             key: [*_cells(interval if key == "belief" else signed, values if key == "belief" else values - base), text]
@@ -255,7 +268,7 @@ def cost(scene: str, belief: Belief) -> None:
     assert truth is not None
     table_ = tabulate(people_as_tracks(truth), truth.fps, truth.px_per_m)
     works = {
-        "blob with the rule": lambda: track("blob", sequence, detections="file"),
+        "blob with the rule": lambda: track("blob", sequence, detections="file", grouping="rule"),
         "belief": lambda: links_of(table_, truth.fps, belief),
         "rule": lambda: links_of(table_, truth.fps, LinkRule()),
     }
@@ -271,7 +284,7 @@ def main() -> None:
     )
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="scenarios, suites or *.toml files")
     parser.add_argument("--train", nargs="+", metavar="NAME", help="ablation: to fit to", default=["standard"])
-    parser.add_argument("--rough", action="store_true", help="suites: positions err and rows are missing")
+    parser.add_argument("--people", choices=["truth", "rough", "file", "image"], default="truth", help="suites: whose")
     parser.add_argument("--grouping", default="belief", metavar="FILE.toml", help="another belief")
     add_seeds(parser, "20000:20001")
     parser.add_argument("--check", type=seed_range, default="20000:20001", metavar="A:B", help="ablation: test seeds")
@@ -287,7 +300,7 @@ def _run(args: argparse.Namespace, belief: Belief) -> None:
     if args.mode == "recordings":
         recordings(args.data, belief)
     elif args.mode == "suites":
-        suites(args.scenes or ["standard", "friends-meet"], args.seeds, belief, args.rough)
+        suites(args.scenes or ["standard", "friends-meet"], args.seeds, belief, args.people)
     elif args.mode == "rates":
         rates(args.scenes or ["street", "crowd", "party", "mixed"], args.seeds, belief)
     elif args.mode == "calibration":

@@ -87,10 +87,10 @@ def track(
     (tracking.time_limit), which stops a step that hangs. params: a config, values by name, the name of a preset, or a
     TOML file; None for the tracker's defaults. detections: "image", "file" or "truth"; None for the first of them that
     can work. sensor: settings as in a scenario's [sensor] that degrade "truth" (misses, clutter, noise, hiding); None:
-    perfect. seed: for the tracker's and the sensor's random numbers. grouping: the rule, or its TOML file, that groups
-    people if the tracker names no groups; None: the default rule. If the tracker names groups, it has no effect, with a
-    UserWarning. Another one says that the tracker's velocities are too far from its motion to derive groups. progress:
-    called with each frame's number, from 1, when the frame is done.
+    perfect. seed: for the tracker's and the sensor's random numbers. grouping: "belief", "rule", a TOML file of
+    either, or the grouping itself, for a tracker that names no groups; None: the belief. If the tracker names groups,
+    it has no effect, with a UserWarning. Another one says that the tracker's velocities are too far from its motion to
+    derive groups. progress: called with each frame's number, from 1, when the frame is done.
 
     Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit; later for a
     frame whose detections are not finite or whose picture cannot be read; after the last frame if tracks in the image
@@ -100,7 +100,8 @@ def track(
     from tracking.grouping.grouped_tracks import names_groups, with_groups
     from tracking.grouping.velocity_check import velocity_warning
 
-    rule = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
+    chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
+    rule = chosen or default_grouping()
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
     prepared.reset(seed)
     reported, spent, begun = [], 0.0, time.perf_counter()
@@ -113,15 +114,16 @@ def track(
     whole = time.perf_counter() - begun
     scale = prepared.scale(reported)
     tracks = with_groups(reported, prepared.context.fps, scale.px_per_m, rule)
-    if rule is not None and names_groups(reported):
+    named = names_groups(reported)
+    if named and chosen is not None:
         warnings.warn(f"{prepared.name} names groups itself: --grouping has no effect", UserWarning, stacklevel=2)
-    elif not names_groups(reported):
+    elif not named:
         fault = velocity_warning(prepared.name, reported, prepared.context.fps, scale.px_per_m, rule)
         if fault is not None:
             warnings.warn(fault, UserWarning, stacklevel=2)
     speed = Speed(len(reported) / spent, len(reported) / whole) if reported else Speed()
     info = run_info(prepared, tracks, seed, sensor or {}, scale, speed)
-    return TrackingRun(tracks, info if rule is None else {**info, "grouping": rule.as_dict()})
+    return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
 
 
 def group(
@@ -130,13 +132,13 @@ def group(
     """Return the people of a sequence, whose ids are known, with groups and events that follow from their motion.
 
     run: tracks of people; groups and events in them are replaced. None: the labelled people of the sequence, as
-    tracking.grouping.known_people gives them; their group labels are not used. grouping: the rule, or its TOML file;
-    None: the default rule. `info` of the result is what run.json tells: that of the run with the new grouping, or of a
+    tracking.grouping.known_people gives them; their group labels are not used. grouping: as of
+    `track`. `info` of the result is what run.json tells: that of the run with the new grouping, or of a
     tracker "group".
 
     Raises InputError if there are no people with ids, the tracks are of whole groups, people lie in the image and its
-    scale is unknown or not above 0, or labels or the file of the rule cannot be read. Raises WorkError if an order of a
-    simulated script was not fulfilled. Warns if frame numbers or speeds are hardly right
+    scale is unknown or not above 0, or labels or the file of the grouping cannot be read. Raises WorkError if an order
+    of a simulated script was not fulfilled. Warns if frame numbers or speeds are hardly right
     (tracking.grouping.plausibility), or velocities are too far from the motion to derive groups.
     """
     from tracking.grouping.grouped_tracks import with_groups, without_groups

@@ -3,7 +3,7 @@
     python -m benchmarks.group_pda MODE [--seeds a:b] [--detections file|truth|image] [--only A,B] [--json FILE] …
 
 scenarios    merging, splitting, crossing, queueing, side by side: lineage, ids, group scores; beside the paper's
-             ablation and the baseline rule over `blob`
+             ablation and the rule and the belief over `blob`
 earlier      the tracker less itself at an earlier commit (--commit), paired
 decisions    each decision of the tracker switched off: paired differences
 events       merges and splits of the suites standard and friends-meet

@@ -3,7 +3,7 @@
 hotel, zara: seq_hotel and zara01 from the labelled positions of people, without their identities. caviar:
 Meet_WalkTogether1 from the centres of labelled boxes, in the image, at two scales: that of the first 100 boxes, which
 is the default, and that of all boxes, given as by `--px-per-m`. Columns: group scores with 95 % intervals by weights of
-blocks of frames; pairwise scores by the people in each hull (of the baseline rule: by its members). Below: number of
+blocks of frames; pairwise scores by the people in each hull (of rule and belief: by its members). Below: number of
 events of each kind that are reported.
 pets: the first 200 frames of PETS09-S2L1 from pixels. No groups are labelled: printed are the number of groups, the
 events, and in how many frames the two people who walk together (11 and 12) are in one hull. A video is written.
@@ -28,6 +28,7 @@ from sim.io.source import open_source
 from sim.types import Array, Tracks, Truth
 from tracking.app.pictures.overlay import write_overlay
 from tracking.grouping.grouped_tracks import with_groups
+from tracking.grouping.grouping_choice import grouping_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.recording_intervals import recording_differences, recording_intervals
 from tracking.run import track
@@ -87,9 +88,12 @@ def labelled_recording(
         scaled = sequence if scale is None else open_source(given.data / path, px_per_m=scale)[0]
         at = f", {scaled.px_per_m:.1f} px/m" if scaled.px_per_m > 0 else ""
         for v in variants:
-            answers[v.name + at] = track(v.tracker, scaled, params=v.params or None, detections="truth")
-        by_rule = with_groups(people_as_tracks(truth), truth.fps, scaled.px_per_m)
-        answers[f"baseline rule, given identities{at}"] = by_rule
+            answers[v.name + at] = track(
+                v.tracker, scaled, params=v.params or None, detections="truth", grouping=v.grouping
+            )
+        for name in ("rule", "belief"):
+            by_pairs = with_groups(people_as_tracks(truth), truth.fps, scaled.px_per_m, grouping_of(name))
+            answers[f"{name}, given identities{at}"] = by_pairs
     keys = [*KEYS, "pairwise_F1", "pairwise_precision", "pairwise_recall"]
     found = {name: with_intervals(truth, tracks, keys) for name, tracks in answers.items()}
     rows = {name: [interval(*ends) for ends in row] for name, row in found.items()}

@@ -35,13 +35,14 @@ Row = dict[str, float]
 class Variant:
     """A tracker and its parameters.
 
-    in_image: the answers of a tracker of people from pixels are scored in the image, as groups from pixels are: its
-    groups stay, their hulls are those of its boxes.
+    grouping: of a tracker of people, "rule" or "belief". in_image: the answers of a tracker of people from pixels are
+    scored in the image, as groups from pixels are: its groups stay, their hulls are those of its boxes.
     """
 
     name: str
     tracker: str
     params: Mapping[str, object] = field(default_factory=dict)
+    grouping: str | None = None
     in_image: bool = False
 
 
@@ -56,16 +57,20 @@ class TrackingJob:
 
 
 def trackers(name: str, mode: DetectionMode) -> tuple[Variant, ...]:
-    """Returns the tracker, its preset "paper", its paper's ablation, and the baseline: groups by rule over `blob`."""
-    blob = (Variant("blob + baseline rule", "blob", in_image=True),) if mode == "image" else ()
-    on_ground = "blob …, on the ground" if mode == "image" else "blob + baseline rule"
+    """Returns the tracker, its preset "paper", its paper's ablation, and the baselines: rule and belief over `blob`."""
+    ground = ", on the ground" if mode == "image" else ""
+    blob = [
+        Variant(f"blob + {grouping}{place}", "blob", grouping=grouping, in_image=in_image)
+        for grouping in ("rule", "belief")
+        for place, in_image in ([("", True), (ground, False)] if ground else [("", False)])
+    ]
     paper = GroupPdaConfig.preset("paper").as_dict()
     ours = (
         Variant(name, name),
         Variant("preset paper", name, paper),
         Variant('association="none"', name, {"association": "none"}),
     )
-    return (*ours, *blob, Variant(on_ground, "blob"))
+    return (*ours, *blob)
 
 
 def with_points(entry: Entry, points: str | None) -> Entry:
@@ -109,12 +114,12 @@ def rows_of_job(job: TrackingJob) -> dict[str, Row] | str:
 
 def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMode) -> dict[str, TrackingRun]:
     """Returns the answers of each variant; variants that differ only in how they are scored share one run."""
-    made: dict[tuple[str, str], TrackingRun] = {}
+    made: dict[tuple[str, str, str | None], TrackingRun] = {}
     found = {}
     for v in variants:
-        key = v.tracker, repr(v.params)
+        key = v.tracker, repr(v.params), v.grouping
         if key not in made:
-            made[key] = track(v.tracker, sequence, params=v.params or None, detections=mode)
+            made[key] = track(v.tracker, sequence, params=v.params or None, detections=mode, grouping=v.grouping)
         found[v.name] = made[key]
     return found
 

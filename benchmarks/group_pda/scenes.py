@@ -1,6 +1,6 @@
 """Modes `scenarios`, `decisions` and `events` of `benchmarks.group_pda`: tables over scenes and suites.
 
-scenarios: scene by scene, the tracker beside its paper's ablation and the baseline rule over `blob`.
+scenarios: scene by scene, the tracker beside its paper's ablation and the rule and the belief over `blob`.
 decisions: the tracker minus the tracker without one of its decisions, paired, all scenes together (--each: scene by
 scene, too); * if 0 lies outside the interval; of IDSW less is better.
 events: merges and splits on suites, counts and F1 of all sequences together; on friends-meet also the columns of

@@ -116,12 +116,14 @@ def test_class_table_and_text_of_the_same_answers_score_the_same(merge, tmp_path
 def test_good_velocities_make_no_warning_and_bad_ones_do(merge) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        track(Exact, merge, detections="truth")
-        track(Numbers, merge, detections="truth")
-        track("blob", merge)
+        track(Exact, merge, detections="truth", grouping="rule")
+        track(Numbers, merge, detections="truth", grouping="rule")
+        track("blob", merge, grouping="rule")
+        for kind in (Differences, Standing):
+            track(kind, merge, detections="file")  # the belief looks at positions only
     for kind in (Differences, Standing):
         with pytest.warns(UserWarning, match=f"{kind.__name__}: one velocity in 5 differs by .* Report nan"):
-            track(kind, merge, detections="file")
+            track(kind, merge, detections="file", grouping="rule")
 
 
 def moving(vel: float, n: int = 40) -> list[Tracks]:
@@ -139,10 +141,11 @@ def test_the_error_of_velocities() -> None:
     assert velocity_error(moving(1.0, 60), FPS, 1.0, rule) == pytest.approx(0.0, abs=1e-9)
     assert velocity_error(moving(0.0, 60), FPS, 1.0, rule) == pytest.approx(np.sqrt(2))
     assert np.isnan(velocity_error(moving(0.0, 20), FPS, 1.0, rule))
-    assert velocity_warning("x", moving(0.0, 60), FPS, 1.0, None) is not None
-    assert velocity_warning("x", moving(np.nan, 60), FPS, 1.0, None) is None
+    assert velocity_warning("x", moving(0.0, 60), FPS, 1.0, rule) is not None
+    assert velocity_warning("x", moving(0.0, 60), FPS, 1.0, None) is None, "the belief takes none"
+    assert velocity_warning("x", moving(np.nan, 60), FPS, 1.0, rule) is None
     assert velocity_warning("x", moving(0.0, 60), FPS, 1.0, LinkRule(smooth=0.5)) is None
-    assert velocity_warning("x", [], FPS, 1.0, None) is None
+    assert velocity_warning("x", [], FPS, 1.0, rule) is None
 
 
 def test_unknown_velocities_become_the_motion_over_half_a_second() -> None:

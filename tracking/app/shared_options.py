@@ -68,7 +68,7 @@ Rule = Annotated[
     typer.Option(
         "--grouping",
         metavar="rule|belief|FILE.toml",
-        help="What derives groups, or a file of `tune grouping` or `fit grouping`.",
+        help="What derives groups (default: belief), or a file of `tune grouping` or `fit grouping`.",
     ),
 ]
 Probabilities = Annotated[

@@ -1,8 +1,8 @@
 """Fill in groups and events of person tracks, for a tracker that reports none or only some of them.
 
 `with_groups` is the entry for runs and scores; `derive` does the work. Both are causal, apart from the last frame:
-- People are linked by the baseline rule (tracking.grouping.link_rule). Linked people form groups with ids
-  (tracking.grouping.group_labels).
+- People are linked by the belief or the baseline rule (tracking.grouping.grouping_choice). Linked people form groups
+  with ids (tracking.grouping.group_labels).
 - Merge, split, form, dissolve, enter and leave events follow from changes of the groups
   (tracking.grouping.merge_split_events).
 - Crossings and queues are measured by sim.truth.crossing_events and sim.truth.queue_detection.
@@ -42,7 +42,7 @@ def with_groups(
     """Return the tracks of a sequence with groups and events filled in by `derive`; in order, one `Tracks` per frame.
 
     tracks: one tracker's, one `Tracks` per frame, from frame 1. fps: frames per second. px_per_m: scale, px per m, if
-    they are in the image. rule: None stands for the default rule.
+    they are in the image. rule: None stands for the default grouping.
 
     Unknown velocities (nan) are replaced by chords of the positions, `with_velocities`. The tracks are returned
     unchanged if there are none or if all are marked as derived. Only velocities are filled in if one has unit "group",
@@ -99,8 +99,9 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
 
     tracks: one tracker's, of a whole sequence, in order, one per frame from frame 1; the result has as many, marked as
     derived. fps: frames per second. px_per_m: px per m, used only if the tracks are in the image. rule: None stands for
-    the default rule.
-    - A tracker that names groups, in `group` or in the members of its `groups`, keeps them. Else the rule forms groups.
+    the default grouping.
+    - A tracker that names groups, in `group` or in the members of its `groups`, keeps them. Else the grouping forms
+      groups.
     - Membership events (all kinds but cross and queue) are derived unless the tracker reported any of them.
     - Crossings are derived unless it reported a crossing, queues unless it reported a queue.
 

@@ -1,4 +1,4 @@
-"""Which grouping makes the groups of tracked people: the baseline rule or the belief, with its parameters.
+"""Which grouping makes the groups of tracked people: the belief (the default) or the baseline rule, with parameters.
 
 `grouping_of` reads what a user names: "rule", "belief", or a TOML file of either.
 """
@@ -17,8 +17,8 @@ Grouping = LinkRule | Belief
 
 
 def default_grouping() -> Grouping:
-    """Returns the grouping of trackers that report people only."""
-    return LinkRule()
+    """Returns the grouping of trackers that report people only: the belief of belief.toml."""
+    return default_belief()
 
 
 def grouping_of(source: str | Path) -> Grouping:

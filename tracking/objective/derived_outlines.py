@@ -1,7 +1,7 @@
-"""Outlines of the groups that the baseline rule derives from tracked people: shapes only, without ids and events.
+"""Outlines of the groups that the default grouping derives from tracked people: shapes only, without ids and events.
 
 The groups are those of `tracking.grouping.grouped_tracks.derive`, in the same frames and with the same members. Links
-come from `find_links`; connected components and footprint hulls are compiled.
+come from `links_of`; connected components and footprint hulls are compiled.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labe
     """Returns the hulls of groups of two or more people in the frames f where labelled[f] is true, sorted by frame.
 
     tracks: of one tracker, of people, without `groups`, sorted by frame; none raises IndexError. If any track has a
-    group id, these ids define the groups, else the baseline rule does. Hulls are drawn round boxes if the tracks are in
-    the image and every track has a box, else round footprints (16-gons on a circle of 0.25 m). Unit: m on the ground,
-    px in the image. fps: frames per second. px_per_m: px per m, used only in the image. labelled (length + 1,): bool by
-    frame number from 1, index 0 unused. A centre is the mean position of the group's people in the frame. Group ids of
-    the result are only row numbers. Without groups it has no rows.
+    group id, these ids define the groups, else the default grouping does. Hulls are drawn round boxes if the tracks are
+    in the image and every track has a box, else round footprints (16-gons on a circle of 0.25 m). Unit: m on the
+    ground, px in the image. fps: frames per second. px_per_m: px per m, used only in the image. labelled (length + 1,):
+    bool by frame number from 1, index 0 unused. A centre is the mean position of the group's people in the frame. Group
+    ids of the result are only row numbers. Without groups it has no rows.
 
     Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
     """
@@ -49,8 +49,9 @@ def _group_of_rows(table: TracksTable, fps: float) -> Ints:
     """Returns a label for each of the R table rows (tracks in frames), (R,): equal for members of one group in a frame,
     -1 alone.
 
-    If any row has a group id of the tracker, these ids are returned, else the components that the baseline rule links:
-    the label is the least column of the group, and a group of which one member is seen has -1. fps: frames per second.
+    If any row has a group id of the tracker, these ids are returned, else the components that the default grouping
+    links: the label is the least column of the group, and a group of which one member is seen has -1. fps: frames per
+    second.
     """
     from tracking.objective import derived_outlines_kernels as kernels
 

@@ -110,9 +110,9 @@ def evaluate(
     Jaccard index of their members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None
     all frames. A frame without tracks counts as empty.
 
-    Groups and events that the tracks lack come from the baseline rule, in the image only if `truth.px_per_m` is known.
-    Scores of people are nan for a tracker of whole groups, scores of groups and events if no scored frame has group
-    labels.
+    Groups and events that the tracks lack come from the default grouping, in the image only if `truth.px_per_m` is
+    known. Scores of people are nan for a tracker of whole groups, scores of groups and events if no scored frame has
+    group labels.
 
     Raises IncomparableError if boxes or positions to be compared are missing, ValueError if an id occurs twice in one
     frame, and InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
@@ -172,7 +172,7 @@ class Scorer:
         tracks: one `Tracks` per frame, any order; of two with equal frame the later is used. similarity: "boxes",
         "ground", "image" or None (boxes if both sides have them, else the tracks' plane). group_match: "hull" or
         "members". frames: n for frames 1 … n, a range, or None for all. A frame without tracks counts as empty. Groups
-        and events that the tracks lack come from the baseline rule. Scores of people are nan for a tracker of whole
+        and events that the tracks lack come from the default grouping. Scores of people are nan for a tracker of whole
         groups. Scores of groups and events are nan if no chosen frame is labelled.
 
         Raises IncomparableError if boxes or positions are missing, ValueError if an id occurs twice in one frame,

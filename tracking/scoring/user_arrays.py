@@ -43,8 +43,8 @@ def score_arrays(
     pos, else in the image. A table whose columns have 0 rows fits both.
 
     Without a group column in the truth only people are scored. Without one in the tracks they get groups by the
-    baseline rule. Events of both sides (merges, splits, crossings, queues …) are derived from groups and positions. A
-    score that cannot be computed is nan.
+    default grouping. Events of both sides (merges, splits, crossings, queues …) are derived from groups and positions.
+    A score that cannot be computed is nan.
 
     fps: frames per second. px_per_m: pixels per metre, for boxes only; None takes the median height of the true boxes
     for 1.7 m. similarity: compares people by "boxes", "ground" or "image"; None: by boxes if both have them, else by

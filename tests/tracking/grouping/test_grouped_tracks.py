@@ -9,6 +9,8 @@ from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
 
 FPS = 10.0
+RULE = LinkRule()
+"""Whose times follow from the paths by hand."""
 
 
 def walk(*pieces, start=(0.0, 0.0)):
@@ -57,7 +59,7 @@ def leaving():
 
 
 def test_a_pair_is_a_group_once_it_is_acquainted():
-    made = derive(tracks(side_by_side()), FPS)
+    made = derive(tracks(side_by_side()), FPS, rule=RULE)
     assert [t.group.tolist() for t in made[:9]] == [[-1, -1]] * 9
     assert all(t.group.tolist() == [1, 1] for t in made[9:])
     assert all(len(t.groups.id) == (t.index > 9) for t in made)
@@ -67,7 +69,7 @@ def test_a_pair_is_a_group_once_it_is_acquainted():
 
 def test_merge_is_told_when_known_and_dated_back():
     """Near from frame 114 on: 16 of the last 20 frames from frame 129 on."""
-    made = derive(tracks(joining()), FPS)
+    made = derive(tracks(joining()), FPS, rule=RULE)
     assert events(made) == [(129, "merge", 114, (-1, 1), (1,), (1, 2, 3))]
     event = made[128].events[0]
     assert (event.emitted, event.end) == (129, 129)
@@ -77,7 +79,7 @@ def test_merge_is_told_when_known_and_dated_back():
 
 def test_split_after_two_seconds_apart():
     """0.69 + 0.4 (t - 5) > 2.5 from t > 9.525 s: first in frame 97, for 2 s in frame 116."""
-    made = derive(tracks(leaving()), FPS)
+    made = derive(tracks(leaving()), FPS, rule=RULE)
     assert events(made) == [(116, "split", 97, (1,), (-1, 1), (1, 2, 3))]
 
 
@@ -96,11 +98,15 @@ def test_strangers_who_pass_are_no_group():
 
 def test_in_the_image_lengths_are_multiplied():
     for scale in (25.0, 400.0):
-        made = derive(tracks(joining(), scale=scale), FPS, px_per_m=scale)
-        assert events(made) == events(derive(tracks(joining()), FPS))
-        assert made[150].groups.pos[0] == pytest.approx(derive(tracks(joining()), FPS)[150].groups.pos[0] * scale)
-        assert made[128].events[0].pos[0] == pytest.approx(derive(tracks(joining()), FPS)[128].events[0].pos[0] * scale)
-    boxed = derive(tracks(side_by_side(), scale=100.0, boxes=True), FPS, px_per_m=100.0)
+        made = derive(tracks(joining(), scale=scale), FPS, px_per_m=scale, rule=RULE)
+        assert events(made) == events(derive(tracks(joining()), FPS, rule=RULE))
+        assert made[150].groups.pos[0] == pytest.approx(
+            derive(tracks(joining()), FPS, rule=RULE)[150].groups.pos[0] * scale
+        )
+        assert made[128].events[0].pos[0] == pytest.approx(
+            derive(tracks(joining()), FPS, rule=RULE)[128].events[0].pos[0] * scale
+        )
+    boxed = derive(tracks(side_by_side(), scale=100.0, boxes=True), FPS, px_per_m=100.0, rule=RULE)
     assert boxed[20].groups.hull[0].tolist() == pytest.approx(np.array([[195, -10], [205, -10], [205, 80], [195, 80]]))
 
 
@@ -138,11 +144,11 @@ def test_crossings_and_queues_of_tracks():
 def test_who_joins_as_they_come_is_no_merge():
     there = np.ones((200, 3), bool)
     there[:60, 2] = False
-    made = derive(tracks(side_by_side(n=3), there=there), FPS)
+    made = derive(tracks(side_by_side(n=3), there=there), FPS, rule=RULE)
     assert events(made) == []
     assert made[100].group.tolist() == [1, 1, 1]
     there[:60] = False
-    made = derive(tracks(side_by_side(n=3), there=there), FPS)
+    made = derive(tracks(side_by_side(n=3), there=there), FPS, rule=RULE)
     assert events(made) == [(70, "enter", 61, (), (1,), (1, 2, 3))]
 
 

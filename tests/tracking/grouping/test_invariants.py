@@ -1,15 +1,22 @@
-"""What does not matter to the baseline rule: ids, place, turn and unit of the world, what comes later, strangers far
+"""What does not matter to the groupings: ids, place, turn and unit of the world, what comes later, strangers far
 away, and, within what it waits for, how often one looks."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.types import Tracks
 from tests.plots import DURATION, crosses, look, merges, scenes, splits
-from tracking.grouping.grouped_tracks import derive
+from tracking.grouping import grouped_tracks
+from tracking.grouping.grouping_choice import grouping_of
 
 FPS = 10.0
+both = pytest.mark.parametrize("grouping", ["belief", "rule"])
+
+
+def derive(tracks, fps, scale=1.0, *, grouping):
+    return grouped_tracks.derive(tracks, fps, scale, grouping_of(grouping))
 
 
 def tracks(scene, ids=None, scale=1.0):
@@ -43,7 +50,7 @@ def partition(made):
 @given(st.lists(st.one_of(merges(), splits(), crosses()), min_size=1, max_size=3))
 def test_each_plot_is_noticed(plots):
     """A split is noticed 2 s after its onset, a merge when near for 80 % of 2 s. Who queues is a group to this rule."""
-    told = events(derive(tracks(look(plots, FPS)), FPS))
+    told = events(derive(tracks(look(plots, FPS)), FPS, grouping="rule"))
     assert sorted(kind for _, kind, _, _ in told) == sorted(p.kind for p in plots)
     for plot in plots:
         if plot.kind in ("merge", "split"):
@@ -52,12 +59,13 @@ def test_each_plot_is_noticed(plots):
             assert any(low <= s <= high for s in late)
 
 
+@both
 @settings(max_examples=15, deadline=None)
 @given(scenes(), st.data())
-def test_ids_do_not_matter(plots, data):
+def test_ids_do_not_matter(grouping, plots, data):
     scene = look(plots, FPS)
     ids = data.draw(st.permutations(range(3, 3 + 2 * scene.pos.shape[1]))).copy()[: scene.pos.shape[1]]
-    base, renamed = derive(tracks(scene), FPS), derive(tracks(scene, ids), FPS)
+    base, renamed = derive(tracks(scene), FPS, grouping=grouping), derive(tracks(scene, ids), FPS, grouping=grouping)
     assert partition(renamed) == partition(base)
     assert events(renamed, ids) == events(base)
 
@@ -66,6 +74,7 @@ CORNER = 22.5
 """Degrees from one corner of a footprint to the next: after such a turn hulls are the same, after others nearly."""
 
 
+@both
 @settings(max_examples=15, deadline=None)
 @given(
     scenes(),
@@ -74,14 +83,17 @@ CORNER = 22.5
     st.booleans(),
     st.sampled_from([1.0, 18.8, 250.0]),
 )
-def test_place_turn_and_unit_do_not_matter(plots, x, degrees, mirror, scale):
+def test_place_turn_and_unit_do_not_matter(grouping, plots, x, degrees, mirror, scale):
     """Of scenes a little beside the plots, whose round numbers lie on thresholds, where rounding would decide."""
     scene = look(plots, FPS)
     scene = scene.but(pos=scene.pos + np.random.default_rng(0).normal(0, 1e-5, scene.pos.shape))
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[c, s], [-s, c]]) @ np.diag([1.0, -1.0 if mirror else 1.0])
     moved = scene.but(pos=scene.pos @ turn + [x, -x], vel=scene.vel @ turn)
-    base, again = derive(tracks(scene), FPS), derive(tracks(moved, scale=scale), FPS, scale)
+    base, again = (
+        derive(tracks(scene), FPS, grouping=grouping),
+        derive(tracks(moved, scale=scale), FPS, scale, grouping=grouping),
+    )
     assert partition(base) == partition(again)
     if degrees % CORNER == 0:
         assert events(base) == events(again)
@@ -90,22 +102,24 @@ def test_place_turn_and_unit_do_not_matter(plots, x, degrees, mirror, scale):
         assert sides[0] == sides[1]
 
 
+@both
 @settings(max_examples=15, deadline=None)
 @given(scenes(), st.floats(0.4, 0.95))
-def test_what_comes_later_changes_no_label(plots, share):
+def test_what_comes_later_changes_no_label(grouping, plots, share):
     scene = look(plots, FPS)
     frames = int(share * DURATION * FPS)
     short = scene.but(**{k: getattr(scene, k)[:frames] for k in ("pos", "vel", "present", "intent")})
-    base, again = derive(tracks(scene), FPS), derive(tracks(short), FPS)
+    base, again = derive(tracks(scene), FPS, grouping=grouping), derive(tracks(short), FPS, grouping=grouping)
     assert partition(base)[:frames] == partition(again)
     changes = [[e for e in events(made) if e[1] in ("merge", "split") and e[0] <= frames] for made in (base, again)]
     assert changes[0] == changes[1]
 
 
+@both
 @settings(max_examples=15, deadline=None)
 @given(scenes(), scenes())
-def test_strangers_far_away_do_not_matter(plots, others):
-    few, many = (derive(tracks(look(some, FPS)), FPS) for some in (plots, [*plots, *others]))
+def test_strangers_far_away_do_not_matter(grouping, plots, others):
+    few, many = (derive(tracks(look(some, FPS)), FPS, grouping=grouping) for some in (plots, [*plots, *others]))
     people = len(few[0].id)
     assert [{g for g in groups if min(g) < people} for groups in partition(many)] == partition(few)
     assert [e for e in events(many) if e[3][0] <= people] == events(few)
@@ -117,7 +131,7 @@ def test_the_frame_rate_does_not_matter(plots, fps):
     """To two frames of the slower rate: 80 % of 10 frames are 8, of 50 they are 40."""
     sides = [
         sorted((kind, members, (start - 1) / f, (k - 1) / f) for k, kind, start, members in events(made))
-        for f, made in ((f, derive(tracks(look(plots, f)), f)) for f in (FPS, fps))
+        for f, made in ((f, derive(tracks(look(plots, f)), f, grouping="rule")) for f in (FPS, fps))
     ]
     assert [side[:2] for side in sides[0]] == [side[:2] for side in sides[1]]
     for a, b in zip(*sides, strict=True):

@@ -12,6 +12,7 @@ from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
 from tracking.environment.episodes import SourceCache, sources
 from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.grouping_choice import default_grouping
 from tracking.grouping.link_rule import LinkRule
 from tracking.run import track
 from tracking.scoring import evaluate
@@ -138,7 +139,7 @@ def test_a_rule_of_ones_own_groups_what_is_tracked(source, tmp_path):
     assert any((t.group >= 0).any() for t in usual)
     assert not any((t.group >= 0).any() for t in own)
     assert own.info["grouping"] == read.info["grouping"] == rule.as_dict()
-    assert "grouping" not in usual.info
+    assert usual.info["grouping"] == default_grouping().as_dict()
 
 
 def test_a_rule_on_the_command_line(source, tmp_path, capsys):

@@ -107,8 +107,8 @@ def _belief(grouping: Grouping) -> Belief:
     if isinstance(grouping, Belief):
         return grouping
     raise InputError(
-        place="--probabilities", got="the grouping rule, which has none", expected="a grouping with probabilities",
-        remedy="add --grouping belief, or a file of `fit grouping`",
+        place="--probabilities", got="the baseline rule, which has none", expected="a grouping with probabilities",
+        remedy="leave --grouping out, or name a file of `fit grouping`",
     )  # fmt: skip
 
 

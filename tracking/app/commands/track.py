@@ -35,7 +35,7 @@ class TrackerSetup:
 
     tracker: name, "file.py:Class" or "module:Class". config: its parameters; None for its own defaults. detections:
     "image", "file" or "truth"; None for the first of these that works. sensor: settings that degrade detections of mode
-    "truth", {} for none. seed: of the tracker's and the sensor's random numbers. grouping: the rule for trackers that
+    "truth", {} for none. seed: of the tracker's and the sensor's random numbers. grouping: for trackers that
     report no groups; None for the default. limited: the tracker with a limit of time for each step; None without.
     """
 
@@ -103,7 +103,7 @@ def track(options: TrackOptions) -> CommandResult:
 
 
 def _setup(options: TrackOptions) -> TrackerSetup:
-    """Returns the tracker with the parameters, detections, sensor settings and grouping rule that the options name.
+    """Returns the tracker with the parameters, detections, sensor settings and grouping that the options name.
 
     Raises InputError if the tracker is unknown or a file is wrong, or for a setting that is wrong or belongs to a
     scenario. Values of the sensor are checked later.

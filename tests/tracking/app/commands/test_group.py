@@ -31,7 +31,7 @@ Place = Callable[[float], tuple[float, float]]
 WALK: dict[int, Place] = {
     1: lambda t: (1 + 1.2 * t, 2.0),
     2: lambda t: (1 + 1.2 * t, 2.8),
-    3: lambda t: (1 + 1.2 * t, 3.6 + 0.8 * max(0.0, 6 - t)),
+    3: lambda t: (1 + 1.2 * t, 3.6 + 0.8 * max(0.0, 4 - t)),
     4: lambda t: (26 - 1.1 * t, 2.4),
     5: lambda t: (1 + 1.2 * t, 9.0),
     6: lambda t: (26 - 1.1 * t, 3.2),
@@ -194,14 +194,14 @@ def test_a_run(walk, tmp_path, capsys):
     scored = done(capsys, "score", data, tmp_path / "again", "--against", first)
     assert all(d["what"].startswith("grouping") for d in scored["differences"])
     done(capsys, "group", tmp_path / "again" / "scene-s40000" / "tracks.parquet", "--out", tmp_path / "third")
-    assert check_run(tmp_path / "third")["grouping"]["acquaintance"] == 1.0, "the default"
+    assert check_run(tmp_path / "third")["grouping"]["grouping"] == "belief", "the default"
     for folder in (first, first / "scene-s40000"):
         assert "the folder of the tracks themselves" in refused(capsys, "group", folder, "--out", folder)
 
 
 def test_probabilities(walk, tmp_path, capsys):
     """A table of pairs, sealed with the run; a run without the option has none."""
-    line = ["group", walk, "--fps", 10, "--grouping", "belief", "--out", tmp_path / "g"]
+    line = ["group", walk, "--fps", 10, "--out", tmp_path / "g"]
     (row,) = done(capsys, *line, "--probabilities")["runs"]
     table = pq.read_table(tmp_path / "g" / "pairs.parquet")
     assert table.column_names == ["frame", "a", "b", "probability"]
@@ -223,7 +223,7 @@ def test_probabilities_know_nothing_later(tmp_path, capsys):
     found = []
     for frames in (200, 120):
         (tmp_path / "walk.txt").write_text(text(frames))
-        line = ["group", tmp_path / "walk.txt", "--fps", 10, "--grouping", "belief", "--probabilities"]
+        line = ["group", tmp_path / "walk.txt", "--fps", 10, "--probabilities"]
         done(capsys, *line, "--out", tmp_path / str(frames))
         table = pq.read_table(tmp_path / str(frames) / "pairs.parquet")
         found.append(table.filter(pc.less_equal(table["frame"], 120)))
@@ -303,7 +303,7 @@ def test_without_people(tmp_path, capsys):
     (tmp_path / "walk" / "gt" / "gt.txt").write_text("3,1,5,5,10,20,0,1,1\n")
     found = done(capsys, "group", tmp_path / "walk", "--fps", 10, "--out", tmp_path / "g")
     assert (found["runs"][0]["people"], found["runs"][0]["groups"]) == (0, [])
-    line = ["group", tmp_path / "walk", "--fps", 10, "--grouping", "belief", "--probabilities", "--out", tmp_path / "h"]
+    line = ["group", tmp_path / "walk", "--fps", 10, "--probabilities", "--out", tmp_path / "h"]
     assert done(capsys, *line)["runs"][0]["pairs"] == 0
     assert run(["group", str(tmp_path / "walk"), "--fps", "10", "--out", str(tmp_path / "g")]) == 0
 
@@ -347,7 +347,7 @@ def test_wrong_options(walk, tmp_path, capsys):
     (tmp_path / "wrong.toml").write_text("[params]\nnaer = 1.0\n")
     assert "naer" in refused(capsys, *here, "--grouping", tmp_path / "wrong.toml")
     assert "none.toml" in refused(capsys, *here, "--grouping", tmp_path / "none.toml")
-    assert "add --grouping belief" in refused(capsys, *here, "--grouping", "rule", "--probabilities")
+    assert "leave --grouping out" in refused(capsys, *here, "--grouping", "rule", "--probabilities")
     folder = biwi(tmp_path / "biwi")
     assert "--px-per-m" in refused(capsys, "group", folder, "--px-per-m", "40", "--out", tmp_path / "g")
     assert not (tmp_path / "g").exists()
