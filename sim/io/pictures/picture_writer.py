@@ -150,8 +150,8 @@ def _add(outputs: dict[str, StreamWriter], sequence: Sequence, frame: Frame, kno
     """Add one frame to each open stream (`outputs`, by name), and append its PixelTruth without the images to `known`.
 
     `known` is changed; it stays as it is for a sequence without exact pixels. The stream "background" gets nothing.
-    Raises InputError if the sequence lacks a stream, WorkError if the stream ids has a person id above 999, OSError if
-    a file cannot be written.
+    Raises InputError if the sequence lacks a stream, WorkError if the stream ids has a person id above 999 or a
+    disparity is 256 px or more, OSError if a file cannot be written.
     """
     for name, picture in (("left", frame.image), ("right", frame.right)):
         if name in outputs:
@@ -168,7 +168,7 @@ def _add(outputs: dict[str, StreamWriter], sequence: Sequence, frame: Frame, kno
     if "disparity" in outputs:
         if pixels.disparity is None:
             raise _missing(sequence, "disparity")
-        outputs["disparity"].add(streams.encode_disparity(pixels.disparity))
+        outputs["disparity"].add(streams.encode_disparity(pixels.disparity, sequence.camera))
     known.append(pixels.replace(ids=np.zeros((0, 0), np.int64), disparity=None))
 
 

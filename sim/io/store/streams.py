@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError, WorkError
-from sim.types import Array, Ints
+from sim.types import Array, Camera, Ints
 
 STREAMS = ("left", "right", "disparity", "ids", "background")
 IMAGES = ("jpg", "png", "mp4")
@@ -20,7 +20,8 @@ FOLDERS = {"left": "img1", "right": "img1_right", "disparity": "disparity", "ids
 EXACT = ("disparity", "ids")
 """Streams of 16-bit numbers, always PNG."""
 
-STEPS = 64  # stored disparity steps per px
+STEPS = 256  # stored disparity steps per px, as in KITTI
+LARGEST = 65535  # largest stored code
 PERSON, STATIC = 2000, 3000  # class × 1000: MOTS has class 2 for pedestrians, and none for walls and pillars
 PEOPLE = 999  # highest person id that class × 1000 + id can hold
 
@@ -101,16 +102,23 @@ def decode_ids(codes: Codes) -> Ints:
     return np.where(wide == STATIC, -2, np.where(wide > PERSON, wide - PERSON, 0))
 
 
-def encode_disparity(disparity: Array) -> Codes:
-    """Return disparities (H, W) px as uint16: round(64 d), clipped to 1 … 65535, 0 where d is nan or infinite.
+def encode_disparity(disparity: Array, camera: Camera | None = None) -> Codes:
+    """Return disparities (H, W) px as uint16 as in KITTI: round(256 d), at least 1, 0 where d is nan or infinite.
 
-    d is the disparity of a pixel; negative ones and 0 become 1, those above 1024 px become 65535.
+    d is the disparity of a pixel; negative ones and 0 become 1. camera: of the pair, for the error; None: unknown.
+    Raises WorkError if a disparity is 256 px or more.
     """
     known = np.isfinite(disparity)
-    steps = np.clip(np.rint(np.where(known, disparity, 0.0) * STEPS), 1, 65535)
+    steps = np.maximum(np.rint(np.where(known, disparity, 0.0) * STEPS), 1)
+    if steps.max(initial=0) > LARGEST:
+        rig = "" if camera is None else f" of a rig with focal_px {camera.focal_px[0]:g}, baseline {camera.baseline:g}"
+        raise WorkError(
+            place="--streams disparity", got=f"a disparity of {steps.max() / STEPS:.0f} px{rig}",
+            expected="less than 256 px", remedy="make camera.baseline smaller, or leave the stream out",
+        )  # fmt: skip
     return np.where(known, steps, 0).astype(np.uint16)
 
 
 def decode_disparity(codes: Codes) -> Array:
-    """Return the disparities (H, W) px of stored codes: code / 64, nan where the code is 0 (unknown)."""
+    """Return the disparities (H, W) px of stored codes: code / 256, nan where the code is 0 (unknown)."""
     return np.where(codes > 0, codes / STEPS, np.nan)

@@ -90,7 +90,7 @@ def test_what_the_exact_streams_hold(tmp_path, make_pictured):
     steps = cv2.imread(str(tmp_path / "a/disparity/000005.png"), cv2.IMREAD_UNCHANGED)
     known = live.load_pixels(5).disparity
     assert np.array_equal(steps == 0, np.isnan(known))
-    assert steps[steps > 0] / 64 == pytest.approx(known[steps > 0])
+    assert steps[steps > 0] / 256 == pytest.approx(known[steps > 0])
 
 
 def test_codes_there_and_back():
@@ -98,10 +98,11 @@ def test_codes_there_and_back():
     assert np.array_equal(streams.decode_ids(streams.encode_ids(ids)), ids)
     with pytest.raises(WorkError, match="person 1000"):
         streams.encode_ids(np.array([[1000]]))
-    d = np.array([[np.nan, 1e-6, 0.5, 100.01, 2000.0]])
-    assert streams.decode_disparity(streams.encode_disparity(d))[0] == pytest.approx(
-        [np.nan, 1 / 64, 0.5, 100.015625, 65535 / 64], nan_ok=True
-    )
+    d = np.array([[np.nan, 1e-6, 0.5, 100.01, 255.998]])
+    assert streams.encode_disparity(d)[0].tolist() == [0, 1, 128, 25603, 65535]
+    assert streams.decode_disparity(streams.encode_disparity(d))[0] == pytest.approx(d[0], abs=1 / 256, nan_ok=True)
+    with pytest.raises(WorkError, match="256 px"):
+        streams.encode_disparity(np.array([[256.0]]))
 
 
 def test_one_content_however_it_is_stored(tmp_path, make_pictured):
