@@ -1,7 +1,7 @@
-"""From a picture to the detections of trackers of points: each foreground blob is one detection.
+"""From a picture to the detections of trackers of points: each foreground blob, or piece of one, is one detection.
 
 The foreground comes from tracking.detect.foreground. A blob that holds several people is one detection, so people who
-share a blob are missed but for one.
+share a blob are missed but for one, unless blobs are divided (tracking.detect.divided_blobs).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import numpy as np
 
 from sim.types import Array, Context, Detections, Frame
 from tracking.detect.background_settings import BackgroundSettings
+from tracking.detect.divided_blobs import divided
 from tracking.detect.foreground import Foreground, convex_areas
 from tracking.detect.person_size import PersonSize
 from tracking.image_scale import required
@@ -18,22 +19,29 @@ from tracking.image_scale import required
 class ForegroundBlobs:
     """Foreground blobs as detections in the image.
 
-    State: settings; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
-    is nan, learned from lone people in its background sample.
+    State: settings; foreground, the pipeline with its background model; size: of a person at each place, from the
+    camera or learned from lone people in the background sample, if blobs are divided, else None. scale: px per metre,
+    the context's, or, if that is nan, learned from lone people.
 
     The context must have a background sample (else AssertionError). Raises InputError if the scale is neither known nor
     learned, if it is zero or negative, or if the sample cannot be used.
     """
 
-    def __init__(self, settings: BackgroundSettings, most_foreground: float, context: Context) -> None:
-        """Train the background model; most_foreground: largest plausible share of foreground, 0 to 1."""
+    def __init__(
+        self, settings: BackgroundSettings, most_foreground: float, context: Context, divide: bool = False
+    ) -> None:
+        """Train the background model; most_foreground: largest plausible share of foreground, 0 to 1; divide: blobs of
+        several people are divided (tracking.detect.divided_blobs)."""
         assert context.background is not None
         self.settings = settings
         self.foreground = Foreground(context, settings, most_foreground)
-        if np.isnan(context.px_per_m):
+        self.size: PersonSize | None = None
+        if divide or np.isnan(context.px_per_m):
             size = PersonSize(context)
             self.foreground.learn_person_size(size, context.background)
-            self.foreground.px_per_m = size.px_per_m
+            self.size = size if divide else None
+            if np.isnan(context.px_per_m):
+                self.foreground.px_per_m = size.px_per_m
         self.scale = self.foreground.px_per_m = required(self.foreground.px_per_m)
 
     def follow(self, settings: BackgroundSettings, most_foreground: float) -> None:
@@ -56,6 +64,7 @@ class ForegroundBlobs:
         self.foreground.adapt(seen, convex_areas(self.foreground.shape, corners))
         if not seen.plausible:
             return None
-        box = self.foreground.person_blobs(seen.mask).box
+        found = self.foreground.person_blobs(seen.mask)
+        box = found.box if self.size is None else divided(found, people, self.size)
         centre = box[:, :2] + box[:, 2:] / 2
         return Detections(frame.index, frame.t, "image", centre, None, box, np.ones(len(box)))

@@ -147,6 +147,16 @@ class ParticleConfig(BackgroundSettings):
         0.5, (0.0, 1.0), "probability", "people whose existence is at least so probable are reported (ours)"
     )
 
+    blobs: str = param(
+        "divided",
+        ("divided", "whole"),
+        "",
+        "from pixels: divided: blobs of several people are divided into detections of a person's size, parts of people "
+        "left out; whole: each blob is one detection (ours)",
+        "categorical",
+        sees="pixels",
+        before="whole",
+    )
     most_foreground: float = param(
         0.6,
         (0.05, 1.0),

@@ -86,7 +86,8 @@ class Particle:
         self.shown: Tracks | None = None
         self.pixels = None
         if context.background is not None:
-            self.pixels = ForegroundBlobs(self.config, self.config.most_foreground, context)
+            divide = self.config.blobs == "divided"
+            self.pixels = ForegroundBlobs(self.config, self.config.most_foreground, context, divide)
         if self.pixels is not None:
             self.context = context = context.replace(px_per_m=self.pixels.scale)
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
