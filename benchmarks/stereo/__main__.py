@@ -1,13 +1,16 @@
 """`stereo`: the paper's scenes, its decisions one by one, honest pictures, cost of matching.
 
-    python -m benchmarks.stereo MODE [--seeds a:b] [--only cross,merge,…] [--json FILE]
+    python -m benchmarks.stereo MODE [--seeds a:b] [--only cross,merge,…] [--chart FILE] [--json FILE]
 
 pictures   OpenCV's StereoSGBM and the tracker's own matcher against the true disparity
+photometric   left against right picture at the true disparity, without a matcher
+trajectories  the paths of groups in space, as in Figs. 5, 7 and 9 of the paper (an SVG)
 scenes     the paper's scenes: position errors (bias and scatter apart), group scores, events
 decisions  each decision of the tracker switched off: paired differences of F1 and of the position error
-cost       time of matching inside the foreground over dense matching, against the foreground's share; frames per second
+cost       time of matching inside the foreground over dense matching, against the foreground's share (table and SVG);
+           frames per second
 
-The docstrings of pictures.py, scenes.py and cost.py in this folder say what the columns mean.
+The docstrings of the files in this folder say what the columns mean.
 """
 
 from __future__ import annotations
@@ -18,11 +21,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.stereo import cost, pictures, scenes
+from benchmarks.stereo import cost, photometric, pictures, scenes, trajectories
 from benchmarks.support.options import add_seeds, new_parser, one_thread, seeds_text
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "pictures": pictures.pictures,
+    "photometric": photometric.photometric,
+    "trajectories": trajectories.trajectories,
     "scenes": scenes.scenes,
     "decisions": scenes.decisions,
     "cost": cost.cost,
@@ -35,6 +40,7 @@ def main() -> None:
     add_seeds(parser, "20000:20030")
     parser.add_argument("--only", help="scenes, separated by commas: cross, merge, stairs, crowded")
     parser.add_argument("--options", help="decisions: parameters, separated by commas")
+    parser.add_argument("--chart", type=Path, default=Path("stereo.svg"), help="trajectories, cost: the SVG to write")
     parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")
     args = parser.parse_args()
     one_thread()

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from benchmarks.stereo.scenes import entries, recordings
+from benchmarks.support.chart import Panel, lines
 from benchmarks.support.tables import table
 from tracking.detect.subtraction_stereo import SubtractionStereo
 from tracking.run import track
@@ -56,6 +57,10 @@ def cost(args: argparse.Namespace) -> dict[str, list[list[float]]]:
                 f"{share + 0.15:.3f}",
                 str(len(here)),
             ]
+    chart = {"time": [float(c[2]) for c in rows.values()], "windows": [float(c[1]) for c in rows.values()]}
+    chart["target"] = [float(c[3]) for c in rows.values()]
+    share = [float(c[0]) for c in rows.values()]
+    lines([Panel("Subtraction stereo over dense matching", share, chart, "share of foreground")], args.chart, 1)
     table("Cost of matching", "foreground", ("mean", "windows", "time", "target", "frames"), rows)
     table("Frames per second", "scene", ("frames/s",), {k: [f"{np.mean(v):.0f}"] for k, v in speed.items()})
     return made

@@ -61,15 +61,17 @@ class SubtractionStereo:
         self._matcher.setTextureThreshold(TEXTURE)
         self._matcher.setDisp12MaxDiff(1 if check else -1)
 
-    def match(self, left: Image, right: Image, mask: Bools) -> Matched:
+    def match(self, left: Image, right: Image, mask: Bools, boxes: Ints | None = None) -> Matched:
         """Returns the disparities inside `mask` (H, W), the foreground of the left picture.
 
-        left, right (H, W): grey values, uint8, of a rectified pair. An empty mask gives nan everywhere. Pixels whose
-        match would lie beyond the left edge of the right picture have none.
+        left, right (H, W): grey values, uint8, of a rectified pair. boxes (K, 4): x0, y0, x1, y1 in px (ends excluded)
+        of boxes that cover the mask; None: those of its connected regions, which takes time to find. An empty mask
+        gives nan everywhere. Pixels whose match would lie beyond the left edge of the right picture have none.
         """
+        boxes = region_boxes(mask) if boxes is None else boxes
         found = np.full(left.shape, np.nan, np.float32)
         area = 0
-        for core, (x0, y0, x1, y1) in zip(*windows(mask, self.margins), strict=True):
+        for core, (x0, y0, x1, y1) in zip(*windows(boxes, self.margins, mask.shape), strict=True):
             part = self._match(left[y0:y1, x0:x1], right[y0:y1, x0:x1])
             inner = slice(core[1], core[3]), slice(core[0], core[2])
             own = part[core[1] - y0 : core[3] - y0, core[0] - x0 : core[2] - x0]
@@ -97,19 +99,25 @@ class SubtractionStereo:
         return np.where(raw > 0, raw.astype(np.float32) / STEPS, np.float32(np.nan))
 
 
-def windows(mask: Bools, margins: Ints) -> tuple[Ints, Ints]:
-    """Return boxes that cover a mask (H, W), and the windows to match in: two arrays (K, 4), x0, y0, x1, y1 in px (ends
-    excluded).
-
-    The boxes are those of the mask's connected regions; a window is a box widened by `margins` (left, top, right,
-    bottom, px) and cut off at the edges of the picture. Boxes are replaced by their common box where the window of two
-    of them together is not larger than their two windows. An empty mask gives K = 0.
-    """
-    high, wide = mask.shape
+def region_boxes(mask: Bools) -> Ints:
+    """Return the boxes (K, 4) of the connected regions of a mask (H, W): x0, y0, x1, y1 in px, ends excluded."""
     one = np.ascontiguousarray(mask).view(np.uint8)
     stats = cv2.connectedComponentsWithStats(one, connectivity=8, ltype=cv2.CV_16U)[2]
-    core = stats[1:, :4].astype(np.int64)
-    core[:, 2:] += core[:, :2]
+    boxes = stats[1:, :4].astype(np.int64)
+    boxes[:, 2:] += boxes[:, :2]
+    return boxes
+
+
+def windows(boxes: Ints, margins: Ints, shape: tuple[int, ...]) -> tuple[Ints, Ints]:
+    """Return boxes that cover the given ones, and the windows to match in: two arrays (K, 4), x0, y0, x1, y1 in px
+    (ends excluded).
+
+    boxes (N, 4): of regions, in the same form. A window is a box widened by `margins` (left, top, right, bottom, px)
+    and cut off at the edges of the picture; shape: its (H, W). Boxes are replaced by their common box where the window
+    of two of them together is not larger than their two windows. N = 0 gives K = 0.
+    """
+    high, wide = shape
+    core = boxes
     outwards, limits = margins * np.array([-1, -1, 1, 1]), np.array([wide, high, wide, high])
     while True:
         window = np.minimum(np.maximum(core + outwards, 0), limits)

@@ -9,7 +9,7 @@ from sim.scene.stereo import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect import blobs
 from tracking.detect.stereo_people import PersonLimits, person_mask, sizes
-from tracking.detect.subtraction_stereo import SubtractionStereo, sampled, windows
+from tracking.detect.subtraction_stereo import SubtractionStereo, region_boxes, sampled, windows
 
 HIGH, WIDE = 120, 200
 
@@ -61,7 +61,7 @@ def test_inside_the_mask_it_is_bit_equal_to_dense_matching() -> None:
 def test_what_is_compared_is_the_area_of_the_windows_times_the_disparities() -> None:
     left, right = pair(5.3)
     stereo, mask = SubtractionStereo(14.0, 9), three_regions()
-    _, found = windows(mask, stereo.margins)
+    _, found = windows(region_boxes(mask), stereo.margins, mask.shape)
     area = sum((x1 - x0 - 16) * (y1 - y0) for x0, y0, x1, y1 in found.tolist())
     assert stereo.match(left, right, mask).evaluated == 16 * area
     assert stereo.match(left, right, np.ones_like(mask)).evaluated == 16 * HIGH * (WIDE - 16)
@@ -72,7 +72,7 @@ def test_what_is_compared_is_the_area_of_the_windows_times_the_disparities() -> 
 
 def test_windows_cover_the_mask_and_join_only_where_that_saves() -> None:
     mask, margins = three_regions(), np.array([20, 4, 4, 4])
-    boxes, wide = windows(mask, margins)
+    boxes, wide = windows(region_boxes(mask), margins, mask.shape)
     covered = np.zeros_like(mask)
     for x0, y0, x1, y1 in boxes.tolist():
         covered[y0:y1, x0:x1] = True

@@ -55,7 +55,9 @@ class PicturePoints:
             return None
         c, left = self.config, grey(image)
         blobs = self.foreground.person_blobs(seen.mask)
-        disparity = self.stereo.match(left, grey(right), blobs.label > 0).disparity
+        boxes = np.rint(blobs.box).astype(np.int64)
+        boxes[:, 2:] += boxes[:, :2]
+        disparity = self.stereo.match(left, grey(right), blobs.label > 0, boxes).disparity
         deviations = (c.pixel_noise, c.pixel_noise, c.disparity_noise)
         limits = PersonLimits(c.least_height, c.most_height, c.least_width, deviations)
         people = person_mask(blobs, disparity, self.camera, limits)
