@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tracking.papers.joint.line_kernels import ACROSS, FLAT
+
 
 def all_partitions(people: int) -> Iterator[list[list[int]]]:
     """Yields every partition of the people 0, ..., people - 1, as lists of members."""
@@ -43,6 +45,13 @@ def validity(points: np.ndarray, parts: list[list[int]], s0: float, nu: float, a
         ]  # fmt: skip
         found.append(max([*ratios, scatter[g] / apart]))
     return float(np.mean(found))
+
+
+def line_of_group(state: np.ndarray) -> float:
+    """Returns how much three or more people are a line; state (n, 4)."""
+    values, axes = np.linalg.eigh(np.cov(state[:, :2].T, bias=True))
+    across = state[:, 2:].mean(axis=0) @ axes[:, 0]
+    return float(max(0.0, 1 - values[0] / FLAT**2) * np.exp(-((across / ACROSS) ** 2) / 2))
 
 
 def log_group_dynamics(new: np.ndarray, old: np.ndarray, parts: list[list[int]], sigma: np.ndarray, dt: float) -> float:

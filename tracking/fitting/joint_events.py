@@ -1,9 +1,11 @@
 """The event classifier of `joint`, learned from simulated truth: pi(e | X, g, g'), eq. 7 of Bazzani et al. 2012.
 
 A multinomial logistic regression over (d_KL, d_v, d_intra) of a group and its nearest one at two times a lag apart, as
-the tracker computes them. Classes are Merge, Split and None, at their natural frequency, so that the probabilities are
-those of an event within the lag. Rows are all groups of the true partition, people alone included, every STRIDE. Places
-and velocities have errors as large as those of a filter.
+the tracker computes them, and over lines of people. Classes are Merge, Split and None, at their natural frequency, so
+that the probabilities are those of an event within the lag. Rows are all groups of the true partition, people alone
+included, every STRIDE. Of every WRONG-th partition there is also a wrong copy, in which a group is divided or two are
+joined; its events are those that lead to the true partition, so that a filter recovers from its errors. Places and
+velocities have errors as large as those of a particle.
 """
 
 from __future__ import annotations
@@ -22,8 +24,10 @@ from tracking.papers.joint.partition_kernels import canonical
 
 STRIDE = 0.2
 """Time between two partitions that are looked at, s."""
-PLACE_ERROR, VELOCITY_ERROR = 0.04, 0.12
+PLACE_ERROR, VELOCITY_ERROR = 0.05, 0.2
 """Standard deviations of the errors of places, m, and velocities, m/s, per axis."""
+WRONG = 5
+"""Of as many partitions one is also given with an error."""
 RIDGE = 1e-3
 """Weight of the squared coefficients, of standardised features, in the loss of a row."""
 LEAST = 5
@@ -36,7 +40,7 @@ CLASSES = ("merge", "split", "none")
 class EventRows:
     """Groups and what happened to them within the lag, one row for each group and time.
 
-    features (R, 6): as group_events_kernels; event (R,): MERGE, SPLIT or NONE; possible (R, 3): which events are: one
+    features (R, 8): as group_events_kernels; event (R,): MERGE, SPLIT or NONE; possible (R, 3): which events are: one
     person does not split, a group without another one does not merge. seconds: time that the partitions cover.
     """
 
@@ -55,8 +59,9 @@ class EventRows:
         return cls(features, event, possible, sum(p.seconds for p in given))
 
 
-def event_rows(truth: Truth, lag: float, seed: int) -> EventRows:
-    """Return the rows of a sequence; lag: s between the two times of the features; seed: of the errors.
+def event_rows(truth: Truth, lag: float, seed: int, *, wrong: bool = True) -> EventRows:
+    """Return the rows of a sequence; lag: s between the two times of the features; seed: of the errors. wrong:
+    whether there are wrong copies of partitions.
 
     truth: with positions, velocities and groups of a simulated sequence.
     """
@@ -70,8 +75,35 @@ def event_rows(truth: Truth, lag: float, seed: int) -> EventRows:
         i, j = i + a.start, j + b.start
         states = [_erring(np.concatenate([truth.pos[r], truth.vel[r]], axis=1), draws) for r in (i, j)]
         found.append(rows_of(states[0], states[1], truth.group[i], truth.group[j]))
+        if wrong and (early - 1) // stride % WRONG == 0 and len(i) > 1:
+            found.append(rows_of(states[0], states[1], wrong_partition(truth.group[i], states[0], draws), truth.group[j]))
     parts = EventRows.joined(found)
     return EventRows(parts.features, parts.event, parts.possible, truth.length / truth.fps)
+
+
+def wrong_partition(group: Ints, state: Array, draws: np.random.Generator) -> Ints:
+    """Return groups (K,), -1 for alone, with an error: with probability 1/2 a part leaves a group, else two people, and
+    with them their groups, are joined who are nearest to each other among those of different groups.
+
+    group (K,): true groups of two or more people; state (K, 4). The part is one person or, as often, half of the group.
+    """
+    out, new = group.copy(), group.max(initial=0) + 1
+    named = np.unique(group[group >= 0])
+    if len(named) and draws.random() < 0.5:
+        members = draws.permutation(np.flatnonzero(group == draws.choice(named)))
+        part = members[: 1 if draws.random() < 0.5 else len(members) // 2]
+        out[part] = new if len(part) > 1 else -1
+        rest = members[len(part) :]
+        out[rest] = out[rest] if len(rest) > 1 else -1
+        return out
+    apart = np.hypot(*(state[:, None, :2] - state[None, :, :2]).transpose(2, 0, 1))
+    apart[(group[:, None] == group) & (group >= 0)] = np.inf
+    np.fill_diagonal(apart, np.inf)
+    a, b = np.unravel_index(int(apart.argmin()), apart.shape)
+    if np.isfinite(apart[a, b]):
+        joined = [(group == group[k]) if group[k] >= 0 else np.arange(len(group)) == k for k in (a, b)]
+        out[joined[0] | joined[1]] = new
+    return out
 
 
 def _erring(state: Array, draws: np.random.Generator) -> Array:

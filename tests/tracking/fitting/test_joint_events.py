@@ -49,14 +49,14 @@ def test_rows_say_what_happened_to_each_group():
 
 def test_the_fit_finds_its_weights():
     rng = np.random.default_rng(0)
-    features = rng.normal(1, 0.7, (60_000, 6))
+    features = rng.normal(1, 0.7, (150_000, 8))
     names = [f"{event}_{term}" for event in ("merge", "split") for term in TERMS]
-    true = dict(zip(names, [-1, 0.5, 0, -1, 1, 0, 0.5, 0.5, 0, -1, 0, 0.5, 1, -1], strict=True))
-    possible = np.ones((60_000, 3), bool)
-    possible[:20_000, SPLIT] = False
-    rows = EventRows(features, np.zeros(60_000, np.int64), possible, 0.0)
+    true = dict(zip(names, [-1, 0.5, 0, -1, 1, 0, 0.3, -0.2, 0.5, 0.5, 0, -1, 0, 0.5, 1, 0, 0.4, -1], strict=True))
+    possible = np.ones((150_000, 3), bool)
+    possible[:50_000, SPLIT] = False
+    rows = EventRows(features, np.zeros(150_000, np.int64), possible, 0.0)
     p = np.exp(log_probabilities(rows, true))
-    event = (rng.random((60_000, 1)) > np.cumsum(p, axis=1)).sum(axis=1)
+    event = (rng.random((150_000, 1)) > np.cumsum(p, axis=1)).sum(axis=1)
     fitted = fit_events(dataclasses.replace(rows, event=event))
     assert list(fitted) == names
     np.testing.assert_allclose(list(fitted.values()), list(true.values()), atol=0.08)
@@ -92,7 +92,7 @@ def test_rates_of_events_do_not_depend_on_the_frame_rate(monkeypatch):
     )  # fmt: skip
     config, rates = JointConfig(), []
     for one in (truth, halved):
-        rows = event_rows(one, config.lag, 0)
+        rows = event_rows(one, config.lag, 0, wrong=False)
         assert (rows.event == NONE).all()
         p = [
             sum(event_probabilities(f, 1.0 + splits, float(merges), config.classifier, config.rules(1 / one.fps, 0.4)))

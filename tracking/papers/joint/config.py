@@ -22,7 +22,10 @@ FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classif
     "params"
 ]
 SIZE_PRIORS = {"none": events.SIZE_NONE, "merge": events.SIZE_MERGE, "all": events.SIZE_ALL}
-TERMS = ("distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "bias")
+TERMS = (
+    "distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "line_between",
+    "line_within", "bias",
+)  # fmt: skip
 """Terms of the event classifier, in the order of the features of group_events_kernels."""
 
 
@@ -82,9 +85,9 @@ class JointConfig(BackgroundSettings):
     )
     alpha: float = param(0.1, (0.0, 1.0), "share", "of the dynamics in the individuals' proposal")
     place_noise: float = param(
-        0.3, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma; the paper gives no Sigma", "log"
+        0.25, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma; the paper gives no Sigma", "log"
     )
-    velocity_noise: float = param(0.3, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
+    velocity_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
     point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")
     pixel_noise: float = param(
         0.15,
@@ -104,6 +107,9 @@ class JointConfig(BackgroundSettings):
 
     validity_rate: float = param(
         20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"
+    )
+    line_rate: float = param(
+        10.0, (0.0, 200.0), "1/s", "cost in log p(Z | X) of a person in a line with the own group, per second (ours)"
     )
     normaliser: str = param(
         "energy",
@@ -167,6 +173,8 @@ class JointConfig(BackgroundSettings):
     merge_distance_late: float = _weight("merge", "distance_late", "", "weight of log(1 + d_KL), later time")
     merge_velocity_late: float = _weight("merge", "velocity_late", "s/m", "weight of d_v, later time")
     merge_spread_late: float = _weight("merge", "spread_late", "1/m", "weight of d_intra, later time")
+    merge_line_between: float = _weight("merge", "line_between", "", "weight of being in one line with the nearest")
+    merge_line_within: float = _weight("merge", "line_within", "", "weight of being a line")
     merge_bias: float = _weight("merge", "bias", "", "constant")
     split_distance_early: float = _weight("split", "distance_early", "", "weight of log(1 + d_KL), earlier time")
     split_velocity_early: float = _weight("split", "velocity_early", "s/m", "weight of d_v, earlier time")
@@ -174,11 +182,13 @@ class JointConfig(BackgroundSettings):
     split_distance_late: float = _weight("split", "distance_late", "", "weight of log(1 + d_KL), later time")
     split_velocity_late: float = _weight("split", "velocity_late", "s/m", "weight of d_v, later time")
     split_spread_late: float = _weight("split", "spread_late", "1/m", "weight of d_intra, later time")
+    split_line_between: float = _weight("split", "line_between", "", "weight of being in one line with the nearest")
+    split_line_within: float = _weight("split", "line_within", "", "weight of being a line")
     split_bias: float = _weight("split", "bias", "", "constant")
 
     @property
     def classifier(self) -> Array:
-        """The weights (2, 7) of Merge and Split: of the six features, then the constant."""
+        """The weights (2, 9) of Merge and Split: of the eight features, then the constant."""
         return np.array([[getattr(self, f"{event}_{term}") for term in TERMS] for event in ("merge", "split")])
 
     @property
