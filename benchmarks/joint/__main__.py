@@ -1,4 +1,4 @@
-"""`joint`: the paper's Table 2, recordings, the event classifier, accuracy and speed over the numbers of particles.
+"""`joint`: the paper's Table 2, recordings, event classifier, numbers of particles, events, what departures are worth.
 
     python -m benchmarks.joint MODE [--seeds a:b] [--filter-seeds a:b] [--set k=v]… [--only A,B]
 
@@ -7,7 +7,10 @@ table2      friends-meet: the paper's columns for full, VAR1, VAR2, VAR3 and .2,
 recordings  seq_hotel, zara01 and Meet_WalkTogether1 from labelled positions with noise 0.1 m and 5 % misses: the
             columns of Table 3b and pairwise F1, beside relational and the default grouping over particle (--data)
 classifier  the event classifier: confusion matrix, log loss, expected events per minute where nothing happens
-particles   friends-meet: accuracy and frames/s over N_x and N_z
+particles   friends-meet: accuracy and frames/s over N_x and N_z (--chart FILE.svg)
+events      a suite (--suite): event F1, hits, false alarms, misses and latency, beside group-pda and the default
+            grouping over blob and particle
+ablation    friends-meet: scores without each departure from the paper that has a parameter, paired differences
 
 A row of table2 holds a sequence's scores, means over filter seeds. Group scores are pooled over the frames of all
 sequences together, strict and core; differences are of the means over sequences, with 95 % intervals. Detections are
@@ -19,10 +22,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from benchmarks.support import tables
+from benchmarks.support import chart, tables
 from benchmarks.support.options import (
     HOTEL,
     WALK_TOGETHER,
@@ -58,6 +62,13 @@ PAPER = {
 COMPARED = ("GDSR", "MOTA", "1-FN", "1-FP")
 PX_PER_M = 40.0
 COUNTS = (10, 25, 50, 100, 200)
+DEPARTURES = (
+    "", "line_rate=0", "merge_line_between=0 split_line_between=0 merge_line_within=0 split_line_within=0",
+    "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "validity_rate=0", "velocity_time=0",
+    "scatter_people=0", "normaliser=sampled", "newcomers=alone", "size_prior=none", "size_prior=all size_std=1.5",
+    "parts_sharpness=0", "lag=0.1", "estimate=histogram", "inertia=0",
+)  # fmt: skip
+"""Settings of the mode ablation."""
 
 
 @dataclass(frozen=True)
@@ -102,9 +113,9 @@ def mean_row(rows: Sequence[Row]) -> Row:
     return {key: float(np.mean([row.get(key, np.nan) for row in rows])) for key in rows[0]}
 
 
-def sequences(seeds: Iterable[int]) -> Iterable[Recording]:
-    """Yields the sequences of friends-meet; entries whose script is not fulfilled for a seed are named and left out."""
-    for entry in resolve("suite:friends-meet"):
+def sequences(seeds: Iterable[int], suite: str = "friends-meet") -> Iterable[Recording]:
+    """Yields the sequences of a suite; entries whose script is not fulfilled for a seed are named and left out."""
+    for entry in resolve(f"suite:{suite}"):
         for seed in seeds:
             try:
                 made = simulate(entry.scenario, seed, entry.repeat, ())
@@ -206,7 +217,7 @@ def classifier(given: argparse.Namespace) -> None:
     parts: dict[bool, list[EventRows]] = {True: [], False: []}
     for k, sequence in enumerate(sequences(given.seeds)):
         assert sequence.truth is not None
-        rows = event_rows(sequence.truth, lag, k)
+        rows = event_rows(sequence.truth, lag, k, wrong=False)
         parts[bool((rows.event != NONE).any())].append(rows)
     rows = EventRows.joined([*parts[True], *parts[False]])
     scores = event_scores(rows, FITTED)
@@ -232,21 +243,74 @@ def classifier(given: argparse.Namespace) -> None:
 
 def particles(given: argparse.Namespace) -> None:
     """Prints a table over N_x and N_z."""
-    made = list(sequences(given.seeds))
+    made, found = list(sequences(given.seeds)), {}
     tables.head(["N_x", "N_z", "GDSR, %", "MOTA, %", *OTHERS])
     for n_x, n_z in [(n, 50) for n in COUNTS] + [(50, n) for n in COUNTS if n != 50]:
         v = Variant("", params={"particles": n_x, "partitions": n_z})
         rows = [mean_row(measured(s, v, given.filter_seeds, given.set)) for s in made]
-        tables.row([str(n_x), str(n_z), *pooled(rows, "")[2:4], *others(rows)])
+        shares, speed = pooled(rows, "")[2:4], float(np.mean([row["speed"] for row in rows]))
+        found[n_x, n_z] = [*map(float, shares), speed]
+        tables.row([str(n_x), str(n_z), *shares, *others(rows)])
+    if given.chart:
+        lines = {
+            "over N_x, N_z = 50": [found[n, 50] for n in COUNTS],
+            "over N_z, N_x = 50": [found[50, n] for n in COUNTS],
+        }
+        panels = [
+            chart.Panel(name, COUNTS, {k: np.array(v)[:, column] for k, v in lines.items()}, "particles")
+            for column, name in enumerate(("GDSR, %", "MOTA, %", "frames/s"))
+        ]
+        chart.lines(panels, given.chart, columns=3)
+
+
+def events(given: argparse.Namespace) -> None:
+    """Prints a table of events on a suite: means of event F1 over sequences, sums of hits, false alarms and misses."""
+    compared = [Variant("joint"), Variant("group-pda", "group-pda", seeds=False)]
+    compared += [Variant(f"{name} + default grouping", name, seeds=name != "blob") for name in ("particle", "blob")]
+    rows: dict[str, list[Row]] = {v.name: [] for v in compared}
+    for sequence in sequences(given.seeds, given.suite):
+        for v in compared:
+            rows[v.name].append(mean_row(measured(sequence, v, given.filter_seeds, given.set)))
+    cells = {}
+    for name, found in rows.items():
+        counts = [
+            " / ".join(f"{np.nansum([row[f'{kind}_{k}'] for row in found]):.0f}" for k in ("TP", "FP", "FN"))
+            for kind in ("merge", "split")
+        ]
+        latency = [row["event_latency"] for row in found if np.isfinite(row["event_latency"])]
+        means = [float(np.nanmean([row[key] for row in found])) for key in ("event_F1", "group_F1", "pairwise_F1")]
+        median = tables.number(float(np.median(latency))) if latency else "–"
+        cells[name] = [*map(tables.number, means), *counts, median]
+    columns = ["event F1", "group F1", "pairwise F1", "merges: hits / false / missed", "splits", "latency, s (median)"]
+    tables.table(
+        f"{given.suite}, {len(rows['joint'])} sequences, seeds {seeds_text(given.seeds)}", "tracker", columns, cells
+    )
+
+
+def ablation(given: argparse.Namespace) -> None:
+    """Prints a table: rows are settings, columns scores pooled over frames and paired differences to the defaults."""
+    made, base = list(sequences(given.seeds)), []
+    tables.head(["setting", *(f"{name}, %" for name in SHARES), "event F1", "Δ GDSR", "Δ MOTA", "Δ event F1"])
+    for setting in DEPARTURES:
+        v = Variant("")
+        rows = [mean_row(measured(s, v, given.filter_seeds, [*given.set, *setting.split()])) for s in made]
+        base = base or rows
+        differences = [difference(rows, base, key) for key in ("group_GDSR", "group_MOTA", "event_F1")]
+        tables.row([setting or "defaults", *pooled(rows, "_core")[:4], others(rows)[0], *differences])
 
 
 def main() -> None:
     parser = new_parser(__doc__)
-    modes = {"table2": table2, "recordings": recordings, "classifier": classifier, "particles": particles}
+    modes = {
+        "table2": table2, "recordings": recordings, "classifier": classifier, "particles": particles, "events": events,
+        "ablation": ablation,
+    }  # fmt: skip
     parser.add_argument("mode", choices=modes)
     add_seeds(parser, "20000:20001")
     parser.add_argument("--filter-seeds", type=seed_range, default="0:5", metavar="A:B", help="seeds of the filters")
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of joint")
+    parser.add_argument("--suite", default="standard", help="of mode events")
+    parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="mode particles: draw it")
     parser.add_argument("--only", help="table2: variants, separated by commas")
     add_data(parser)
     given = parser.parse_args()

@@ -76,7 +76,8 @@ def event_rows(truth: Truth, lag: float, seed: int, *, wrong: bool = True) -> Ev
         states = [_erring(np.concatenate([truth.pos[r], truth.vel[r]], axis=1), draws) for r in (i, j)]
         found.append(rows_of(states[0], states[1], truth.group[i], truth.group[j]))
         if wrong and (early - 1) // stride % WRONG == 0 and len(i) > 1:
-            found.append(rows_of(states[0], states[1], wrong_partition(truth.group[i], states[0], draws), truth.group[j]))
+            copy = wrong_partition(truth.group[i], states[0], draws)
+            found.append(rows_of(states[0], states[1], copy, truth.group[j]))
     parts = EventRows.joined(found)
     return EventRows(parts.features, parts.event, parts.possible, truth.length / truth.fps)
 

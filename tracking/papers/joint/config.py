@@ -29,8 +29,8 @@ TERMS = (
 """Terms of the event classifier, in the order of the features of group_events_kernels."""
 
 
-def _weight(event: str, term: str, unit: str, meaning: str) -> Any:
-    return param(FITTED[f"{event}_{term}"], (-100.0, 100.0), unit, f"{event}: {meaning}", tunable=False)
+def _weight(event: str, term: str, unit: str, meaning: str, before: float | None = None) -> Any:
+    return param(FITTED[f"{event}_{term}"], (-100.0, 100.0), unit, f"{event}: {meaning}", tunable=False, before=before)
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,11 @@ class JointConfig(BackgroundSettings):
         20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"
     )
     line_rate: float = param(
-        10.0, (0.0, 200.0), "1/s", "cost in log p(Z | X) of a person in a line with the own group, per second (ours)"
+        10.0,
+        (0.0, 200.0),
+        "1/s",
+        "cost in log p(Z | X) of a person in a line with the own group, per second (ours)",
+        before=0.0,
     )
     normaliser: str = param(
         "energy",
@@ -173,8 +177,10 @@ class JointConfig(BackgroundSettings):
     merge_distance_late: float = _weight("merge", "distance_late", "", "weight of log(1 + d_KL), later time")
     merge_velocity_late: float = _weight("merge", "velocity_late", "s/m", "weight of d_v, later time")
     merge_spread_late: float = _weight("merge", "spread_late", "1/m", "weight of d_intra, later time")
-    merge_line_between: float = _weight("merge", "line_between", "", "weight of being in one line with the nearest")
-    merge_line_within: float = _weight("merge", "line_within", "", "weight of being a line")
+    merge_line_between: float = _weight(
+        "merge", "line_between", "", "weight of being in one line with the nearest", before=0.0
+    )
+    merge_line_within: float = _weight("merge", "line_within", "", "weight of being a line", before=0.0)
     merge_bias: float = _weight("merge", "bias", "", "constant")
     split_distance_early: float = _weight("split", "distance_early", "", "weight of log(1 + d_KL), earlier time")
     split_velocity_early: float = _weight("split", "velocity_early", "s/m", "weight of d_v, earlier time")
@@ -182,8 +188,10 @@ class JointConfig(BackgroundSettings):
     split_distance_late: float = _weight("split", "distance_late", "", "weight of log(1 + d_KL), later time")
     split_velocity_late: float = _weight("split", "velocity_late", "s/m", "weight of d_v, later time")
     split_spread_late: float = _weight("split", "spread_late", "1/m", "weight of d_intra, later time")
-    split_line_between: float = _weight("split", "line_between", "", "weight of being in one line with the nearest")
-    split_line_within: float = _weight("split", "line_within", "", "weight of being a line")
+    split_line_between: float = _weight(
+        "split", "line_between", "", "weight of being in one line with the nearest", before=0.0
+    )
+    split_line_within: float = _weight("split", "line_within", "", "weight of being a line", before=0.0)
     split_bias: float = _weight("split", "bias", "", "constant")
 
     @property

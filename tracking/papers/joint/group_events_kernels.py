@@ -161,14 +161,21 @@ def event_probabilities(
 
 @njit(cache=True)
 def propose(
-    early: Array, late: Array, points: Array, line: Array, label: Ints, uniforms: Array, weights: Array, rules: Array,
+    early: Array,
+    late: Array,
+    points: Array,
+    line: Array,
+    label: Ints,
+    uniforms: Array,
+    weights: Array,
+    rules: Array,
     scales: Array,
 ) -> None:
     """Draw Z_{t+1} from the joint group proposal for all particles: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7.
 
-    early, late (N_x, K, 4): states at both times; points (N_x, K, D): the later ones as the validity sees them, m;
-    line (N_x, K, K): as line_kernels.lines; label (N_x, N_z, K): Z_t, changed in place; uniforms (N_x, N_z, K, 3): of the heads of groups. weights, rules: as
-    event_probabilities; scales: as partition_kernels.SCATTER and the following.
+    early, late (N_x, K, 4): states at both times; points (N_x, K, D): the later ones as the validity sees them, m; line
+    (N_x, K, K): as line_kernels.lines; label (N_x, N_z, K): Z_t, changed in place; uniforms (N_x, N_z, K, 3): of the
+    heads of groups. weights, rules: as event_probabilities; scales: as partition_kernels.SCATTER and the following.
 
     Groups are visited in random order. A group that an event has changed is not visited. A pair of groups that are each
     other's nearest draws its merge once, so that the probability is the pair's (ours).

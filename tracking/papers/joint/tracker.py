@@ -27,7 +27,9 @@ Departures, all ours:
 - The Davies-Bouldin index has a prior scatter and a virtual other cluster, sees velocities, and acts per second.
 - People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
   features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
-- The partition is that of least Binder loss, with inertia; ids follow the identity rule.
+- People in lines (line_kernels): groups that are lines cost in p(Z | X), and the classifier has two features of lines.
+- The partition is that of least Binder loss, with inertia; ids follow the identity rule; onsets of events are dated
+  back.
 The preset `paper` switches off what has a parameter.
 """
 
@@ -52,6 +54,7 @@ from tracking.papers.joint.division_kernels import place_newcomer
 from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
+from tracking.papers.joint.reported_events import ReportedEvents
 
 MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)
 """Keys of the random streams."""
@@ -62,9 +65,10 @@ class Joint:
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
     particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; together (K, K):
-    probability that each pair is in one group, in the last frame; health: how many particles the weights are worth;
-    draws, the random streams; pixels: detector of blobs, None from points; shown (K, 4): boxes of the people reported
-    last, px; plane, "ground" or "image"; context. All but config exist after `reset` only.
+    probability that each pair is in one group, in the last frame; events: those of the reported groups; health: how
+    many particles the weights are worth; draws, the random streams; pixels: detector of blobs, None from points; shown
+    (K, 4): boxes of the people reported last, px; plane, "ground" or "image"; context. All but config exist after
+    `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -93,7 +97,7 @@ class Joint:
             np.full(shape, -np.log(c.partitions)), np.zeros((c.particles, 0)), np.zeros(c.particles),
         )  # fmt: skip
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
-        self.together = np.zeros((0, 0))
+        self.together, self.events = np.zeros((0, 0)), ReportedEvents(context.fps)
         self.health = ParticleHealth(c.particles, context.fps)
         self.draws = [rng(seed, "tracker", key) for key in range(PLACING + 1)]
         flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
@@ -251,11 +255,16 @@ class Joint:
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
         box = boxes_at(pos, self.people.size) if self.plane == "image" else None
         self.shown = np.zeros((0, 4)) if box is None else box
-        group = reported_groups.group_ids(self.identities, frame.index, id, self._groups(joint))
+        old = self.identities.groups
+        parts = [frozenset(id[rows].tolist()) for rows in self._groups(joint)]
+        changes = self.identities.step(frame.index, frozenset(id.tolist()), parts)
+        self.events.add(id, mean[:, :2])
+        events = self.events.events(changes, old, self.identities.groups, self.unit)
+        group = reported_groups.known_groups(self.identities, id)
         groups = reported_groups.no_groups(group)
         score, cov = np.ones(len(id)), cov * self.unit**2
         return Tracks(
-            frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov, box, score, groups
+            frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov, box, score, groups, events
         )  # fmt: skip
 
     def _groups(self, joint: Array) -> list[Ints]:

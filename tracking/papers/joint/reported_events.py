@@ -1,0 +1,86 @@
+"""Events of the reported groups, with onsets dated back by the rules of the truth (ours).
+
+A merge or split is reported when the partition changes. Its start is the frame in which the parts came together, or
+parted, in the past that is known then.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from sim.truth.identity import GroupChange, Members
+from sim.truth.merge_split_rules import frames_of
+from sim.types import Array, GroupEvent, Ints
+from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, event_of_change
+
+CHORD = 0.5
+"""Time over which velocities are measured, s."""
+ARRIVAL = 1.0
+"""s: people who were together so soon after they were first seen arrived together."""
+
+
+class ReportedEvents:
+    """State: recent, the ids (K,) and places (K, 2), m, of the frames of the last SEARCHED s; first: frame from 0 in
+    which each person was seen first; frames: their number so far; fps."""
+
+    def __init__(self, fps: float) -> None:
+        self.fps, self.frames = fps, 0
+        self.recent: deque[tuple[Ints, Array]] = deque(maxlen=frames_of(SEARCHED, fps) + frames_of(CHORD, fps))
+        self.first: dict[int, int] = {}
+
+    def add(self, id: Ints, pos: Array) -> None:
+        """Add a frame: ids (K,) and places (K, 2), m, of the people reported."""
+        self.recent.append((id.copy(), pos.copy()))
+        for person in id.tolist():
+            self.first.setdefault(person, self.frames)
+        self.frames += 1
+
+    def events(
+        self, changes: Iterable[GroupChange], old: Members, new: Members, scale: float
+    ) -> tuple[GroupEvent, ...]:
+        """Return the events of the changes of groups in the last frame added; their members are ids of people.
+
+        old, new: members of the groups before and after. scale: reported units per metre.
+        """
+        changes = list(changes)
+        if not changes:
+            return ()
+        ids, motion = self._motion()
+        column = {person: k for k, person in enumerate(ids)}
+        begin, now = self.frames - len(self.recent), set(self.recent[-1][0].tolist())
+        out = []
+        for change in changes:
+            there = frozenset(change.members) & now
+            sets = _parts(change, old, new, there)
+            since = max((min(self.first[p] for p in part) for part in sets), default=0) - begin
+            parts = Parts([frozenset(column[p] for p in part) for part in sets], since)
+            own = replace(change, members=tuple(sorted(column[p] for p in change.members if p in column)))
+            event = event_of_change(own, len(self.recent) - 1, parts, motion, frames_of(ARRIVAL, self.fps))
+            if event is not None:
+                x, y = event.pos
+                out.append(replace(
+                    event, start=event.start + begin, end=event.end + begin, emitted=self.frames,
+                    members=tuple(sorted(ids[p - 1] for p in event.members)), pos=(x * scale, y * scale),
+                ))  # fmt: skip
+        return tuple(out)
+
+    def _motion(self) -> tuple[list[int], TrackedMotion]:
+        """Returns the ids of the people of the recent frames, and their motion; velocities are chords of places."""
+        ids = sorted({person for id, _ in self.recent for person in id.tolist()})
+        pos = np.full((len(self.recent), len(ids), 2), np.nan)
+        for t, (id, place) in enumerate(self.recent):
+            pos[t, np.searchsorted(ids, id)] = place
+        chord, vel = frames_of(CHORD, self.fps), np.full_like(pos, np.nan)
+        vel[chord:] = (pos[chord:] - pos[:-chord]) * self.fps / chord
+        return ids, TrackedMotion(pos, vel, self.fps)
+
+
+def _parts(change: GroupChange, old: Members, new: Members, there: frozenset[int]) -> list[frozenset[int]]:
+    """Returns the groups and people alone, of people `there`, that a change joined, or into which it divided one."""
+    groups, names = (new, change.after) if change.kind in ("split", "dissolve") else (old, change.before)
+    parts = [part for g in names if g >= 0 and (part := groups[g] & there)]
+    return parts + [frozenset([p]) for p in sorted(there.difference(*parts))]
