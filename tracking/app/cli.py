@@ -221,6 +221,18 @@ def coco(
 
 
 @export.command()
+def kitti(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset with stereo pairs.")],
+    out: Out,
+    json: Json = False,
+) -> CommandResult:
+    """Write stereo pairs, disparities and calibrations as in KITTI."""
+    from tracking.app.commands.datasets import export_kitti
+
+    return export_kitti(folder, out)
+
+
+@export.command()
 @options_from(WebdatasetOptions)
 def webdataset(options: WebdatasetOptions) -> CommandResult:
     """Write tar shards for streaming, in the format of the library webdataset."""

@@ -70,6 +70,18 @@ def export_coco(source: Path, out: Path) -> CommandResult:
     return CommandResult({"file": path}, str(path))
 
 
+def export_kitti(source: Path, out: Path) -> CommandResult:
+    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder `out`.
+
+    The result's data: "folders", one per sequence. Files of an earlier export are replaced. Raises InputError if --out
+    is wrong, the source is no intact generated dataset, or a sequence has no pairs; WorkError if the disk is full.
+    """
+    from sim.io.export.kitti import kitti
+
+    folders = kitti(source, option_parsing.output_folder(out))
+    return CommandResult({"folders": folders}, "\n".join(map(str, folders)))
+
+
 def export_webdataset(options: WebdatasetOptions) -> CommandResult:
     """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json.
 

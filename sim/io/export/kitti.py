@@ -1,0 +1,73 @@
+"""KITTI export: stereo pairs, true disparities and calibration of generated sequences, named as in KITTI's stereo data.
+
+OUT/<split>/<name>/ of a sequence holds image_2 (left) and image_3 (right), 8-bit PNG; disp_noc_0, 16-bit PNG of 256
+times the disparity in px, 0 where it is unknown or the right camera does not see the point; and calib.txt. Pictures are
+named for the frame, from 000001.png. calib.txt has three lines of 12 numbers, 3 x 4 matrices row by row: P2 and P3
+project points of the left camera's coordinates into the left and right picture; Tr maps world to left camera.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.errors import InputError
+from sim.io.files.atomic import write_file
+from sim.io.pictures.stored_pictures import StoredPictures
+from sim.io.source import sequence_folders, split_and_name
+from sim.io.store.camera_files import read_camera
+from sim.io.store.manifest import read_manifest
+from sim.types import Camera
+
+FOLDERS = {"left": "image_2", "right": "image_3", "disparity": "disp_noc_0"}
+
+
+def kitti(source: str | Path, out: str | Path) -> list[Path]:
+    """Write the pairs, disparities and calibrations of a generated dataset, and return the folders of its sequences.
+
+    source: a sequence or dataset with the streams left and right; disparities are written where stored. out: folder;
+    files of an earlier export are replaced. The same dataset gives the same bytes.
+
+    Raises InputError if the source is no generated dataset, a sequence lacks left or right, a file of it is missing or
+    altered, two sequences share a folder, or `out` cannot be written; WorkError if the disk is full.
+    """
+    folders = sequence_folders(Path(source), "generated")
+    targets = [Path(out) / split_and_name(folder) for folder in folders]
+    if len(set(targets)) < len(targets):
+        raise InputError(file=source, got="two sequences of one name", expected="unique names", remedy="rename one")
+    for folder, target in zip(folders, targets, strict=True):
+        _export(folder, target)
+    return targets
+
+
+def calibration(camera: Camera) -> str:
+    """Return the text of calib.txt for the camera of a rectified pair."""
+    (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
+    left = np.array([[fx, 0, cx - 0.5, 0], [0, fy, cy - 0.5, 0], [0, 0, 1, 0]])  # KITTI: a pixel's centre is a whole px
+    right = left.copy()
+    right[0, 3] = -fx * camera.baseline
+    pose = np.column_stack([camera.rotation, -camera.rotation @ camera.position])
+    return "".join(_line(name, matrix) for name, matrix in (("P2", left), ("P3", right), ("Tr", pose)))
+
+
+def _line(name: str, matrix: NDArray[Any]) -> str:
+    return f"{name}: {' '.join(f'{v:.12e}' for v in matrix.ravel().tolist())}\n"
+
+
+def _export(folder: Path, target: Path) -> None:
+    stored = StoredPictures(folder, read_manifest(folder))
+    missing = [name for name in ("left", "right") if name not in stored.streams]
+    if missing:
+        raise InputError(
+            file=folder, got=f"no stream {' or '.join(missing)}", expected="left and right",
+            remedy="generate it with --streams left,right,disparity",
+        )  # fmt: skip
+    write_file(target / "calib.txt", calibration(read_camera(folder / "camera.json")).encode())
+    for stream, name in FOLDERS.items():
+        if stream in stored.streams:
+            for k, picture in enumerate(stored.all(stream, stored.manifest["sequence"]["length"]), 1):
+                write_file(target / name / f"{k:06d}.png", cv2.imencode(".png", picture)[1].tobytes())
