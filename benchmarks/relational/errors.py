@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.support import chart, tables
+from benchmarks.support.options import HOTEL, ZARA
 from scenarios.loading.resolve import resolve
+from sim.io.source import open_source
 from sim.sequence import simulate
-from sim.types import Array, Context, Detections, Frame, Sequence, Tracks, Truth
+from sim.types import Array, Bools, Context, Detections, Frame, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
 from tracking.papers.relational.config import ParticleConfig
 from tracking.prepare import prepare
@@ -29,6 +31,8 @@ CUT = 2.0
 """Largest error of a person, and cost of a missing track, m."""
 LENGTHS = (0.2, 0.5, 1.0, 2.0, 3.0)
 """Lengths of the occlusion in mode hidden, s."""
+PERIOD, AWAY, ROUGH = 6.0, 2.0, 0.1
+"""Mode recordings: s from one occlusion to the next, its length, standard deviation of a detection per axis, m."""
 FPS, SEEN, NOISE = 10.0, 4.0, 0.05
 """Mode hidden: frames per second, s before the occlusion, standard deviation of a detection, m."""
 
@@ -166,3 +170,42 @@ def hidden(given: argparse.Namespace) -> None:
         shown = {name: tuple(np.array(values).T) for name, values in curves.items()}
         title = "error of a hidden partner, m"
         chart.lines([chart.Panel(title, LENGTHS, shown, "length of the occlusion, s", y_range=(0, 1.6))], given.chart)
+
+
+def hiding_frames(truth: Truth, seed: int, fps: float) -> tuple[Bools, list[Frame]]:
+    """Returns which rows of the truth are hidden, (R,), and the frames of a detector.
+
+    The member of each true group with the highest id is not detected in the last AWAY s of every PERIOD s. Positions
+    err by ROUGH m.
+    """
+    assert truth.pos is not None
+    rng, hidden, frames = np.random.default_rng(seed), np.zeros(len(truth.id), bool), []
+    last = {int(g): int(truth.id[truth.group == g].max()) for g in np.unique(truth.group[truth.group >= 0])}
+    chosen = np.array([last.get(g) == p for g, p in zip(truth.group.tolist(), truth.id.tolist(), strict=True)])
+    for index in range(1, truth.length + 1):
+        rows, t = truth.rows(index), (index - 1) / fps
+        hidden[rows] = chosen[rows] & (t % PERIOD >= PERIOD - AWAY)
+        points = truth.pos[rows][:, :2] + rng.normal(0, ROUGH, (rows.stop - rows.start, 2))
+        points = points[~hidden[rows]]
+        frames.append(Frame(index, t, detections=Detections(index, t, "ground", points, score=np.ones(len(points)))))
+    return hidden, frames
+
+
+def recordings(given: argparse.Namespace) -> None:
+    """Prints a table: rows are recordings, columns the errors of both filters in hidden and in other rows."""
+    tables.head(["recording", "people", *FILTERS, "relational − particle"])
+    for label, path in (("seq_hotel", HOTEL), ("zara01", ZARA)):
+        (q,) = open_source(given.recordings / path)
+        found: dict[str, dict[str, list[float]]] = {
+            kind: {name: [] for name in FILTERS} for kind in ("hidden", "others")
+        }
+        for seed in given.seeds:
+            hidden, frames = hiding_frames(q.truth, seed, q.fps)
+            for name in FILTERS:
+                tracker = find(name)(config_of(name, given.counts[0], given))
+                tracker.reset(Context(q.fps, float("nan")), seed)
+                away = errors(q.truth, [tracker.step(frame, frame.detections) for frame in frames])
+                found["hidden"][name].append(float(away[hidden].mean()))
+                found["others"][name].append(float(away[~hidden].mean()))
+        for kind, mean in found.items():
+            _row(f"{label} | {kind}", mean)

@@ -6,13 +6,16 @@ import argparse
 import time
 import warnings
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 import tracking
 from benchmarks.relational.errors import config_of, errors
 from benchmarks.support import tables
+from benchmarks.support.options import HOTEL, ZARA
 from scenarios.loading.resolve import resolve
+from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Context, Detections, Frame, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
@@ -27,13 +30,19 @@ from tracking.tracker_registry import find
 COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
 DEPARTURES = (
     "", "weights=joint", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
-    "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
+    "hidden_time=2", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
     "least_existence=0", "birth_doubt=0.9", "survival_time=1000", "clutter_density=0.02",
 )  # fmt: skip
 """Settings of the ablation; the first one is the defaults."""
 NEAR = 1.0
 """m: a track farther than this from a person is not this person's."""
 BINS = 5
+
+
+RECORDINGS = {"seq_hotel": HOTEL, "zara01": ZARA}
+EXACT: dict[str, Any] = {"noise_m": 0.0, "detect_prob": 1.0, "clutter_rate": 0.0}
+ROUGH = EXACT | {"noise_m": 0.1, "detect_prob": 0.95}
+"""Detections of labelled people in mode reliability --recordings: without errors, and with; no false alarms."""
 
 
 def _sequences(given: argparse.Namespace, suite: str) -> Iterator[tuple[str, int, Sequence]]:
@@ -81,26 +90,42 @@ def _pooled(scored: list[dict[str, float]], kind: str) -> str:
 
 def reliability(given: argparse.Namespace) -> None:
     """Prints a table: rows are probabilities of pairs, columns how often these belong together, and F1 at 1/2."""
-    rows: dict[str, list[Array]] = {"relational": [], "belief on particle": []}
-    for _, seed, q in _sequences(given, given.suite):
+    if not given.recordings:
+        return _reliability([(seed, q, {}) for _, seed, q in _sequences(given, given.suite)], given)
+    for name, path in RECORDINGS.items():
+        (q,) = open_source(given.recordings / path)
+        for label, sensor in (("exact", EXACT), ("errors of 0.1 m, 5 % missed", ROUGH)):
+            print(f"\n{name}, {label}\n")
+            _reliability([(seed, q, sensor) for seed in given.seeds], given)
+    return None
+
+
+def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argparse.Namespace) -> None:
+    """Prints the table of some sequences with their seeds and settings of the sensor, none for stored detections."""
+    rows: dict[str, list[Array]] = {"relational": [], "belief on particle": [], "belief on relational": []}
+    for seed, q, sensor in runs:
+        mode = "truth" if sensor else "file"
+        found = {}
         config = config_of("relational", given.counts[0], given)
-        ready = prepare("relational", q, params=config, detections="file")
+        ready = prepare("relational", q, params=config, detections=mode, sensor=sensor, seed=seed)
         ready.reset(seed)
+        found["relational"] = []
         tracker = ready.tracker
         assert isinstance(tracker, Relational)
         for frame in ready.frames():
             tracks = ready.step(frame)
+            found["relational"].append(tracks)
             place = {int(i): k for k, i in enumerate(tracker.slots.id) if i >= 0}
             true = _people_of(q.truth, tracks)
             pairs = [(a, b) for a in true for b in true if a < b]
             known = [(tracker.together[place[a], place[b]], _same(true[a], true[b])) for a, b in pairs]
             rows["relational"].append(np.array(known).reshape(-1, 2))
-        bare = _tracked("particle", seed, q, given)
-        found = pair_probabilities(bare, q.fps, q.px_per_m, default_belief())
-        people = {t.index: _people_of(q.truth, t) for t in bare}
-        joined = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), found.probability.tolist(), strict=True)
-        known = [(p, _same(people[f][a], people[f][b])) for f, a, b, p in joined if a in people[f] and b in people[f]]
-        rows["belief on particle"].append(np.array(known).reshape(-1, 2))
+        config = config_of("particle", given.counts[0], given)
+        ready = prepare("particle", q, params=config, detections=mode, sensor=sensor, seed=seed)
+        ready.reset(seed)
+        found["particle"] = [ready.step(frame) for frame in ready.frames()]
+        for name, bare in found.items():
+            rows[f"belief on {name}"].append(_believed(q, bare))
     tables.head(["pairs", *(f"{k / BINS:g} to {(k + 1) / BINS:g}" for k in range(BINS)), "F1 at 1/2", "mean gap"])
     for label, parts in rows.items():
         p, same = np.concatenate(parts).T
@@ -109,6 +134,15 @@ def reliability(given: argparse.Namespace) -> None:
         gap = sum(abs(same[k == b].mean() - p[k == b].mean()) * (k == b).mean() for b in range(BINS) if (k == b).any())
         hit, said = (same[p > 0.5]).sum(), (p > 0.5).sum()
         tables.row([label, *cells, f"{2 * hit / max(said + same.sum(), 1):.3f}", f"{gap:.3f}"])
+
+
+def _believed(q: Sequence, tracks: list[Tracks]) -> Array:
+    """Returns the probability of each pair by the belief and whether the two belong together, (N, 2)."""
+    found = pair_probabilities(tracks, q.fps, q.px_per_m, default_belief())
+    people = {t.index: _people_of(q.truth, t) for t in tracks}
+    joined = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), found.probability.tolist(), strict=True)
+    known = [(p, _same(people[f][a], people[f][b])) for f, a, b, p in joined if a in people[f] and b in people[f]]
+    return np.array(known).reshape(-1, 2)
 
 
 def _people_of(truth: Truth, tracks: Tracks) -> dict[int, int]:
