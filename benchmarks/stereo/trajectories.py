@@ -2,7 +2,7 @@
 
 A row per scene, of the first seed: on the left the paths seen from above, on the right the height of the groups against
 time. Coloured: each reported group; grey: the mean position of the members of each true group, at a height of half a
-person above the ground.
+person above the ground. Features lie mostly on the upper half of people, which the camera sees.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _panel(title, x_label, y_label, found: Curves, true: Curves, axes, corner) -
         for value in np.arange(np.ceil(low[axis]), high[axis], max(np.ceil((high - low)[axis] / 6), 1)):
             at = (value - low[axis]) * scale[axis]
             place = (EDGE + at - 4, HEIGHT - EDGE + 16) if axis == 0 else (EDGE - 20, HEIGHT - EDGE - at + 4)
-            made.append(text(*place, f"{value:g}"))
+            made.append(text(*place, f"{value + 0:g}"))
     frame = f'x="{corner[0] + EDGE}" y="{corner[1] + EDGE}" width="{WIDTH - 1.5 * EDGE}" height="{HEIGHT - 2 * EDGE}"'
     made.append(f'<rect {frame} fill="none" stroke="#ccc"/>')
     made += [line(c, "#999", 3) for c in true.values()]

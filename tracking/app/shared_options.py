@@ -33,7 +33,7 @@ Fps = Annotated[
 Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metre of a recording without a camera.")]
 Calibration = Annotated[
     Path | None,
-    typer.Option("--camera", metavar="FILE", help="Calibration of a recording: camera.json or Tsai's XML."),
+    typer.Option("--camera", metavar="FILE", help="Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair."),
 ]
 Detector = Annotated[
     Path | None, typer.Option("--sensor", metavar="FILE.toml", help="Detector profile, as `fit sensor` writes it.")

@@ -8,6 +8,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.regular_file import require_regular
+from sim.io.formats.opencv_yaml import read_opencv_yaml
 from sim.io.formats.tsai import read_tsai
 from sim.io.store.camera_files import read_camera
 from sim.types import Camera
@@ -16,10 +17,11 @@ SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios 
 
 
 def read_calibration(path: Path) -> Camera:
-    """Return the Camera of the calibration file `path`: Tsai's XML if its name ends in .xml, else our camera.json.
+    """Return the Camera of the calibration file `path`: Tsai's XML if its name ends in .xml, OpenCV's YAML of a
+    rectified pair if it ends in .yml or .yaml, else our camera.json.
 
-    Raises InputError if there is no such file, it is no XML or JSON object, a value is missing or of the wrong kind or
-    shape, or the camera cannot be used (sim.scene.camera_check).
+    Raises InputError if there is no such file, it is no XML, YAML or JSON object, a value is missing or of the wrong
+    kind or shape, or the camera cannot be used (sim.scene.camera_check).
     """
     require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
     if path.suffix.lower() == ".toml":
@@ -28,6 +30,8 @@ def read_calibration(path: Path) -> Camera:
             file=path, place="--camera", got="a TOML file", expected="a camera.json, or Tsai's calibration as .xml",
             remedy=remedy,
         )  # fmt: skip
+    if path.suffix.lower() in (".yml", ".yaml"):
+        return read_opencv_yaml(path)
     return read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
 
 

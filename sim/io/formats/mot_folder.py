@@ -6,6 +6,7 @@ import configparser
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
 
 from scenarios.errors import InputError
@@ -107,6 +108,8 @@ def open_folder(
 ) -> Sequence:
     """Return the MOTChallenge folder `path` (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
+    Pictures in img1_right/, if there are any, are those of the right camera of a rectified pair, by the same numbers.
+
     fps: frames per second instead of those of seqinfo.ini; with neither, 25 with a warning. px_per_m: image scale;
     None: unknown (nan; the truth then takes the boxes' median height / 1.7 m). camera: its calibration, scaled to the
     picture size; None: unknown. images False leaves the pictures out; otherwise they are decoded one by one while
@@ -127,6 +130,7 @@ def open_folder(
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found = mot_text.read_detections(det, info.length) if is_present(det) else None
     pictures = find_pictures(path / info.image_dir, info.length, is_present(gt) or found is not None)
+    right = find_pictures(path / f"{info.image_dir}_right", info.length, is_present(gt) or found is not None)
     length = info.length or max(_labelled(found, gt), pictures.last)
     if not length:
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
@@ -143,9 +147,13 @@ def open_folder(
             yield Frame(index, (index - 1) / rate, detections=None if found is None else found.at(index, rate))
 
     def frames() -> Iterator[Frame]:
-        shown = pictures.read(range(1, length + 1), seen)
-        for frame, picture in zip(bare(), fill_gaps(shown, length, path.name), strict=True):
-            yield frame.replace(image=picture)
+        every = range(1, length + 1)
+        shown = fill_gaps(pictures.read(every, seen), length, path.name)
+        other = (
+            fill_gaps(right.read(every, seen), length, f"{path.name}, right") if right.files else repeat(None, length)
+        )
+        for frame, picture, beside in zip(bare(), shown, other, strict=True):
+            yield frame.replace(image=picture, right=beside)
 
     def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
         return pictures.read(wanted, seen if images else pictures.first_size())
@@ -154,7 +162,8 @@ def open_folder(
         name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
         load_truth=(lambda: mot_text.read_truth(gt, info.name, rate, length, scale)) if gt.is_file() else None,
         image_size=size, camera=None if camera is None else scaled_to_image(camera, size, path),
-        px_per_m=scale, has_images=images and bool(pictures.files), has_detections=found is not None,
+        px_per_m=scale, has_images=images and bool(pictures.files),
+        has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
         source={"kind": "mot", "path": str(path), **({} if choice is None else {"background": str(choice)})},
     )  # fmt: skip

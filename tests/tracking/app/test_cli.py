@@ -52,12 +52,13 @@ class Place:
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory) -> Path:
-    """A scene, a dataset of it with two seeds, and the fake tracker's answers; one of them with small pictures."""
+    """A scene, a dataset of it with two seeds, the fake tracker's answers, and one sequence with small stereo pairs."""
     folder = tmp_path_factory.mktemp("made")
     (folder / "scene.toml").write_text(SCENE)
     line = ["generate", str(folder / "scene.toml"), "--out"]
     assert run([*line, str(folder / "data"), "--seeds", "40000:40002", "--streams", "none"]) == 0
-    assert run([*line, str(folder / "seen"), "--seeds", "40000", "--set", "camera.image=[128,96]"]) == 0
+    pair = ["--streams", "left,right,disparity", "--set", "camera.baseline=0.2"]
+    assert run([*line, str(folder / "seen"), "--seeds", "40000", "--set", "camera.image=[128,96]", *pair]) == 0
     for name, out in (("data", "tracks"), ("seen/flockscope-demo/scene-s40000", "tracks-seen")):
         assert run(["track", FAKE, str(folder / name), "--out", str(folder / out)]) == 0
     return folder
@@ -136,6 +137,7 @@ COMMANDS = {
     "tune": (TUNE + " --trials 2 --seeds 0", TUNE + " --trials 2 --seeds 0:20000"),
     "validate": ("validate {data}", "validate {out}/nothing"),
     "export coco": ("export coco {data} --out {out}/coco.json", "export coco {out}/nothing --out {out}/coco.json"),
+    "export kitti": ("export kitti {seen} --out {out}", "export kitti {one} --out {out}"),
     "export webdataset": (
         "export webdataset {data} --out {out}",
         "export webdataset {data} --out {out} --shard-size 0",

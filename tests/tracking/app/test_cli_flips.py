@@ -511,6 +511,7 @@ OPTIONS = {
 ELSEWHERE = {
     ("generate", "workers"),  # the same bytes for any number: tests/sim/test_generate.py
     ("generate", "cluster"),  # and on a cluster: tests/sim/test_generate_cluster.py
+    ("kitti", "folder"),  # tests/sim/io/export/test_kitti.py
     ("demo", "quick"),  # the long one is for `make demo`
     ("generate", "sensor"),  # tests/tracking/app/test_fit.py
     ("track", "sensor"),

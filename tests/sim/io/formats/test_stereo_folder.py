@@ -1,0 +1,84 @@
+"""Real stereo recordings: left and right pictures in folders, calibrations of ours and of OpenCV."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.formats.calibration import read_calibration
+from sim.io.source import open_source
+from tests.sim.scene.test_stereo import rig
+from tracking.run import track
+
+SIZE = (48, 64)
+
+
+def write_yaml(path, camera, **changed) -> None:
+    (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
+    left = np.array([[fx, 0, cx - 0.5, 0], [0, fy, cy - 0.5, 0], [0, 0, 1, 0]])
+    right = left.copy()
+    right[0, 3] = -fx * camera.baseline
+    values = {"image_width": camera.image[0], "image_height": camera.image[1], "P1": left, "P2": right}
+    values |= {"rotation": camera.rotation, "position": camera.position, **changed}
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for key, value in values.items():
+        if value is not None:
+            storage.write(key, value if isinstance(value, int) else np.array(value))
+    storage.release()
+
+
+def test_opencv_yaml_gives_the_camera(tmp_path) -> None:
+    camera = rig(40.0)
+    write_yaml(tmp_path / "pair.yml", camera)
+    found = read_calibration(tmp_path / "pair.yml")
+    assert found.image == camera.image
+    assert found.centre_px == pytest.approx(camera.centre_px)
+    assert found.focal_px == pytest.approx(camera.focal_px)
+    assert found.baseline == pytest.approx(camera.baseline)
+    assert found.rotation == pytest.approx(camera.rotation)
+    assert found.position == pytest.approx(camera.position)
+
+
+@pytest.mark.parametrize(
+    ("changed", "place"),
+    [({"P2": None}, "P2"), ({"P2": np.eye(3)}, "P2"), ({"P2": np.eye(3, 4)}, "P2"), ({"position": None}, "position")],
+)
+def test_a_calibration_that_is_no_pair_is_refused(tmp_path, changed, place) -> None:
+    write_yaml(tmp_path / "pair.yaml", rig(40.0), **changed)
+    with pytest.raises(InputError) as error:
+        read_calibration(tmp_path / "pair.yaml")
+    assert error.value.place == place
+
+
+@pytest.mark.parametrize("text", ["", "no yaml", "%YAML:1.0\n---\nP1: [", "\x00\x01"])
+def test_damaged_yaml_is_an_input_error(tmp_path, text) -> None:
+    (tmp_path / "pair.yml").write_text(text)
+    with pytest.raises(InputError):
+        read_calibration(tmp_path / "pair.yml")
+
+
+def test_a_folder_with_right_pictures_is_a_stereo_recording(tmp_path) -> None:
+    r = np.random.default_rng(0)
+    camera = rig(40.0).replace(image=(SIZE[1], SIZE[0]), centre_px=(SIZE[1] / 2, SIZE[0] / 2), focal_px=(50.0, 50.0))
+    still = r.integers(20, 200, (*SIZE, 3), np.uint8)
+    made = {
+        name: [still + r.integers(0, 9, still.shape, np.uint8) for _ in range(12)] for name in ("img1", "img1_right")
+    }
+    for name, pictures in made.items():
+        (tmp_path / "rec" / name).mkdir(parents=True)
+        for k, picture in enumerate(pictures, 1):
+            cv2.imwrite(str(tmp_path / "rec" / name / f"{k:06d}.png"), picture)
+    (tmp_path / "rec/img1_right/000007.png").unlink()
+    write_yaml(tmp_path / "pair.yml", camera)
+    (sequence,) = open_source(tmp_path / "rec", camera=tmp_path / "pair.yml", fps=30.0)
+    with pytest.warns(UserWarning, match="frame 7"):
+        frames = list(sequence)
+    assert sequence.has_right
+    assert all(np.array_equal(f.image, p) for f, p in zip(frames, made["img1"], strict=True))
+    right = [f.right for f in frames]
+    assert right[6] is None
+    assert np.array_equal(right[7], made["img1_right"][7])
+    with pytest.warns(UserWarning, match="frame 7"), pytest.warns(UserWarning, match="background sample"):
+        assert len(track("stereo", sequence, detections="image")) == 12
