@@ -21,6 +21,7 @@ from sim.types import Array, Context, Detections, Frame, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
 from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
+from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.pair_probabilities import pair_probabilities
 from tracking.papers.relational.tracker import Relational
 from tracking.prepare import prepare
@@ -30,7 +31,7 @@ from tracking.tracker_registry import find
 COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
 DEPARTURES = (
     "", "weights=joint", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
-    "hidden_time=2", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
+    "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
     "least_existence=0", "birth_doubt=0.9", "survival_time=1000", "clutter_density=0.02",
 )  # fmt: skip
 """Settings of the ablation; the first one is the defaults."""
@@ -65,10 +66,9 @@ def scores(given: argparse.Namespace) -> None:
     values: dict[str, list[dict[str, float]]] = {}
     for _, seed, q in _sequences(given, given.suite):
         found = {name: _tracked(name, seed, q, given) for name in ("blob", "particle", "relational")}
-        rows = {f"{name}, rule": with_groups(without_groups(t), q.fps, q.px_per_m) for name, t in found.items()}
-        for name in found:
-            bare = without_groups(found[name])
-            rows[f"{name}, belief"] = with_groups(bare, q.fps, q.px_per_m, default_belief())
+        bare = {name: without_groups(t) for name, t in found.items()}
+        rows = {f"{name}, rule": with_groups(t, q.fps, q.px_per_m, LinkRule()) for name, t in bare.items()}
+        rows |= {f"{name}, belief": with_groups(t, q.fps, q.px_per_m, default_belief()) for name, t in bare.items()}
         rows["relational, own groups"] = with_groups(found["relational"], q.fps, q.px_per_m)
         for label, tracks in rows.items():
             values.setdefault(label, []).append(tracking.evaluate(q.truth, tracks))
