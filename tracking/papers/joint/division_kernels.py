@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,10 @@ from tracking.papers.joint.partition_kernels import clusters, same_row, validity
 
 MOST_LISTED = 6
 """Largest group of which all divisions into two parts are tried."""
+ONE: Any
+TWO: Any
+ONE, TWO = np.int64(1), np.int64(2)
+"""Numbers of clusters, of the type for which validity_of is compiled anyway."""
 
 
 @njit(cache=True)
@@ -22,17 +27,26 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
     divisions are candidates; of larger groups those that leave one person out, and cuts across the first principal axis
     of the points.
     """
-    members = np.flatnonzero(cluster == g)
-    n = len(members)
-    own = points[members]
+    members = members_of(cluster, g)
+    n, dims = len(members), points.shape[1]
+    own = np.empty((n, dims))
+    for k in range(n):
+        own[k] = points[members[k]]
     sides = candidates(own)
-    centre, scatter = np.empty((2, points.shape[1])), np.empty(2)
-    energy = np.empty(len(sides))
+    centre, scatter = np.empty((n, dims)), np.empty(n)
+    energy, least = np.empty(len(sides)), np.inf
     for c in range(len(sides)):
-        energy[c] = sharpness * validity_of(own, sides[c], 2, scales, centre, scatter)
-    least = energy.min()
-    total = np.cumsum(np.exp(least - energy))
-    chosen = sides[min(np.searchsorted(total, uniform * total[-1], side="right"), len(sides) - 1)]
+        energy[c] = sharpness * validity_of(own, sides[c], TWO, scales, centre, scatter)
+        least = min(least, energy[c])
+    total = 0.0
+    for c in range(len(sides)):
+        energy[c] = math.exp(least - energy[c])
+        total += energy[c]
+    row, reached = 0, energy[0]
+    while row < len(sides) - 1 and uniform * total >= reached:
+        row += 1
+        reached += energy[row]
+    chosen = sides[row]
     for side in range(2):
         first, size = -1, 0
         for k in range(n):
@@ -43,6 +57,29 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
         for k in range(n):
             if chosen[k] == side:
                 label[members[k]] = 1 + first if size > 1 else 0
+
+
+@njit(cache=True)
+def members_of(cluster: Ints, g: int) -> Ints:
+    """Return the people (n,) of cluster g, ascending; cluster (K,)."""
+    n = 0
+    out = np.empty(len(cluster), np.int64)
+    for k in range(len(cluster)):
+        if cluster[k] == g:
+            out[n] = k
+            n += 1
+    return out[:n]
+
+
+@njit(cache=True)
+def rank(values: Array, n: int, out: Ints) -> None:
+    """Write the order of the first n values, ascending, equal ones as they come, into out (n or more,)."""
+    for k in range(n):
+        at = k
+        while at > 0 and values[out[at - 1]] > values[k]:
+            out[at] = out[at - 1]
+            at -= 1
+        out[at] = k
 
 
 @njit(cache=True)
@@ -59,19 +96,33 @@ def candidates(points: Array) -> Ints:
     sides = np.zeros((2 * n - 1, n), np.int64)
     for k in range(n):
         sides[k, k] = 1
-    mean = np.zeros(dims)
-    for k in range(n):
-        mean += points[k] / n
-    axis = points[0] - mean + 1e-9
-    for _ in range(30):
-        new = np.zeros(dims)
+    away, axis, new, along = np.empty((n, dims)), np.empty(dims), np.empty(dims), np.zeros(n)
+    for d in range(dims):
+        mean = 0.0
         for k in range(n):
-            new += (points[k] - mean) * np.dot(points[k] - mean, axis)
-        axis = new / max(math.sqrt(np.dot(new, new)), 1e-12)
-    along = np.empty(n)
+            mean += points[k, d] / n
+        for k in range(n):
+            away[k, d] = points[k, d] - mean
+        axis[d] = away[0, d] + 1e-9
+    for _ in range(30):
+        length = 0.0
+        for d in range(dims):
+            new[d] = 0.0
+        for k in range(n):
+            share = 0.0
+            for d in range(dims):
+                share += away[k, d] * axis[d]
+            for d in range(dims):
+                new[d] += away[k, d] * share
+        for d in range(dims):
+            length += new[d] ** 2
+        for d in range(dims):
+            axis[d] = new[d] / max(math.sqrt(length), 1e-12)
     for k in range(n):
-        along[k] = np.dot(points[k] - mean, axis)
-    ranked = np.argsort(along)
+        for d in range(dims):
+            along[k] += away[k, d] * axis[d]
+    ranked = np.empty(n, np.int64)
+    rank(along, n, ranked)
     for cut in range(1, n):
         for k in range(cut):
             sides[n + cut - 1, ranked[k]] = 1
@@ -124,12 +175,13 @@ def _nearest_to(points: Array, cluster: Ints, count: int, person: int) -> int:
 @njit(cache=True)
 def _join_probability(points: Array, cluster: Ints, other: int, person: int, sharpness: float, scales: Array) -> float:
     """Returns the probability that a person alone joins the cluster `other`."""
-    members = np.flatnonzero(cluster == other)
-    own = np.empty((len(members) + 1, points.shape[1]))
-    own[0], own[1:] = points[person], points[members]
-    centre, scatter = np.empty((2, points.shape[1])), np.empty(2)
-    sides = np.ones(len(own), np.int64)
-    sides[0] = 0
-    apart = validity_of(own, sides, 2, scales, centre, scatter)
-    together = validity_of(own, np.zeros(len(own), np.int64), 1, scales, centre, scatter)
+    members = members_of(cluster, other)
+    n, dims = len(members) + 1, points.shape[1]
+    own, sides = np.empty((n, dims)), np.zeros((2, n), np.int64)
+    own[0] = points[person]
+    for k in range(1, n):
+        own[k], sides[0, k] = points[members[k - 1]], 1
+    centre, scatter = np.empty((n, dims)), np.empty(n)
+    apart = validity_of(own, sides[0], TWO, scales, centre, scatter)
+    together = validity_of(own, sides[1], ONE, scales, centre, scatter)
     return 1 / (1 + math.exp(min(sharpness * (together - apart), 700.0)))

@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Ints
-from tracking.papers.joint.division_kernels import divide
+from tracking.papers.joint.division_kernels import divide, rank
 from tracking.papers.joint.line_kernels import line_of, lines_of
 from tracking.papers.joint.partition_kernels import clusters, same_row
 
@@ -185,7 +185,7 @@ def propose(
     first, second, features = np.empty((n, 9)), np.empty((n, 9)), np.empty(FEATURES)
     order, changed, visited = np.empty(n), np.empty(n, np.bool_), np.empty(n, np.bool_)
     merge, split = np.empty(n), np.empty(n)
-    before = np.empty(n, np.int64)
+    before, visits = np.empty(n, np.int64), np.empty(n, np.int64)
     for i in range(particles):
         count = 0
         for j in range(partitions):
@@ -209,7 +209,8 @@ def propose(
                 happens = happens or uniforms[i, j, head[g], EVENT] < merge[g] + split[g]
             if not happens:
                 continue
-            for g in np.argsort(order[:count]):
+            rank(order, count, visits)
+            for g in visits[:count]:
                 if changed[g]:
                     continue
                 h, u = nearest[g], uniforms[i, j, head[g], EVENT]
