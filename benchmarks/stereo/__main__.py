@@ -3,6 +3,8 @@
     python -m benchmarks.stereo MODE [--seeds a:b] [--only cross,merge,…] [--chart FILE] [--json FILE]
 
 pictures   OpenCV's StereoSGBM and the tracker's own matcher against the true disparity
+decalibration  what a slightly wrong rig costs the tracker's matcher
+real       the tracker's matcher on a real pair
 photometric   left against right picture at the true disparity, without a matcher
 trajectories  the paths of groups in space, as in Figs. 5, 7 and 9 of the paper (an SVG)
 scenes     the paper's scenes: position errors (bias and scatter apart), group scores, events
@@ -21,11 +23,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.stereo import cost, photometric, pictures, scenes, trajectories
-from benchmarks.support.options import add_seeds, new_parser, one_thread, seeds_text
+from benchmarks.stereo import cost, decalibration, photometric, pictures, real, scenes, trajectories
+from benchmarks.support.options import add_data, add_seeds, new_parser, one_thread, seeds_text
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "pictures": pictures.pictures,
+    "decalibration": decalibration.decalibration,
+    "real": real.real,
     "photometric": photometric.photometric,
     "trajectories": trajectories.trajectories,
     "scenes": scenes.scenes,
@@ -38,6 +42,7 @@ def main() -> None:
     parser = new_parser(__doc__)
     parser.add_argument("mode", choices=MODES)
     add_seeds(parser, "20000:20030")
+    add_data(parser)
     parser.add_argument("--only", help="scenes, separated by commas: cross, merge, stairs, crowded")
     parser.add_argument("--options", help="decisions: parameters, separated by commas")
     parser.add_argument("--chart", type=Path, default=Path("stereo.svg"), help="trajectories, cost: the SVG to write")
