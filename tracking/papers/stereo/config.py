@@ -115,7 +115,7 @@ class StereoConfig(BackgroundSettings):
         0.15, (0.05, 20.0), "m",
         "from pixels: a feature counts in the mean by the inverse of the features' density on the ground, with a "
         "kernel of this standard deviation; the largest: all features alike (ours)",
-        "log", before=False, sees="pixels",
+        "log", before=20.0, sees="pixels",
     )  # fmt: skip
     speed_prior: float = param(
         1.3, (0.1, 10.0), "m/s", "standard deviation of people's velocities, for newborn groups (ours)", "log"
