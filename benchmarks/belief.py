@@ -6,7 +6,7 @@
     python -m benchmarks.belief calibration [--scenes streets] [--seeds 20000:20001] [--out CHART.svg]
     python -m benchmarks.belief decisions [--scenes standard friends-meet …] [--seeds 10000:10001]
     python -m benchmarks.belief ablation --train standard streets … [--seeds 30000:30002] [--check 20000:20001]
-    python -m benchmarks.belief cost [--scenes station-rush]
+    python -m benchmarks.belief cost
 
 recordings: pairwise F1 on seq_hotel and zara01 from labelled positions, with intervals by blocks of frames; then from
 positions that err by 0.1 m, with 5 % missed, mean over 10 draws. CAVIAR's Meet_WalkTogether1 at its own scale. SPENCER
@@ -21,7 +21,7 @@ calibration: probability and share of mates by bin, expected calibration error, 
 the same as a reliability plot.
 decisions: the scores of suites with numbers of the belief's file changed.
 ablation: the fit without each quantity: log loss and F1 on --check seeds, and F1 on the recordings.
-cost: CPU time per frame of `blob` (with the rule), of the belief and of the rule, on an entry of the suite streets.
+cost: CPU time per frame of `blob` (with the rule), of the belief and of the rule, in `crowd` with 23 and 110 people.
 --grouping FILE.toml: another belief.
 """
 
@@ -47,6 +47,7 @@ from scenarios.loading.resolve import Entry, resolve
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Tracks, Truth
+from sim.types import Sequence as Recording
 from tracking import track
 from tracking.fitting.belief import fit_belief, sample_of
 from tracking.fitting.belief_scores import BINS, belief_scores, reliability
@@ -169,7 +170,7 @@ def suites(names: Sequence[str], seeds: range, belief: Belief, source: str) -> N
 
 CHANGES: Mapping[str, Mapping[str, float]] = {
     "belief": {}, "stay = come = 0": {"stay": 0.0, "come": 0.0}, "stay = 0": {"stay": 0.0}, "come = 0": {"come": 0.0},
-    "come = 2": {"come": 2.0}, "stay = 8": {"stay": 8.0}, "memory = 0": {"memory": 0.0},
+    "come = 2.5": {"come": 2.5}, "stay = 8": {"stay": 8.0}, "memory = 0": {"memory": 0.0},
     "arrival = 0": {"arrival": 0.0},
 }  # fmt: skip
 
@@ -261,9 +262,17 @@ def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> No
         row([family or "–", *(f"{scores[k]:.4f}" for k in ("log loss", "calibration error", "F1")), *real])
 
 
-def cost(scene: str, belief: Belief) -> None:
-    (entry,) = [e for e in resolve("streets") if e.name == scene]
-    sequence = simulate(entry.scenario, 20000, entry.repeat, streams=())
+CROWDED = [f"group.{name}.repeat=36" for name in ("passers", "stop")] + ["world.size=[28, 28]"]
+"""Keys of `crowd` with about 100 people."""
+
+
+def cost(belief: Belief) -> None:
+    for name, keys in (("crowd", ()), ("crowd", CROWDED)):
+        (entry,) = resolve(name, keys)
+        _cost(simulate(entry.scenario, 20000, entry.repeat, streams=()), belief)
+
+
+def _cost(sequence: Recording, belief: Belief) -> None:
     truth = sequence.truth
     assert truth is not None
     table_ = tabulate(people_as_tracks(truth), truth.fps, truth.px_per_m)
@@ -272,7 +281,7 @@ def cost(scene: str, belief: Belief) -> None:
         "belief": lambda: links_of(table_, truth.fps, belief),
         "rule": lambda: links_of(table_, truth.fps, LinkRule()),
     }
-    head([f"{scene}, {len(truth.frame) / truth.length:.0f} people", "CPU time, ms per frame"])
+    head([f"{sequence.name}, {len(truth.frame) / truth.length:.0f} people", "CPU time, ms per frame"])
     for name, work in works.items():
         row([name, number(1000 * best_times(work, 3)[0] / truth.length)])
 
@@ -310,7 +319,7 @@ def _run(args: argparse.Namespace, belief: Belief) -> None:
     elif args.mode == "ablation":
         ablation(args.train, args.seeds, args.check, args.data)
     else:
-        cost((args.scenes or ["station-rush"])[0], belief)
+        cost(belief)
 
 
 if __name__ == "__main__":

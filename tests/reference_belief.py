@@ -10,14 +10,14 @@ import numpy as np
 TIMES = (0.8, 5.0, 15.0)
 
 
-def evidence(pos, seconds):
-    """dict from (step, a, b) to the dict of quantities; pos (S, P, 2), nan where not seen."""
+def evidence(pos, time, seconds):
+    """dict from (step, a, b) to the dict of quantities; pos (S, P, 2), time (S, P), nan where not seen."""
     steps, people = pos.shape[:2]
     seen = [[p for p in range(people) if np.isfinite(pos[t, p, 0])] for t in range(steps)]
     first = {p: next(t for t in range(steps) if p in seen[t]) for p in range(people) if any(p in s for s in seen)}
     past, found = {}, {}
     for t in range(steps):
-        vel = {p: chord(pos, t, p, seconds) for p in seen[t]}
+        vel = {p: chord(pos, time, t, p, seconds) for p in seen[t]}
         for a, b in combinations(seen[t], 2):
             if np.hypot(*(pos[t, b] - pos[t, a])) < 4.0:
                 past.setdefault((a, b), []).append((t, instant(pos[t], vel, a, b, seen[t])))
@@ -34,10 +34,10 @@ def evidence(pos, seconds):
     return found
 
 
-def chord(pos, t, p, seconds):
+def chord(pos, time, t, p, seconds):
     for steps in range(max(1, round(0.8 / seconds)), 0, -1):
         if t - steps >= 0 and np.isfinite(pos[t - steps, p, 0]):
-            return (pos[t, p] - pos[t - steps, p]) / (steps * seconds)
+            return (pos[t, p] - pos[t - steps, p]) / (time[t, p] - time[t - steps, p])
     return np.full(2, math.nan)
 
 
@@ -75,10 +75,10 @@ def mean(rows, name, t, time, seconds):
     return sum(w * x for w, x in known) / sum(w for w, _ in known) if known else math.nan
 
 
-def beliefs(pos, seconds, belief):
+def beliefs(pos, time, seconds, belief):
     """dict from (step, a, b) to log-odds."""
     found = {}
-    for (t, a, b), row in evidence(pos, seconds).items():
+    for (t, a, b), row in evidence(pos, time, seconds).items():
         speed = row["speed, 5 s"]
         stands = 0.0 if math.isnan(speed) else min(max((0.6 - speed) / 0.4, 0.0), 1.0)
         many = min(max((row["others, 5 s"] - 1) / 5, 0.0), 1.0)

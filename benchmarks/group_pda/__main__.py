@@ -48,6 +48,7 @@ def main() -> None:
     add_seeds(parser, "20000:20025", option="--image-seeds", what="difference, curves from pixels: ")
     parser.add_argument("--detections", choices=("file", "truth", "image"), default="file")
     parser.add_argument("--points", choices=("own", "seen", "foot"), help="sensor.points of scenes and suites")
+    parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="keys of scenes and suites")
     parser.add_argument("--only", help="scenes, suites, parts, kinds or differences, separated by commas")
     parser.add_argument("--commit", default="HEAD", help="earlier: the commit that today is compared with")
     parser.add_argument("--each", action="store_true", help="decisions: scene by scene, too")

@@ -73,7 +73,7 @@ all sequences together; second: mean of sequences, in which sequences with few t
 def scenarios(given: argparse.Namespace) -> Any:
     """Prints a table per scene and returns its rows."""
     names = given.only.split(",") if given.only else SCENES
-    entries = [entry for name in names for entry in resolve(name)]
+    entries = [entry for name in names for entry in resolve(name, given.set)]
     found = gathered(entries, given, compared(given))
     for scene, rows in found.items():
         title = f"{scene}: {heading(given, rows)}"
@@ -88,7 +88,7 @@ def decisions(given: argparse.Namespace) -> Any:
         Variant("default", given.tracker),
         *(Variant(name, given.tracker, params) for name, params in WITHOUT.items()),
     )
-    found = gathered([entry for name in names for entry in resolve(name)], given, variants)
+    found = gathered([entry for name in names for entry in resolve(name, given.set)], given, variants)
     pooled = {v.name: [row for rows in found.values() for row in rows[v.name]] for v in variants}
     for scene, rows in {"all": pooled, **(found if given.each else {})}.items():
         default = columns.values(rows["default"], DECIDED)
@@ -105,7 +105,7 @@ def events(given: argparse.Namespace) -> Any:
     """Prints the tables of each suite and returns its rows by scene and variant."""
     found = {}
     for suite in given.only.split(",") if given.only else SUITES:
-        by_scene = gathered(resolve(f"suite:{suite}"), given, compared(given))
+        by_scene = gathered(resolve(f"suite:{suite}", given.set), given, compared(given))
         rows = {name: [r for scene in by_scene.values() for r in scene.get(name, ())] for name in _names(by_scene)}
         table(f"{suite}: {heading(given, rows)}", "tracker", list(EVENT_COLUMNS), columns.filled(EVENT_COLUMNS, rows))
         if suite == "friends-meet":

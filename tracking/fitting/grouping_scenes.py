@@ -110,13 +110,13 @@ def rows_of(name: str, people: Walkers) -> PairScene:
     size = frames_per_step(people.fps)
     length, count = people.labels.shape
     seconds = size / people.fps
-    places = step_positions(people.frame, people.column, people.pos, length, count, people.fps)
-    parts = [(r.pair, r.step, r.a, r.b, r.values.astype(np.float32)) for r in evidence(places, seconds)]
+    places, times = step_positions(people.frame, people.column, people.pos, length, count, people.fps)
+    parts = [(r.pair, r.step, r.a, r.b, r.values.astype(np.float32)) for r in evidence(places, times, seconds)]
     if not parts:
         none = np.zeros(0, np.int64)
         return PairScene(name, seconds, none, none, np.zeros((0, 0), np.float32), none.astype(bool))
     pair, step, a, b, values = (np.concatenate(x) for x in zip(*parts, strict=True))
-    first, second = (people.labels[(step + 1) * size - 1, p] for p in (a, b))
+    first, second = (people.labels[step * size, p] for p in (a, b))
     kept = np.flatnonzero(rng(len(pair), "label", 1).permutation(int(pair.max()) + 1)[pair] < MOST_PAIRS)
     order = kept[np.lexsort((step[kept], pair[kept]))]
     together = (first >= 0) & (first == second)

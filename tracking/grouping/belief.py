@@ -63,7 +63,7 @@ class Belief:
     tables: tuple[Table, ...]
     bias: float
     stay: float = 5.0
-    come: float = 1.3
+    come: float = 1.6
     memory: float = 1.0
     arrival: float = 1.0
 
@@ -137,12 +137,13 @@ class PairBeliefs:
     log_odds: Array
 
 
-def pair_beliefs(pos: Array, seconds: float, belief: Belief) -> PairBeliefs:
+def pair_beliefs(pos: Array, time: Array, seconds: float, belief: Belief) -> PairBeliefs:
     """Returns the beliefs of all pairs of people who come within 4 m of each other. Nothing looks ahead.
 
-    pos (S, P, 2): m by step and person (`step_positions`), nan where not seen. seconds: length of a step, s.
+    pos (S, P, 2), time (S, P): m and s by step and person (`step_positions`), nan where not seen. seconds: length of a
+    step, s.
     """
-    parts = [(rows.step, rows.a, rows.b, belief.log_odds(rows.values)) for rows in evidence(pos, seconds)]
+    parts = [(rows.step, rows.a, rows.b, belief.log_odds(rows.values)) for rows in evidence(pos, time, seconds)]
     if not parts:
         nobody = np.zeros(0, np.int64)
         return PairBeliefs(nobody, nobody, nobody, np.zeros(0))
@@ -153,11 +154,11 @@ def beliefs_of_tracks(frame: Ints, column: Ints, pos: Array, length: int, fps: f
     """Returns the beliefs of all pairs of people of a sequence of `length` frames.
 
     A row is one person in one frame: frame (R,) from 0; column (R,): number of the person, from 0; pos (R, 2): x, y in
-    m. fps: frames per second. Step s of the result is known in frame (s + 1) `frames_per_step(fps)` - 1.
+    m. fps: frames per second. Step s of the result is known in frame s `frames_per_step(fps)`.
     """
     size = frames_per_step(fps)
-    places = step_positions(frame, column, pos, length, int(column.max(initial=-1)) + 1, fps)
-    return pair_beliefs(places, size / fps, belief)
+    places, times = step_positions(frame, column, pos, length, int(column.max(initial=-1)) + 1, fps)
+    return pair_beliefs(places, times, size / fps, belief)
 
 
 @cache

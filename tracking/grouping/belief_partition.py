@@ -13,7 +13,7 @@ from sim.truth.proximity import runs, stretches
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import UNSEEN, Belief, beliefs_of_tracks
 from tracking.grouping.link_rule import Links
-from tracking.grouping.pair_evidence import frames_per_step
+from tracking.grouping.pair_evidence import count_steps, frames_per_step
 
 
 def partition(
@@ -45,10 +45,10 @@ def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float,
     """
     size = frames_per_step(fps)
     found = beliefs_of_tracks(frame, column, pos, length, fps, belief)
-    people, steps = int(column.max(initial=0)) + 1, length // size
+    people, steps = int(column.max(initial=0)) + 1, count_steps(length, size)
     seen = np.zeros((steps, people), bool)
-    whole = frame < steps * size
-    seen[frame[whole] // size, column[whole]] = True
+    step = -(-frame // size)
+    seen[step[step < steps], column[step < steps]] = True
     pair = found.a * people + found.b
     order = np.lexsort((found.step, pair))
     row, at = _remembered(pair[order], found.step[order], seen, frames_of(belief.memory, fps / size))
@@ -69,7 +69,7 @@ def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float,
     on = np.arange(len(t)) < len(first)
     order = np.lexsort((both, t))
     t, both, on = t[order], both[order], on[order]
-    return Links((t + 1) * size - 1, both // people, both % people, on)
+    return Links(t * size, both // people, both % people, on)
 
 
 def _remembered(pair: Ints, step: Ints, seen: Bools, memory: int) -> tuple[Ints, Ints]:

@@ -61,38 +61,51 @@ def frames_per_step(fps: float) -> int:
     return max(1, int(STEP * fps + 1e-9))
 
 
-def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: int, fps: float) -> Array:
-    """Returns the mean position (S, people, 2), m, of each person in each whole step; nan if not seen in it.
+def count_steps(length: int, size: int) -> int:
+    """Returns the number of steps in `length` frames. size: frames per step. Step s is known in frame s size."""
+    return -(-length // size)
+
+
+def step_positions(
+    frame: Ints, column: Ints, pos: Array, length: int, people: int, fps: float
+) -> tuple[Array, Array]:
+    """Returns the mean position (S, people, 2), m, of each person in each step, and the mean time (S, people), s, of the
+    frames in which the person was seen in it; nan if in none.
 
     frame (R,): from 0; column (R,): person; pos (R, 2): x, y in m. length: frames of the sequence; fps: frames per
-    second. Step s has the frames from s to s + 1 times `frames_per_step(fps)`, the last one excluded.
+    second. Step s ends with the frame s `frames_per_step(fps)`: the first one is the first frame alone. Frames after
+    the end of the last step are left out.
     """
     size = frames_per_step(fps)
-    steps = length // size
-    key = (frame // size * people + column)[frame < steps * size]
+    steps = count_steps(length, size)
+    step = -(-frame // size)
+    whole = step < steps
+    key = (step * people + column)[whole]
     count = np.bincount(key, minlength=steps * people)
-    total = np.stack([np.bincount(key, x[frame < steps * size], steps * people) for x in pos.T], axis=-1)
+    total = np.stack([np.bincount(key, x[whole], steps * people) for x in (*pos.T, frame / fps)], axis=-1)
     mean = np.full(total.shape, np.nan)
     np.divide(total, count[:, None], out=mean, where=count[:, None] > 0)
-    return mean.reshape(steps, people, 2)
+    mean = mean.reshape(steps, people, 3)
+    return mean[..., :2], mean[..., 2]
 
 
-def step_velocities(pos: Array, seconds: float) -> Array:
+def step_velocities(pos: Array, time: Array, seconds: float) -> Array:
     """Returns velocities (S, P, 2), m/s: chords from a person's earliest position within the last 0.8 s; else nan.
 
-    pos (S, P, 2): m by step and person, nan where not seen. seconds: length of a step, s.
+    pos (S, P, 2), time (S, P): m and s by step and person, nan where not seen. seconds: length of a step, s.
     """
     vel = np.full_like(pos, np.nan)
     for steps in range(1, min(max(1, round(CHORD / seconds)), len(pos) - 1) + 1):
-        chord = (pos[steps:] - pos[:-steps]) / (steps * seconds)
+        chord = (pos[steps:] - pos[:-steps]) / (time[steps:] - time[:-steps])[..., None]
         np.copyto(vel[steps:], chord, where=np.isfinite(chord))
     return vel
 
 
-def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
+def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
     """Yields the rows of all pairs in portions of whole steps, in order.
 
-    pos (S, P, 2): m by step and person (`step_positions`), nan where not seen. seconds: length of a step, s.
+    pos (S, P, 2), time (S, P): m and s by step and person (`step_positions`), nan where not seen. seconds: length of a
+    step, s.
 
     Averaged over the pair's rows, with weights exp(-age / time): velocity difference (m/s), of vectors; sideways and
     lengthwise (m): parts of the distance across and along the mean velocity of the two, where that is at least 0.3 m/s,
@@ -108,7 +121,7 @@ def evidence(pos: Array, seconds: float) -> Iterator[PairRows]:
     seen, nan if that is step 0.
     Unknown velocities leave nan out of the means.
     """
-    vel = step_velocities(pos, seconds)
+    vel = step_velocities(pos, time, seconds)
     step, column = np.nonzero(np.isfinite(pos[..., 0]))
     place, motion = pos[step, column], vel[step, column]
     i, j = close_pairs(step, place, REACH)

@@ -24,14 +24,21 @@ def places(seed, frames=30, people=7, seconds=0.2):
     return out
 
 
+def times(pos, seconds):
+    """Mean times of what was seen in each step: up to half a step earlier than its end."""
+    ends = np.arange(len(pos))[:, None] * seconds
+    return ends - np.random.default_rng(0).uniform(0, seconds / 2, pos.shape[:2])
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("seconds", [0.3, 0.4])
 def test_evidence_equals_the_slow_twin(seed, seconds):
     pos = places(seed)
-    expected = slow.evidence(pos, seconds)
+    time = times(pos, seconds)
+    expected = slow.evidence(pos, time, seconds)
     rows = [
         (key, values)
-        for r in evidence(pos, seconds)
+        for r in evidence(pos, time, seconds)
         for *key, values in zip(r.step.tolist(), r.a.tolist(), r.b.tolist(), r.values, strict=True)
     ]
     assert sorted(tuple(key) for key, _ in rows) == sorted(expected)
@@ -42,7 +49,8 @@ def test_evidence_equals_the_slow_twin(seed, seconds):
 @pytest.mark.parametrize("seed", range(3))
 def test_beliefs_equal_the_slow_twin(seed):
     pos, belief = places(seed), default_belief()
-    found, expected = pair_beliefs(pos, 0.4, belief), slow.beliefs(pos, 0.4, belief)
+    time = times(pos, 0.4)
+    found, expected = pair_beliefs(pos, time, 0.4, belief), slow.beliefs(pos, time, 0.4, belief)
     keys = zip(found.step.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
     np.testing.assert_allclose(found.log_odds, [expected[key] for key in keys], atol=1e-9)
     assert len(found.log_odds) == len(expected)
@@ -99,19 +107,21 @@ def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
 @pytest.mark.parametrize("seed", range(3))
 def test_nothing_looks_ahead(seed):
     pos, belief = places(seed), default_belief()
-    whole, part = pair_beliefs(pos, 0.4, belief), pair_beliefs(pos[:8], 0.4, belief)
+    time = times(pos, 0.4)
+    whole, part = pair_beliefs(pos, time, 0.4, belief), pair_beliefs(pos[:8], time[:8], 0.4, belief)
     count = len(part.step)
     assert (whole.step[:count] == part.step).all()
     assert whole.step[count:].min() == 8
     np.testing.assert_array_equal(whole.log_odds[:count], part.log_odds)
 
 
-def test_steps_hold_means_of_whole_steps():
+def test_steps_hold_means_of_the_frames_since_the_last():
     frame, column = np.array([0, 1, 2, 3, 4, 0, 3]), np.array([0, 0, 0, 0, 0, 1, 1])
     pos = np.column_stack([np.array([0.0, 1, 2, 3, 4, 7, 9]), np.zeros(7)])
     assert [frames_per_step(fps) for fps in (2.5, 10, 25, 30)] == [1, 4, 10, 12]
-    found = step_positions(frame, column, pos, 5, 2, 5.0)[..., 0]
-    np.testing.assert_array_equal(found, [[0.5, 7], [2.5, 9]])
+    found, time = step_positions(frame, column, pos, 5, 2, 5.0)
+    np.testing.assert_array_equal(found[..., 0], [[0, 7], [1.5, np.nan], [3.5, 9]])
+    np.testing.assert_allclose(time, [[0, 0], [0.3, np.nan], [0.7, 0.6]])
 
 
 def test_the_file_is_read_as_written(tmp_path):
@@ -199,7 +209,7 @@ def test_probabilities_are_those_of_the_pairs(scene):
     found = pair_probabilities(people, scene.fps, 1.0, default_belief())
     assert ((found.probability > 0) & (found.probability < 1)).all()
     assert (found.a < found.b).all()
-    assert found.frame.min() == frames_per_step(scene.fps)
+    assert found.frame.min() == 1
     label = {(f, p): g for f, p, g in zip(scene.frame.tolist(), scene.id.tolist(), scene.group.tolist(), strict=True)}
     rows = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
     same = np.array([label[f, a] == label[f, b] >= 0 for f, a, b in rows])
