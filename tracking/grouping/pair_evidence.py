@@ -66,11 +66,9 @@ def count_steps(length: int, size: int) -> int:
     return -(-length // size)
 
 
-def step_positions(
-    frame: Ints, column: Ints, pos: Array, length: int, people: int, fps: float
-) -> tuple[Array, Array]:
-    """Returns the mean position (S, people, 2), m, of each person in each step, and the mean time (S, people), s, of the
-    frames in which the person was seen in it; nan if in none.
+def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: int, fps: float) -> tuple[Array, Array]:
+    """Returns each person's mean position in each step (S, people, 2), m, and the mean time of the frames in which the
+    person was seen in it (S, people), s; nan if in none.
 
     frame (R,): from 0; column (R,): person; pos (R, 2): x, y in m. length: frames of the sequence; fps: frames per
     second. Step s ends with the frame s `frames_per_step(fps)`: the first one is the first frame alone. Frames after
@@ -85,8 +83,8 @@ def step_positions(
     total = np.stack([np.bincount(key, x[whole], steps * people) for x in (*pos.T, frame / fps)], axis=-1)
     mean = np.full(total.shape, np.nan)
     np.divide(total, count[:, None], out=mean, where=count[:, None] > 0)
-    mean = mean.reshape(steps, people, 3)
-    return mean[..., :2], mean[..., 2]
+    by_person = mean.reshape(steps, people, 3)
+    return by_person[..., :2], by_person[..., 2]
 
 
 def step_velocities(pos: Array, time: Array, seconds: float) -> Array:
