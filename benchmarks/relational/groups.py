@@ -32,7 +32,7 @@ COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
 DEPARTURES = (
     "", "weights=joint", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
     "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
-    "least_existence=0", "birth_doubt=0.9", "survival_time=1000", "clutter_density=0.02",
+    "least_existence=0", "birth_doubt=0.9", "clutter_density=0.02",
 )  # fmt: skip
 """Settings of the ablation; the first one is the defaults."""
 NEAR = 1.0

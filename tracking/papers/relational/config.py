@@ -136,7 +136,6 @@ class ParticleConfig(BackgroundSettings):
         "probability",
         "least probability that a detection is nobody's for it to start a person (ours)",
     )
-    survival_time: float = param(30.0, (1.0, 1000.0), "s", "mean time until a person disappears (ours)", "log")
     time_window: float = param(
         3.0, (0.1, 30.0), "s", "a person who is not measured for so long is removed (sec. 2.1.1)", "log"
     )

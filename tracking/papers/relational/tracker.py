@@ -149,8 +149,6 @@ class Particle:
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
         behind, self.cut = covered_by_people(p, camera, c.body_radius)
         self.hidden = 1 - (1 - self.hidden) * (1 - behind)
-        if not c.certain_sensor:
-            p.exist *= np.exp(-self.dt * (1 - self.hidden) / c.survival_time)
         self._relate()
 
     @property
