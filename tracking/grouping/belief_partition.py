@@ -11,9 +11,9 @@ import numpy as np
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.proximity import runs, stretches
 from sim.types import Array, Bools, Ints
-from tracking.grouping.belief import UNSEEN, Belief, beliefs_of_tracks
+from tracking.grouping.belief import UNSEEN, Belief, pair_beliefs
 from tracking.grouping.link_rule import Links
-from tracking.grouping.pair_evidence import count_steps, frames_per_step
+from tracking.grouping.pair_evidence import frames_per_step, step_positions
 
 
 def partition(
@@ -44,11 +44,10 @@ def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float,
     m. fps: frames per second.
     """
     size = frames_per_step(fps)
-    found = beliefs_of_tracks(frame, column, pos, length, fps, belief)
-    people, steps = int(column.max(initial=0)) + 1, count_steps(length, size)
-    seen = np.zeros((steps, people), bool)
-    step = -(-frame // size)
-    seen[step[step < steps], column[step < steps]] = True
+    people = int(column.max(initial=0)) + 1
+    places, times = step_positions(frame, column, pos, length, people, fps)
+    found, steps = pair_beliefs(places, times, size / fps, belief), len(places)
+    seen = np.isfinite(places[..., 0])
     pair = found.a * people + found.b
     order = np.lexsort((found.step, pair))
     row, at = _remembered(pair[order], found.step[order], seen, frames_of(belief.memory, fps / size))

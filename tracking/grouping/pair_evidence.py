@@ -61,11 +61,6 @@ def frames_per_step(fps: float) -> int:
     return max(1, int(STEP * fps + 1e-9))
 
 
-def count_steps(length: int, size: int) -> int:
-    """Returns the number of steps in `length` frames. size: frames per step. Step s is known in frame s size."""
-    return -(-length // size)
-
-
 def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: int, fps: float) -> tuple[Array, Array]:
     """Returns each person's mean position in each step (S, people, 2), m, and the mean time of the frames in which the
     person was seen in it (S, people), s; nan if in none.
@@ -75,8 +70,7 @@ def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: i
     the end of the last step are left out.
     """
     size = frames_per_step(fps)
-    steps = count_steps(length, size)
-    step = -(-frame // size)
+    steps, step = -(-length // size), -(-frame // size)
     whole = step < steps
     key = (step * people + column)[whole]
     count = np.bincount(key, minlength=steps * people)
