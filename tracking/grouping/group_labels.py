@@ -123,12 +123,18 @@ def parts_of_change(change: GroupChange, old: Members, state: LinkedPeople) -> P
 
     old: members of the groups before the change; state: after it. People who are absent are left out.
     """
-    divides = change.kind in ("split", "dissolve")
-    groups, names = (state.identities.groups, change.after) if divides else (old, change.before)
-    people = state.present.keys() & set(change.members)
-    parts = [part for g in names if g >= 0 and (part := groups[g] & people)]
-    parts += [frozenset([p]) for p in sorted(people.difference(*parts))]
+    parts = part_sets(change, old, state.identities.groups, frozenset(state.present.keys() & set(change.members)))
     return Parts(parts, max((min(state.present[p] for p in part) for part in parts), default=0))
+
+
+def part_sets(change: GroupChange, old: Members, new: Members, people: PersonSet) -> list[PersonSet]:
+    """Returns the groups and people alone, of `people`, that a change joined, or into which it divided a group.
+
+    old, new: members of the groups before and after the change.
+    """
+    groups, names = (new, change.after) if change.kind in ("split", "dissolve") else (old, change.before)
+    parts = [part for g in names if g >= 0 and (part := groups[g] & people)]
+    return parts + [frozenset([p]) for p in sorted(people.difference(*parts))]
 
 
 def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, list[tuple[int, int | None]]]:

@@ -15,6 +15,7 @@ import numpy as np
 from sim.truth.identity import GroupChange, Members
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, GroupEvent, Ints
+from tracking.grouping.group_labels import part_sets
 from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, event_of_change
 
 CHORD = 0.5
@@ -55,7 +56,7 @@ class ReportedEvents:
         out = []
         for change in changes:
             there = frozenset(change.members) & now
-            sets = _parts(change, old, new, there)
+            sets = part_sets(change, old, new, there)
             since = max((min(self.first[p] for p in part) for part in sets), default=0) - begin
             parts = Parts([frozenset(column[p] for p in part) for part in sets], since)
             own = replace(change, members=tuple(sorted(column[p] for p in change.members if p in column)))
@@ -77,10 +78,3 @@ class ReportedEvents:
         chord, vel = frames_of(CHORD, self.fps), np.full_like(pos, np.nan)
         vel[chord:] = (pos[chord:] - pos[:-chord]) * self.fps / chord
         return ids, TrackedMotion(pos, vel, self.fps)
-
-
-def _parts(change: GroupChange, old: Members, new: Members, there: frozenset[int]) -> list[frozenset[int]]:
-    """Returns the groups and people alone, of people `there`, that a change joined, or into which it divided one."""
-    groups, names = (new, change.after) if change.kind in ("split", "dissolve") else (old, change.before)
-    parts = [part for g in names if g >= 0 and (part := groups[g] & there)]
-    return parts + [frozenset([p]) for p in sorted(there.difference(*parts))]
