@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 DURATION = 24.0  # s
 APART = 60.0  # m between the plots of a scene
 WIDTH = 0.7  # m between two who walk abreast
+MOVE = 0.8  # m/s at which people move up in a queue
 
 
 @dataclass(frozen=True)
@@ -112,18 +113,20 @@ def crosses(draw):
 
 @st.composite
 def queues(draw):
-    """Three to five strangers line up, one after the other; some are served."""
+    """Three to five strangers line up, one after the other; some are served. Those behind move up, and then stand for
+    longer than a frame of any rate: else two moves are one in some rates, and that one lasts as long as a queue may.
+    """
     n, spacing, speed = draw(st.integers(3, 5)), draw(number(0.6, 1.2)), draw(number(0.8, 1.4))
     stand = np.cumsum([draw(number(1, 3)) for _ in range(n)])
-    served, pause = draw(st.integers(0, n - 2)), draw(number(1.5, 2.5))
+    served, pause = draw(st.integers(0, n - 2)), spacing / MOVE + draw(number(0.25, 1.5))
     leave = stand[-1] + 4 + pause * np.arange(n)
     people = []
     for k in range(n):
         pieces = [(stand[k], (-speed, 0))]
         now = stand[k]
         for turn in range(min(served, k)):
-            pieces += [(leave[turn] - now, (0, 0)), (spacing / 0.8, (-0.8, 0))]
-            now = leave[turn] + spacing / 0.8
+            pieces += [(leave[turn] - now, (0, 0)), (spacing / MOVE, (-MOVE, 0))]
+            now = leave[turn] + spacing / MOVE
         pieces += [(leave[k] - now, (0, 0)), (1, (0, 1.2))] if k < served else [(1, (0, 0))]
         people.append(way((spacing * k + speed * stand[k], 0), *pieces))
     return Plot("queue", float(stand[2]), tuple(people), ((0, tuple(range(n))),))
