@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.belonging.pair_features import NAMES, Pairs, pair_features
-from benchmarks.belonging.sources import sample, source_of
+from benchmarks.belonging.people import density, scene_of, sparse
+from benchmarks.belonging.sources import of_scenes, sample, source_of
 from benchmarks.belonging.transfer import average_precision, f1
 from scenarios.loading.resolve import load, resolve
 from sim.sequence import simulate
@@ -95,6 +96,23 @@ def test_weighted_scores_are_those_of_repeated_frames() -> None:
         steps = [(y[q >= at].sum(), (q >= at).sum()) for at in np.unique(q)[::-1]]
         gains = np.diff([0, *(hits for hits, _ in steps)])
         assert other == pytest.approx(sum(g * h / n for g, (h, n) in zip(gains, steps, strict=True)) / y.sum())
+
+
+def test_scenes_of_a_source_are_what_they_are_alone() -> None:
+    made = [simulate(e.scenario, 1, streams=()).truth for e in resolve("streets") if "quiet" in e.name]
+    truths = [sample(truth) for truth in made if truth is not None]
+    source = source_of(truths, recording=False)
+    kept = of_scenes(source, np.array([2, 0]))
+    alone = source_of([truths[2], truths[0]], recording=False)
+    for number in (0, 1):
+        ours, theirs = scene_of(kept, number), scene_of(alone, number)
+        np.testing.assert_array_equal(ours.pos, theirs.pos)
+        np.testing.assert_array_equal(ours.party, theirs.party)
+        rows, others = kept.pair_scene == number, alone.pair_scene == number
+        np.testing.assert_array_equal(kept.features[rows], alone.features[others])
+    assert kept.length.tolist() == alone.length.tolist()
+    densities = [density(scene_of(source, k)) for k in range(3)]
+    assert len(sparse(source, np.median(densities)).length) == 1
 
 
 def test_streets_have_lone_people_who_stand_at_first_and_at_most_2000_rows_of_a_scene() -> None:

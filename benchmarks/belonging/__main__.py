@@ -2,7 +2,7 @@
 
     python -m benchmarks.belonging pairs [--scenes street crowd party streets] [--seeds 0:3] [--out FOLDER]
     python -m benchmarks.belonging likeness [--chart FILE.svg]
-    python -m benchmarks.belonging people
+    python -m benchmarks.belonging people [--sparse DENSITY]
     python -m benchmarks.belonging transfer --peer-python PYTHON [--train street+crowd+party …]
     python -m benchmarks.belonging giveaway --peer-python PYTHON
 
@@ -16,7 +16,8 @@ pairs: writes the people, and the features of all pairs of people who are less t
 simulated scene, drawn at random: a dense scene has many pairs, and would else outweigh all others.
 likeness: quantiles (10, 50, 90 %) of each feature, of mates (two people of one labelled group) and of strangers; then
 the Kolmogorov-Smirnov distance of each simulated source to each recording, beside that of the two recordings.
-people: who is on the streets, how they arrive, wait and walk.
+people: who is on the streets, how they arrive, wait and walk. --sparse adds a column of the scenes of a source with
+fewer people per m², as recordings are to be compared with scenes of their own density.
 transfer: classifiers that are trained on one source tell mates from strangers on a recording. Pairwise F1 over (pair,
 frame) at the threshold 0.5 and at the threshold that is best on held-out scenes of the training source; average
 precision; 95 % intervals by blocks of frames. Then F1 at 0.5 without one family of features.
@@ -53,6 +54,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("belonging"), metavar="FOLDER", help="of the sources")
     parser.add_argument("--label-errors", action="store_true", help="pairs: simulated positions err like labels do")
     parser.add_argument("--chart", type=Path, metavar="FILE", help="likeness: where to draw the distributions")
+    parser.add_argument("--sparse", type=float, metavar="DENSITY", help="people: scenes below it in a column")
     parser.add_argument("--train", nargs="+", metavar="A+B", help="transfer: instead of each scene")
     parser.add_argument("--peer-python", metavar="PYTHON", help="interpreter of an environment with scikit-learn")
     add_seeds(parser, "0:3", what="pairs: ")
@@ -66,7 +68,7 @@ def main() -> None:
     elif args.mode == "likeness":
         likeness.likeness(args.out, scenes, tuple(RECORDINGS), args.chart)
     elif args.mode == "people":
-        people.people(args.out, scenes, tuple(RECORDINGS))
+        people.people(args.out, scenes, tuple(RECORDINGS), args.sparse)
     elif args.mode == "transfer":
         transfer.transfer(args.out, args.train or scenes, tuple(RECORDINGS), args.peer_python)
     else:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from benchmarks.belonging.pair_features import NAMES, STANDING
-from benchmarks.belonging.sources import FPS, Source, read
+from benchmarks.belonging.sources import FPS, Source, of_scenes, read
 from benchmarks.support.tables import table
 from sim.io.formats.group_labels import rows_to_grid
 from sim.io.formats.velocity import chords
@@ -238,7 +238,18 @@ def _walking_speed(scene: Scene) -> Array:
     return out
 
 
-def people(folder: Path, scenes: Sequence[str], recordings: Sequence[str]) -> None:
+def sparse(source: Source, most: float) -> Source:
+    """Returns the scenes of a source with less than `most` people per m²."""
+    scenes = range(len(source.length))
+    return of_scenes(source, np.array([k for k in scenes if density(scene_of(source, k)) < most], np.int64))
+
+
+def people(folder: Path, scenes: Sequence[str], recordings: Sequence[str], most: float | None) -> None:
+    """most: people per m² below which the scenes of a suite have a column of their own; None: no such column."""
     found = {name: figures(read(folder, name)) for name in (*recordings, *scenes)}
+    for name in scenes if most is not None else ():
+        thin = sparse(read(folder, name), most)
+        if 0 < len(thin.length) < len(read(folder, name).length):
+            found[f"{name}, below {most:g} per m²"] = figures(thin)
     rows = {figure: [one[figure] for one in found.values()] for figure in next(iter(found.values()))}
     table("people", "", list(found), rows)

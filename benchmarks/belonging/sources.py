@@ -21,6 +21,7 @@ from tracking.tuning.grouping_episodes import SURVEYED, with_label_errors
 
 FPS = 2.5
 BLOCKS = 10  # of a recording
+PAIR_FIELDS = ("pair_scene", "pair_frame", "a", "b", "features", "mates", "part", "drawn")
 SCENE_ROWS = 2_000  # of pairs, at most, of a simulated scene
 
 
@@ -121,6 +122,16 @@ def _sampled(entry: Entry, seed: int, label_errors: bool) -> Truth:
     truth = simulate(entry.scenario, seed, entry.repeat, streams=()).truth
     assert truth is not None
     return sample(with_label_errors(truth, SURVEYED, seed, entry.repeat) if label_errors else truth)
+
+
+def of_scenes(source: Source, kept: Ints) -> Source:
+    """Returns the scenes of a source whose numbers are in kept (K,), numbered from 0 in this order."""
+    number = np.full(len(source.length), -1)
+    number[kept] = np.arange(len(kept))
+    people, pairs = number[source.scene] >= 0, number[source.pair_scene] >= 0
+    rows = {f.name: getattr(source, f.name)[pairs if f.name in PAIR_FIELDS else people] for f in fields(Source)[1:]}
+    rows |= {name: number[rows[name]] for name in ("scene", "pair_scene")}
+    return Source(length=source.length[kept], **rows)
 
 
 def write(folder: Path, name: str, source: Source) -> None:
