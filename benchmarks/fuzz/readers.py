@@ -176,6 +176,7 @@ READERS: dict[str, Callable[[Path], None]] = {
     "observation": _observation,
     "camera json": _camera("camera.json"),
     "camera xml": _camera("camera.xml"),
+    "camera yaml": _camera("pair.yml"),
     "biwi": _source(),
     "caviar": _source("walk.xml"),
     "mot": _source(),

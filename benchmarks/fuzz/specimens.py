@@ -99,6 +99,27 @@ CAMERA = (
     '{"format": 1, "kind": "pinhole", "image": [64, 48], "focal_px": [60, 60], "centre_px": [32, 24], "position": '
     '[1, 2, 5], "rotation": [[1, 0, 0], [0, -0.8, -0.6], [0, 0.6, -0.8]], "baseline": 0.1, "px_per_m": null}'
 )
+PAIR = """%YAML:1.0
+---
+image_width: 64
+image_height: 48
+P1: !!opencv-matrix
+   rows: 3
+   cols: 4
+   dt: d
+   data: [ 60., 0., 31.5, 0., 0., 60., 23.5, 0., 0., 0., 1., 0. ]
+P2: !!opencv-matrix
+   rows: 3
+   cols: 4
+   dt: d
+   data: [ 60., 0., 31.5, -6., 0., 60., 23.5, 0., 0., 0., 1., 0. ]
+rotation: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 1., 0., 0., 0., -0.8, -0.6, 0., 0.6, -0.8 ]
+position: [ 1., 2., 5. ]
+"""
 SEQINFO = "[Sequence]\nname=walk\nimDir=img1\nframeRate=10\nseqLength=4\nimWidth=64\nimHeight=48\nimExt=.png\n"
 ROWS = "".join(f"{f},{i},{10 * i + f},10,8,20,1,1,0.9\n" for f in (1, 2, 3, 4) for i in (1, 2))
 TEN = "".join(f"{f},{i},{10 * i + f},10,8,20,0.9,{i}.5,2.25,0\n" for f in (1, 2, 3, 4) for i in (1, 2))
@@ -131,6 +152,7 @@ TEXTS: dict[str, dict[str, str]] = {
     "observation": {"view.toml": OBSERVATION},
     "camera json": {"camera.json": CAMERA},
     "camera xml": {"camera.xml": TSAI},
+    "camera yaml": {"pair.yml": PAIR},
     "biwi": {"obsmat.txt": OBSMAT, "groups.txt": "1 2\n3\n"},
     "caviar": {"walk.xml": CAVIAR},
     "mot": {"seqinfo.ini": SEQINFO, "gt/gt.txt": ROWS, "det/det.txt": DETECTIONS},

@@ -1,6 +1,6 @@
 """`stereo`: the paper's scenes, its decisions one by one, honest pictures, cost of matching.
 
-    python -m benchmarks.stereo MODE [--seeds a:b] [--only cross,merge,…] [--chart FILE] [--json FILE]
+    python -m benchmarks.stereo MODE [--seeds a:b] [--only cross,merge,…] [--chart FILE] [--store FILE] [--json FILE]
 
 pictures   OpenCV's StereoSGBM and the tracker's own matcher against the true disparity
 decalibration  what a slightly wrong rig costs the tracker's matcher
@@ -9,6 +9,7 @@ photometric   left against right picture at the true disparity, without a matche
 trajectories  the paths of groups in space, as in Figs. 5, 7 and 9 of the paper (an SVG)
 scenes     the paper's scenes: position errors (bias and scatter apart), group scores, events
 decisions  each decision of the tracker switched off: paired differences of F1 and of the position error
+density    `stereo` in crowds of growing density, beside `group-pda` and `blob` on the left pictures (table and SVG)
 cost       time of matching inside the foreground over dense matching, against the foreground's share (table and SVG);
            frames per second
 
@@ -23,7 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.stereo import cost, decalibration, photometric, pictures, real, scenes, trajectories
+from benchmarks.stereo import cost, decalibration, density, photometric, pictures, real, scenes, trajectories
 from benchmarks.support.options import add_data, add_seeds, new_parser, one_thread, seeds_text
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
@@ -34,6 +35,7 @@ MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "trajectories": trajectories.trajectories,
     "scenes": scenes.scenes,
     "decisions": scenes.decisions,
+    "density": density.density,
     "cost": cost.cost,
 }
 
@@ -45,7 +47,10 @@ def main() -> None:
     add_data(parser)
     parser.add_argument("--only", help="scenes, separated by commas: cross, merge, stairs, crowded")
     parser.add_argument("--options", help="decisions: parameters, separated by commas")
-    parser.add_argument("--chart", type=Path, default=Path("stereo.svg"), help="trajectories, cost: the SVG to write")
+    parser.add_argument(
+        "--chart", type=Path, default=Path("stereo.svg"), help="trajectories, density, cost: the SVG to write"
+    )
+    parser.add_argument("--store", type=Path, help="scenes, decisions, density: JSON of rows; measured ones are kept")
     parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")
     args = parser.parse_args()
     one_thread()

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from unittest import mock
 
 import numpy as np
 
+from benchmarks.stereo.kept_points import shared_points
+from benchmarks.stereo.stored_rows import Row, Stored
 from benchmarks.support.in_memory import in_memory
 from benchmarks.support.tables import interval, number, signed, table
 from scenarios.errors import FlockscopeError
@@ -25,8 +26,6 @@ from scenarios.loading.resolve import Entry, resolve
 from sim.sequence import simulate
 from sim.types import Sequence as Recording
 from sim.types import Tracks
-from tracking.detect import background
-from tracking.detect.background_training import Trained, train
 from tracking.papers.stereo.config import StereoConfig
 from tracking.run import track
 from tracking.scoring import evaluate
@@ -46,14 +45,18 @@ ABLATIONS: Mapping[str, Mapping[str, object]] = {
     "memory": {"memory": 0.0},
     "count_weight": {"count_weight": 0.0},
     "velocity_weight": {"velocity_weight": 0.0},
+    "climb_noise": {"climb_noise": 0.5},
+    "height_noise": {"height_noise": 0.1},
+    "speed_prior": {"speed_prior": 10.0},
     "back_check": {"back_check": 5.0},
     "left_right": {"left_right": False},
     "spread_weight": {"spread_weight": 0.1},
     "merge_time": {"merge_time": 0.0},
     "split": {"split": False},
+    "confirm_time": {"confirm_time": 0.0},
+    "coast_time": {"coast_time": 10.0, "report_coast": 5.0},
     "person or not": {"least_height": 0.0, "least_width": 0.0, "most_height": 10.0},
 }
-Row = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ def entries(only: str | None) -> dict[str, Entry]:
     return {name: e for name, e in found.items() if wanted is None or name in wanted}
 
 
-def recordings(entry: Entry, seeds: range) -> Iterator[tuple[int, Recording]]:
+def recordings(entry: Entry, seeds: Iterable[int]) -> Iterator[tuple[int, Recording]]:
     """Yields the pairs of pictures of each seed, kept in memory; a seed that cannot be simulated is printed and left
     out."""
     for seed in seeds:
@@ -134,22 +137,22 @@ def _errors_of_frame(t: Tracks, groups: object, camera: object) -> list[np.ndarr
 
 
 def measured(args: argparse.Namespace, variants: tuple[Variant, ...]) -> dict[str, dict[str, dict[int, Row]]]:
-    """Returns the rows by scene, variant and seed. All variants share the training on a background sample."""
+    """Returns the rows by scene, variant and seed. Rows of earlier runs in the file args.store are kept, and new ones
+    are added to it after each sequence."""
     made: dict[str, dict[str, dict[int, Row]]] = {}
+    stored = Stored(args.store)
     for name, entry in entries(args.only).items():
         made[name] = {v.name: {} for v in variants}
-        for seed, sequence in recordings(entry, args.seeds):
-            known: dict[tuple[float, bool], Trained] = {}
-
-            def once(sample, rate, follow_gain, known=known):  # type: ignore[no-untyped-def]
-                if (rate, follow_gain) not in known:
-                    known[rate, follow_gain] = train(sample, rate, follow_gain)
-                return known[rate, follow_gain]
-
-            with mock.patch.object(background, "train", once):
+        missing = [s for s in args.seeds if not all(stored.has(name, v.name, s) for v in variants)]
+        for seed, sequence in recordings(entry, missing):
+            with shared_points():
                 for v in variants:
-                    made[name][v.name][seed] = row_of(sequence, v)
+                    if not stored.has(name, v.name, seed):
+                        stored.add(name, v.name, seed, row_of(sequence, v))
+            stored.write()
             print(f"{name} {seed}", file=sys.stderr, flush=True)
+        for v in variants:
+            made[name][v.name] = stored.rows(name, v.name)
     return made
 
 

@@ -119,6 +119,9 @@ def _observation(spec: Scenario | ObservationSpec) -> Iterator[_Range]:
     yield _Range("picture.blur_px", picture.blur_px, 0.0, 100.0, " px")
     yield _Range("picture.foliage", picture.foliage, 0.0, 1.0, "")
     yield _Range("picture.sway_px", picture.sway_px, 0.0, 100.0, " px")
+    yield _Range("picture.right_gain", picture.right_gain, 1e-3, 1000.0, "")
+    yield _Range("picture.right_roll_deg", picture.right_roll_deg, -10.0, 10.0, " degrees")
+    yield _Range("picture.right_down_px", picture.right_down_px, -100.0, 100.0, " px")
 
 
 def _most(size: Value) -> float:

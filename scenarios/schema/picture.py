@@ -67,6 +67,9 @@ class Picture(Model):
     - blur_px: standard deviation of the blur, px. jpeg: quality 0 to 100; 0 = no compression.
     - foliage: share of the image covered by moving plants, on the ground only. sway_px, sway_time: standard deviation
       of their movement, px, and the time after which its correlation is 0.6, s.
+    - right_gain, right_roll_deg, right_down_px: what is wrong with the right picture of a pair, though the calibration
+      does not say so: a factor of its brightness, and how far its content is turned clockwise about the image's centre,
+      degrees, and moved down, px. True disparities are those of the pair without these errors.
     """
 
     texture: Share = Field(0.5, description="contrast of the patterns on ground and walls")
@@ -84,3 +87,10 @@ class Picture(Model):
     )
     sway_px: NonNegative = Field(1.5, description="standard deviation of the plants' movement along each axis, px")
     sway_time: Positive = Field(0.4, description="time after which the correlation of that movement is 0.6, s")
+    right_gain: Positive = Field(1.0, description="factor of the right picture's brightness, which is not calibrated")
+    right_roll_deg: float = Field(
+        0.0, description="angle by which the right picture's content is turned clockwise, which is not calibrated"
+    )
+    right_down_px: float = Field(
+        0.0, description="distance by which the right picture's content lies too low, px, which is not calibrated"
+    )

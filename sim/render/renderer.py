@@ -18,6 +18,7 @@ from sim.render.blur_noise import blur_weights, noise_offsets, noise_pool
 from sim.render.camera_view import NODE_STEP, CameraView
 from sim.render.canvas import UNIT, FrameCanvas
 from sim.render.clothing import clothing_atlas
+from sim.render.compression import compressed
 from sim.render.disparity import empty_scene_disparities, frame_disparities
 from sim.render.foliage import Foliage, grow_plants
 from sim.render.frame_batch import FrameBatch, PeopleInView
@@ -30,7 +31,7 @@ from sim.types import BACKGROUNDS, Camera, Frame, Image, Motion, PixelTruth
 if TYPE_CHECKING:
     from scenarios.schema.picture import Light, Picture
 
-LEFT, RIGHT = 0, 1
+LEFT, RIGHT, MISALIGNED = 0, 1, 2  # views; the last: the right camera as it is, if it is not as calibrated
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +75,21 @@ class Renderer:
 
     @cached_property
     def right_view(self) -> CameraView:
-        """The CameraView of the empty scene from the right camera of the pair, `baseline` m to the right.
+        """The CameraView of the empty scene from the right camera as calibrated, `baseline` m to the right.
 
         Raises InputError if there is no right camera (kind "top", or a baseline of 0) or the drawn light or share of
         plants is impossible."""
         self.check_pair()
         right = cameras.right_camera(self.camera)
+        return CameraView(right, self.motion, self.illumination, self.picture, self._plants)
+
+    @cached_property
+    def _shown_right_view(self) -> CameraView:
+        """The CameraView from the right camera as it is, turned and moved; raises InputError as `right_view`."""
+        roll, down = np.radians(self.picture.right_roll_deg), self.picture.right_down_px
+        if roll == 0 and down == 0:
+            return self.right_view
+        right = cameras.misaligned(self.right_view.camera, roll, down)
         return CameraView(right, self.motion, self.illumination, self.picture, self._plants)
 
     def check_pair(self) -> None:
@@ -189,8 +199,9 @@ class Renderer:
         shade: draw the image; else it has shape (0, 0, 3). label: make the pixel truth; else it is None. disparity:
         with disparities; no effect without `label`. Raises InputError if the right view is needed and there is none, or
         drawn light or plants are impossible; IndexError if there is no such frame."""
-        view, batch = self.right_view if side else self.left_view, self._batch(index)
-        people, seen = batch.people(index), batch.in_view(view, side, index)
+        view, batch = self._shown_right_view if side else self.left_view, self._batch(index)
+        number = MISALIGNED if side and view is not self.right_view else side
+        people, seen = batch.people(index), batch.in_view(view, number, index)
         canvas = self._moved_canvas(view, index) if shade else view.take_canvas()
         if shade:
             self._draw_shadows(view, canvas, people, seen)
@@ -255,22 +266,14 @@ class Renderer:
 
         image = np.empty((view.height, view.width, 3), np.uint8)
         number = index + BACKGROUNDS
-        bright = view.brightness(self._time(index), number)
+        bright = view.brightness(self._time(index), number) * np.float32(self.picture.right_gain if side else 1.0)
         offsets = noise_offsets(view.height, self.motion.seed, side, number, self.motion.repeat)
         flat = view.height, 3 * view.width
         finish_image(
             canvas.colour.reshape(flat), view.blurred_canvas.reshape(flat), canvas.dirty, self._weights, bright,
             NODE_STEP, self._noise, np.float32(self.picture.shot), offsets, image.reshape(flat),
         )  # fmt: skip
-        return _compressed(image, self.picture.jpeg) if self.picture.jpeg else image
-
-
-def _compressed(image: Image, quality: int) -> Image:
-    """Return the image (H, W, 3) uint8, BGR, after JPEG compression with this quality, 1 (worst) to 100."""
-    import cv2
-
-    code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
-    return np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
+        return compressed(image, self.picture.jpeg) if self.picture.jpeg else image
 
 
 def make_renderer(

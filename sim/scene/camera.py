@@ -109,6 +109,13 @@ def right_camera(camera: Camera) -> Camera:
     return camera.replace(position=camera.position + camera.baseline * camera.rotation[0])
 
 
+def misaligned(camera: Camera, roll: float, down: float) -> Camera:
+    """Return a copy of a pinhole camera whose image is turned clockwise by `roll` (rad) about its centre, then moved
+    down by `down` px."""
+    turn = np.array([[np.cos(roll), -np.sin(roll), 0.0], [np.sin(roll), np.cos(roll), 0.0], [0.0, 0.0, 1.0]])
+    return camera.replace(rotation=turn @ camera.rotation, centre_px=(camera.centre_px[0], camera.centre_px[1] + down))
+
+
 def disparity(camera: Camera, depth: Array) -> Array:
     """Return the disparity u_left - u_right = f B / z in px for depths z (m) of any shape; zeros for kind "top".
 

@@ -1,5 +1,7 @@
 """Reader of a rectified stereo camera from OpenCV's YAML (`cv2.FileStorage`), as `cv2.stereoRectify` leads to it.
 
+The text is read here, as `cv2.FileStorage` itself may end the process at damaged text.
+
 Keys: image_width, image_height, px; P1 and P2, the 3 x 4 projections of the rectified left and right camera, P2[0, 3] =
 -P2[0, 0] times the baseline in m; and, as OpenCV knows no world, rotation (3 x 3, world to rectified left camera) and
 position (3 numbers, of the left camera, m).
@@ -7,8 +9,9 @@ position (3 numbers, of the left camera, m).
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +24,14 @@ from sim.types import Array, Camera
 SAME = 1e-6
 """Relative difference allowed between P1 and the left part of P2."""
 POSE = ("rotation", "position")
+KEY = re.compile(r"([A-Za-z_]\w*)\s*:\s*(.*)")
+NUMBER = re.compile(r"[-+]?(\d{1,30}\.?\d{0,30}|\.\d{1,30})([eE][-+]?\d{1,3})?")
+LIST = re.compile(r"\[([^\[\]]*)\]")
+MATRIX = re.compile(
+    r"!!opencv-(?:nd-)?matrix\s+(?:rows:\s*(\d{1,2})\s+cols:\s*(\d{1,2})|sizes:\s*\[([\d,\s]{0,20})\])\s+"
+    r"dt:\s*\w+\s+data:\s*(\[[^\[\]]*\])\s*"
+)
+"""A matrix of two or of any number of dimensions, as FileStorage writes it."""
 
 
 def read_opencv_yaml(path: Path) -> Camera:
@@ -30,20 +41,8 @@ def read_opencv_yaml(path: Path) -> Camera:
     InputError if the file cannot be read as OpenCV's YAML, a key is missing or of a wrong shape, P1 and P2 are no
     rectified horizontal pair, or the camera cannot be used (sim.scene.camera_check).
     """
-    import cv2
-
-    text = read_text(path)
-    storage = cv2.FileStorage()
-    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
-        storage.open(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY | cv2.FILE_STORAGE_FORMAT_YAML)
-        values = {key: _value(storage, key) for key in ("image_width", "image_height", "P1", "P2", *POSE)}
-    except (cv2.error, SystemError, UnicodeError):
-        expected = "a file of cv2.FileStorage"
-        raise InputError(file=path, got="no OpenCV YAML", expected=expected, remedy="check --camera") from None
-    finally:
-        storage.release()
-        cv2.utils.logging.setLogLevel(level)
+    blocks = _blocks(path, read_text(path))
+    values = {key: _value(blocks[key]) for key in ("image_width", "image_height", "P1", "P2", *POSE) if key in blocks}
     width, height = (float(_numbers(path, values, k, ())) for k in ("image_width", "image_height"))
     left, right = (_numbers(path, values, k, (3, 4)) for k in ("P1", "P2"))
     rotation, position = _numbers(path, values, "rotation", (3, 3)), _numbers(path, values, "position", (3,))
@@ -66,24 +65,46 @@ def read_opencv_yaml(path: Path) -> Camera:
     return require_camera(camera, path)
 
 
-def _value(storage: Any, key: str) -> Array | None:
-    """Returns a number or matrix as an array, None if the key is missing or something else."""
-    node = storage.getNode(key)
-    if node.isInt() or node.isReal():
-        return np.array(node.real())
-    if node.isMap():
-        found = node.mat()
-        return None if found is None else np.asarray(found, np.float64)
-    if node.isSeq():
-        return np.array([node.at(k).real() for k in range(node.size())])
-    return None
+def _blocks(path: Path, text: str) -> dict[str, str]:
+    """Returns the text of each key of the first level, its indented lines included, without comments."""
+    lines = [line.partition("#")[0].rstrip() for line in text.splitlines()]
+    if not lines or not lines[0].startswith("%YAML"):
+        expected = "a file of cv2.FileStorage, which begins with %YAML"
+        raise InputError(file=path, got="no OpenCV YAML", expected=expected, remedy="check --camera")
+    blocks: dict[str, list[str]] = {}
+    key = ""
+    for line in lines[1:]:
+        if found := KEY.match(line):
+            key = found[1]
+            blocks[key] = [found[2]]
+        elif key and line[:1].isspace():
+            blocks[key].append(line)
+    return {key: "\n".join(block) for key, block in blocks.items()}
 
 
-def _numbers(path: Path, values: dict[str, Array | None], key: str, shape: tuple[int, ...]) -> Array:
+def _value(block: str) -> Array | None:
+    """Returns a number, a list of numbers or a matrix as an array; None if the block is something else."""
+    matrix = MATRIX.fullmatch(block)
+    body = (block if matrix is None else matrix[4]).strip()
+    if matrix is None and NUMBER.fullmatch(body):
+        return np.array(float(body))
+    items = LIST.fullmatch(body)
+    numbers = [] if items is None else [item.strip() for item in items[1].split(",")]
+    if not numbers or not all(NUMBER.fullmatch(item) for item in numbers):
+        return None
+    values = np.array([float(item) for item in numbers])
+    if matrix is None:
+        return values
+    sizes = re.findall(r"\d+", matrix[3]) if matrix[1] is None else (matrix[1], matrix[2])
+    shape = tuple(int(size) for size in sizes)
+    return values.reshape(shape) if int(np.prod(shape)) == len(values) else None
+
+
+def _numbers(path: Path, values: Mapping[str, Array | None], key: str, shape: tuple[int, ...]) -> Array:
     """Returns the value of a key in the shape; raises InputError if it is missing or does not fit."""
-    value = values[key]
+    value = values.get(key)
     if value is None or value.size != int(np.prod(shape)) or not (np.abs(value) <= COORDINATE).all():
-        got = "no such key" if value is None else f"shape {value.shape}"
+        got = "no such numbers" if value is None else f"shape {value.shape}"
         expected = f"numbers of shape {shape} within {COORDINATE:g}" if shape else f"a number within {COORDINATE:g}"
         raise InputError(file=path, place=key, got=got, expected=expected, remedy="correct it")
     return np.asarray(value.reshape(shape), np.float64)

@@ -244,6 +244,24 @@ def test_both_cameras_see_the_same_surfaces() -> None:
     assert np.median(wrong) > 2 * np.median(off)
 
 
+def test_a_misaligned_right_camera_turns_and_moves_its_picture_only() -> None:
+    import cv2
+
+    motion, camera = motion_in(BUILT), VIEWS["high"]
+    plain = make_renderer(motion, camera, Light(), SHARP).draw(3, right=True, pixels=True, disparity=True)
+    picture = SHARP.model_copy(update={"right_roll_deg": 2.0, "right_down_px": 1.5, "right_gain": 1.1})
+    wrong = make_renderer(motion, camera, Light(), picture).draw(3, right=True, pixels=True, disparity=True)
+    assert np.array_equal(plain.image, wrong.image)
+    assert np.array_equal(plain.pixels.disparity, wrong.pixels.disparity, equal_nan=True)
+    matrix = cv2.getRotationMatrix2D((camera.centre_px[0] - 0.5, camera.centre_px[1] - 0.5), -2.0, 1.0)
+    matrix[1, 2] += 1.5
+    expected = 1.1 * cv2.warpAffine(plain.right, matrix, plain.right.shape[1::-1], flags=cv2.INTER_CUBIC).astype(float)
+    inside = np.s_[10:-10, 10:-10]
+    off = np.abs(np.minimum(expected, 255) - wrong.right)[inside]
+    assert np.median(off) < 3.0
+    assert np.median(off) < 0.4 * np.median(np.abs(plain.right.astype(float) - wrong.right)[inside])
+
+
 def test_a_matcher_finds_the_true_disparity() -> None:
     import cv2
 

@@ -196,8 +196,11 @@ PICTURES = {
     "picture.foliage": ("", "picture.foliage=0.3"),
     "picture.sway_px": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_px=4"),
     "picture.sway_time": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_time=2"),
+    "picture.right_gain": ("", "picture.right_gain=1.2"),
+    "picture.right_roll_deg": ("", "picture.right_roll_deg=1"),
+    "picture.right_down_px": ("", "picture.right_down_px=1"),
 }
-"""What pictures alone are made of: looked for in frame 3, at 0.4 s, without the noise."""
+"""What pictures alone are made of: looked for in frame 3, at 0.4 s, without the noise; `right_` in right pictures."""
 
 TEXT_ONLY = {"schema", "about", "group[].id", "event[](merge).into", "event[](split).parts[].id"}
 """Keys that name things within the file, or say what it is."""
@@ -278,9 +281,12 @@ def test_a_key_changes_pictures_and_only_those(key):
     assert before.model_dump(exclude={"light", "picture"}) == after.model_dump(exclude={"light", "picture"})
     bare = {} if key in ("picture.noise", "picture.shot") else {"noise": 0.0}
     a, b = (
-        make_renderer(*three_people(), s.light, s.picture.model_copy(update=bare)).frame(3) for s in (before, after)
+        make_renderer(*three_people(), s.light, s.picture.model_copy(update=bare)).draw(3, right=True)
+        for s in (before, after)
     )
-    assert (a != b).any()
+    of_right = key.startswith("picture.right_")
+    assert (a.image != b.image).any() != of_right
+    assert (a.right != b.right).any()
 
 
 @pytest.mark.parametrize("key", WHEN)

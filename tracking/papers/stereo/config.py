@@ -107,9 +107,17 @@ class StereoConfig(BackgroundSettings):
     accel_noise: float = param(
         0.5, (0.05, 5.0), "m/s^1.5", "process noise: white acceleration per root second (eq. 2)", "log"
     )
+    climb_noise: float = param(
+        0.1, (0.02, 5.0), "m/s^1.5", "from pixels: as accel_noise, of the height (ours)", "log", before=0.5,
+        sees="pixels",
+    )  # fmt: skip
     centroid_noise: float = param(
         0.1, (0.005, 1.0), "m",
         "measurement noise of a group's mean beside that of its points, as points come and go (ours)", "log",
+    )  # fmt: skip
+    height_noise: float = param(
+        0.2, (0.005, 1.0), "m", "from pixels: as centroid_noise, of the height, as features lie anywhere on a body "
+        "(ours)", "log", before=0.1, sees="pixels",
     )  # fmt: skip
     density_width: float = param(
         0.15, (0.05, 20.0), "m",

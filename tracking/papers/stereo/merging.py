@@ -6,8 +6,9 @@ MR_i is the ellipsoid (x - X_i)' (Sigma_i + P_i)^-1 (x - X_i) <= merge_gate in s
 Two ellipsoids are tested exactly (tracking.filters.ellipsoid_overlap).
 
 Departures: P_i, the covariance of the state, is added to Sigma_i; regions must overlap for `merge_time`; only confirmed
-groups merge. The paper does not say what P of a merged group is: here it is that of a
-weighted mean, sum of n_i^2 P_i. The group with most points keeps its id.
+groups that are measured in the frame merge, as P_i of a hidden group grows until its region holds any other group. The
+paper does not say what P of a merged group is: here it is that of a weighted mean, sum of n_i^2 P_i. The group with
+most points keeps its id.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class SpaceMerging:
 
         An event is an enter if at most one of the groups was there for 1 s before the onset.
         """
-        able = sorted((g for g in groups if g.confirmed), key=lambda g: g.id)
+        able = sorted((g for g in groups if g.confirmed and g.last_seen >= t), key=lambda g: g.id)
         near = {(a.id, b.id) for a, b in _close_pairs(able, config.merge_gate) if overlap(a, b, config.merge_gate)}
         self.since = {pair: self.since.get(pair, t) for pair in near}
         due = [pair for pair in sorted(near) if t - self.since[pair] >= config.merge_time - 1e-9]

@@ -52,7 +52,9 @@ def test_a_calibration_that_is_no_pair_is_refused(tmp_path, changed, place) -> N
     assert error.value.place == place
 
 
-@pytest.mark.parametrize("text", ["", "no yaml", "%YAML:1.0\n---\nP1: [", "\x00\x01"])
+@pytest.mark.parametrize(
+    "text", ["", "no yaml", "%YAML:1.0\n---\nP1: [", "\x00\x01", "%YAML:1.0\n---\nimage_width: [1.., 2]\n"]
+)
 def test_damaged_yaml_is_an_input_error(tmp_path, text) -> None:
     (tmp_path / "pair.yml").write_text(text)
     with pytest.raises(InputError):

@@ -14,7 +14,7 @@ from tracking.detect.features import SpacePoints
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import POS, PairMeasurement
-from tracking.papers.stereo.merging import pooled
+from tracking.papers.stereo.merging import overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera
 from tracking.papers.stereo.tracker import Stereo
 
@@ -135,6 +135,16 @@ def test_groups_of_one_velocity_merge_and_opposite_ones_never() -> None:
         a = walkers(4, 20, [-1.5, 5.0, 1], [1.0, 0, 0], 100)
         b = walkers(5, 20, [1.8, y, 1], [-1.0, 0, 0], 100, first=100)
         assert "merge" not in kinds(scripted(together(a, b), StereoConfig(merge_time=0.0))[1])
+
+
+def test_a_hidden_group_merges_with_nobody() -> None:
+    """Its covariance grows until its region holds the other group."""
+    a, b = ([x, 5, 1] for x in (0, 2.4))
+    seen = together(walkers(0, 15, a, [0, 0.5, 0], 60, sd=0.15), walkers(1, 15, b, [0, 0.5, 0], 60, first=100, sd=0.15))
+    hidden = together(walkers(0, 15, [0, 6, 1], [0, 0.5, 0], 43, sd=0.15))
+    tracker, tracks = scripted([*seen, *hidden], StereoConfig(merge_time=0.1, merge_gate=14.0))
+    assert kinds(tracks) == ["enter", "enter"]
+    assert overlap(*tracker.groups, tracker.config.merge_gate)
 
 
 def test_a_merged_group_has_the_moments_of_all_points() -> None:

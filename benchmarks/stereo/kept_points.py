@@ -1,0 +1,59 @@
+"""Points of `stereo` that several variants share: those whose image processing is the same get the same points.
+
+Image processing knows nothing of groups. So its points are made once per sequence and set of its parameters, and the
+tracks are the same as without sharing. The training on a background sample is shared, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from unittest import mock
+
+from sim.types import Context, Image
+from tracking.detect import background
+from tracking.detect.background_training import train
+from tracking.detect.features import SpacePoints
+from tracking.papers.stereo import tracker
+from tracking.papers.stereo.config import StereoConfig
+from tracking.papers.stereo.picture_points import PicturePoints, stereo_camera
+
+TRACKING = frozenset({
+    "gate", "position_weight", "velocity_weight", "count_weight", "memory", "attach", "point_covariance",
+    "person_spread", "velocity_spread", "spread_weight", "spread_time", "accel_noise", "climb_noise", "centroid_noise",
+    "height_noise", "density_width", "speed_prior", "radius", "point_radius", "point_noise", "least_group",
+    "least_features", "merge_gate", "merge_time", "split", "split_time", "split_speed", "confirm_time", "coast_time",
+    "report_coast",
+})  # fmt: skip
+"""Parameters that change no points."""
+
+
+@contextmanager
+def shared_points() -> Iterator[None]:
+    """Shares points and training between all runs of `stereo` within the context, which are of one sequence."""
+    known: dict[tuple[object, ...], list[SpacePoints | None]] = {}
+    trained = {}
+
+    class Kept:
+        """In place of PicturePoints: makes the points at the first run, and returns those at the others."""
+
+        def __init__(self, config: StereoConfig, context: Context) -> None:
+            self.config, self.camera = config, stereo_camera(context.camera)
+            key = tuple((name, value) for name, value in config.as_dict().items() if name not in TRACKING)
+            self.source = None if key in known else PicturePoints(config, context)
+            self.made = known.setdefault(key, [])
+            self.given = iter(self.made)
+
+        def points(self, image: Image, right: Image) -> SpacePoints | None:
+            if self.source is None:
+                return next(self.given)
+            self.made.append(self.source.points(image, right))
+            return self.made[-1]
+
+    def once(sample, rate, follow_gain):  # type: ignore[no-untyped-def]
+        if (rate, follow_gain) not in trained:
+            trained[rate, follow_gain] = train(sample, rate, follow_gain)
+        return trained[rate, follow_gain]
+
+    with mock.patch.object(tracker, "PicturePoints", Kept), mock.patch.object(background, "train", once):
+        yield
