@@ -6,6 +6,7 @@ pictures   OpenCV's StereoSGBM and the tracker's own matcher against the true di
 decalibration  what a slightly wrong rig costs the tracker's matcher
 real       the tracker's matcher on a real pair
 photometric   left against right picture at the true disparity, without a matcher
+contrast   the rendered ground beside real ground, without a matcher
 trajectories  the paths of groups in space, as in Figs. 5, 7 and 9 of the paper (an SVG)
 scenes     the paper's scenes: position errors (bias and scatter apart), group scores, events
 decisions  each decision of the tracker switched off: paired differences of F1 and of the position error
@@ -24,7 +25,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.stereo import cost, decalibration, density, photometric, pictures, real, scenes, trajectories
+from benchmarks.stereo import contrast, cost, decalibration, density, photometric, pictures, real, scenes, trajectories
 from benchmarks.support.options import add_data, add_seeds, new_parser, one_thread, seeds_text
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
@@ -32,6 +33,7 @@ MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "decalibration": decalibration.decalibration,
     "real": real.real,
     "photometric": photometric.photometric,
+    "contrast": contrast.contrast,
     "trajectories": trajectories.trajectories,
     "scenes": scenes.scenes,
     "decisions": scenes.decisions,
