@@ -2,13 +2,11 @@
 
     x_i R x_j  if MR_i and MR_j overlap                                              (13)
     X = sum of n_i X_i,   Sigma = sum of n_i {Sigma_i + (X_i - X)(X_i - X)'}         (14), (15)
-MR_i is the ellipsoid (x - X_i)' (Sigma_i + P_i)^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
+MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
 Two ellipsoids are tested exactly (tracking.filters.ellipsoid_overlap).
 
-Departures: P_i, the covariance of the state, is added to Sigma_i; regions must overlap for `merge_time`; only confirmed
-groups that are measured in the frame merge, as P_i of a hidden group grows until its region holds any other group. The
-paper does not say what P of a merged group is: here it is that of a weighted mean, sum of n_i^2 P_i. The group with
-most points keeps its id.
+Departures: regions must overlap for `merge_time`; only confirmed groups merge. The paper does not say what P of a
+merged group is: here it is that of a weighted mean, sum of n_i^2 P_i. The group with most points keeps its id.
 """
 
 from __future__ import annotations
@@ -43,7 +41,7 @@ class SpaceMerging:
 
         An event is an enter if at most one of the groups was there for 1 s before the onset.
         """
-        able = sorted((g for g in groups if g.confirmed and g.last_seen >= t), key=lambda g: g.id)
+        able = sorted((g for g in groups if g.confirmed), key=lambda g: g.id)
         near = {(a.id, b.id) for a, b in _close_pairs(able, config.merge_gate) if overlap(a, b, config.merge_gate)}
         self.since = {pair: self.since.get(pair, t) for pair in near}
         due = [pair for pair in sorted(near) if t - self.since[pair] >= config.merge_time - 1e-9]
@@ -58,7 +56,7 @@ class SpaceMerging:
 def overlap(a: SpaceGroup, b: SpaceGroup, gate: float) -> bool:
     """Return True if the regions MR of two groups have a common point (eq. 13); gate: squared Mahalanobis radius."""
     d = (b.ekf.x - a.ekf.x)[:, 0]
-    return separation(d, a.spread + a.ekf.P, b.spread + b.ekf.P) <= gate
+    return separation(d, a.spread, b.spread) <= gate
 
 
 def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[SpaceGroup, SpaceGroup]]:
@@ -67,7 +65,7 @@ def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[SpaceG
     if not len(i):
         return []
     x = np.stack([g.ekf.x for g in groups])
-    A = np.stack([g.spread + g.ekf.P for g in groups])
+    A = np.stack([g.spread for g in groups])
     d = x[j] - x[i]
     half = (d * np.linalg.solve(A[i] + A[j], d)).sum((1, 2)) / 2
     return [(groups[i[k]], groups[j[k]]) for k in np.flatnonzero(half <= gate).tolist()]

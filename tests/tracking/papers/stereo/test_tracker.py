@@ -11,10 +11,11 @@ from scenarios.errors import InputError
 from sim.types import Context, Frame
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
+from tracking.filters.ellipsoid_overlap import separation
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import POS, PairMeasurement
-from tracking.papers.stereo.merging import overlap, pooled
+from tracking.papers.stereo.merging import pooled
 from tracking.papers.stereo.picture_points import stereo_camera
 from tracking.papers.stereo.tracker import Stereo
 
@@ -138,13 +139,15 @@ def test_groups_of_one_velocity_merge_and_opposite_ones_never() -> None:
 
 
 def test_a_hidden_group_merges_with_nobody() -> None:
-    """Its covariance grows until its region holds the other group."""
+    """The covariance P of its state grows, but its region is that of its spread."""
     a, b = ([x, 5, 1] for x in (0, 2.4))
     seen = together(walkers(0, 15, a, [0, 0.5, 0], 60, sd=0.15), walkers(1, 15, b, [0, 0.5, 0], 60, first=100, sd=0.15))
     hidden = together(walkers(0, 15, [0, 6, 1], [0, 0.5, 0], 43, sd=0.15))
     tracker, tracks = scripted([*seen, *hidden], StereoConfig(merge_time=0.1, merge_gate=14.0))
     assert kinds(tracks) == ["enter", "enter"]
-    assert overlap(*tracker.groups, tracker.config.merge_gate)
+    one, other = tracker.groups
+    d = (other.ekf.x - one.ekf.x)[:, 0]
+    assert separation(d, one.spread + one.ekf.P, other.spread + other.ekf.P) < 14.0
 
 
 def test_a_merged_group_has_the_moments_of_all_points() -> None:
