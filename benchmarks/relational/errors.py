@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.support import chart, tables
-from benchmarks.support.options import HOTEL, ZARA
+from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA
 from scenarios.loading.resolve import resolve
 from sim.io.source import open_source
 from sim.sequence import simulate
-from sim.types import Array, Bools, Context, Detections, Frame, Sequence, Tracks, Truth
+from sim.types import Array, Bools, Context, Detections, Frame, Plane, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
 from tracking.papers.relational.config import ParticleConfig
 from tracking.prepare import prepare
@@ -37,13 +37,22 @@ FPS, SEEN, NOISE = 10.0, 4.0, 0.05
 """Mode hidden: frames per second, s before the occlusion, standard deviation of a detection, m."""
 
 
+def places(truth: Truth) -> tuple[Array, float]:
+    """Returns the places (R, 2) of the people of each row, and the unit of a metre: on the ground in m and 1; in the
+    image the centres of boxes in px and the scale."""
+    if truth.pos is not None:
+        return truth.pos[:, :2], 1.0
+    assert truth.box is not None
+    return truth.box[:, :2] + truth.box[:, 2:] / 2, truth.px_per_m
+
+
 def errors(truth: Truth, tracks: list[Tracks]) -> Array:
     """Returns the error of each person and frame of the truth, (R,), m."""
     out = np.full(len(truth.id), CUT)
-    assert truth.pos is not None
+    pos, unit = places(truth)
     for t in tracks:
         rows = truth.rows(t.index)
-        away = np.hypot(*(truth.pos[rows][:, None] - t.pos[None, :, :2]).transpose(2, 0, 1))
+        away = np.hypot(*(pos[rows][:, None] - t.pos[None, :, :2]).transpose(2, 0, 1)) / unit
         people, found = optimal(away, CUT)
         out[np.arange(rows.start, rows.stop)[people]] = away[people, found]
     return out
@@ -67,6 +76,7 @@ def run(name: str, config: ParticleConfig, seed: int, sequence: Sequence) -> tup
 
 def particles(given: argparse.Namespace) -> None:
     """Prints a table for each scene: rows are numbers of particles, columns both filters and their difference."""
+    panels = []
     for entry in (e for e in resolve("suite:occlusion") if not given.entry or e.name in given.entry.split(",")):
         train = [(seed, simulate(entry.scenario, seed, 0, ())) for seed in TRAINING]
         test = [(seed, simulate(entry.scenario, seed, 0, ())) for seed in given.seeds]
@@ -75,6 +85,7 @@ def particles(given: argparse.Namespace) -> None:
             ["particles", "noise of the baseline", "particle, RMSE", "relational, RMSE", *FILTERS,
              "relational − particle", "the same, hidden people", "difference of sums, m"]
         )  # fmt: skip
+        curves: dict[str, list[Array]] = {name: [] for name in FILTERS}
         for count in given.counts:
             base = config_of("particle", count, given)
             tried = {
@@ -82,14 +93,22 @@ def particles(given: argparse.Namespace) -> None:
                 for noise in NOISES
             }
             noise = min(tried, key=tried.__getitem__)
-            _compare(count, noise, test, given)
+            for name, values in _compare(count, noise, test, given).items():
+                curves[name].append(np.array(mean_interval(np.array(values))))
+        shown = {name: tuple(np.array(values).T) for name, values in curves.items()}
+        panels.append(chart.Panel(f"{entry.name}: error, m", given.counts, shown, "particles"))
+    if given.chart:
+        chart.lines(panels, given.chart)
 
 
 def _mean_error(config: ParticleConfig, seed: int, sequence: Sequence) -> float:
     return float(errors(sequence.truth, run("particle", config, seed, sequence)[0]).mean())
 
 
-def _compare(count: int, noise: float, test: list[tuple[int, Sequence]], given: argparse.Namespace) -> None:
+def _compare(
+    count: int, noise: float, test: list[tuple[int, Sequence]], given: argparse.Namespace
+) -> dict[str, list[float]]:
+    """Prints a row of the table and returns the mean errors of the sequences of each filter."""
     mean, square, hidden, total = ({name: [] for name in FILTERS} for _ in range(4))
     for seed, sequence in test:
         assert sequence.truth.visibility is not None
@@ -108,6 +127,7 @@ def _compare(count: int, noise: float, test: list[tuple[int, Sequence]], given: 
          *(tables.interval(*map(float, mean_interval(np.array(mean[n])))) for n in FILTERS),
          _difference(mean), _difference({n: np.array(hidden[n])[gone] for n in FILTERS}), _difference(total)]
     )  # fmt: skip
+    return mean
 
 
 def _difference(values: dict[str, Any]) -> str:
@@ -178,23 +198,23 @@ def hiding_frames(truth: Truth, seed: int, fps: float) -> tuple[Bools, list[Fram
     The member of each true group with the highest id is not detected in the last AWAY s of every PERIOD s. Positions
     err by ROUGH m.
     """
-    assert truth.pos is not None
+    pos, unit = places(truth)
+    plane: Plane = "image" if truth.pos is None else "ground"
     rng, hidden, frames = np.random.default_rng(seed), np.zeros(len(truth.id), bool), []
     last = {int(g): int(truth.id[truth.group == g].max()) for g in np.unique(truth.group[truth.group >= 0])}
     chosen = np.array([last.get(g) == p for g, p in zip(truth.group.tolist(), truth.id.tolist(), strict=True)])
     for index in range(1, truth.length + 1):
         rows, t = truth.rows(index), (index - 1) / fps
         hidden[rows] = chosen[rows] & (t % PERIOD >= PERIOD - AWAY)
-        points = truth.pos[rows][:, :2] + rng.normal(0, ROUGH, (rows.stop - rows.start, 2))
-        points = points[~hidden[rows]]
-        frames.append(Frame(index, t, detections=Detections(index, t, "ground", points, score=np.ones(len(points)))))
+        points = (pos[rows] + rng.normal(0, ROUGH * unit, (rows.stop - rows.start, 2)))[~hidden[rows]]
+        frames.append(Frame(index, t, detections=Detections(index, t, plane, points, score=np.ones(len(points)))))
     return hidden, frames
 
 
 def recordings(given: argparse.Namespace) -> None:
     """Prints a table: rows are recordings, columns the errors of both filters in hidden and in other rows."""
     tables.head(["recording", "people", *FILTERS, "relational − particle"])
-    for label, path in (("seq_hotel", HOTEL), ("zara01", ZARA)):
+    for label, path in (("seq_hotel", HOTEL), ("zara01", ZARA), ("Meet_WalkTogether1", WALK_TOGETHER)):
         (q,) = open_source(given.recordings / path)
         found: dict[str, dict[str, list[float]]] = {
             kind: {name: [] for name in FILTERS} for kind in ("hidden", "others")
@@ -203,7 +223,7 @@ def recordings(given: argparse.Namespace) -> None:
             hidden, frames = hiding_frames(q.truth, seed, q.fps)
             for name in FILTERS:
                 tracker = find(name)(config_of(name, given.counts[0], given))
-                tracker.reset(Context(q.fps, float("nan")), seed)
+                tracker.reset(Context(q.fps, places(q.truth)[1] if q.truth.pos is None else float("nan")), seed)
                 away = errors(q.truth, [tracker.step(frame, frame.detections) for frame in frames])
                 found["hidden"][name].append(float(away[hidden].mean()))
                 found["others"][name].append(float(away[~hidden].mean()))

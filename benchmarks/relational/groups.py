@@ -1,9 +1,8 @@
-"""Groups and events of `relational`, its probabilities of pairs, its departures one by one, and its speed."""
+"""Groups and events of `relational`, its probabilities of pairs, and its departures one by one."""
 
 from __future__ import annotations
 
 import argparse
-import time
 import warnings
 from collections.abc import Iterator
 from typing import Any
@@ -11,13 +10,13 @@ from typing import Any
 import numpy as np
 
 import tracking
-from benchmarks.relational.errors import config_of, errors
+from benchmarks.relational.errors import FILTERS, config_of, errors
 from benchmarks.support import tables
 from benchmarks.support.options import HOTEL, ZARA
 from scenarios.loading.resolve import resolve
 from sim.io.source import open_source
 from sim.sequence import simulate
-from sim.types import Array, Context, Detections, Frame, Sequence, Tracks, Truth
+from sim.types import Array, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
 from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
@@ -25,14 +24,14 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.pair_probabilities import pair_probabilities
 from tracking.papers.relational.tracker import Relational
 from tracking.prepare import prepare
-from tracking.stats import mean_interval
-from tracking.tracker_registry import find
+from tracking.stats import paired
 
 COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
 DEPARTURES = (
-    "", "weights=joint", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
-    "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
-    "least_existence=0", "birth_doubt=0.9", "clutter_density=0.02",
+    "", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0", "weights=joint", "kernel_width=0",
+    "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0", "hidden_time=0.3", "noise_scale=1",
+    "resample_share=1", "resampling=systematic", "newcomer_share=0", "least_existence=0", "birth_doubt=0.9",
+    "clutter_density=0.02",
 )  # fmt: skip
 """Settings of the ablation; the first one is the defaults."""
 NEAR = 1.0
@@ -53,15 +52,17 @@ def _sequences(given: argparse.Namespace, suite: str) -> Iterator[tuple[str, int
 
 
 def _tracked(name: str, seed: int, sequence: Sequence, given: argparse.Namespace) -> list[Tracks]:
-    own = ["groups=posterior"] if name == "relational" else []
-    config = None if name == "blob" else config_of(name, given.counts[0], given).with_set(*own)
+    config = None if name == "blob" else config_of(name, given.counts[0], given)
     ready = prepare(name, sequence, params=config, detections="file")
     ready.reset(seed)
     return [ready.step(frame) for frame in ready.frames()]
 
 
 def scores(given: argparse.Namespace) -> None:
-    """Prints a table: rows are trackers and groupings, columns mean scores, and merges and splits of all sequences."""
+    """Prints a table: rows are trackers and groupings, columns mean scores, and merges and splits of all sequences.
+
+    A second table has the paired differences of both filters.
+    """
     warnings.simplefilter("ignore")
     values: dict[str, list[dict[str, float]]] = {}
     for _, seed, q in _sequences(given, given.suite):
@@ -69,7 +70,6 @@ def scores(given: argparse.Namespace) -> None:
         bare = {name: without_groups(t) for name, t in found.items()}
         rows = {f"{name}, rule": with_groups(t, q.fps, q.px_per_m, LinkRule()) for name, t in bare.items()}
         rows |= {f"{name}, belief": with_groups(t, q.fps, q.px_per_m, default_belief()) for name, t in bare.items()}
-        rows["relational, own groups"] = with_groups(found["relational"], q.fps, q.px_per_m)
         for label, tracks in rows.items():
             values.setdefault(label, []).append(tracking.evaluate(q.truth, tracks))
     count = len(next(iter(values.values())))
@@ -78,6 +78,14 @@ def scores(given: argparse.Namespace) -> None:
     for label, scored in values.items():
         means = [f"{np.nanmean([s.get(key, np.nan) for s in scored]):.3f}" for key in COLUMNS]
         tables.row([label, *means, *(_pooled(scored, kind) for kind in ("merge", "split"))])
+    print()
+    tables.head(["relational − particle, belief", *COLUMNS])
+    before, after = (
+        np.array([[s.get(key, np.nan) for key in COLUMNS] for s in values[f"{name}, belief"]]) for name in FILTERS
+    )
+    known = [np.isfinite(a) & np.isfinite(b) for a, b in zip(before.T, after.T, strict=True)]
+    pairs = [paired(a[k], b[k]) for a, b, k in zip(before.T, after.T, known, strict=True)]
+    tables.row(["paired", *(tables.signed(*map(float, p)) for p in pairs)])
 
 
 def _pooled(scored: list[dict[str, float]], kind: str) -> str:
@@ -115,10 +123,11 @@ def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argpar
         for frame in ready.frames():
             tracks = ready.step(frame)
             found["relational"].append(tracks)
-            place = {int(i): k for k, i in enumerate(tracker.slots.id) if i >= 0}
+            ids, together = tracker.walking_together()
+            place = {int(i): k for k, i in enumerate(ids)}
             true = _people_of(q.truth, tracks)
             pairs = [(a, b) for a in true for b in true if a < b]
-            known = [(tracker.together[place[a], place[b]], _same(true[a], true[b])) for a, b in pairs]
+            known = [(together[place[a], place[b]], _same(true[a], true[b])) for a, b in pairs]
             rows["relational"].append(np.array(known).reshape(-1, 2))
         config = config_of("particle", given.counts[0], given)
         ready = prepare("particle", q, params=config, detections=mode, sensor=sensor, seed=seed)
@@ -175,35 +184,3 @@ def ablation(given: argparse.Namespace) -> None:
             rows.append([errors(q.truth, tracks).mean(), *(scored.get(key, np.nan) for key in COLUMNS)])
         means = np.nanmean(np.array(rows), axis=0)
         tables.row([setting or "defaults", *(f"{value:.3f}" for value in means)])
-
-
-def speed(given: argparse.Namespace) -> None:
-    """Prints a table: rows are numbers of people in pairs, columns frames per second of CPU time of both filters."""
-    tables.head(["people", "particle", "relational"])
-    for people in (2, 5, 10, 20, 50):
-        cells = []
-        for name in ("particle", "relational"):
-            tracker = find(name)(config_of(name, given.counts[0], given))
-            rates = []
-            for seed in given.seeds:
-                frames = list(_walkers(people, seed))
-                tracker.reset(Context(10.0, float("nan")), seed)
-                for frame in frames[:20]:
-                    tracker.step(frame, frame.detections)
-                begun = time.process_time()
-                for frame in frames[20:]:
-                    tracker.step(frame, frame.detections)
-                rates.append((len(frames) - 20) / (time.process_time() - begun))
-            cells.append(tables.interval(*map(float, mean_interval(np.array(rates)))))
-        tables.row([str(people), *cells])
-
-
-def _walkers(people: int, seed: int) -> Iterator[Frame]:
-    """Yields 80 frames of people who walk in pairs, the pairs 3 m apart, with misses and no false alarms."""
-    rng = np.random.default_rng(seed)
-    k = np.arange(people)
-    start = np.stack([k // 2 % 5 * 3.0, k // 10 * 3.0 + k % 2 * 0.7], axis=1)
-    for t in range(80):
-        pos = start + np.array([0.12 * t, 0.0]) + rng.normal(0, 0.05, (people, 2))
-        pos = pos[rng.random(people) < 0.95]
-        yield Frame(t + 1, t / 10, detections=Detections(t + 1, t / 10, "ground", pos, None, None, np.ones(len(pos))))

@@ -208,6 +208,22 @@ class RelationalConfig(ParticleConfig):
 
     tracker: ClassVar[str] = "relational"
 
+    coupling_time: float = param(
+        0.15,
+        (0.0, 10.0),
+        "s",
+        "time constant with which people who walk together approach their mean velocity (ours); 0: they have it "
+        "(sec. 3.2)",
+        before=0.0,
+    )
+    common_noise: float = param(
+        0.8,
+        (0.0, 1.0),
+        "share",
+        "of the variance of the velocity's noise, that people who walk together have in common (ours); 0: none "
+        "(sec. 3.2)",
+        before=0.0,
+    )
     relation_rate: float = param(
         1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
     )
@@ -216,13 +232,4 @@ class RelationalConfig(ParticleConfig):
     relation_velocity: float = param(5.9, (0.0, 40.0), "s/m", "loss of log odds per m/s of velocity difference (ours)")
     newcomer_share: float = param(
         0.5, (0.0, 1.0), "probability", "that a new person near a group belongs to it (sec. 3.2)"
-    )
-    groups: str = param(
-        "tracks",
-        ("tracks", "posterior"),
-        "",
-        "tracks: groups are derived from the tracks, as for other trackers of people; posterior: from the "
-        "probabilities that two people walk together (ours)",
-        "categorical",
-        before="posterior",
     )

@@ -23,7 +23,8 @@ class ParticleSet:
     count: P. weights (P, K): of the particles, sum 1 for each slot; slots of a cluster have equal columns. cluster
     (K,): the least slot of each slot's cluster. pos (P, K, 2): m. vel (P, K, 2): m/s. exist (P, K): probability that
     the person exists, given the particle's path (ours: it is computed, not drawn). related (P, K, K) bool, symmetric:
-    which pairs walk together.
+    which pairs walk together. ancestor (P, K): the particle from which each slot's state descends, since `ancestor` was
+    last set to the particles' own numbers.
     """
 
     count: int
@@ -33,12 +34,15 @@ class ParticleSet:
     vel: Array
     exist: Array
     related: Bools
+    ancestor: Ints
 
     @classmethod
     def empty(cls, count: int) -> ParticleSet:
         """Return `count` particles without people."""
         flat, two = np.zeros((count, 0)), np.zeros((count, 0, 2))
-        return cls(count, flat, np.zeros(0, np.int64), two, two.copy(), flat.copy(), np.zeros((count, 0, 0), bool))
+        none = np.zeros((count, 0), np.int64)
+        related = np.zeros((count, 0, 0), bool)
+        return cls(count, flat, np.zeros(0, np.int64), two, two.copy(), flat.copy(), related, none)
 
     @property
     def people(self) -> int:
@@ -107,7 +111,7 @@ class ParticleSet:
                 chosen = residual_resample(weights, draws.random(self.count))
             else:
                 chosen = systematic_resample(weights, float(draws.random()))
-            for values in (self.pos, self.vel, self.exist, self.related):
+            for values in (self.pos, self.vel, self.exist, self.related, self.ancestor):
                 values[:, members] = values[chosen[:, None], members]
             self.related[:, :, members] = self.related[:, members].transpose(0, 2, 1)
             self.weights[:, members] = 1 / self.count
@@ -138,6 +142,7 @@ class ParticleSet:
         self.weights, self.exist = self.weights[:, slots], self.exist[:, slots]
         self.pos, self.vel = self.pos[:, slots], self.vel[:, slots]
         self.related = self.related[:, slots][:, :, slots]
+        self.ancestor = self.ancestor[:, slots]
 
     def add(self, pos: Array, vel: Array, exist: float, related: Bools) -> None:
         """Add a slot with places pos (P, 2) and velocities vel (P, 2), the same existence in each particle, and
@@ -152,3 +157,4 @@ class ParticleSet:
         grown[:, :k, :k] = self.related
         grown[:, k, :k] = grown[:, :k, k] = related
         self.related = grown
+        self.ancestor = np.concatenate([self.ancestor, np.arange(count)[:, None]], axis=1)

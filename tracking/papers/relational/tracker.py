@@ -18,42 +18,43 @@ column A. A group has the mean velocity vector of its members; the row of the ta
 Departures, all ours:
 - The speed table is learned from simulated people without errors; a row is a drift and a diffusion, so that it holds at
   any frame rate. Table 3, of measured boxes at 25 frames/s, is the preset caviar-25fps.
+- People who walk together approach their mean velocity with a time constant, and have a part of the noise in common. In
+  the paper they have the mean velocity in each frame, and noise of their own.
 - Relations change by hazards per second; the paper does not say how. Each pair is a chain of two states, and groups are
   connected components: this needs no labels, and gives the probability that two people walk together.
 - People have slots that are common to all particles. That a person exists is a probability in each particle, and not
   drawn: particles with and without each of many newcomers would be few.
 - The sensor has missed people and false alarms. A person not measured in the last frame is measured with a smaller
   probability, as people are hidden for a while.
-- Behind the pillars and walls of a known scene, and behind other people, nobody is measured, and nobody dies or counts
-  as missed there. Hidden feet displace a point away from the camera.
+- Nobody is measured, dies or counts as missed behind pillars and walls of a known scene and behind other people. Hidden
+  feet displace a point away from the camera.
 - A detection that is probably nobody's starts a person, who has no weight until the next frame.
 - People have weights of their own (factorised): sums over mappings in which all others are averaged. A missed person
   has those of the partners as factors. Particles are resampled if they are worth few, and drawn apart by a kernel.
-- Groups are derived from the tracks, or a consistent partition of the pairs by their probabilities; see walking_groups.
+- Groups are derived from the tracks; the probability that two people walk together is an output of its own.
 The preset `paper` switches off what has a parameter.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
 from typing import ClassVar
 
 import numpy as np
 
 from sim.rng import rng
-from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
+from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
-from tracking.grouping import reported_groups
 from tracking.image_scale import required
 from tracking.papers.relational import report, sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.occluders import covered_by_people, hidden_share
+from tracking.papers.relational.particle_diversity import ParticleDiversity
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.slots import Slots
-from tracking.papers.relational.walking_groups import PeopleNow, WalkingGroups
 
-MOTION, BIRTHS, RESAMPLING, RELATIONS, JOINING = range(5)
+MOTION, BIRTHS, RESAMPLING, RELATIONS, JOINING, COUPLING = range(6)
 """Keys of the random streams. Relations have streams of their own, so that they change no other draw."""
 
 
@@ -61,11 +62,10 @@ class Particle:
     """The tracker `particle`: a joint particle filter of people who do not know of each other.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
-    the people; hidden (K,): probability that each person is behind a known pillar or wall;
-    pixels: detector of blobs, None from points; shown: the tracks that were reported last, None before; plane, "ground"
-    or "image"; context; draws, the random streams; vanished: number of frames in which all weights were
-    0; effective: least effective number of particles of any person in the last measured frame. All but config exist
-    after `reset` only.
+    the people; hidden (K,): probability that each person is behind a known pillar or wall; pixels: detector of blobs,
+    None from points; shown: the tracks reported last, None before; plane, "ground" or "image"; context; draws, the
+    random streams; vanished: number of frames in which all weights were 0; diversity: how many particles the weights
+    are worth. All but config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -91,11 +91,11 @@ class Particle:
         if self.pixels is not None:
             self.context = context = context.replace(px_per_m=self.pixels.scale)
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
-        self.draws = [rng(seed, "tracker", key) for key in range(JOINING + 1)]
+        self.draws = [rng(seed, "tracker", key) for key in range(COUPLING + 1)]
         flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
         self.plane: Plane = "image" if flat else "ground"
         self.hidden = np.zeros(0)
-        self.vanished, self.effective = 0, float(self.config.particles)
+        self.vanished, self.diversity = 0, ParticleDiversity(context.fps)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Return the people of the frame as Tracks; updates all particles.
@@ -117,6 +117,7 @@ class Particle:
         if detections is not None:
             c = self.config
             self.particles.resample(c.resample_share, c.resampling, c.kernel_width, self.draws[RESAMPLING])
+            self.diversity.resample(self.particles)
         return tracks
 
     @property
@@ -124,6 +125,11 @@ class Particle:
         """Scale of the image in px per metre: the context's, or, from pixels, learned from its background sample; nan
         if unknown."""
         return self.context.px_per_m
+
+    @property
+    def diagnostics(self) -> dict[str, float | None]:
+        """What run.json tells of the particles: means of the shares of effective particles and of ancestors."""
+        return self.diversity.summary()
 
     @property
     def dt(self) -> float:
@@ -144,7 +150,9 @@ class Particle:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, c.speed_table(self.dt), self.dt)
+        shared, coupling = self._coupling()
+        table = c.speed_table(self.dt)
+        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, self.dt)
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
         behind, self.cut = covered_by_people(p, camera, c.body_radius)
@@ -156,6 +164,11 @@ class Particle:
         """Place of the camera on the ground, (2,), m; nan if there is none or it looks straight down."""
         camera = self.context.camera if self.plane == "ground" else None
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
+
+    def _coupling(self) -> tuple[Array, Array]:
+        """Returns the normals that groups have in common (P, K, 2), and the coupling (2,) of transition_kernels; people
+        of `particle` have none."""
+        return np.zeros(self.particles.pos.shape), np.zeros(2)
 
     def _relate(self) -> None:
         """Draw new relations; people of `particle` have none."""
@@ -171,7 +184,7 @@ class Particle:
         sight = sensor.Sight(self._detection_probability(), missed, self.cut, self.eye)
         said = sensor.weigh(self.particles, points, sight, self.noise, self.config)
         self.vanished += said.vanished
-        self.effective = float(self.particles.effective().min(initial=self.particles.count))
+        self.diversity.weigh(self.particles)
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
         for j in np.flatnonzero(said.nobody > self.config.birth_doubt).tolist():
@@ -207,11 +220,9 @@ class Particle:
         new people and false alarms (ours).
         """
         p, c, draws = self.particles, self.config, self.draws[BIRTHS].standard_normal((2, self.particles.count, 2))
-        born = c.birth_rate * self.dt
+        exist = c.birth_rate * self.dt / (c.birth_rate * self.dt + c.clutter_density)
         related = self._relations_of_newcomer(point)
-        p.add(
-            point + self.noise * draws[0], c.speed_prior * draws[1], born / (born + c.clutter_density), related
-        )  # fmt: skip
+        p.add(point + self.noise * draws[0], c.speed_prior * draws[1], exist, related)
         self.slots.add(size)
 
     def _relations_of_newcomer(self, point: Array) -> Bools:
@@ -229,22 +240,14 @@ class Particle:
         if self.plane == "image":
             pos, vel, cov = pos * self.unit, vel * self.unit, cov * self.unit**2
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
-        found = Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
-        return self._with_groups(found, rows, (place, velocity))
-
-    def _with_groups(self, tracks: Tracks, rows: Bools, means: tuple[Array, Array]) -> Tracks:
-        """Returns the tracks with groups and events; `particle` has none.
-
-        rows (K,): the slots that are reported; means: places (K, 2), m, and velocities (K, 2), m/s.
-        """
-        return tracks
+        return Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
 
 
 class Relational(Particle):
     """The tracker `relational`: the particle filter of `particle` with the relation "walking together" in it.
 
-    together (K, K): probability that each pair walks together, in the last frame, by slots; 1 on the diagonal. groups:
-    the groups made of it. The rest of the state is that of Particle.
+    together (K, K): probability that each pair walks together, in the last frame, by slots; 1 on the diagonal. The rest
+    of the state is that of Particle.
     """
 
     config_class: ClassVar[type[ParticleConfig]] = RelationalConfig
@@ -253,7 +256,7 @@ class Relational(Particle):
     def reset(self, context: Context, seed: int) -> None:
         """Forget everything and start a sequence, as `Particle.reset`."""
         super().reset(context, seed)
-        self.groups = WalkingGroups()
+        self.together = np.zeros((0, 0))
 
     @property
     def _rules(self) -> Array:
@@ -261,6 +264,12 @@ class Relational(Particle):
         c = self.config
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
+
+    def _coupling(self) -> tuple[Array, Array]:
+        time = self.config.coupling_time
+        follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
+        shared = self.draws[COUPLING].standard_normal(self.particles.pos.shape)
+        return shared, np.array([follow, self.config.common_noise])
 
     def _relate(self) -> None:
         p = self.particles
@@ -271,27 +280,21 @@ class Relational(Particle):
 
     def _relations_of_newcomer(self, point: Array) -> Bools:
         """Returns the relations (P, K) bool of a new person at `point` (2,), m: to all members of the group joined."""
-        p, label = self.particles, self.particles.labels()
+        p, label, share = self.particles, self.particles.labels(), self.config.newcomer_share
         uniforms = self.draws[JOINING].random(p.count)
-        group = transition_kernels.join(
-            p.pos, p.exist, label, point, self.config.newcomer_share, uniforms, self._rules
-        )  # fmt: skip
+        group = transition_kernels.join(p.pos, p.exist, label, point, share, uniforms, self._rules)
         return np.asarray(label == group[:, None])
 
-    def _keep(self, rows: Bools) -> None:
-        super()._keep(rows)
-        self.groups.keep(rows)
-
-    def _start(self, point: Array, size: Array) -> None:
-        super()._start(point, size)
-        self.groups.add()
-
-    def _with_groups(self, tracks: Tracks, rows: Bools, means: tuple[Array, Array]) -> Tracks:
+    def _report(self, frame: Frame) -> Tracks:
         p = self.particles
         self.together = transition_kernels.pairs_together(p.related, p.exist, p.weights, p.cluster)
-        if self.config.groups == "tracks":
-            return tracks
-        now = PeopleNow(tracks.index, self.slots.id, *means, self.together, rows, self.slots.missed)
-        group, events = self.groups.step(now, self.context.fps)
-        scaled = tuple(replace(e, pos=(e.pos[0] * self.unit, e.pos[1] * self.unit)) for e in events)
-        return tracks.replace(group=group[rows], groups=reported_groups.no_groups(group[rows]), events=scaled)
+        return super()._report(frame)
+
+    def walking_together(self) -> tuple[Ints, Array]:
+        """Return ids (R,) of the people reported last, and the probability (R, R) that two of them walk together.
+
+        It is the share of the weight of the particles in which the pair is related, given that both exist; 1 on the
+        diagonal.
+        """
+        rows = np.zeros(0, np.int64) if self.shown is None else np.flatnonzero(np.isin(self.slots.id, self.shown.id))
+        return self.slots.id[rows], self.together[np.ix_(rows, rows)]

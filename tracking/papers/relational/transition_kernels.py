@@ -17,6 +17,9 @@ from sim.types import Array, Bools, Ints
 SPEED, DRIFT, SPREAD = range(3)
 """Columns of a speed table (5, 3): upper end of a row's speeds, mean loss of speed in a step and standard deviation of
 the velocity after it, per axis; all in m/s."""
+FOLLOW, COMMON = range(2)
+"""Slots of `coupling` (2,): share of the difference to the mean velocity of a group that a member loses in a step, and
+share of the variance of a member's noise that the group has in common; the paper: 1 and 0."""
 RATE, BIAS, DISTANCE, VELOCITY = range(4)
 """Slots of `rules` (4,): weight that the old relation loses in a step, 1 - exp(-rate dt); log odds of walking together
 at the same place, their loss per m of distance and per m/s of velocity difference."""
@@ -53,30 +56,42 @@ def group_labels(related: Bools, label: Ints) -> None:
 
 
 @njit(cache=True)
-def move(pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, table: Array, dt: float) -> None:
+def move(
+    pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, shared: Array, table: Array, coupling: Array,
+    dt: float,
+) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; related (P, K, K): old relations;
-    noise (P, K, 2): standard normals; table (5, 3): the speed table of the step.
+    noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling (2,).
 
-    v_i = u - B u / |u| + C noise, with u the mean velocity of the person and of those who walk together with the
-    person, and B, C of the table's row for |u| (Table 3). x_i = x_i + v_i dt. The mean weights people by their
-    existence (ours); u of a person alone is the own velocity.
+    v_i = u - B u / |u| + C e_i, x_i = x_i + v_i dt, with B, C of the table's row for |u| (Table 3). For a person alone
+    u = v_i and e_i = noise. Otherwise m is the mean velocity of the person and of those who walk together with the
+    person, weighted by their existence (ours), and u = v_i + FOLLOW (m - v_i), e_i = sqrt(1 - COMMON) noise +
+    sqrt(COMMON) s_i, where s_i is the sum of `shared` of the same people over the root of their number. FOLLOW 1 and
+    COMMON 0: u = m and e_i = noise, as in the paper; other values are ours.
     """
     particles, n, _ = pos.shape
-    old = np.empty((n, 2))
+    own, old = math.sqrt(1.0 - coupling[COMMON]), np.empty((n, 2))
     for p in range(particles):
         old[:] = vel[p]
         for i in range(n):
             x, y, weight, partners = exist[p, i] * old[i, 0], exist[p, i] * old[i, 1], exist[p, i], 0
+            a, b = shared[p, i, 0], shared[p, i, 1]
             for j in range(n):
                 if related[p, i, j]:
                     x += exist[p, j] * old[j, 0]
                     y += exist[p, j] * old[j, 1]
+                    a, b = a + shared[p, j, 0], b + shared[p, j, 1]
                     weight += exist[p, j]
                     partners += 1
+            ex, ey = noise[p, i, 0], noise[p, i, 1]
+            if partners > 0:
+                part = math.sqrt(coupling[COMMON] / (partners + 1))
+                ex, ey = own * ex + part * a, own * ey + part * b
             if partners > 0 and weight > 0:
-                x, y = x / weight, y / weight
+                x = old[i, 0] + coupling[FOLLOW] * (x / weight - old[i, 0])
+                y = old[i, 1] + coupling[FOLLOW] * (y / weight - old[i, 1])
             else:
                 x, y = old[i, 0], old[i, 1]
             speed = math.sqrt(x * x + y * y)
@@ -84,8 +99,8 @@ def move(pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, tab
             while speed > table[row, SPEED]:
                 row += 1
             keep = 1.0 - table[row, DRIFT] / speed if speed > 0 else 1.0
-            vel[p, i, 0] = x * keep + table[row, SPREAD] * noise[p, i, 0]
-            vel[p, i, 1] = y * keep + table[row, SPREAD] * noise[p, i, 1]
+            vel[p, i, 0] = x * keep + table[row, SPREAD] * ex
+            vel[p, i, 1] = y * keep + table[row, SPREAD] * ey
             pos[p, i, 0] += dt * vel[p, i, 0]
             pos[p, i, 1] += dt * vel[p, i, 1]
 

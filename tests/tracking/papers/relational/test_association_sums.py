@@ -96,6 +96,25 @@ def test_bethe_value_is_a_lower_bound():
     assert 0.3 < worst < 0.9
 
 
+def test_bias_of_propagated_sums_on_clusters_of_people():
+    """People in a row, 0.5 m apart: sums are low by more the larger the cluster is, and probabilities err."""
+    ratios = []
+    for count in (3, 6, 10):
+        found = []
+        for seed in range(20):
+            rng = np.random.default_rng(seed)
+            pos = np.stack([0.5 * np.arange(count), np.zeros(count)], axis=1)
+            away = (pos + rng.normal(0, 0.15, pos.shape))[:, None] - (pos + rng.normal(0, 0.15, pos.shape))[None]
+            W = 0.95 / 0.002 * np.exp(-(away**2).sum(axis=2) / 0.18) / (0.18 * math.pi)
+            miss, spare = np.full(count, 0.05), np.ones(count)
+            (true, shares), (bethe, about) = summed(exact_sum, W, miss, spare), summed(propagated_sum, W, miss, spare)
+            assert bethe <= true + 1e-9
+            assert np.abs(about - shares).max() < 0.5
+            found.append(math.exp(bethe - true))
+        ratios.append(np.mean(found))
+    assert 0.3 < ratios[2] < ratios[1] < ratios[0] < 0.95
+
+
 def test_large_sums_are_propagated():
     rng = np.random.default_rng(2)
     W = rng.exponential(size=(14, 14))

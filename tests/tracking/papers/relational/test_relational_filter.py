@@ -17,6 +17,8 @@ from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.tracker import Particle, Relational
 from tracking.prepare import prepare
 
+AT_ONCE = np.array([1.0, 0.0])
+"""The paper's coupling: members of a group have its mean velocity, and noise of their own."""
 CERTAIN = {"detect_prob": 1.0, "clutter_density": 0.0, "resample_share": 1.0}
 
 
@@ -24,6 +26,14 @@ def flat_table(diffusion):
     """A speed table without drift and with one diffusion."""
     rows = range(1, 6)
     return {f"drift_{k}": 0.0 for k in rows} | {f"diffusion_{k}": diffusion for k in rows} | {"noise_scale": 1.0}
+
+
+def move(particles, noise, table, coupling, dt, shared=None):
+    """Move the particles by a step of dt s."""
+    shared = np.zeros(noise.shape) if shared is None else shared
+    transition_kernels.move(
+        particles.pos, particles.vel, particles.exist, particles.related, noise, shared, table, coupling, dt
+    )
 
 
 def detections(index, *points):
@@ -153,10 +163,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
     particles.related[:, 0, 1] = particles.related[:, 1, 0] = related
     truth, velocity = np.zeros(2), np.zeros(2)
     for _ in range(steps):
-        noise = rng.standard_normal((count, 2, 2))
-        transition_kernels.move(
-            particles.pos, particles.vel, particles.exist, particles.related, noise, config.speed_table(1.0), 1.0
-        )
+        move(particles, rng.standard_normal((count, 2, 2)), config.speed_table(1.0), AT_ONCE, 1.0)
         velocity = 0.7 * velocity + rng.standard_normal(2)
         truth = truth + velocity
         points = (truth + r * rng.standard_normal(2))[None] if seen else np.zeros((0, 2))
@@ -310,17 +317,51 @@ def test_a_sensor_without_false_alarms_misses_nobody():
 
 
 @pytest.mark.parametrize("related", [False, True])
-def test_diffusion_is_that_of_any_frame_rate(related):
+@pytest.mark.parametrize("time", [0.0, 0.4])
+def test_diffusion_is_that_of_any_frame_rate(related, time):
     spreads = []
     for fps in (25.0, 12.5):
         particles, rng = placed(20_000, [[0, 0], [1, 0]], [[1, 0], [1, 0]]), np.random.default_rng(3)
         particles.related[:, 0, 1] = particles.related[:, 1, 0] = related
-        config = ParticleConfig()
+        coupling = np.array([1 - np.exp(-1 / (fps * time)), 0.5]) if time else AT_ONCE
         for _ in range(round(fps)):
-            noise = rng.standard_normal((20_000, 2, 2))
-            args = particles.pos, particles.vel, particles.exist, particles.related, noise
-            transition_kernels.move(*args, config.speed_table(1 / fps), 1 / fps)
+            noise, shared = rng.standard_normal((2, 20_000, 2, 2))
+            move(particles, noise, ParticleConfig().speed_table(1 / fps), coupling, 1 / fps, shared)
         mean = particles.vel.mean(axis=1) if related else particles.vel[:, 0]
         place = particles.pos.mean(axis=1) if related else particles.pos[:, 0]
         spreads.append([mean.std(axis=0).mean(), place.std(axis=0).mean()])
     np.testing.assert_allclose(spreads[0], spreads[1], rtol=0.05)
+
+
+def test_velocities_of_partners_approach_each_other_with_the_time_constant():
+    """Their difference falls by e in coupling_time, at any frame rate, and the mean stays; a person alone goes on."""
+    for fps in (10.0, 40.0):
+        particles = placed(1, [[0, 0], [0, 1], [9, 9]], [[2, 0], [0, 1], [1, 1]])
+        particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+        coupling = np.array([1 - np.exp(-1 / (fps * 0.5)), 0.5])
+        for _ in range(round(0.5 * fps)):
+            move(particles, np.zeros((1, 3, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), coupling, 1 / fps)
+        a, b, alone = particles.vel[0]
+        np.testing.assert_allclose(a - b, np.array([2, -1]) / np.e, rtol=1e-12)
+        np.testing.assert_allclose((a + b) / 2, [1, 0.5], rtol=1e-12)
+        assert alone.tolist() == [1, 1]
+
+
+def test_partners_have_a_share_of_the_noise_in_common():
+    """The variance of each person's noise is that of a person alone; the correlation of partners is common_noise."""
+    count, rng = 40_000, np.random.default_rng(4)
+    particles = placed(count, [[0, 0], [0, 1], [1, 0], [9, 9]])
+    particles.related[:, :3, :3] = ~np.eye(3, dtype=bool)
+    noise, shared = rng.standard_normal((2, count, 4, 2))
+    move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), np.array([0.5, 0.7]), 1.0, shared)
+    expected = np.eye(4)
+    expected[:3, :3] += 0.7 * (1 - np.eye(3))
+    np.testing.assert_allclose(np.cov(particles.vel[..., 0].T), expected, atol=0.03)
+    assert np.array_equal(particles.vel[:, 3], noise[:, 3])
+
+
+@pytest.mark.parametrize("name", ["paper", "caviar-25fps"])
+def test_presets_couple_velocities_as_the_paper(name):
+    tracker = Relational(RelationalConfig.preset(name))
+    tracker.reset(Context(25.0, float("nan")), 0)
+    assert tracker._coupling()[1].tolist() == AT_ONCE.tolist()
