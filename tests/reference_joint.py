@@ -6,8 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracking.papers.joint.line_kernels import ACROSS, FLAT
-
 
 def all_partitions(people: int) -> Iterator[list[list[int]]]:
     """Yields every partition of the people 0, ..., people - 1, as lists of members."""
@@ -47,22 +45,17 @@ def validity(points: np.ndarray, parts: list[list[int]], s0: float, nu: float, a
     return float(np.mean(found))
 
 
-def line_of_group(state: np.ndarray) -> float:
-    """Returns how much three or more people are a line; state (n, 4)."""
-    values, axes = np.linalg.eigh(np.cov(state[:, :2].T, bias=True))
-    across = state[:, 2:].mean(axis=0) @ axes[:, 0]
-    return float(max(0.0, 1 - values[0] / FLAT**2) * np.exp(-((across / ACROSS) ** 2) / 2))
-
-
-def log_group_dynamics(new: np.ndarray, old: np.ndarray, parts: list[list[int]], sigma: np.ndarray, dt: float) -> float:
-    """Returns log p(X' | X, Z) of eq. 5; new, old (K, 4); sigma (4, 4)."""
+def log_group_dynamics(
+    new: np.ndarray, old: np.ndarray, parts: list[list[int]], sigma: np.ndarray, dt: float, share: float = 1.0
+) -> float:
+    """Returns log p(X' | X, Z) of eq. 5; new, old (K, 4); sigma (4, 4); share of the group's velocity."""
     B = np.zeros((4, 4))
     B[0, 2] = B[1, 3] = dt
     total = 0.0
     for part in parts:
         g = old[part].mean(axis=0)
         for k in part:
-            residual = new[k] - (old[k] + B @ g)
+            residual = new[k] - (old[k] + B @ (share * g + (1 - share) * old[k]))
             total += -residual @ np.linalg.solve(sigma, residual) / 2 - np.log(np.linalg.det(2 * np.pi * sigma)) / 2
     return total
 

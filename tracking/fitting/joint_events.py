@@ -1,7 +1,7 @@
 """The event classifier of `joint`, learned from simulated truth: pi(e | X, g, g'), eq. 7 of Bazzani et al. 2012.
 
 A multinomial logistic regression over (d_KL, d_v, d_intra) of a group and its nearest one at two times a lag apart, as
-the tracker computes them, and over lines of people. Classes are Merge, Split and None, at their natural frequency, so
+the tracker computes them. Classes are Merge, Split and None, at their natural frequency, so
 that the probabilities are those of an event within the lag. Rows are all groups of the true partition, people alone
 included, every STRIDE. Of every WRONG-th partition there is also a wrong copy, in which a group is divided or two are
 joined; its events are those that lead to the true partition, so that a filter recovers from its errors. Places and
@@ -26,7 +26,7 @@ STRIDE = 0.2
 """Time between two partitions that are looked at, s."""
 PLACE_ERROR, VELOCITY_ERROR = 0.05, 0.2
 """Standard deviations of the errors of places, m, and velocities, m/s, per axis."""
-WRONG = 5
+WRONG = 20
 """Of as many partitions one is also given with an error."""
 RIDGE = 1e-3
 """Weight of the squared coefficients, of standardised features, in the loss of a row."""
@@ -40,7 +40,7 @@ CLASSES = ("merge", "split", "none")
 class EventRows:
     """Groups and what happened to them within the lag, one row for each group and time.
 
-    features (R, 8): as group_events_kernels; event (R,): MERGE, SPLIT or NONE; possible (R, 3): which events are: one
+    features (R, 6): as group_events_kernels; event (R,): MERGE, SPLIT or NONE; possible (R, 3): which events are: one
     person does not split, a group without another one does not merge. seconds: time that the partitions cover.
     """
 

@@ -131,13 +131,13 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
     apart = np.where(late > 0, apart, np.nan)
     means = ExponentialMeans(count, len(QUANTITIES), seconds)
     for r in _portions(step[i]):
-        distance, quantities = _instant(place, motion, i[r], j[r])
+        distance, quantities = instant_evidence(place, motion, i[r], j[r])
         averaged = means.add(step[i[r]], pair[r], quantities)
         values = np.column_stack([averaged, distance, gap[r], apart[r]])
         yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values)
 
 
-def _instant(pos: Array, vel: Array, i: Ints, j: Ints) -> tuple[Array, Array]:
+def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> tuple[Array, Array]:
     """Returns the distance (R,) and the quantities of `QUANTITIES` of each pair of rows i, j at its own step, (R, 10).
 
     pos, vel (N, 2): m, m/s, one row per person and step. i, j (R,): all pairs within 4 m in some steps.

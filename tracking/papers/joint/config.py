@@ -23,14 +23,13 @@ FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classif
 ]
 SIZE_PRIORS = {"none": events.SIZE_NONE, "merge": events.SIZE_MERGE, "all": events.SIZE_ALL}
 TERMS = (
-    "distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "line_between",
-    "line_within", "bias",
+    "distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "bias",
 )  # fmt: skip
 """Terms of the event classifier, in the order of the features of group_events_kernels."""
 
 
-def _weight(event: str, term: str, unit: str, meaning: str, before: float | None = None) -> Any:
-    return param(FITTED[f"{event}_{term}"], (-100.0, 100.0), unit, f"{event}: {meaning}", tunable=False, before=before)
+def _weight(event: str, term: str, unit: str, meaning: str) -> Any:
+    return param(FITTED[f"{event}_{term}"], (-100.0, 100.0), unit, f"{event}: {meaning}", tunable=False)
 
 
 @dataclass(frozen=True)
@@ -88,6 +87,13 @@ class JointConfig(BackgroundSettings):
         0.25, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma; the paper gives no Sigma", "log"
     )
     velocity_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
+    group_share: float = param(
+        0.25,
+        (0.0, 1.0),
+        "share",
+        "of the group's mean velocity in a member's motion, the rest is the own velocity; 1: eq. 5 (below 1: ours)",
+        before=1.0,
+    )
     point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")
     pixel_noise: float = param(
         0.15,
@@ -108,12 +114,8 @@ class JointConfig(BackgroundSettings):
     validity_rate: float = param(
         20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"
     )
-    line_rate: float = param(
-        10.0,
-        (0.0, 200.0),
-        "1/s",
-        "cost in log p(Z | X) of a person in a line with the own group, per second (ours)",
-        before=0.0,
+    belief_rate: float = param(
+        20.0, (0.0, 100.0), "1/s", "weight of the beliefs of pairs in log p(Z | X), per second (ours)", before=0.0
     )
     normaliser: str = param(
         "energy",
@@ -163,7 +165,14 @@ class JointConfig(BackgroundSettings):
         "categorical",
     )
     inertia: float = param(
-        0.1, (0.0, 0.45), "probability", "beyond 1/2 that a pair needs to join or leave a group (ours)"
+        0.2, (0.0, 0.45), "probability", "beyond 1/2 that a pair needs to join or leave a group (ours)"
+    )
+    group_time: float = param(
+        0.3,
+        (0.0, 5.0),
+        "s",
+        "time constant of the mean of a pair's probability, by which groups are reported (ours)",
+        before=0.0,
     )
 
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity (ours)", "log")
@@ -177,10 +186,6 @@ class JointConfig(BackgroundSettings):
     merge_distance_late: float = _weight("merge", "distance_late", "", "weight of log(1 + d_KL), later time")
     merge_velocity_late: float = _weight("merge", "velocity_late", "s/m", "weight of d_v, later time")
     merge_spread_late: float = _weight("merge", "spread_late", "1/m", "weight of d_intra, later time")
-    merge_line_between: float = _weight(
-        "merge", "line_between", "", "weight of being in one line with the nearest", before=0.0
-    )
-    merge_line_within: float = _weight("merge", "line_within", "", "weight of being a line", before=0.0)
     merge_bias: float = _weight("merge", "bias", "", "constant")
     split_distance_early: float = _weight("split", "distance_early", "", "weight of log(1 + d_KL), earlier time")
     split_velocity_early: float = _weight("split", "velocity_early", "s/m", "weight of d_v, earlier time")
@@ -188,15 +193,11 @@ class JointConfig(BackgroundSettings):
     split_distance_late: float = _weight("split", "distance_late", "", "weight of log(1 + d_KL), later time")
     split_velocity_late: float = _weight("split", "velocity_late", "s/m", "weight of d_v, later time")
     split_spread_late: float = _weight("split", "spread_late", "1/m", "weight of d_intra, later time")
-    split_line_between: float = _weight(
-        "split", "line_between", "", "weight of being in one line with the nearest", before=0.0
-    )
-    split_line_within: float = _weight("split", "line_within", "", "weight of being a line", before=0.0)
     split_bias: float = _weight("split", "bias", "", "constant")
 
     @property
     def classifier(self) -> Array:
-        """The weights (2, 9) of Merge and Split: of the eight features, then the constant."""
+        """The weights (2, 7) of Merge and Split: of the six features, then the constant."""
         return np.array([[getattr(self, f"{event}_{term}") for term in TERMS] for event in ("merge", "split")])
 
     @property

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from sim.types import Array, Ints
-from tracking.papers.joint import group_events_kernels, line_kernels, partition_kernels
+from tracking.papers.joint import group_events_kernels, partition_kernels
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import log_sum
 from tracking.papers.joint.individuals import Proposal, precision_of, process_noise
@@ -27,13 +27,15 @@ class FrameModel:
     labels as partition_kernels has them.
 
     config; dt: s; noise: standard deviation of a measured place, m; z (K, 2): measured places, m, nan for a person who
-    was not measured; motion, choices, events: the random streams of step 4 (normals and uniforms) and of step 7.
+    was not measured; belief (K, K): log-odds that each pair belongs together; motion, choices, events: the random
+    streams of step 4 (normals and uniforms) and of step 7.
     """
 
     config: JointConfig
     dt: float
     noise: float
     z: Array
+    belief: Array
     motion: np.random.Generator
     choices: np.random.Generator
     events: np.random.Generator
@@ -76,7 +78,7 @@ class FrameModel:
             still = np.empty(late.shape[:2])
             own_dynamics(late, early, precision, scale, 0.0, still)
             return np.asarray(out + (still - own).sum(axis=1)[:, None])
-        group_dynamics(late, early, z, precision, scale, self.dt, out)
+        group_dynamics(late, early, z, precision, scale, self.dt, self.config.group_share, out)
         return np.asarray(out - own.sum(axis=1)[:, None])
 
     def groups(self, new: Array, x: Array, z: Ints) -> Ints:
@@ -92,23 +94,23 @@ class FrameModel:
         uniforms = self.events.random((*shape, 3))
         lag = x.shape[-1] // STATE * self.dt
         group_events_kernels.propose(
-            early, late, self._points(late), _lines(late), out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
+            early, late, self._points(late), out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
         )  # fmt: skip
         return out
 
     def energy(self, new: Array, z: Ints) -> Array:
-        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), with lambda_cl per second, less what people in lines
-        cost (ours); 0 in VAR3."""
+        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), with lambda_cl per second, plus the belief of the
+        pairs in one group (ours); 0 in VAR3."""
         c = self.config
         out = np.zeros(z.shape[:2])
         if c.variant == "VAR3":
             return out
         partition_kernels.validities(self._points(_states(new)), z, c.scales, out)
         out *= -c.validity_rate * self.dt
-        waiting = np.empty_like(out)
-        late = _states(new)
-        line_kernels.people_in_lines(late, _lines(late), z, waiting)
-        out -= c.line_rate * self.dt * waiting
+        if c.belief_rate > 0:
+            worth = np.empty_like(out)
+            partition_kernels.pair_sums(self.belief, z, worth)
+            out += c.belief_rate * self.dt * worth
         if c.normaliser == "sampled":
             out -= log_sum(out)[:, None] - math.log(z.shape[1])
         return np.asarray(out)
@@ -128,13 +130,6 @@ def validity_points(x: Array, velocity_time: float) -> Array:
 def _states(x: Array) -> Array:
     """Returns the newest states of X, (N_x, K, 4)."""
     return np.ascontiguousarray(x[..., :STATE])
-
-
-def _lines(state: Array) -> Array:
-    """Returns how much each pair of people is in one line, (N_x, K, K); state (N_x, K, 4)."""
-    out = np.empty((*state.shape[:2], state.shape[1]))
-    line_kernels.lines(state, out)
-    return out
 
 
 @cache

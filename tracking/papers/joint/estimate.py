@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
 from tracking.papers.joint import partition_kernels
 
 
@@ -13,6 +13,20 @@ def moments(state: Array, weights: Array) -> tuple[Array, Array]:
     mean = np.einsum("ik,ikd->kd", weights, state)
     away = state - mean
     return mean, np.einsum("ik,ikd,ike->kde", weights, away, away)
+
+
+def mean_over_time(now: Array, id: Ints, seen: Bools, before: Array, before_id: Ints, share: float) -> Array:
+    """Return the mean over time of the probability that each pair is in one group, (K, K) (ours).
+
+    now (K, K): the probability in this frame; id (K,): people; seen (K,): who was measured; before (L, L), before_id
+    (L,): the mean of the last frame; share: of it in the new mean. The mean of a pair stays while one of the two is not
+    measured. That of a new pair is the probability in its first frame.
+    """
+    out, both = now.copy(), np.where(seen[:, None] & seen, share, 1.0)
+    _, new, old = np.intersect1d(id, before_id, assume_unique=True, return_indices=True)
+    rows = np.ix_(new, new)
+    out[rows] += both[rows] * (before[np.ix_(old, old)] - now[rows])
+    return out
 
 
 def binder_partition(together: Array, label: Ints, before: Ints, inertia: Array | float) -> list[Ints]:

@@ -1,8 +1,8 @@
 """Kernels of the joint group proposal (eqs 6, 7): features of a group and its nearest one, events, and what they do.
 
 States are (K, 4): x, y in m, vx, vy in m/s. The features of a group g and its nearest group g' are (d_KL, d_v, d_intra)
-at two times, a lag apart, both with the members of Z_t, and g' the nearest at the earlier time, and how much both
-together, and g alone, are a line at the later time (ours). People alone are groups of one (ours).
+at two times, a lag apart, both with the members of Z_t, and g' the nearest at the earlier time. People alone are groups
+of one (ours).
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import numpy as np
 from sim.compiler import njit
 from sim.types import Array, Ints
 from tracking.papers.joint.division_kernels import divide, rank
-from tracking.papers.joint.line_kernels import line_of, lines_of
 from tracking.papers.joint.partition_kernels import clusters, same_row
 
 SIZE, X, Y, VX, VY, XX, XY, YY, SPREAD = range(9)
@@ -24,9 +23,8 @@ PRIOR, PRIOR_WEIGHT = 0.35, 1.0
 """Standard deviation per axis, m, to which covariances of places are shrunk, and the people that it counts for."""
 LOG_KL_MOST = 8.0
 """Largest log(1 + d_KL); also its value without another group."""
-LINES, FEATURES = 6, 8
-"""d_KL, d_v, d_intra at the earlier time, then at the later one; from LINES on how
-much g and g' together, and g alone, are a line, at the later one."""
+FEATURES = 6
+"""d_KL, d_v, d_intra at the earlier time, then at the later one."""
 RATIO, SHARPNESS, RATE, SIZE_MODE, SIZE_MEAN, SIZE_STD = range(6)
 """Slots of `rules` (6,): time step over lag; weight of the validity in the choice of parts; factor of the rate of
 events; where the size prior acts; its mean and standard deviation, people."""
@@ -90,7 +88,7 @@ def nearest_clusters(moments: Array, count: int, nearest: Ints) -> None:
 
 @njit(cache=True)
 def features_of(early: Array, late: Array, g: int, other: int, out: Array) -> None:
-    """Write the first six features of cluster g and its nearest cluster `other` (-1: none); early, late: moments
+    """Write the six features of cluster g and its nearest cluster `other` (-1: none); early, late: moments
     (G, 9)."""
     for k in range(2):
         moments = early if k == 0 else late
@@ -104,7 +102,7 @@ def features_of(early: Array, late: Array, g: int, other: int, out: Array) -> No
 
 @njit(cache=True)
 def partition_features(early: Array, late: Array, label: Ints, features: Array, nearest: Ints, head: Ints) -> int:
-    """Write features (G, 8), nearest cluster and head of each cluster of one partition; return G.
+    """Write features (G, 6), nearest cluster and head of each cluster of one partition; return G.
 
     early, late (K, 4): states at both times; label (K,): the partition.
     """
@@ -115,12 +113,8 @@ def partition_features(early: Array, late: Array, label: Ints, features: Array, 
     moments_of(early, cluster, count, first)
     moments_of(late, cluster, count, second)
     nearest_clusters(first, count, nearest)
-    line = np.empty((n, n))
-    lines_of(late, line)
     for g in range(count):
         features_of(first, second, g, nearest[g], features[g])
-        features[g, LINES] = line_of(late, line, cluster, g, nearest[g]) if nearest[g] >= 0 else 0.0
-        features[g, LINES + 1] = line_of(late, line, cluster, g, g)
     return count
 
 
@@ -130,7 +124,7 @@ def event_probabilities(
 ) -> tuple[float, float]:
     """Return the probabilities of Merge and Split of a group in a step: pi(e | X, g, g'), eq. 7.
 
-    features (8,); size, other: people in g and g', other = 0 if a merge is excluded; weights (2, 9): of Merge and
+    features (6,); size, other: people in g and g', other = 0 if a merge is excluded; weights (2, 7): of Merge and
     Split, the constant last; rules: as RATIO and the following. The classifier gives probabilities over the lag,
     against None; they are turned into those of a step as hazards (ours). One person does not split.
     """
@@ -164,7 +158,6 @@ def propose(
     early: Array,
     late: Array,
     points: Array,
-    line: Array,
     label: Ints,
     uniforms: Array,
     weights: Array,
@@ -173,9 +166,9 @@ def propose(
 ) -> None:
     """Draw Z_{t+1} from the joint group proposal for all particles: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7.
 
-    early, late (N_x, K, 4): states at both times; points (N_x, K, D): the later ones as the validity sees them, m; line
-    (N_x, K, K): as line_kernels.lines; label (N_x, N_z, K): Z_t, changed in place; uniforms (N_x, N_z, K, 3): of the
-    heads of groups. weights, rules: as event_probabilities; scales: as partition_kernels.SCATTER and the following.
+    early, late (N_x, K, 4): states at both times; points (N_x, K, D): the later ones as the validity sees them, m;
+    label (N_x, N_z, K): Z_t, changed in place; uniforms (N_x, N_z, K, 3): of the heads of groups. weights, rules: as
+    event_probabilities; scales: as partition_kernels.SCATTER and the following.
 
     Groups are visited in random order. A group that an event has changed is not visited. A pair of groups that are each
     other's nearest draws its merge once, so that the probability is the pair's (ours).
@@ -198,8 +191,6 @@ def propose(
                 for g in range(count):
                     h = nearest[g]
                     features_of(first, second, g, h, features)
-                    features[LINES] = line_of(late[i], line[i], cluster, g, h) if h >= 0 else 0.0
-                    features[LINES + 1] = line_of(late[i], line[i], cluster, g, g)
                     other = first[h, SIZE] if h >= 0 else 0.0
                     merge[g], split[g] = event_probabilities(features, first[g, SIZE], other, weights, rules)
             happens = False

@@ -133,6 +133,24 @@ def validities(points: Array, label: Ints, scales: Array, out: Array) -> None:
 
 
 @njit(cache=True)
+def pair_sums(worth: Array, label: Ints, out: Array) -> None:
+    """Write the sum of worth (K, K) over the pairs in one group of each partition, (N_x, N_z); label (N_x, N_z, K)."""
+    particles, partitions, n = label.shape
+    for i in range(particles):
+        for j in range(partitions):
+            if j > 0 and same_row(label[i, j], label[i, j - 1]):
+                out[i, j] = out[i, j - 1]
+                continue
+            total = 0.0
+            for k in range(n):
+                if label[i, j, k] > 0:
+                    for other in range(k):
+                        if label[i, j, other] == label[i, j, k]:
+                            total += worth[k, other]
+            out[i, j] = total
+
+
+@njit(cache=True)
 def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
     """Write partitions drawn uniformly from all partitions of K people, (N_x, N_z, K) (VAR2).
 

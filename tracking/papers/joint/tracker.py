@@ -27,9 +27,10 @@ Departures, all ours:
 - The Davies-Bouldin index has a prior scatter and a virtual other cluster, sees velocities, and acts per second.
 - People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
   features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
-- People in lines (line_kernels): groups that are lines cost in p(Z | X), and the classifier has two features of lines.
-- The partition is that of least Binder loss, with inertia; ids follow the identity rule; onsets of events are dated
-  back.
+- p(Z | X) also has the beliefs of pairs (pair_belief).
+- In eq. 5 a member moves with a share of the group's velocity and the rest of the own one.
+- The partition is that of least Binder loss, of means over time, with inertia. A member who is missed stays. Ids follow
+  the identity rule; onsets of events are dated back.
 The preset `paper` switches off what has a parameter.
 """
 
@@ -52,6 +53,7 @@ from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import STATE, FrameModel, validity_points
 from tracking.papers.joint.division_kernels import place_newcomer
 from tracking.papers.joint.individuals import moved, process_noise
+from tracking.papers.joint.pair_belief import PairBelief
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
 from tracking.papers.joint.reported_events import ReportedEvents
@@ -65,10 +67,10 @@ class Joint:
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
     particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; together (K, K):
-    probability that each pair is in one group, in the last frame; events: those of the reported groups; health: how
-    many particles the weights are worth; draws, the random streams; pixels: detector of blobs, None from points; shown
-    (K, 4): boxes of the people reported last, px; plane, "ground" or "image"; context. All but config exist after
-    `reset` only.
+    probability that each pair is in one group, mean over time, and paired (K,), the ids of its rows; events: those of
+    the reported groups; belief: of pairs; health: how many particles the weights are worth; draws, the random streams;
+    pixels: detector of blobs, None from points; shown (K, 4): boxes of the people reported last, px; plane, "ground" or
+    "image"; context. All but config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -97,7 +99,9 @@ class Joint:
             np.full(shape, -np.log(c.partitions)), np.zeros((c.particles, 0)), np.zeros(c.particles),
         )  # fmt: skip
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
-        self.together, self.events = np.zeros((0, 0)), ReportedEvents(context.fps)
+        self.together, self.paired = np.zeros((0, 0)), np.zeros(0, np.int64)
+        self.events = ReportedEvents(context.fps)
+        self.belief = PairBelief(context.fps)
         self.health = ParticleHealth(c.particles, context.fps)
         self.draws = [rng(seed, "tracker", key) for key in range(PLACING + 1)]
         flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
@@ -119,7 +123,7 @@ class Joint:
         z = np.full((len(self.people.id), 2), np.nan)
         z[rows] = points[columns]
         self._filter(z)
-        tracks = self._report(frame)
+        tracks = self._report(frame, np.isfinite(z[:, 0]))
         self._resample()
         if detections is not None:
             free = np.ones(len(points), bool)
@@ -175,7 +179,9 @@ class Joint:
         if not len(z):
             return
         draws = self.draws
-        model = FrameModel(self.config, self.dt, self.noise, z, draws[MOTION], draws[CHOICES], draws[EVENTS])
+        model = FrameModel(
+            self.config, self.dt, self.noise, z, self.belief.log_odds, draws[MOTION], draws[CHOICES], draws[EVENTS]
+        )
         self.nested = decentralised_filter.advance(self.nested, model, draws[PARTITIONS].random(self.config.particles))
 
     def _resample(self) -> None:
@@ -208,6 +214,7 @@ class Joint:
         partition_kernels.relabel(kept)
         self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest)
         self.people.keep(rows)
+        self.belief.keep(rows)
         self.health.keep(rows)
 
     def _newcomers(self, points: Array, sizes: Array | None) -> None:
@@ -235,6 +242,7 @@ class Joint:
             np.concatenate([n.log_w, np.zeros(past.shape[:2])], axis=1), n.log_rest,
         )  # fmt: skip
         self.people.add(self.newcomers.size[rows])
+        self.belief.add(self.nested.x[..., :STATE].mean(axis=0))
         self.health.add(past.shape[1])
         if c.newcomers == "validity":
             self._place(past.shape[1])
@@ -246,8 +254,8 @@ class Joint:
         for person in range(n.x.shape[1] - new, n.x.shape[1]):
             place_newcomer(points, n.z, person, self.draws[PLACING].random(n.log_q.shape), c.parts_sharpness, c.scales)
 
-    def _report(self, frame: Frame) -> Tracks:
-        """Returns the Tracks of the frame, on the ground in m, in the image in px."""
+    def _report(self, frame: Frame, seen: Bools) -> Tracks:
+        """Returns the Tracks of the frame, on the ground in m, in the image in px; seen (K,): who was measured."""
         n, c, id = self.nested, self.config, self.people.id
         joint = n.weights()
         weights = n.component_weights() if c.weights == "people" else np.repeat(joint[:, None], len(id), axis=1)
@@ -256,8 +264,9 @@ class Joint:
         box = boxes_at(pos, self.people.size) if self.plane == "image" else None
         self.shown = np.zeros((0, 4)) if box is None else box
         old = self.identities.groups
-        parts = [frozenset(id[rows].tolist()) for rows in self._groups(joint)]
+        parts = [frozenset(id[rows].tolist()) for rows in self._groups(joint, seen)]
         changes = self.identities.step(frame.index, frozenset(id.tolist()), parts)
+        self.belief.see(mean[:, :2])
         self.events.add(id, mean[:, :2])
         events = self.events.events(changes, old, self.identities.groups, self.unit)
         group = reported_groups.known_groups(self.identities, id)
@@ -267,16 +276,19 @@ class Joint:
             frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov, box, score, groups, events
         )  # fmt: skip
 
-    def _groups(self, joint: Array) -> list[Ints]:
+    def _groups(self, joint: Array, seen: Bools) -> list[Ints]:
         """Returns the rows of the members of each group; sets `together`; joint (N_x,): the weights of step 1."""
         n, c, id = self.nested, self.config, self.people.id
         if not len(id):
-            self.together = np.zeros((0, 0))
+            self.together, self.paired = np.zeros((0, 0)), id.copy()
             return []
         particle = n.rest_weights() if c.weights == "people" else joint
         weights = particle[:, None] * np.exp(n.log_q)
-        self.together = np.empty((len(id), len(id)))
-        partition_kernels.co_membership(n.z, weights, self.together)
+        now = np.empty((len(id), len(id)))
+        partition_kernels.co_membership(n.z, weights, now)
+        share = np.exp(-self.dt / c.group_time) if c.group_time > 0 else 0.0
+        self.together = estimate.mean_over_time(now, id, seen, self.together, self.paired, share)
+        self.paired = id.copy()
         if c.estimate == "histogram":
             return estimate.histogram_partition(n.z, weights)
         before = reported_groups.known_groups(self.identities, id)

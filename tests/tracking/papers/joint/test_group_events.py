@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.reference_joint import all_partitions, label_of, line_of_group, validity
+from tests.reference_joint import all_partitions, label_of, validity
 from tracking.papers.joint import division_kernels
 from tracking.papers.joint import group_events_kernels as events
 from tracking.papers.joint.config import JointConfig
@@ -16,7 +16,7 @@ COUNT = 20_000
 
 
 def weights(merge=-100.0, split=-100.0):
-    table = np.zeros((2, 9))
+    table = np.zeros((2, 7))
     table[:, BIAS] = merge, split
     return table
 
@@ -31,8 +31,7 @@ def proposed(pos, label, table, rule=None, count=COUNT, seed=0):
     state = np.concatenate([pos, np.zeros_like(pos)], axis=1)[None]
     labels = np.tile(np.asarray(label, np.int64), (1, count, 1))
     uniforms = np.random.default_rng(seed).random((1, count, len(pos), 3))
-    line = np.zeros((1, len(pos), len(pos)))
-    events.propose(state, state, state, line, labels, uniforms, table, rules() if rule is None else rule, SCALES)
+    events.propose(state, state, state, labels, uniforms, table, rules() if rule is None else rule, SCALES)
     return labels[0]
 
 
@@ -55,7 +54,7 @@ def test_a_pair_of_people_merges_once_with_its_probability():
 
 
 def test_the_rate_of_events_does_not_depend_on_the_frame_rate():
-    features = np.array([2.0, 0.3, 0.5, 1.5, 0.2, 0.6, 0.1, 0.2])
+    features = np.array([2.0, 0.3, 0.5, 1.5, 0.2, 0.6])
     table, lag, quiet = JointConfig().classifier, 0.4, []
     for dt in (0.1, 0.05):
         p = sum(events.event_probabilities(features, 2.0, 1.0, table, rules(ratio=dt / lag)))
@@ -64,8 +63,8 @@ def test_the_rate_of_events_does_not_depend_on_the_frame_rate():
 
 
 def test_over_a_lag_the_probabilities_are_the_classifiers():
-    features, table = np.array([2.0, 0.3, 0.5, 1.5, 0.2, 0.6, 0.1, 0.2]), JointConfig().classifier
-    scores = np.append(table[:, :8] @ features + table[:, 8], 0.0)
+    features, table = np.array([2.0, 0.3, 0.5, 1.5, 0.2, 0.6]), JointConfig().classifier
+    scores = np.append(table[:, :6] @ features + table[:, 6], 0.0)
     expected = np.exp(scores) / np.exp(scores).sum()
     assert events.event_probabilities(features, 2.0, 1.0, table, rules(ratio=1.0)) == pytest.approx(expected[:2])
     no_merge = np.exp(scores[1]) / np.exp(scores[1:]).sum()
@@ -125,7 +124,7 @@ def test_a_group_merges_with_the_nearest_one_only():
 def test_features_are_those_of_the_definition():
     early = np.array([[0, 0, 1, 0], [1, 0, 1, 0], [4, 1, 0, 0.5]], float)
     late = early + np.array([0.2, 0, 0, 0])
-    features, nearest, head = np.empty((3, 8)), np.empty(3, np.int64), np.empty(3, np.int64)
+    features, nearest, head = np.empty((3, 6)), np.empty(3, np.int64), np.empty(3, np.int64)
     assert events.partition_features(early, late, np.array([1, 1, 0]), features, nearest, head) == 2
     assert (nearest[:2].tolist(), head[:2].tolist()) == ([1, 0], [0, 2])
     prior = events.PRIOR**2 * np.eye(2)
@@ -134,8 +133,7 @@ def test_features_are_those_of_the_definition():
     inverse = np.linalg.inv(A), np.linalg.inv(B)
     kl = (np.trace(inverse[0] @ B) + np.trace(inverse[1] @ A) - 4 + d @ (inverse[0] + inverse[1]) @ d) / 2
     expected = [min(np.log1p(kl), events.LOG_KL_MOST), np.hypot(1, 0.5), 0.5]
-    np.testing.assert_allclose(features[0], [*expected * 2, line_of_group(late), 0])
-    assert 0.1 < line_of_group(late) < 0.9
+    np.testing.assert_allclose(features[0], expected * 2)
     np.testing.assert_allclose(features[1, [2, 5]], 0)
 
 

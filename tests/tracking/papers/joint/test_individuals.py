@@ -82,10 +82,10 @@ def test_the_density_is_the_normal_one():
     np.testing.assert_allclose(log_density(x, mean, SIGMA), expected)
 
 
-def dynamics(new, old, label):
+def dynamics(new, old, label, share=1.0):
     precision, scale = precision_of(SIGMA)
     out, own = np.empty(label.shape[:2]), np.empty(new.shape[:2])
-    group_dynamics(new, old, label, precision, scale, DT, out)
+    group_dynamics(new, old, label, precision, scale, DT, share, out)
     own_dynamics(new, old, precision, scale, DT, own)
     return out, own
 
@@ -95,10 +95,18 @@ def test_eq_5_is_that_of_all_partitions():
     old, new = rng.normal(0, 0.5, (2, 3, 4, 4))
     parts = list(all_partitions(4))
     label = np.array([[label_of(p) for p in parts]] * 3)
-    out, _ = dynamics(new, old, label)
-    for i in range(3):
-        expected = [log_group_dynamics(new[i], old[i], p, covariance(SIGMA), DT) for p in parts]
-        np.testing.assert_allclose(out[i], expected)
+    for share in (1.0, 0.3):
+        out, _ = dynamics(new, old, label, share)
+        for i in range(3):
+            expected = [log_group_dynamics(new[i], old[i], p, covariance(SIGMA), DT, share) for p in parts]
+            np.testing.assert_allclose(out[i], expected)
+
+
+def test_without_the_group_s_share_eq_5_is_eq_3():
+    rng = np.random.default_rng(5)
+    old, new = rng.normal(0, 0.5, (2, 3, 4, 4))
+    out, own = dynamics(new, old, np.ones((3, 1, 4), np.int64), share=0.0)
+    np.testing.assert_allclose(out[:, 0], own.sum(axis=1))
 
 
 def test_eq_5_of_people_alone_is_eq_3_to_the_last_bit():

@@ -10,7 +10,7 @@ from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.individuals import process_noise
-from tracking.papers.joint.partition_kernels import canonical
+from tracking.papers.joint.partition_kernels import canonical, pair_sums
 from tracking.papers.joint.tracker import Joint
 from tracking.prepare import prepare
 from tracking.run import track
@@ -117,9 +117,10 @@ def test_variants_track_and_keep_labels_in_their_form(variant):
 def test_groups_move_individuals_in_the_full_model_only():
     """Two people side by side: eq. 5 is evaluated with the partitions, and VAR1 has no use for them."""
     points = walk([[0, 0], [0, 0.7]], [1.0, 0.0], 20, noise=0.05)
-    full = stepped(Joint(JointConfig(validity_rate=0.0)), points)
-    var1 = stepped(Joint(JointConfig(validity_rate=0.0, variant="VAR1")), points)
-    alone = stepped(Joint(JointConfig(validity_rate=0.0, variant="VAR1", newcomers="alone", **QUIET)), points)
+    plain = {"validity_rate": 0.0, "belief_rate": 0.0}
+    full = stepped(Joint(JointConfig(**plain)), points)
+    var1 = stepped(Joint(JointConfig(**plain, variant="VAR1")), points)
+    alone = stepped(Joint(JointConfig(**plain, variant="VAR1", newcomers="alone", **QUIET)), points)
     assert not np.array_equal(full[-1].pos, var1[-1].pos)
     assert np.array_equal(var1[-1].pos, alone[-1].pos)
 
@@ -150,6 +151,35 @@ def test_a_person_who_is_missed_goes_on_and_is_removed():
     tracks = stepped(Joint(JointConfig(coast_time=1.0)), points + gone)
     assert [len(t.id) for t in tracks[-15:]] == [1] * 11 + [0] * 4
     assert tracks[29].pos[0, 0] == pytest.approx(2.9, abs=0.4)
+
+
+def test_a_member_who_is_missed_stays_in_the_group():
+    """Without a measurement nothing is known of a change of groups."""
+    points = walk([[0, 0], [0, 0.7], [0, 1.4]], [1.2, 0.0], 40, noise=0.05)
+    shown = [p if k < 25 else p[:2] for k, p in enumerate(points)]
+    tracks = stepped(Joint(), shown)
+    for t in tracks[24:]:
+        assert len(set(t.group.tolist())) == 1
+        assert t.group[0] >= 0
+    assert [len(t.id) for t in tracks[24:36]] == [3] * 12
+
+
+def test_the_mean_over_time_delays_groups():
+    """A pair that is sure from one frame on has the probability 1 - exp(-t / group_time)."""
+    points = [np.array([[0, 0], [0, 6 - min(0.2 * k, 5.3)]]) for k in range(60)]
+    found = [
+        next(t.index for t in stepped(Joint(JointConfig(group_time=time)), points) if (t.group >= 0).any())
+        for time in (0.0, 1.5)
+    ]
+    assert found[0] + 5 <= found[1] <= 60
+
+
+def test_pairs_of_a_group_count_with_their_belief():
+    label = np.array([[[1, 1, 0, 4, 4], [1, 1, 1, 1, 1], [0, 0, 0, 0, 0]]])
+    worth = np.random.default_rng(0).normal(0, 1, (5, 5))
+    worth, out = worth + worth.T, np.empty((1, 3))
+    pair_sums(worth, label, out)
+    np.testing.assert_allclose(out[0], [worth[0, 1] + worth[3, 4], np.tril(worth, -1).sum(), 0])
 
 
 def test_a_lost_image_removes_nobody():

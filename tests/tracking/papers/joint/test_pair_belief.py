@@ -1,0 +1,55 @@
+"""The belief of pairs that is kept up to date frame by frame, against that of whole sequences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.grouping.belief import UNSEEN, beliefs_of_tracks, default_belief
+from tracking.papers.joint.pair_belief import PairBelief
+
+FPS = 10.0
+
+
+def test_the_belief_is_that_of_the_whole_sequence():
+    """People come and go: after each step all pairs have the belief of tracking.grouping, to the last bit."""
+    rng = np.random.default_rng(0)
+    people, frames = 7, 90
+    born, gone = rng.integers(0, 40, people), 1 + 4 * rng.integers(12, 23, people)  # whole steps
+    born[:2] = 0
+    start, velocity = rng.uniform(0, 4, (people, 2)), rng.normal(0, 0.6, (people, 2))
+    pos = start + velocity * np.arange(frames)[:, None, None] / FPS + 0.03 * rng.standard_normal((frames, people, 2))
+    there = (np.arange(frames)[:, None] >= born) & (np.arange(frames)[:, None] < gone)
+    frame, column = np.nonzero(there)
+    whole = beliefs_of_tracks(frame, column, pos[there], frames, FPS, default_belief())
+    kept, now, compared = PairBelief(FPS), np.zeros(0, np.int64), 0
+    for t in range(frames):
+        kept.keep(there[t, now])
+        now = now[there[t, now]]
+        new = np.setdiff1d(np.flatnonzero(there[t]), now)
+        now = np.concatenate([now, new])
+        kept.add(np.concatenate([pos[t, now], velocity[now]], axis=1))
+        kept.see(pos[t, now])
+        if t % kept.size == 0:
+            expected = np.full((people, people), UNSEEN)
+            rows = whole.step == t // kept.size
+            expected[whole.a[rows], whole.b[rows]] = expected[whole.b[rows], whole.a[rows]] = whole.log_odds[rows]
+            apart = ~np.eye(len(now), dtype=bool)
+            np.testing.assert_allclose(kept.log_odds[apart], expected[np.ix_(now, now)][apart], rtol=0, atol=1e-9)
+            compared += int(rows.sum())
+    assert compared > 100
+
+
+def test_new_people_have_a_belief_at_once():
+    """Of the others, the belief of the last step stays."""
+    kept = PairBelief(FPS)
+    old = np.array([[0, 0, 1, 0], [0, 0.7, 1, 0.0]])
+    kept.add(old)
+    for t in range(30):
+        kept.see(old[:, :2] + [t / FPS, 0])
+    before = kept.log_odds[0, 1]
+    kept.keep(np.array([True, True]))
+    kept.add(np.array([[3, 0, 1, 0], [3, 0.7, 1, 0], [3, 1.4, 1, 0], [3, -0.7, -1, 0], [30, 0, 1, 0]]))
+    assert kept.log_odds[0, 1] == before > 0
+    assert kept.log_odds[1, 2] > kept.log_odds[0, 3] > UNSEEN
+    assert kept.log_odds[1, 3] < 0
+    assert (kept.log_odds[4, :4] == UNSEEN).all()

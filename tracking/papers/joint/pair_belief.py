@@ -1,0 +1,127 @@
+"""The belief that each pair of tracked people belongs together (tracking/grouping), kept up to date by frames (ours).
+
+The evidence of a pair is averaged over its past, in steps of at most 0.4 s, as `tracking.grouping.pair_evidence` does
+for a whole sequence.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from sim.truth.proximity import close_pairs
+from sim.types import Array, Bools, Ints
+from tracking.grouping.belief import UNSEEN, default_belief
+from tracking.grouping.pair_evidence import (
+    CHORD,
+    QUANTITIES,
+    REACH,
+    TIMES,
+    ExponentialMeans,
+    frames_per_step,
+    instant_evidence,
+)
+
+
+class PairBelief:
+    """The log-odds that each pair of K people belongs together.
+
+    State: log_odds (K, K): of the last step, or, of new people, of their first frame; UNSEEN for pairs that are 4 m
+    apart or more. total (K, 3): sums of x, y, m, and of time, s, over the frames of the current step; count (K,): of
+    these frames. past: means of `total` in the last steps, (K, 3), nan where there are none. first (K,): step in which
+    each person was seen first, nan before its end. first_distance (K, K): m, in the first step of both, nan if unknown.
+    means: of the evidence, for K x K pairs. frames, steps: how many there were.
+    """
+
+    def __init__(self, fps: float) -> None:
+        self.fps, self.size = fps, frames_per_step(fps)
+        self.seconds = self.size / fps
+        self.frames = self.steps = 0
+        self.past: deque[Array] = deque(maxlen=1 + max(1, round(CHORD / self.seconds)))
+        self.log_odds, self.first_distance = np.zeros((0, 0)), np.zeros((0, 0))
+        self.total, self.count, self.first = np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+        self.means = ExponentialMeans(0, len(QUANTITIES), self.seconds)
+
+    def add(self, state: Array) -> None:
+        """Add people as the last rows; state (K, 4): x, y, m, vx, vy, m/s, of all people now.
+
+        The evidence of a pair with a new person is that of this moment.
+        """
+        old, n = len(self.count), len(state)
+        self._reorder(np.concatenate([np.arange(old), np.full(n - old, -1)]))
+        i, j = self._pairs(state[:, :2])
+        fresh = j >= old
+        i, j = i[fresh], j[fresh]
+        self.log_odds[old:] = self.log_odds[:, old:] = UNSEEN
+        if len(i):
+            distance, quantities = instant_evidence(state[:, :2], state[:, 2:], i, j)
+            came = np.nan_to_num(self.first, nan=self.steps)
+            known = self.steps > 0
+            self._judge(i, j, np.repeat(quantities, len(TIMES), axis=1), distance, came, distance if known else np.nan)
+
+    def keep(self, rows: Bools) -> None:
+        """Remove all people but those where `rows` (K,) is True."""
+        self._reorder(np.flatnonzero(rows))
+
+    def see(self, pos: Array) -> None:
+        """Go on by a frame, with the places (K, 2), m."""
+        self.total += np.column_stack([pos, np.full(len(pos), self.frames / self.fps)])
+        self.count += 1
+        if self.frames % self.size == 0:
+            self._end_step()
+        self.frames += 1
+
+    def _end_step(self) -> None:
+        n = len(self.count)
+        now = self.total / self.count[:, None]
+        self.past.append(now)
+        self.total, self.count = np.zeros((n, 3)), np.zeros(n)
+        pos, fresh = now[:, :2], np.isnan(self.first)
+        self.first[fresh] = self.steps
+        apart, new = np.hypot(*(pos[:, None] - pos).transpose(2, 0, 1)), fresh[:, None] | fresh
+        self.first_distance[new] = apart[new] if self.steps > 0 else np.nan
+        vel = np.full((n, 2), np.nan)
+        for before in list(self.past)[-2::-1]:
+            chord = (pos - before[:, :2]) / (now[:, 2] - before[:, 2])[:, None]
+            np.copyto(vel, chord, where=np.isfinite(chord))
+        self.log_odds[:] = UNSEEN
+        i, j = self._pairs(pos)
+        if len(i):
+            distance, quantities = instant_evidence(pos, vel, i, j)
+            averaged = self.means.add(np.full(len(i), self.steps), i * n + j, quantities)
+            self._judge(i, j, averaged, distance, self.first, self.first_distance[i, j])
+        self.steps += 1
+
+    def _judge(self, i: Ints, j: Ints, averaged: Array, distance: Array, came: Array, first: Array | float) -> None:
+        """Sets the log-odds of the pairs i, j (R,): averaged (R, Q), distance and first distance (R,), m; came (K,):
+        step."""
+        both = np.stack([came[i], came[j]])
+        gap = np.where(both.min(axis=0) > 0, np.abs(both[0] - both[1]) * self.seconds, np.nan)
+        values = np.column_stack([averaged, distance, gap, np.broadcast_to(first, distance.shape)])
+        self.log_odds[i, j] = self.log_odds[j, i] = default_belief().log_odds(values)
+
+    def _pairs(self, pos: Array) -> tuple[Ints, Ints]:
+        """Returns the pairs i < j (R,) of people less than 4 m apart; pos (K, 2)."""
+        i, j = close_pairs(np.zeros(len(pos), np.int64), pos, REACH)
+        return np.minimum(i, j), np.maximum(i, j)
+
+    def _reorder(self, old: Ints) -> None:
+        """Makes the people those of the rows `old` (K',), -1 for a new one."""
+        n, new = len(self.count), old < 0
+
+        def rows(table: Array, fill: float) -> Array:
+            return np.concatenate([table, np.full((1, *table.shape[1:]), fill)])[old]
+
+        def square(table: Array, fill: float) -> Array:
+            padded = np.full((n + 1, n + 1), fill)
+            padded[:n, :n] = table
+            return padded[np.ix_(old, old)]
+
+        self.log_odds, self.first_distance = square(self.log_odds, 0.0), square(self.first_distance, np.nan)
+        self.total, self.count, self.first = rows(self.total, 0.0), rows(self.count, 0.0), rows(self.first, np.nan)
+        self.past = deque((rows(p, np.nan) for p in self.past), self.past.maxlen)
+        pairs, means = np.where(new[:, None] | new, -1, old[:, None] * n + old).ravel(), self.means
+        means.total = np.concatenate([means.total, np.zeros((1, *means.total.shape[1:]))])[pairs]
+        means.weight = np.concatenate([means.weight, np.zeros((1, *means.weight.shape[1:]))])[pairs]
+        means.last = np.append(means.last, 0)[pairs]
