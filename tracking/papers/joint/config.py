@@ -178,7 +178,13 @@ class JointConfig(BackgroundSettings):
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity (ours)", "log")
     gate: float = param(0.999, (0.9, 0.99999), "probability", "that a detection of a person is in the gate (ours)")
     confirm_time: float = param(0.3, (0.0, 3.0), "s", "for which a new person must be seen to be tracked (ours)")
-    coast_time: float = param(1.0, (0.1, 10.0), "s", "a person who is missed for longer is removed (ours)", "log")
+    coast_time: float = param(
+        1.0,
+        (0.1, 10.0),
+        "s",
+        "people are removed who are missed for longer, in a group all together (ours)",
+        "log",
+    )
 
     merge_distance_early: float = _weight("merge", "distance_early", "", "weight of log(1 + d_KL), earlier time")
     merge_velocity_early: float = _weight("merge", "velocity_early", "s/m", "weight of d_v, earlier time")

@@ -52,6 +52,16 @@ class People:
         if sizes is not None:
             self.size[rows] = followed_sizes(self.size[rows], sizes, dt)
 
+    def absence(self, group: Ints) -> Array:
+        """Return for how long each person has been missed, s, (K,); in a group of whom nobody was measured, the sum
+        over its members.
+
+        group (K,): of each person, -1 for alone. Members are missed independently, so that their evidence adds up.
+        """
+        same = ((group[:, None] == group) & (group >= 0)) | np.eye(len(group), dtype=bool)
+        measured = (same & (self.missed == 0)).any(axis=1)
+        return np.where(measured, self.missed, same @ self.missed)
+
 
 @dataclass
 class Newcomers:

@@ -129,7 +129,7 @@ class Joint:
             free = np.ones(len(points), bool)
             free[columns] = False
             self.people.record(rows, None if sizes is None else sizes[columns], self.dt)
-            self._keep(self.people.missed <= self.config.coast_time + 1e-9)
+            self._keep(self.people.absence(tracks.group) <= self.config.coast_time + 1e-9)
             self._newcomers(points[free], None if sizes is None else sizes[free])
         return tracks
 

@@ -11,6 +11,7 @@ from sim.types import Context, Detections, Frame
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.individuals import process_noise
 from tracking.papers.joint.partition_kernels import canonical, pair_sums
+from tracking.papers.joint.people import People
 from tracking.papers.joint.tracker import Joint
 from tracking.prepare import prepare
 from tracking.run import track
@@ -180,6 +181,13 @@ def test_pairs_of_a_group_count_with_their_belief():
     worth, out = worth + worth.T, np.empty((1, 3))
     pair_sums(worth, label, out)
     np.testing.assert_allclose(out[0], [worth[0, 1] + worth[3, 4], np.tril(worth, -1).sum(), 0])
+
+
+def test_the_absence_of_a_group_adds_up():
+    """Of a group of whom nobody is measured, people are removed the sooner the more they are."""
+    people = People(missed=np.array([0.2, 0.4, 0.3, 0.0, 0.5, 0.1]))
+    found = people.absence(np.array([4, 4, 7, 7, -1, -1]))
+    np.testing.assert_allclose(found, [0.6, 0.6, 0.3, 0.0, 0.5, 0.1])
 
 
 def test_a_lost_image_removes_nobody():
