@@ -268,6 +268,7 @@ def events(given: argparse.Namespace) -> None:
     """Prints a table of events on a suite: means of event F1 over sequences, sums of hits, false alarms and misses."""
     compared = [Variant("joint"), Variant("group-pda", "group-pda", seeds=False)]
     compared += [Variant(f"{name} + default grouping", name, seeds=name != "blob") for name in ("particle", "blob")]
+    compared = [v for v in compared if not given.only or v.name in given.only.split(",")]
     rows: dict[str, list[Row]] = {v.name: [] for v in compared}
     for sequence in sequences(given.seeds, given.suite):
         for v in compared:
@@ -284,7 +285,10 @@ def events(given: argparse.Namespace) -> None:
         cells[name] = [*map(tables.number, means), *counts, median]
     columns = ["event F1", "group F1", "pairwise F1", "merges: hits / false / missed", "splits", "latency, s (median)"]
     tables.table(
-        f"{given.suite}, {len(rows['joint'])} sequences, seeds {seeds_text(given.seeds)}", "tracker", columns, cells
+        f"{given.suite}, {len(rows[compared[0].name])} sequences, seeds {seeds_text(given.seeds)}",
+        "tracker",
+        columns,
+        cells,
     )
 
 
@@ -312,7 +316,7 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of joint")
     parser.add_argument("--suite", default="standard", help="of mode events")
     parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="mode particles: draw it")
-    parser.add_argument("--only", help="table2, recordings: variants; ablation: settings; separated by commas")
+    parser.add_argument("--only", help="table2, recordings, events: variants; ablation: settings; separated by commas")
     add_data(parser)
     given = parser.parse_args()
     modes[given.mode](given)
