@@ -125,7 +125,7 @@ def _errors_of_frame(t: Tracks, groups: object, camera: object) -> list[np.ndarr
         depth = (np.append(pos, 1.0) - camera.position) @ camera.rotation[2]  # type: ignore[attr-defined]
         if len(members) < 2 or depth > DEEPEST:
             continue
-        away = t.pos[:, :2] - pos
+        away = t.groups.pos[:, :2] - pos  # type: ignore[union-attr]
         k = np.linalg.norm(away, axis=1).argmin() if len(away) else -1
         if k < 0 or np.linalg.norm(away[k]) > NEAR:
             made.append(None)

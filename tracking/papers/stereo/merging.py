@@ -46,7 +46,7 @@ class SpaceMerging:
         self.since = {pair: self.since.get(pair, t) for pair in near}
         due = [pair for pair in sorted(near) if t - self.since[pair] >= config.merge_time - 1e-9]
         events = []
-        for part in _connected(able, due):
+        for part in _connected(able, due) if due else ():
             onset = min(self.since[pair] for pair in due if pair[0] in {g.id for g in part})
             events.append(_merge(groups, part, onset))
         self.since = {pair: s for pair, s in self.since.items() if pair not in due}
