@@ -72,12 +72,16 @@ def test_without_events_nothing_is_fitted():
 
 @pytest.mark.slow
 def test_the_classifier_beats_the_frequencies_on_unseen_scenes():
-    """E8: log loss on seeds that nothing was fitted to."""
+    """E8: log loss on seeds that nothing was fitted to, on true partitions and with wrong copies."""
     entries = [e for e in resolve("suite:friends-meet") if e.repeat == 2 and "queue" not in e.name]
     truths = [(simulate(e.scenario, 30_200, e.repeat, ()).truth, 30_200) for e in entries]
-    scores = event_scores(EventRows.joined(event_rows(t, JointConfig().lag, s) for t, s in truths), FITTED)
-    assert scores["merges"] > 10
-    assert scores["log_loss"] < 0.8 * scores["prior_log_loss"]
+    true, both = (
+        event_scores(EventRows.joined(event_rows(t, JointConfig().lag, s, wrong=wrong) for t, s in truths), FITTED)
+        for wrong in (False, True)
+    )
+    assert true["merges"] > 10
+    assert true["log_loss"] < 0.8 * true["prior_log_loss"]
+    assert both["log_loss"] < both["prior_log_loss"]
 
 
 def test_rates_of_events_do_not_depend_on_the_frame_rate(monkeypatch):
