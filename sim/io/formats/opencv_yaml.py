@@ -1,6 +1,6 @@
 """Reader of a rectified stereo camera from OpenCV's YAML (`cv2.FileStorage`), as `cv2.stereoRectify` leads to it.
 
-The text is read here, as `cv2.FileStorage` itself may end the process at damaged text.
+The text is read here, as the process ended once while `cv2.FileStorage` read damaged text.
 
 Keys: image_width, image_height, px; P1 and P2, the 3 x 4 projections of the rectified left and right camera, P2[0, 3] =
 -P2[0, 0] times the baseline in m; and, as OpenCV knows no world, rotation (3 x 3, world to rectified left camera) and

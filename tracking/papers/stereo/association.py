@@ -5,9 +5,8 @@
 Each point belongs to the group with the largest m_total among those in whose region it lies.
 
 Departures. k_p and k_v are exponents: as factors they cancel. S is the sum of the group's spread Sigma, the covariance
-P of its centroid and that of the point, C_i; the same for velocities. The number of a group's points to the power
-`count_weight` is a further factor, and exp(memory) if the group had the same feature in the last frame. A point in no
-region is attached to a group by eq. 12 (`attached`).
+P of its centroid and that of the point, C_i; the same for velocities. A point in no region is attached to a group by
+eq. 12 (`attached`).
 """
 
 from __future__ import annotations
@@ -24,24 +23,18 @@ from tracking.papers.stereo.measurement import POS, VEL
 from tracking.papers.stereo.space_group import SpaceGroup
 
 
-def associated(
-    groups: Sequence[SpaceGroup], points: SpacePoints, had: Ints, config: StereoConfig, radius: float
-) -> Ints:
+def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: StereoConfig, radius: float) -> Ints:
     """Return for each of M points the number of its group in `groups`, (M,), -1 for none (eqs 8 to 11).
 
-    groups: predicted to this frame. had (M,): number of the group that had the point in the last frame, -1 for none.
-    radius: of the spheres, m, for `attached`.
+    groups: predicted to this frame. radius: of the spheres, m, for `attached`.
     """
-    G, M = len(groups), len(points)
-    if not G or not M:
-        return np.full(M, -1)
+    if not groups or not len(points):
+        return np.full(len(points), -1)
     spread = np.stack([g.spread for g in groups])
     P = np.stack([g.ekf.P for g in groups])
     d2, position = _log_density(points.pos, points.cov, groups, (spread, P), POS, config)
     dv2, velocity = _log_density(points.vel, points.vel_cov, groups, (spread, P), VEL, config)
     total = config.position_weight * position + config.velocity_weight * velocity
-    total += config.count_weight * np.log([max(g.count, 1.0) for g in groups])[:, None]
-    total += config.memory * (np.arange(G)[:, None] == had)
     inside = d2 < config.gate
     owner = np.where(inside.any(0), np.where(inside, total, -np.inf).argmax(0), -1)
     return attached(points, owner, dv2 < config.gate, radius) if config.attach else owner

@@ -79,12 +79,6 @@ class StereoConfig(BackgroundSettings):
     velocity_weight: float = param(
         1.0, (0.0, 3.0), "", "k_v of eq. 10 as an exponent: as a factor it has no effect (ours)"
     )
-    count_weight: float = param(
-        1.0, (0.0, 2.0), "", "exponent of the number of a group's points in its association probability (ours)"
-    )
-    memory: float = param(
-        2.0, (0.0, 10.0), "", "log odds for the group that had the same feature in the last frame (ours)"
-    )
     attach: bool = param(
         True, (True, False), "",
         "points in no region whose sphere overlaps that of a group's point, with a velocity in the region of the "
@@ -125,9 +119,6 @@ class StereoConfig(BackgroundSettings):
         "kernel of this standard deviation; the largest: all features alike (ours)",
         "log", before=20.0, sees="pixels",
     )  # fmt: skip
-    speed_prior: float = param(
-        1.3, (0.1, 10.0), "m/s", "standard deviation of people's velocities, for newborn groups (ours)", "log"
-    )
 
     radius: float = param(
         0.8, (0.1, 2.0), "m", "from pixels: radius of a feature's sphere; features 2 r apart are linked (eq. 12)",

@@ -17,6 +17,8 @@ from tracking.papers.stereo.config import StereoConfig
 
 FASTEST = 2.0
 """m/s: a point moves no faster than this relative to its prediction."""
+SPEED = 1.3
+"""m/s: standard deviation of the velocity of a point that was not seen before."""
 
 
 class PointLinks:
@@ -34,7 +36,7 @@ class PointLinks:
         """Return the detections xyz (M, 3), m, of the next frame as points in space, in the same order.
 
         The velocity is the slope over the time window. Without an earlier place it is 0, with a standard deviation of
-        speed_prior.
+        SPEED.
         """
         frames, M = max(round(config.window_time * self.fps), 1) + 1, len(xyz)
         past = self._past(frames)
@@ -68,7 +70,7 @@ class PointLinks:
         M, unit = len(self.id), np.eye(3)
         known = np.isfinite(self.world[..., 0])
         moving = known.sum(1) > 1
-        vel, vel_cov = np.zeros((M, 3)), np.repeat(config.speed_prior**2 * unit[None], M, 0)
+        vel, vel_cov = np.zeros((M, 3)), np.repeat(SPEED**2 * unit[None], M, 0)
         if moving.any():
             times = np.arange(self.world.shape[1]) / self.fps
             vel[moving], spread = slopes(self.world[moving], known[moving], times)

@@ -99,21 +99,16 @@ def predict(group: SpaceGroup, motion: Motion3D) -> None:
 def newborn(points: SpacePoints, motion: Motion3D, t: float) -> SpaceGroup:
     """Return a tentative group of M points, M at least 1, with their mean position, velocity and covariance (sec. 3.4).
 
-    t: time of the frame, s. The mean velocity is combined with a prior of mean 0 and standard deviation speed_prior
-    (ours), as the depth velocity of features is hardly known.
+    t: time of the frame, s.
     """
     from filterpy.kalman import ExtendedKalmanFilter
 
     config, n = motion.config, len(points)
     ekf = ExtendedKalmanFilter(dim_x=6, dim_z=3)
     ekf.P = np.zeros((6, 6))
-    noise = points.vel_cov.mean(0) / n + config.velocity_spread**2 / n * np.eye(3)
-    prior = config.speed_prior**2 * np.eye(3)
-    gain = prior @ np.linalg.inv(prior + noise)
-    ekf.x[POS, 0], ekf.x[VEL, 0] = points.pos.mean(0), gain @ points.vel.mean(0)
+    ekf.x[POS, 0], ekf.x[VEL, 0] = points.pos.mean(0), points.vel.mean(0)
     ekf.P[np.ix_(POS, POS)] = mean_covariance(points, config)
-    P_vel = prior - gain @ prior
-    ekf.P[np.ix_(VEL, VEL)] = (P_vel + P_vel.T) / 2
+    ekf.P[np.ix_(VEL, VEL)] = points.vel_cov.mean(0) / n + config.velocity_spread**2 / n * np.eye(3)
     group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt)
     group.members = points.pos - group.pos
     return group

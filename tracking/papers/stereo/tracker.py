@@ -129,9 +129,7 @@ class Stereo:
             (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.least_group, c.least_features)
         )
         former = self._former(points.id)
-        row = {g.id: k for k, g in enumerate(self.groups) if g.confirmed}
-        had = np.array([row.get(id, -1) for id in former.tolist()], np.int64)
-        owner = associated(self.groups, points, had, c, radius)
+        owner = associated(self.groups, points, c, radius)
         children: list[SpaceGroup] = []
         for k, group in enumerate(self.groups):
             mine = points.at(owner == k)
