@@ -71,11 +71,17 @@ def _panel(panel: Panel, left: float, top: float, colour: Mapping[str, str]) -> 
         v = top + TOP + (high - b) / (high - low) * (HEIGHT - TOP - BOTTOM)
         return np.stack([u, v], axis=-1)
 
+    clip = f"clip-{left:g}-{top:g}"
+    (u, v), size = at(np.array(x0), np.array(high)), (WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM)
     body = [_text(left + LEFT, top + 20, panel.title, weight="600"), *_axes(panel, at, x, x0, x1, low, high)]
+    if any(len(value) == 3 for value in curves.values()):
+        frame = f'<rect x="{u:.1f}" y="{v:.1f}" width="{size[0]}" height="{size[1]}"/>'
+        body.append(f'<clipPath id="{clip}">{frame}</clipPath>')
     for name, value in curves.items():
         if len(value) == 3:
             band = np.concatenate([at(x, value[1]), at(x, value[2])[::-1]])
-            body.append(f'<polygon points="{_points(band)}" fill="{colour[name]}" opacity="0.15"/>')
+            shape = f'<polygon points="{_points(band)}" fill="{colour[name]}" opacity="0.15" clip-path="url(#{clip})"/>'
+            body.append(shape)
         stroke = f'fill="none" stroke="{colour[name]}" stroke-width="2"'
         body.append(f'<polyline points="{_points(at(x, value[0]))}" {stroke}/>')
         if len(x) <= 12:
