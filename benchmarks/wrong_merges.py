@@ -28,9 +28,9 @@ from tracking.fitting.grouping_scenes import simulated
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.grouping_choice import grouping_of
 from tracking.grouping.known_people import people_as_tracks
+from tracking.scoring.events import ALIKE, KINDS, ComparableEvent, EventMembers, match_events
 
 MERGES = frozenset({"merge", "form"})
-TOLERANCE = 1.0  # s
 SHORT = 4.0  # s
 STANDING = 0.3  # m/s
 ROWS = (
@@ -50,33 +50,31 @@ class Finding:
     people: tuple[int, ...]
 
 
-def alike(a: GroupEvent, b: GroupEvent) -> bool:
-    """Returns True if the members of two events have a Jaccard index of at least 0.5."""
-    one, other = set(a.members), set(b.members)
-    return 2 * len(one & other) >= len(one | other)
-
-
 def findings(truth: Truth, reported: Sequence[tuple[GroupEvent, int]]) -> list[Finding]:
     """Returns all reported merges of a sequence, each as (event, frame of the report), then those that were missed."""
-    true, fps = [e for e in truth.events if e.kind in MERGES], truth.fps
-    open_, out = list(true), []
-    for event, frame in reported:
-        near = [e for e in open_ if alike(e, event) and abs(e.start - event.start) <= TOLERANCE * fps]
-        if near:
-            open_.remove(min(near, key=lambda e: abs(e.start - event.start)))
+    merges, fps, out = [e for e in truth.events if e.kind in MERGES], truth.fps, []
+    true, told = [_comparable(e) for e in merges], [_comparable(e) for e, _ in reported]
+    pairs = match_events(true, told, fps, 1.0)[KINDS.index("merge")].pairs
+    right, found = {id(b) for _, b in pairs}, {id(a) for a, _ in pairs}
+    for (event, frame), own in zip(reported, told, strict=True):
+        if id(own) in right:
             kind = "right"
-        elif any(alike(e, event) for e in true):
+        elif any(own.members.jaccard(e.members) >= ALIKE for e in true):
             kind = "at another time"
         elif _one_group(truth, event, frame):
             kind = "who belong together"
         else:
             kind = "strangers who " + ("stand" if _speed(truth, event, frame) < STANDING else "walk")
         out.append(Finding(kind, event.start / fps, frame / fps, event.members))
-    for event in open_:
+    for event in (e for e, own in zip(merges, true, strict=True) if id(own) not in found):
         short = _lasts(truth, event) <= SHORT
         kind = "missed, together for " + ("up to 4 s" if short else "longer")
         out.append(Finding(kind, event.start / fps, event.start / fps, event.members))
     return out
+
+
+def _comparable(event: GroupEvent) -> ComparableEvent:
+    return ComparableEvent("merge", event.start, None, EventMembers(frozenset(event.members)), (np.nan, np.nan))
 
 
 def _one_group(truth: Truth, event: GroupEvent, frame: int) -> bool:
@@ -116,14 +114,15 @@ def main() -> None:
     parser.add_argument("--list", action="store_true", help="print every wrong and every missed merge")
     add_seeds(parser, "20000:20002")
     args = parser.parse_args()
+    groupings = {g: grouping_of(g) for g in args.grouping}
     for name in args.scenes:
         counts: dict[str, dict[str, Counter[str]]] = {g: defaultdict(Counter) for g in args.grouping}
         for entry in resolve(name):
             for seed in args.seeds:
                 truth = simulated(entry, seed)
                 people = people_as_tracks(truth)
-                for g in args.grouping:
-                    made = derive(people, truth.fps, truth.px_per_m, grouping_of(g))
+                for g, grouping in groupings.items():
+                    made = derive(people, truth.fps, truth.px_per_m, grouping)
                     found = findings(truth, [(e, t.index) for t in made for e in t.events if e.kind in MERGES])
                     if args.list:
                         _list(f"{g}, {truth.name}", found)
