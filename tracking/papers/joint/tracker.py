@@ -27,7 +27,7 @@ Departures, all ours:
 - The Davies-Bouldin index has a prior scatter and a virtual other cluster, sees velocities, and acts per second.
 - People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
   features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
-- p(Z | X) also has the beliefs of pairs (pair_belief).
+- p(Z | X) also has the beliefs of pairs (`tracking.grouping.pair_belief`).
 - In eq. 5 a member moves with a share of the group's velocity and the rest of the own one.
 - The partition is that of least Binder loss, of means over time, with inertia. A member who is missed stays. Ids follow
   the identity rule; onsets of events are dated back.
@@ -46,6 +46,7 @@ from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tra
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
 from tracking.grouping import reported_groups
+from tracking.grouping.pair_belief import PairBelief
 from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
 from tracking.papers.joint.config import JointConfig
@@ -53,7 +54,6 @@ from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import STATE, FrameModel, validity_points
 from tracking.papers.joint.division_kernels import place_newcomer
 from tracking.papers.joint.individuals import moved, process_noise
-from tracking.papers.joint.pair_belief import PairBelief
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
 from tracking.papers.joint.reported_events import ReportedEvents

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.grouping.belief import UNSEEN, beliefs_of_tracks, default_belief
-from tracking.papers.joint.pair_belief import PairBelief
+from tracking.grouping.pair_belief import PairBelief
 
 FPS = 10.0
 
