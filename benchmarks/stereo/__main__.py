@@ -48,7 +48,7 @@ def main() -> None:
     add_seeds(parser, "20000:20030")
     add_data(parser)
     parser.add_argument("--only", help="scenes, separated by commas: cross, merge, stairs, crowded")
-    parser.add_argument("--options", help="decisions: parameters, separated by commas")
+    parser.add_argument("--options", help="decisions: parameters, separated by commas; scenes: stereo, preset paper")
     parser.add_argument(
         "--chart", type=Path, default=Path("stereo.svg"), help="trajectories, density, cost: the SVG to write"
     )

@@ -20,9 +20,9 @@ from tracking.papers.stereo.picture_points import PicturePoints, stereo_camera
 
 TRACKING = frozenset({
     "gate", "position_weight", "velocity_weight", "attach", "point_covariance",
-    "person_spread", "velocity_spread", "spread_weight", "spread_time", "accel_noise", "climb_noise", "centroid_noise",
-    "height_noise", "density_width", "radius", "point_radius", "point_noise", "least_group",
-    "least_features", "merge_gate", "merge_time", "split", "split_time", "split_speed", "confirm_time", "coast_time",
+    "person_spread", "velocity_spread", "spread_weight", "spread_time", "accel_noise", "centroid_noise",
+    "density_width", "radius", "point_radius", "point_noise", "least_group",
+    "least_features", "merge_gate", "split", "split_time", "split_speed", "confirm_time", "coast_time",
     "report_coast",
 })  # fmt: skip
 """Parameters that change no points."""

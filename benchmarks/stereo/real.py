@@ -21,7 +21,7 @@ def real(args: argparse.Namespace) -> list[float]:
     paths = [args.data / "stereo" / f"aloe{side}.jpg" for side in "LR"]
     whole = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in paths]
     left, right = (cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for image in whole)
-    own = SubtractionStereo(LARGEST, BLOCK).dense(left, right).disparity
+    own = SubtractionStereo(LARGEST, BLOCK).dense(left, right)
     other = cv2.StereoSGBM.create(0, LARGEST + 1, 5, 600, 2400, 1, 31, 5, 100, 2).compute(left, right) / 16.0
     matched = np.isfinite(own)
     apart = np.abs(own - other)[matched & (other > 0)]

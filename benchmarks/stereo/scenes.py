@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks.stereo.further_scenes import further_entries
 from benchmarks.stereo.kept_points import shared_points
 from benchmarks.stereo.stored_rows import Row, Stored
 from benchmarks.support.in_memory import in_memory
@@ -43,12 +44,8 @@ ABLATIONS: Mapping[str, Mapping[str, object]] = {
     "point_covariance": {"point_covariance": False},
     "attach": {"attach": False},
     "velocity_weight": {"velocity_weight": 0.0},
-    "climb_noise": {"climb_noise": 0.5},
-    "height_noise": {"height_noise": 0.1},
     "back_check": {"back_check": 5.0},
-    "left_right": {"left_right": False},
     "spread_weight": {"spread_weight": 0.1},
-    "merge_time": {"merge_time": 0.0},
     "split": {"split": False},
     "confirm_time": {"confirm_time": 0.0},
     "coast_time": {"coast_time": 10.0, "report_coast": 5.0},
@@ -65,10 +62,13 @@ class Variant:
 
 
 def entries(only: str | None) -> dict[str, Entry]:
-    """Returns the scenes of the suite by name, without its prefix; only: names, separated by commas."""
-    wanted = None if only is None else set(only.split(","))
+    """Returns the scenes of the suite by name, without its prefix; only: names of these or of the further scenes,
+    separated by commas."""
     found = {e.name.removeprefix("stereo-"): e for e in resolve(SUITE)}
-    return {name: e for name, e in found.items() if wanted is None or name in wanted}
+    if only is None:
+        return found
+    every = {**found, **further_entries()}
+    return {name: every[name] for name in every if name in set(only.split(","))}
 
 
 def recordings(entry: Entry, seeds: Iterable[int]) -> Iterator[tuple[int, Recording]]:
@@ -156,6 +156,8 @@ def measured(args: argparse.Namespace, variants: tuple[Variant, ...]) -> dict[st
 def scenes(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
     """Prints the table of scenes, for the defaults and the preset `paper`, and returns the rows."""
     variants = (Variant("stereo"), Variant("preset paper", StereoConfig.preset("paper").as_dict()))
+    if args.options is not None:
+        variants = tuple(v for v in variants if v.name in args.options.split(","))
     made = measured(args, variants)
     rows = {f"{name}, {v}": _cells(name, list(of.values())) for name, by in made.items() for v, of in by.items()}
     table("Scenes of the paper", "scene", COLUMNS, rows)

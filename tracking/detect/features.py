@@ -35,6 +35,8 @@ BORDER = 1
 """px: new corners keep away from the edge of their region by so much, as the ground shows through there."""
 SAMPLE = 1
 """px: a feature's disparity is the median in a square of 2 SAMPLE + 1 px."""
+CENTRE = np.float32(0.5)
+"""px: OpenCV counts places from the centre of the first pixel, the camera from its corner."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +86,9 @@ class FeatureRules:
 class Features:
     """The features of a left camera, followed from frame to frame.
 
-    State of N features: id (N,), from 1, none given twice; uv (N, 2) px; world (N, K, 3) their points in the last K
-    frames, m, nan where they were not measured; age (N,): frames since they were found. grey (H, W): the last picture,
-    None before the first.
+    State of N features: id (N,), from 1, none given twice; uv (N, 2): places in the picture, px, in the camera's count;
+    world (N, K, 3) their points in the last K frames, m, nan where they were not measured; age (N,): frames since they
+    were found. grey (H, W): the last picture, None before the first.
     """
 
     def __init__(self, camera: Camera, fps: float) -> None:
@@ -132,12 +134,12 @@ class Features:
 
     def _follow(self, before: Image, now: Image, mask: Bools, rules: FeatureRules) -> None:
         """Moves the features from one picture to the next; drops those that are lost, or not in the mask any more."""
-        start: Any = self.uv[:, None]
+        start: Any = (self.uv - CENTRE)[:, None]
         follow: Any = partial(cv2.calcOpticalFlowPyrLK, winSize=WINDOW, maxLevel=LEVELS)
         found, there, _ = follow(before, now, start, None)
         again, back, _ = follow(now, before, found, None)
         off = np.abs(again - start)[:, 0].max(1)
-        self.uv = found[:, 0]
+        self.uv = found[:, 0] + CENTRE
         high, wide = mask.shape
         inside = (self.uv >= 0).all(1) & (self.uv < [wide, high]).all(1)
         good = inside & (there[:, 0] == 1) & (back[:, 0] == 1) & (off <= rules.back)
@@ -168,7 +170,7 @@ class Features:
         if not free.any():
             return
         found = cv2.goodFeaturesToTrack(grey, room, QUALITY, max(rules.spacing, 1.0), mask=free, blockSize=3)
-        new = np.zeros((0, 2), np.float32) if found is None else found[:, 0]
+        new = np.zeros((0, 2), np.float32) if found is None else found[:, 0] + CENTRE
         self.id = np.concatenate([self.id, np.arange(self.next_id, self.next_id + len(new))])
         self.next_id += len(new)
         self.uv = np.concatenate([self.uv, new])

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from sim.scene.stereo import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import FeatureRules, Features, slopes
 
@@ -110,3 +111,17 @@ def test_the_stated_covariance_of_a_velocity_is_that_of_its_errors() -> None:
     stated = np.sqrt(camera.rotation[2] @ cov @ camera.rotation[2] / spread[0])
     assert stated == pytest.approx(1.8, abs=0.1)
     assert measured == pytest.approx(stated, rel=0.1)
+
+
+def test_a_feature_lies_in_space_where_the_camera_sees_it() -> None:
+    """Pixel (row, column) has its centre at (column + 0.5, row + 0.5); for OpenCV that place is (column, row)."""
+    camera = rig(0.0, baseline=0.5)
+    spot = np.array([[150.5, 120.5, D]])
+    v, u = np.mgrid[:240, :320] + 0.5
+    image = np.rint(255 * np.exp(-((u - spot[0, 0]) ** 2 + (v - spot[0, 1]) ** 2) / 8)).astype(np.uint8)
+    mask, features = np.zeros((240, 320), bool), Features(camera, FPS)
+    mask[100:140, 130:170] = True
+    for _ in range(8):
+        found = features.step(image, mask, np.full((240, 320), D, np.float32), RULES)
+    nearest = np.linalg.norm(project_pair(camera, found.pos) - spot, axis=1).min()
+    assert nearest < 0.1

@@ -27,10 +27,6 @@ class StereoConfig(BackgroundSettings):
     block: float = param(
         0.27, (0.1, 1.0), "m", "from pixels: width of the block that is compared in matching", "log", sees="pixels"
     )
-    left_right: bool = param(
-        True, (True, False), "", "from pixels: left and right matches must agree within 1 px", "categorical",
-        sees="pixels",
-    )  # fmt: skip
     least_height: float = param(
         0.5, (0.0, 1.5), "m", "from pixels: a lower foreground region is no person (sec. 2)", sees="pixels"
     )
@@ -101,17 +97,9 @@ class StereoConfig(BackgroundSettings):
     accel_noise: float = param(
         0.5, (0.05, 5.0), "m/s^1.5", "process noise: white acceleration per root second (eq. 2)", "log"
     )
-    climb_noise: float = param(
-        0.1, (0.02, 5.0), "m/s^1.5", "from pixels: as accel_noise, of the height (ours)", "log", before=0.5,
-        sees="pixels",
-    )  # fmt: skip
     centroid_noise: float = param(
         0.1, (0.005, 1.0), "m",
         "measurement noise of a group's mean beside that of its points, as points come and go (ours)", "log",
-    )  # fmt: skip
-    height_noise: float = param(
-        0.2, (0.005, 1.0), "m", "from pixels: as centroid_noise, of the height, as features lie anywhere on a body "
-        "(ours)", "log", before=0.1, sees="pixels",
     )  # fmt: skip
     density_width: float = param(
         0.15, (0.05, 20.0), "m",
@@ -136,9 +124,6 @@ class StereoConfig(BackgroundSettings):
     )
     merge_gate: float = param(
         9.0, (0.5, 30.0), "", "squared Mahalanobis radius of the six-dimensional regions of merging (eq. 13)"
-    )
-    merge_time: float = param(
-        0.5, (0.0, 3.0), "s", "time for which the regions must overlap before groups merge (ours)"
     )
     split: bool = param(True, (True, False), "", "groups whose points are unlinked parts split (ours)", "categorical")
     split_time: float = param(

@@ -5,8 +5,8 @@
 MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
 Two ellipsoids are tested exactly (tracking.filters.ellipsoid_overlap).
 
-Departures: regions must overlap for `merge_time`; only confirmed groups merge. The paper does not say what P of a
-merged group is: here it is that of a weighted mean, sum of n_i^2 P_i. The group with most points keeps its id.
+Departures: only confirmed groups merge. The paper does not say what P of a merged group is: here it is that of a
+weighted mean, sum of n_i^2 P_i. The group with most points keeps its id.
 """
 
 from __future__ import annotations
@@ -24,33 +24,17 @@ from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.space_group import SpaceGroup
 
 SETTLED = 1.0
-"""s: a group that was there for a shorter time before the onset enters with the other one; that is no merge (ours)."""
+"""s: a group that was there for a shorter time enters with the other one; that is no merge (ours)."""
 
 
-class SpaceMerging:
-    """Merges groups whose regions overlap for long enough.
+def merge(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
+    """Merge groups of the list, in place, at time t (s) and return the events: merge, or enter.
 
-    State: since, a dict by pair of ids, the smaller first: the time, s, since which their regions have overlapped.
+    An event is an enter if at most one of the groups has been there for 1 s.
     """
-
-    def __init__(self) -> None:
-        self.since: dict[tuple[int, int], float] = {}
-
-    def step(self, groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
-        """Merge groups of the list, in place, at time t (s) and return the events: merge, or enter.
-
-        An event is an enter if at most one of the groups was there for 1 s before the onset.
-        """
-        able = sorted((g for g in groups if g.confirmed), key=lambda g: g.id)
-        near = {(a.id, b.id) for a, b in _close_pairs(able, config.merge_gate) if overlap(a, b, config.merge_gate)}
-        self.since = {pair: self.since.get(pair, t) for pair in near}
-        due = [pair for pair in sorted(near) if t - self.since[pair] >= config.merge_time - 1e-9]
-        events = []
-        for part in _connected(able, due) if due else ():
-            onset = min(self.since[pair] for pair in due if pair[0] in {g.id for g in part})
-            events.append(_merge(groups, part, onset))
-        self.since = {pair: s for pair, s in self.since.items() if pair not in due}
-        return events
+    able = sorted((g for g in groups if g.confirmed), key=lambda g: g.id)
+    near = [(a.id, b.id) for a, b in _close_pairs(able, config.merge_gate) if overlap(a, b, config.merge_gate)]
+    return [_merge(groups, part, t) for part in (_connected(able, near) if near else ())]
 
 
 def overlap(a: SpaceGroup, b: SpaceGroup, gate: float) -> bool:
@@ -82,15 +66,15 @@ def pooled(states: Array, spreads: Array, counts: Array) -> tuple[Array, Array]:
     return X, np.einsum("k,kij->ij", n, spreads + away[:, :, None] * away[:, None])
 
 
-def _connected(able: Sequence[SpaceGroup], due: list[tuple[int, int]]) -> list[list[SpaceGroup]]:
-    """Returns the sets of two or more groups that are connected by the pairs of ids `due`."""
+def _connected(able: Sequence[SpaceGroup], pairs: list[tuple[int, int]]) -> list[list[SpaceGroup]]:
+    """Returns the sets of two or more groups that are connected by pairs of ids."""
     row = {g.id: k for k, g in enumerate(able)}
-    i, j = np.array([[row[a], row[b]] for a, b in due], np.int64).reshape(-1, 2).T
+    i, j = np.array([[row[a], row[b]] for a, b in pairs], np.int64).reshape(-1, 2).T
     label = connected_components(coo_array((np.ones(len(i)), (i, j)), (len(able), len(able))), directed=False)[1]
     return [[able[k] for k in np.flatnonzero(label == c).tolist()] for c in np.unique(label[i]).tolist()]
 
 
-def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], onset: float) -> WholeGroupEvent:
+def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> WholeGroupEvent:
     """Replaces the parts by their union in the list, and returns the event. The group with most points survives."""
     kept = max(parts, key=lambda g: (g.count, -g.id))
     counts = np.array([g.count for g in parts])
@@ -98,12 +82,12 @@ def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], onset: float) -> W
     X, kept.spread = pooled(np.stack([g.ekf.x[:, 0] for g in parts]), np.stack([g.spread for g in parts]), counts)
     kept.ekf.x, kept.ekf.P = X[:, None], np.einsum("k,kij->ij", n**2, np.stack([g.ekf.P for g in parts]))
     kept.members = np.concatenate([g.members + p for g, p in zip(parts, old, strict=True)]) - kept.pos
-    kept.count, settled = float(counts.sum()), [g for g in parts if g.first_seen <= onset - SETTLED]
+    kept.count, settled = float(counts.sum()), [g for g in parts if g.first_seen <= t - SETTLED]
     kept.first_seen, kept.last_seen = min(g.first_seen for g in parts), max(g.last_seen for g in parts)
     kept.measured_time, kept.apart_since = max(g.measured_time for g in parts), float("nan")
     before = tuple(sorted(g.id for g in parts))
     groups[:] = [g for g in groups if g is kept or g not in parts]
     x, y = kept.pos[:2].tolist()
     if len(settled) < 2:
-        return WholeGroupEvent("enter", onset, (), (kept.id,), (x, y))
-    return WholeGroupEvent("merge", onset, before, (kept.id,), (x, y))
+        return WholeGroupEvent("enter", t, (), (kept.id,), (x, y))
+    return WholeGroupEvent("merge", t, before, (kept.id,), (x, y))

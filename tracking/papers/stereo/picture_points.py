@@ -37,7 +37,7 @@ class PicturePoints:
         self.foreground.follow(config, config.most_foreground)
         largest = self.camera.focal_px[0] * self.camera.baseline / config.nearest
         block = odd(config.block * self.foreground.scale, 5)
-        self.stereo = SubtractionStereo(largest, block, config.left_right)
+        self.stereo = SubtractionStereo(largest, block)
 
     def points(self, image: Image, right: Image) -> SpacePoints | None:
         """Return the features of people as points in space; None if more is foreground than `most_foreground`.
@@ -55,9 +55,7 @@ class PicturePoints:
             return None
         c, left = self.config, grey(image)
         blobs = self.foreground.person_blobs(seen.mask)
-        boxes = np.rint(blobs.box).astype(np.int64)
-        boxes[:, 2:] += boxes[:, :2]
-        disparity = self.stereo.match(left, grey(right), blobs.label > 0, boxes).disparity
+        disparity = self.stereo.match(left, grey(right), blobs.label > 0).disparity
         deviations = (c.pixel_noise, c.pixel_noise, c.disparity_noise)
         limits = PersonLimits(c.least_height, c.most_height, c.least_width, deviations)
         people = person_mask(blobs, disparity, self.camera, limits)

@@ -78,15 +78,11 @@ class Motion3D:
 
 
 def motion_model(config: StereoConfig, dt: float) -> Motion3D:
-    """Return the model of motion for a step of dt s, with filterpy's Q_continuous_white_noise.
-
-    Ours: the height has a process noise of its own, as people hardly accelerate upwards.
-    """
+    """Return the model of motion for a step of dt s, with filterpy's Q_continuous_white_noise."""
     from filterpy.common import Q_continuous_white_noise
 
     Phi = np.kron(np.eye(3), np.array([[1.0, dt], [0.0, 1.0]]))
-    density = np.square([config.accel_noise, config.accel_noise, config.climb_noise])
-    Q = np.kron(np.diag(density), Q_continuous_white_noise(2, dt))
+    Q = np.kron(config.accel_noise**2 * np.eye(3), Q_continuous_white_noise(2, dt))
     return Motion3D(config, dt, Phi, Q)
 
 
@@ -126,10 +122,9 @@ def mean_position(points: SpacePoints, measurement: Measurement, config: StereoC
 def mean_covariance(points: SpacePoints, config: StereoConfig) -> Array:
     """Return the covariance (3, 3), m^2, of the mean of M points as a measurement of their group's position.
 
-    It is that of the mean of the points' errors, and centroid_noise^2 in x and y, height_noise^2 in z.
+    It is that of the mean of the points' errors, and centroid_noise^2 in each coordinate.
     """
-    own = np.square([config.centroid_noise, config.centroid_noise, config.height_noise])
-    return np.asarray(points.cov.mean(0) / len(points) + np.diag(own))
+    return np.asarray(points.cov.mean(0) / len(points) + config.centroid_noise**2 * np.eye(3))
 
 
 def spread_of(points: SpacePoints, config: StereoConfig) -> Array:

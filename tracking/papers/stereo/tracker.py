@@ -34,7 +34,7 @@ from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import POS, Measurement, PairMeasurement, PlaceMeasurement
-from tracking.papers.stereo.merging import SpaceMerging
+from tracking.papers.stereo.merging import merge
 from tracking.papers.stereo.picture_points import PicturePoints
 from tracking.papers.stereo.point_links import PointLinks
 from tracking.papers.stereo.report import ShownFrame, expected_places, space_tracks
@@ -48,10 +48,9 @@ FEATURE_OUTLINE = 0.5
 class Stereo:
     """The tracker `stereo`: groups of people in space, from pairs of pictures or from points.
 
-    State: config, which may be replaced between two frames; groups, a list; ids; merging, the times since which pairs
-    overlap; pictures: from pictures to points, None from points; links: from detections to points; motion: the model of
-    a step; had: ids of the points of the last frame and of the confirmed groups that had them; plane; context. All but
-    config exist after `reset` only.
+    State: config, which may be replaced between two frames; groups, a list; ids; pictures: from pictures to points,
+    None from points; links: from detections to points; motion: the model of a step; had: ids of the points of the last
+    frame and of the confirmed groups that had them; plane; context. All but config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("stereo", "points")
@@ -70,7 +69,7 @@ class Stereo:
         del seed
         self.context = context
         self.groups: list[SpaceGroup] = []
-        self.ids, self.merging = GroupIds(), SpaceMerging()
+        self.ids = GroupIds()
         self.pictures = None if context.background is None else PicturePoints(self.config, context)
         self.links, self.motion = PointLinks(context.fps), motion_model(self.config, 1 / context.fps)
         self.measurement: Measurement = (
@@ -100,7 +99,7 @@ class Stereo:
             predict(group, self.motion)
         if points is not None:
             self._measure(points, t)
-        events = self.merging.step(self.groups, self.config, t)
+        events = merge(self.groups, self.config, t)
         events += confirm(self.groups, self.config, t, self.ids)
         events += remove_lost(self.groups, self.config, t)
         outline = FOOTPRINT * (FEATURE_OUTLINE if self.pictures is not None else 1.0)

@@ -58,8 +58,7 @@ def test_a_linear_measurement_makes_it_a_kalman_filter() -> None:
         kf.predict()
         pos = points.pos + DT * k * np.array([1.0, 0.3, 0.0]) + 0.1 * r.standard_normal((8, 3))
         measure(group, at_places(pos, points.cov), PlaceMeasurement(), motion, DT * k)
-        own = np.square([config.centroid_noise, config.centroid_noise, config.height_noise])
-        kf.update(pos.mean(0)[:, None], R=0.01 / 8 * np.eye(3) + np.diag(own))
+        kf.update(pos.mean(0)[:, None], R=(0.01 / 8 + config.centroid_noise**2) * np.eye(3))
         assert np.abs(group.ekf.x - kf.x).max() < 1e-12
         assert np.abs(group.ekf.P - kf.P).max() < 1e-12
 
@@ -68,7 +67,7 @@ def test_a_linear_measurement_makes_it_a_kalman_filter() -> None:
 def test_errors_have_the_stated_covariance(depth: float) -> None:
     """NEES of the state over 60 runs of 2 s: 6 in the mean, within 99 % of chi-square."""
     camera = rig(**FIT)
-    config = StereoConfig(centroid_noise=0.05, height_noise=0.12, accel_noise=0.5, climb_noise=0.2, density_width=20.0)
+    config = StereoConfig(centroid_noise=0.05, accel_noise=0.5, density_width=20.0)
     measurement, motion, n, runs = PairMeasurement(camera), motion_model(config, DT), 12, 60
     deviations, nees = np.array([0.3, 0.3, 0.25]), []
     for run in range(runs):
@@ -82,8 +81,7 @@ def test_errors_have_the_stated_covariance(depth: float) -> None:
         group = None
         for k in range(60):
             x = motion.Phi @ x + noise @ r.standard_normal(6)
-            own = np.array([config.centroid_noise, config.centroid_noise, config.height_noise])
-            true = x[POS] + members + own * r.standard_normal(3)
+            true = x[POS] + members + config.centroid_noise * r.standard_normal(3)
             uvd = project_pair(camera, true) + deviations * r.standard_normal((n, 3))
             pos = back_project(camera, uvd)
             points = at_places(pos, point_covariances(camera, pos, deviations**2))

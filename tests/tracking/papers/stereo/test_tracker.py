@@ -135,7 +135,7 @@ def test_groups_of_one_velocity_merge_and_opposite_ones_never() -> None:
     for y in (5.0, 5.3, 5.6):
         a = walkers(4, 20, [-1.5, 5.0, 1], [1.0, 0, 0], 100)
         b = walkers(5, 20, [1.8, y, 1], [-1.0, 0, 0], 100, first=100)
-        assert "merge" not in kinds(scripted(together(a, b), StereoConfig(merge_time=0.0))[1])
+        assert "merge" not in kinds(scripted(together(a, b))[1])
 
 
 def test_a_hidden_group_merges_with_nobody() -> None:
@@ -143,7 +143,7 @@ def test_a_hidden_group_merges_with_nobody() -> None:
     a, b = ([x, 5, 1] for x in (0, 2.4))
     seen = together(walkers(0, 15, a, [0, 0.5, 0], 60, sd=0.15), walkers(1, 15, b, [0, 0.5, 0], 60, first=100, sd=0.15))
     hidden = together(walkers(0, 15, [0, 6, 1], [0, 0.5, 0], 43, sd=0.15))
-    tracker, tracks = scripted([*seen, *hidden], StereoConfig(merge_time=0.1, merge_gate=14.0))
+    tracker, tracks = scripted([*seen, *hidden], StereoConfig(merge_gate=14.0))
     assert kinds(tracks) == ["enter", "enter"]
     one, other = tracker.groups
     d = (other.ekf.x - one.ekf.x)[:, 0]

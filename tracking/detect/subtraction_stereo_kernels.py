@@ -1,0 +1,166 @@
+"""Kernels of tracking.detect.subtraction_stereo: block matching at the pixels of a mask.
+
+The same integers as OpenCV's `cv2.StereoBM`, at fewer pixels: its prefilter (Sobel along the row, clipped), the sum of
+absolute differences (SAD) over a square block, its test of uniqueness, and its parabola. Row sums of differences are
+made for the rows and columns that blocks of masked pixels touch. The SAD of a pixel is that of the pixel above it, with
+one row more and one less.
+
+Disparities d are in the order D - 1 to 0 px, so that the right pictures' columns x - D + 1 to x are read in order. A
+run (row, first column, end) is a maximal sequence of pixels of a mask in one row.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.compiler import njit
+from sim.types import Bools, Image
+
+Runs = NDArray[np.int32]
+Shorts = NDArray[np.int16]
+CAP = 31
+"""Largest absolute value of the filtered pictures, OpenCV's default."""
+STEPS = 16
+"""Disparity steps per px."""
+
+
+@njit(cache=True)
+def reach(runs: Runs, half: int, shape: tuple[int, int]) -> Bools:
+    """Returns the pixels (H, W) of a picture of this shape at most `half` rows above or below runs (R, 3)."""
+    near = np.zeros(shape, np.bool_)
+    for k in range(len(runs)):
+        row, first, end = runs[k]
+        near[max(row - half, 0) : row + half + 1, first:end] = True
+    return near
+
+
+@njit(cache=True)
+def sobel(picture: Image, row: int, first: int, end: int, filtered: Shorts) -> None:
+    """Fills columns first to end of a row of `filtered` (H, W): 0 to 2 CAP, CAP at the first and last column.
+
+    Beyond the first and last row lies the next row inside.
+    """
+    high, wide = picture.shape
+    above = row - 1 if row > 0 else min(1, high - 1)
+    below = row + 1 if row < high - 1 else max(high - 2, 0)
+    for x in range(max(first, 1), min(end, wide - 1)):
+        slope = (
+            np.int32(picture[above, x + 1]) - np.int32(picture[above, x - 1])
+            + 2 * (np.int32(picture[row, x + 1]) - np.int32(picture[row, x - 1]))
+            + np.int32(picture[below, x + 1]) - np.int32(picture[below, x - 1])
+        )  # fmt: skip
+        filtered[row, x] = min(max(slope, -CAP), CAP) + CAP
+    if first == 0:
+        filtered[row, 0] = CAP
+    if end == wide:
+        filtered[row, wide - 1] = CAP
+
+
+@njit(cache=True)
+def filtered_pair(left: Image, right: Image, needed: Runs, half: int, D: int, filters: Shorts) -> None:
+    """Fills `filters` (2, H, W), the filtered left and right picture, where `row_sums` of the runs `needed` (R, 3)
+    reads them."""
+    wide = left.shape[1]
+    k = 0
+    while k < len(needed):
+        row, first, end = needed[k]
+        while k < len(needed) and needed[k, 0] == row:
+            end = needed[k, 2]
+            k += 1
+        sobel(left, row, first - half, end + half, filters[0])
+        sobel(right, row, max(first - half - D + 1, 0), min(end + half, wide), filters[1])
+
+
+@njit(cache=True)
+def row_sums(left: Shorts, right: Shorts, first: int, end: int, half: int, apart: Shorts, sums: Shorts) -> None:
+    """Fills columns first to end of `sums` (W, D): the sums over 2 half + 1 columns of the absolute differences at each
+    disparity.
+
+    left, right (W,): a row of the filtered pictures. apart (W, D): work space, the differences themselves.
+    """
+    D = sums.shape[1]
+    for x in range(first - half, end + half):
+        value, other, here = left[x], right[x - D + 1 : x + 1], apart[x]
+        for d in range(D):
+            here[d] = np.int16(max(value, other[d]) - min(value, other[d]))
+    total = sums[first]
+    total[:] = 0
+    for x in range(first - half, first + half + 1):
+        here = apart[x]
+        for d in range(D):
+            total[d] += here[d]
+    for x in range(first + 1, end):
+        total, before, new, old = sums[x], sums[x - 1], apart[x + half], apart[x - half - 1]
+        for d in range(D):
+            total[d] = np.int16(before[d] + new[d] - old[d])
+
+
+@njit(cache=True)
+def best(sad: NDArray[np.int32], unique: int) -> float:
+    """Returns the disparity, px, with the least of the SADs (D,), the largest disparity first; nan if there is none.
+
+    There is none if another disparity more than 1 px away has a SAD at most `unique` % larger, or if the best is 0.
+    """
+    D = len(sad)
+    least = sad[0]
+    for d in range(1, D):
+        least = min(least, sad[d])
+    limit = np.int32(least + least * unique // 100)
+    close = np.int32(0)
+    for d in range(D):
+        close += np.int32(sad[d] <= limit)
+    k = 0
+    while sad[k] != least:
+        k += 1
+    for d in range(max(k - 1, 0), min(k + 2, D)):
+        close -= np.int32(sad[d] <= limit)
+    if close:
+        return np.nan
+    more = sad[k + 1] if k < D - 1 else sad[D - 2]
+    less = sad[k - 1] if k > 0 else sad[1]
+    bend = more + less - 2 * least + abs(more - less)
+    part = 0
+    if bend:
+        part = abs(more - less) * 256 // bend
+        part = part if more > less else -part
+    found = ((D - 1 - k) * 256 + part + 15) >> 4
+    return found / STEPS if found > 0 else np.nan
+
+
+@njit(cache=True)
+def block_match(
+    runs: Runs, needed: Runs, half: int, D: int, unique: int, filters: Shorts, found: NDArray[np.float32]
+) -> None:
+    """Fills `found` (H, W) with the disparities, px, at the pixels of the runs (R, 3), in raster order.
+
+    needed (Q, 3): runs of the pixels at most `half` rows above or below them; filters (2, H, W): the filtered pictures.
+    Blocks and the columns of their matches must lie inside the pictures.
+    """
+    wide = found.shape[1]
+    kept = 2 * half + 2
+    sums = np.empty((kept, wide, D), np.int16)
+    apart = np.empty((wide, D), np.int16)
+    sad = np.empty((wide, D), np.int32)
+    at = np.full(wide, -2)
+    q = 0
+    for k in range(len(runs)):
+        row, first, end = runs[k]
+        while q < len(needed) and needed[q, 0] <= row + half:
+            y = needed[q, 0]
+            row_sums(filters[0, y], filters[1, y], needed[q, 1], needed[q, 2], half, apart, sums[y % kept])
+            q += 1
+        for x in range(first, end):
+            total = sad[x]
+            if at[x] == row - 1:
+                new, old = sums[(row + half) % kept, x], sums[(row - half - 1) % kept, x]
+                for d in range(D):
+                    total[d] += np.int32(new[d]) - np.int32(old[d])
+            else:
+                total[:] = 0
+                for y in range(row - half, row + half + 1):
+                    new = sums[y % kept, x]
+                    for d in range(D):
+                        total[d] += np.int32(new[d])
+            at[x] = row
+            found[row, x] = best(total, unique)
