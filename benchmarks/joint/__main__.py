@@ -11,6 +11,8 @@ particles   friends-meet: accuracy and frames/s over N_x and N_z (--chart FILE.s
 events      a suite (--suite): event F1, hits, false alarms, misses and latency, beside group-pda and the default
             grouping over blob and particle
 ablation    friends-meet: scores without each departure from the paper that has a parameter, paired differences
+process     friends-meet: the Dirichlet process as validity and as dynamics of partitions, with and without beliefs,
+            paired differences to the paper's validity and events
 
 A row of table2 holds a sequence's scores, means over filter seeds. Group scores are pooled over the frames of all
 sequences together, strict and core; differences are of the means over sequences, with 95 % intervals. Detections are
@@ -66,9 +68,12 @@ DEPARTURES = (
     "belief_rate=0", "group_share=1", "group_time=0", "inertia=0", "newcomers=alone", "validity_rate=0",
     "size_prior=none", "velocity_time=0", "lag=0.1", "parts_sharpness=0", "scatter_people=0", "normaliser=sampled",
     "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
-    "estimate=histogram",
+    "estimate=histogram", "validity=bayesian", "partition_dynamics=dirichlet",
+    "validity=bayesian partition_dynamics=dirichlet",
 )  # fmt: skip
 """Settings of the mode ablation."""
+PROCESS = ("", "validity=bayesian", "partition_dynamics=dirichlet", "validity=bayesian partition_dynamics=dirichlet")
+"""Settings of the mode process, run with beliefs and without."""
 
 
 @dataclass(frozen=True)
@@ -304,11 +309,27 @@ def ablation(given: argparse.Namespace) -> None:
         tables.row([setting or "defaults", *pooled(rows, "_core")[:4], others(rows)[0], *differences])
 
 
+def process(given: argparse.Namespace) -> None:
+    """Prints a table: rows are settings with and without beliefs, with differences to the first row of each half."""
+    made = list(sequences(given.seeds))
+    deltas = ("GDSR", "MOTA", "1-FP", "1-FN")
+    tables.head(["setting", *(f"{k}, %" for k in SHARES), *OTHERS, *(f"Δ {k}" for k in deltas), "Δ event F1"])
+    for belief in ("", "belief_rate=0"):
+        base: list[Row] = []
+        for setting in given.only.split(",") if given.only else PROCESS:
+            words = [*given.set, *setting.split(), *belief.split()]
+            rows = [mean_row(measured(s, Variant(""), given.filter_seeds, words)) for s in made]
+            base = base or rows
+            differences = [difference(rows, base, key) for key in (*(f"group_{k}" for k in deltas), "event_F1")]
+            name = " ".join([setting, belief]).strip() or "defaults"
+            tables.row([name, *pooled(rows, "_core")[:4], *others(rows), *differences])
+
+
 def main() -> None:
     parser = new_parser(__doc__)
     modes = {
         "table2": table2, "recordings": recordings, "classifier": classifier, "particles": particles, "events": events,
-        "ablation": ablation,
+        "ablation": ablation, "process": process,
     }  # fmt: skip
     parser.add_argument("mode", choices=modes)
     add_seeds(parser, "20000:20001")
@@ -316,7 +337,9 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of joint")
     parser.add_argument("--suite", default="standard", help="of mode events")
     parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="mode particles: draw it")
-    parser.add_argument("--only", help="table2, recordings, events: variants; ablation: settings; separated by commas")
+    parser.add_argument(
+        "--only", help="table2, recordings, events: variants; ablation, process: settings; separated by commas"
+    )
     add_data(parser)
     given = parser.parse_args()
     modes[given.mode](given)

@@ -6,6 +6,7 @@ writes; it names the command, the seeds and the scores of the fit.
 
 from __future__ import annotations
 
+import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +18,14 @@ from sim.types import Array
 from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.papers.joint import group_events_kernels as events
+from tracking.papers.joint.cluster_evidence_kernels import SUMS
 
 FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8"))[
     "params"
 ]
+FITTED_MIXTURE: dict[str, float] = tomllib.loads(
+    Path(__file__).with_name("dirichlet_process.toml").read_text(encoding="utf-8")
+)["params"]
 SIZE_PRIORS = {"none": events.SIZE_NONE, "merge": events.SIZE_MERGE, "all": events.SIZE_ALL}
 TERMS = (
     "distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "bias",
@@ -30,6 +35,11 @@ TERMS = (
 
 def _weight(event: str, term: str, unit: str, meaning: str) -> Any:
     return param(FITTED[f"{event}_{term}"], (-100.0, 100.0), unit, f"{event}: {meaning}", tunable=False)
+
+
+def _mixture(name: str, values: tuple[float, float], unit: str, meaning: str) -> Any:
+    value = FITTED_MIXTURE[name]
+    return param(value, values, unit, f"Dirichlet process: {meaning} (ours)", "log", before=value)
 
 
 @dataclass(frozen=True)
@@ -111,6 +121,14 @@ class JointConfig(BackgroundSettings):
         sees="pixels",
     )
 
+    validity: str = param(
+        "davies-bouldin",
+        ("davies-bouldin", "bayesian"),
+        "",
+        "davies-bouldin: the paper's cluster validity; bayesian: log p(Z, X) of a Dirichlet process mixture (ours)",
+        "categorical",
+        before="davies-bouldin",
+    )
     validity_rate: float = param(
         20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"
     )
@@ -129,6 +147,40 @@ class JointConfig(BackgroundSettings):
     apart: float = param(2.0, (0.5, 10.0), "m", "D_0: distance of a virtual other cluster (ours)", "log")
     velocity_time: float = param(
         1.0, (0.0, 5.0), "s", "m per m/s: weight of velocities beside places in the validity (ours)"
+    )
+
+    partition_dynamics: str = param(
+        "classifier",
+        ("classifier", "dirichlet"),
+        "",
+        "classifier: merges and splits of groups; dirichlet: labels of people drawn from an online Dirichlet process "
+        "mixture (ours, after the authors' later paper)",
+        "categorical",
+        online=False,
+        before="classifier",
+    )
+    concentration: float = _mixture(
+        "concentration", (1e-8, 10.0), "1/(m^2 (m/s)^2)", "c, concentration times the density of the prior of means"
+    )
+    spread_degrees: float = _mixture(
+        "spread_degrees", (0.5, 1000.0), "", "nu, degrees of freedom of the prior of a component's variance of places"
+    )
+    place_spread: float = _mixture("place_spread", (0.05, 5.0), "m", "s, scale of this prior, per axis")
+    velocity_spread: float = _mixture(
+        "velocity_spread", (0.02, 5.0), "m/s", "s_v, standard deviation of velocities in a component, per axis"
+    )
+    redraw_rate: float = param(
+        1.0, (0.05, 20.0), "1/s", "Dirichlet process: rate at which a person's label is drawn anew (ours)", "log",
+        before=1.0,
+    )  # fmt: skip
+    memory_time: float = param(
+        0.0,
+        (0.0, 20.0),
+        "s",
+        "Dirichlet process: time constant with which components forget; of their past each second counts as one "
+        "observation; 0: no past (ours)",
+        online=False,
+        before=0.0,
     )
 
     lag: float = param(0.4, (0.05, 3.0), "s", "between the two times of the features of events (ours)", online=False)
@@ -215,6 +267,22 @@ class JointConfig(BackgroundSettings):
     def scales(self) -> Array:
         """The scales (3,) of the validity, as partition_kernels has them: s_0, nu, D_0."""
         return np.array([self.scatter, self.scatter_people, self.apart])
+
+    @property
+    def mixture(self) -> Array:
+        """The Dirichlet process mixture (4,), as cluster_evidence_kernels has it."""
+        rest = self.spread_degrees, self.place_spread, self.velocity_spread
+        return np.array([math.log(self.concentration), *rest])
+
+    @property
+    def memory(self) -> int:
+        """Columns of the memory of components: 0 without a Dirichlet process or if components do not remember."""
+        return SUMS if self.partition_dynamics == "dirichlet" and self.memory_time > 0 else 0
+
+    def ageing(self, dt: float) -> Array:
+        """Return how components remember over dt s, (3,), as dirichlet_process_kernels has it."""
+        kept = math.exp(-dt / self.memory_time) if self.memory_time > 0 else 0.0
+        return np.array([dt, kept, (1 - kept) * self.memory_time])
 
     def rules(self, dt: float, lag: float) -> Array:
         """Return the rules (6,) of events in a step of dt s, as group_events_kernels has them; lag: s."""

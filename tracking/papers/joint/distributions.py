@@ -9,7 +9,12 @@ from functools import cache
 import numpy as np
 
 from sim.types import Array, Ints
-from tracking.papers.joint import group_events_kernels, partition_kernels
+from tracking.papers.joint import (
+    cluster_evidence_kernels,
+    dirichlet_process_kernels,
+    group_events_kernels,
+    partition_kernels,
+)
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import log_sum
 from tracking.papers.joint.individuals import Proposal, precision_of, process_noise
@@ -81,32 +86,43 @@ class FrameModel:
         group_dynamics(late, early, z, precision, scale, self.dt, self.config.group_share, out)
         return np.asarray(out - own.sum(axis=1)[:, None])
 
-    def groups(self, new: Array, x: Array, z: Ints) -> Ints:
-        """Step 7: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7; uniform over all partitions in VAR2 and VAR3."""
+    def groups(self, new: Array, x: Array, z: Ints, memory: Array) -> tuple[Ints, Array]:
+        """Step 7: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7, or the Dirichlet process (ours); uniform over all
+        partitions in VAR2 and VAR3. memory: of the Dirichlet process, as dirichlet_process_kernels has it."""
         c, shape = self.config, z.shape
         out = z.copy()
         if c.variant in ("VAR2", "VAR3"):
             partition_kernels.uniform_partitions(
                 stam_cumulated(shape[2]), self.events.random((*shape[:2], shape[2] + 1)), out
             )  # fmt: skip
-            return out
+            return out, memory
+        if c.partition_dynamics == "dirichlet":
+            chance = np.full(shape[2], -math.expm1(-c.redraw_rate * self.dt))
+            dirichlet_process_kernels.propose(
+                _states(new), out, memory, chance, self.events.random((*shape, 2)), c.mixture, c.ageing(self.dt)
+            )  # fmt: skip
+            return out, memory
         late, early = _states(new), np.ascontiguousarray(x[..., -STATE:])
         uniforms = self.events.random((*shape, 3))
         lag = x.shape[-1] // STATE * self.dt
         group_events_kernels.propose(
             early, late, self._points(late), out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
         )  # fmt: skip
-        return out
+        return out, memory
 
     def energy(self, new: Array, z: Ints) -> Array:
-        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), with lambda_cl per second, plus the belief of the
-        pairs in one group (ours); 0 in VAR3."""
+        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), or lambda_cl log p(Z_t, X_t) of the Dirichlet process
+        mixture (ours), with lambda_cl per second, plus the belief of the pairs in one group (ours); 0 in VAR3."""
         c = self.config
         out = np.zeros(z.shape[:2])
         if c.variant == "VAR3":
             return out
-        partition_kernels.validities(self._points(_states(new)), z, c.scales, out)
-        out *= -c.validity_rate * self.dt
+        if c.validity == "bayesian":
+            cluster_evidence_kernels.log_evidences(_states(new), z, c.mixture, out)
+            out *= c.validity_rate * self.dt
+        else:
+            partition_kernels.validities(self._points(_states(new)), z, c.scales, out)
+            out *= -c.validity_rate * self.dt
         if c.belief_rate > 0:
             worth = np.empty_like(out)
             partition_kernels.pair_sums(self.belief, z, worth)

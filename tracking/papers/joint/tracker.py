@@ -28,6 +28,9 @@ Departures, all ours:
 - People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
   features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
 - p(Z | X) also has the beliefs of pairs (`tracking.grouping.pair_belief`).
+- Options: log p(Z, X) of a Dirichlet process mixture as cluster validity (cluster_evidence_kernels), and the process in
+  place of events (dirichlet_process_kernels), as the authors have it later: Bazzani, Zanotto, Cristani, Murino, "Joint
+  individual-group modeling for tracking", IEEE PAMI 37(4), 2015. Both are reconstructions.
 - In eq. 5 a member moves with a share of the group's velocity and the rest of the own one.
 - The partition is that of least Binder loss, of means over time, with inertia. A member who is missed stays. Ids follow
   the identity rule; onsets of events are dated back.
@@ -51,11 +54,11 @@ from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
-from tracking.papers.joint.distributions import STATE, FrameModel, validity_points
-from tracking.papers.joint.division_kernels import place_newcomer
+from tracking.papers.joint.distributions import STATE, FrameModel
 from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
+from tracking.papers.joint.placement import place
 from tracking.papers.joint.reported_events import ReportedEvents
 
 MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)
@@ -97,6 +100,7 @@ class Joint:
         self.nested = Nested(
             np.zeros((c.particles, 0, STATE * self.frames)), np.zeros((*shape, 0), np.int64),
             np.full(shape, -np.log(c.partitions)), np.zeros((c.particles, 0)), np.zeros(c.particles),
+            np.zeros((*shape, 0, c.memory)),
         )  # fmt: skip
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
         self.together, self.paired = np.zeros((0, 0)), np.zeros(0, np.int64)
@@ -201,7 +205,7 @@ class Joint:
         self.health.resample(own)
         self.nested = Nested(
             nested.x[own, columns], nested.z[chosen], nested.log_q[chosen], np.zeros_like(nested.log_w),
-            np.zeros_like(nested.log_rest),
+            np.zeros_like(nested.log_rest), nested.memory[chosen],
         )  # fmt: skip
 
     def _keep(self, rows: Bools) -> None:
@@ -212,7 +216,8 @@ class Joint:
         label = n.z
         kept = np.ascontiguousarray(label[..., rows])
         partition_kernels.relabel(kept)
-        self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest)
+        memory = np.ascontiguousarray(n.memory[:, :, rows])
+        self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest, memory)
         self.people.keep(rows)
         self.belief.keep(rows)
         self.health.keep(rows)
@@ -240,19 +245,13 @@ class Joint:
         self.nested = Nested(
             np.concatenate([n.x, past], axis=1), np.concatenate([n.z, alone], axis=2), n.log_q,
             np.concatenate([n.log_w, np.zeros(past.shape[:2])], axis=1), n.log_rest,
+            np.concatenate([n.memory, np.zeros((*alone.shape, n.memory.shape[-1]))], axis=2),
         )  # fmt: skip
         self.people.add(self.newcomers.size[rows])
         self.belief.add(self.nested.x[..., :STATE].mean(axis=0))
         self.health.add(past.shape[1])
         if c.newcomers == "validity":
-            self._place(past.shape[1])
-
-    def _place(self, new: int) -> None:
-        """Draw whether each of the `new` last people joins the nearest group or person."""
-        n, c = self.nested, self.config
-        points = validity_points(n.x, c.velocity_time)
-        for person in range(n.x.shape[1] - new, n.x.shape[1]):
-            place_newcomer(points, n.z, person, self.draws[PLACING].random(n.log_q.shape), c.parts_sharpness, c.scales)
+            place(self.nested, past.shape[1], c, self.draws[PLACING])
 
     def _report(self, frame: Frame, seen: Bools) -> Tracks:
         """Returns the Tracks of the frame, on the ground in m, in the image in px; seen (K,): who was measured."""

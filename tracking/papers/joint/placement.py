@@ -1,0 +1,30 @@
+"""The groups of new people: drawn when they are added to the particles (ours; the paper's f adds them alone)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracking.papers.joint import dirichlet_process_kernels
+from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.decentralised_filter import Nested
+from tracking.papers.joint.distributions import STATE, validity_points
+from tracking.papers.joint.division_kernels import place_newcomer
+
+NO_AGEING = np.array([0.0, 1.0, 0.0])
+"""Ageing of the memory of components within a frame: none."""
+
+
+def place(nested: Nested, new: int, config: JointConfig, draws: np.random.Generator) -> None:
+    """Draw in all partitions whether each of the `new` last people, alone so far, joins a group or person; in place.
+
+    It is the nearest one, joined with the probability of the validity; with the Dirichlet process any one.
+    """
+    n, c, people = nested, config, nested.x.shape[1]
+    if c.partition_dynamics == "dirichlet":
+        chance = (np.arange(people) >= people - new).astype(float)
+        state, uniforms = np.ascontiguousarray(n.x[..., :STATE]), draws.random((*n.z.shape, 2))
+        dirichlet_process_kernels.propose(state, n.z, n.memory, chance, uniforms, c.mixture, NO_AGEING)
+        return
+    points = validity_points(n.x, c.velocity_time)
+    for person in range(people - new, people):
+        place_newcomer(points, n.z, person, draws.random(n.log_q.shape), c.parts_sharpness, c.scales)
