@@ -45,11 +45,9 @@ def sobel(picture: Image, row: int, first: int, end: int, filtered: Shorts) -> N
     above = row - 1 if row > 0 else min(1, high - 1)
     below = row + 1 if row < high - 1 else max(high - 2, 0)
     for x in range(max(first, 1), min(end, wide - 1)):
-        slope = (
-            np.int32(picture[above, x + 1]) - np.int32(picture[above, x - 1])
-            + 2 * (np.int32(picture[row, x + 1]) - np.int32(picture[row, x - 1]))
-            + np.int32(picture[below, x + 1]) - np.int32(picture[below, x - 1])
-        )  # fmt: skip
+        slope = int(picture[above, x + 1]) - int(picture[above, x - 1])
+        slope += 2 * (int(picture[row, x + 1]) - int(picture[row, x - 1]))
+        slope += int(picture[below, x + 1]) - int(picture[below, x - 1])
         filtered[row, x] = min(max(slope, -CAP), CAP) + CAP
     if first == 0:
         filtered[row, 0] = CAP
