@@ -6,7 +6,8 @@ table2      friends-meet: the paper's columns for full, VAR1, VAR2, VAR3 and .2,
             group-pda, relational and the default grouping over blob; differences of variants, paired
 recordings  seq_hotel, zara01 and Meet_WalkTogether1 from labelled positions with noise 0.1 m and 5 % misses: the
             columns of Table 3b and pairwise F1, beside relational and the default grouping over particle (--data)
-classifier  the event classifier: confusion matrix, log loss, expected events per minute where nothing happens
+classifier  the event classifier: confusion matrix, log loss, expected events per minute where nothing happens; with
+            --recordings on true partitions of seq_hotel, zara01 and Meet_WalkTogether1
 particles   friends-meet: accuracy and frames/s over N_x and N_z (--chart FILE.svg)
 events      a suite (--suite): event F1, hits, false alarms, misses and latency, beside group-pda and the default
             grouping over blob and particle
@@ -28,6 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.joint import event_classifier
 from benchmarks.support import chart, tables
 from benchmarks.support.options import (
     HOTEL,
@@ -46,8 +48,8 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import DetectionMode
 from sim.types import Sequence as Recording
-from tracking.fitting.joint_events import CLASSES, NONE, EventRows, event_rows, event_scores, log_probabilities
-from tracking.papers.joint.config import FITTED, JointConfig
+from tracking.fitting.joint_events import event_rows
+from tracking.papers.joint.config import JointConfig
 from tracking.run import track
 from tracking.scoring import evaluate
 from tracking.stats import paired
@@ -65,7 +67,7 @@ COMPARED = ("GDSR", "MOTA", "1-FN", "1-FP")
 PX_PER_M = 40.0
 COUNTS = (10, 25, 50, 100)
 DEPARTURES = (
-    "belief_rate=0", "group_share=1", "group_time=0", "inertia=0", "newcomers=alone", "validity_rate=0",
+    "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
     "size_prior=none", "velocity_time=0", "lag=0.1", "parts_sharpness=0", "scatter_people=0", "normaliser=sampled",
     "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
     "estimate=histogram", "validity=bayesian validity_rate=4", "partition_dynamics=dirichlet",
@@ -221,33 +223,13 @@ def recordings(given: argparse.Namespace) -> None:
 
 
 def classifier(given: argparse.Namespace) -> None:
-    """Prints the scores of the event classifier on true partitions of unseen seeds."""
-    lag = JointConfig().lag
-    parts: dict[bool, list[EventRows]] = {True: [], False: []}
-    for k, sequence in enumerate(sequences(given.seeds)):
-        assert sequence.truth is not None
-        rows = event_rows(sequence.truth, lag, k, wrong=False)
-        parts[bool((rows.event != NONE).any())].append(rows)
-    rows = EventRows.joined([*parts[True], *parts[False]])
-    scores = event_scores(rows, FITTED)
-    tables.table(
-        f"friends-meet, seeds {seeds_text(given.seeds)}",
-        "score",
-        ["value"],
-        {k: [f"{v:.4g}"] for k, v in scores.items()},
-    )
-    p = np.exp(log_probabilities(rows, FITTED))
-    most = p.argmax(axis=1)
-    cells = {
-        name: [str(int(((rows.event == k) & (most == j)).sum())) for j in range(len(CLASSES))]
-        for k, name in enumerate(CLASSES)
-    }
-    tables.table("confusion: rows true, columns the most probable event", "", CLASSES, cells)
-    quiet = EventRows.joined(parts[False])
-    if quiet.seconds:
-        per_row = 1 - np.exp(log_probabilities(quiet, FITTED)[:, NONE])
-        rate = per_row.sum() * 0.2 / lag / (quiet.seconds / 60)
-        print(f"\nexpected events per minute in {len(parts[False])} sequences without one: {rate:.3f}")
+    """Prints the scores of the event classifier on true partitions of unseen seeds, or of recordings."""
+    if given.recordings:
+        event_classifier.recordings(given.data)
+        return
+    truths = [sequence.truth for sequence in sequences(given.seeds)]
+    rows = [event_rows(t, JointConfig().lag, k, wrong=False) for k, t in enumerate(truths) if t is not None]
+    event_classifier.report(f"friends-meet, seeds {seeds_text(given.seeds)}", rows, truths[0].fps if truths[0] else 1.0)
 
 
 def particles(given: argparse.Namespace) -> None:
@@ -339,6 +321,7 @@ def main() -> None:
     parser.add_argument("--filter-seeds", type=seed_range, default="0:5", metavar="A:B", help="seeds of the filters")
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of joint")
     parser.add_argument("--suite", default="standard", help="of mode events")
+    parser.add_argument("--recordings", action="store_true", help="mode classifier: labelled recordings (--data)")
     parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="mode particles: draw it")
     parser.add_argument(
         "--only", help="table2, recordings, events: variants; ablation, process: settings; separated by commas"

@@ -135,6 +135,14 @@ class JointConfig(BackgroundSettings):
     belief_rate: float = param(
         20.0, (0.0, 100.0), "1/s", "weight of the beliefs of pairs in log p(Z | X), per second (ours)", before=0.0
     )
+    belief_memory: float = param(
+        0.2,
+        (0.0, 2.0),
+        "share",
+        "of the belief's `stay`, which is added for people who were reported in one group, and of `come`, which is "
+        "taken from the others (ours)",
+        before=0.0,
+    )
     normaliser: str = param(
         "energy",
         ("energy", "sampled"),
@@ -215,16 +223,6 @@ class JointConfig(BackgroundSettings):
         "",
         "binder: the partition of least expected Binder loss (ours); histogram: Fig. 3",
         "categorical",
-    )
-    inertia: float = param(
-        0.2, (0.0, 0.45), "probability", "beyond 1/2 that a pair needs to join or leave a group (ours)"
-    )
-    group_time: float = param(
-        0.3,
-        (0.0, 5.0),
-        "s",
-        "time constant of the mean of a pair's probability, by which groups are reported (ours)",
-        before=0.0,
     )
 
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity (ours)", "log")

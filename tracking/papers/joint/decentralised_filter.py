@@ -54,6 +54,13 @@ class Nested:
     log_rest: Array
     memory: Array
 
+    @classmethod
+    def empty(cls, shape: tuple[int, int], size: int, memory: int) -> Nested:
+        """Return particles of no component; shape: N_x, N_z; size: D; memory: length of what a component remembers."""
+        log_q = np.full(shape, -np.log(shape[1]))
+        x, z, log_w = np.zeros((shape[0], 0, size)), np.zeros((*shape, 0), np.int64), np.zeros((shape[0], 0))
+        return cls(x, z, log_q, log_w, np.zeros(shape[0]), np.zeros((*shape, 0, memory)))
+
     def weights(self) -> Array:
         """Return the weights w of step 1, (N_x,), sum 1."""
         return normalised(self.log_w.sum(axis=1) + self.log_rest)

@@ -15,33 +15,30 @@ def moments(state: Array, weights: Array) -> tuple[Array, Array]:
     return mean, np.einsum("ik,ikd,ike->kde", weights, away, away)
 
 
-def mean_over_time(now: Array, id: Ints, seen: Bools, before: Array, before_id: Ints, share: float) -> Array:
-    """Return the mean over time of the probability that each pair is in one group, (K, K) (ours).
+def kept_while_missed(now: Array, id: Ints, seen: Bools, before: Array, before_id: Ints) -> Array:
+    """Return the probability that each pair is in one group, (K, K), which stays while one of the two is not measured
+    (ours).
 
     now (K, K): the probability in this frame; id (K,): people; seen (K,): who was measured; before (L, L), before_id
-    (L,): the mean of the last frame; share: of it in the new mean. The mean of a pair stays while one of the two is not
-    measured. That of a new pair is the probability in its first frame.
+    (L,): the probability returned in the last frame. That of a new pair is the one of its first frame.
     """
-    out, both = now.copy(), np.where(seen[:, None] & seen, share, 1.0)
+    out = now.copy()
     _, new, old = np.intersect1d(id, before_id, assume_unique=True, return_indices=True)
-    rows = np.ix_(new, new)
-    out[rows] += both[rows] * (before[np.ix_(old, old)] - now[rows])
+    rows, both = np.ix_(new, new), seen[new][:, None] & seen[new]
+    out[rows] = np.where(both, now[rows], before[np.ix_(old, old)])
     return out
 
 
-def binder_partition(together: Array, label: Ints, before: Ints, inertia: Array | float) -> list[Ints]:
+def binder_partition(together: Array, label: Ints, before: Ints) -> list[Ints]:
     """Return the groups of two or more people, as arrays of rows: the partition of least expected Binder loss (ours).
 
     together (K, K): co-membership C, the probability that each pair is in one group; label (N_x, N_z, K): the sampled
-    partitions; before (K,): group of each person in the last frame, -1 for alone; inertia: (K, K) or a number. The loss
-    is the sum over pairs of |1(k ~ l) - C_kl|; a pair that was together counts as `inertia` more probable, any other as
-    less. The search starts from the best sampled partition and from the last frame's, and moves one person after the
-    other.
+    partitions; before (K,): group of each person in the last frame, -1 for alone. The loss is the sum over pairs of
+    |1(k ~ l) - C_kl|. The search starts from the best sampled partition and from the last frame's, and moves one person
+    after the other.
     """
-    people = len(together)
-    same = (before[:, None] >= 0) & (before[:, None] == before)
-    gain = together - 0.5 + np.where(same, inertia, -inertia)
-    sampled = np.empty(people, np.int64)
+    gain = together - 0.5
+    sampled = np.empty(len(together), np.int64)
     partition_kernels.best_sampled(gain, label, sampled)
     starts = [sampled, _numbered(before)]
     gains = [partition_kernels.binder_moves(gain, start) for start in starts]

@@ -27,13 +27,13 @@ Departures, all ours:
 - The Davies-Bouldin index has a prior scatter and a virtual other cluster, sees velocities, and acts per second.
 - People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
   features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
-- p(Z | X) also has the beliefs of pairs (`tracking.grouping.pair_belief`).
+- p(Z | X) also has the beliefs of pairs (`tracking.grouping.pair_belief`), with a memory of the groups reported.
 - Options: log p(Z, X) of a Dirichlet process mixture as cluster validity (cluster_evidence_kernels), and the process in
   place of events (dirichlet_process_kernels), as the authors have it later: Bazzani, Zanotto, Cristani, Murino, "Joint
   individual-group modeling for tracking", IEEE PAMI 37(4), 2015. Both are reconstructions.
 - In eq. 5 a member moves with a share of the group's velocity and the rest of the own one.
-- The partition is that of least Binder loss, of means over time, with inertia. A member who is missed stays. Ids follow
-  the identity rule; onsets of events are dated back.
+- The partition is that of least Binder loss. A member who is missed stays. Ids follow the identity rule; onsets of
+  events are dated back.
 The preset `paper` switches off what has a parameter.
 """
 
@@ -52,6 +52,7 @@ from tracking.grouping import reported_groups
 from tracking.grouping.pair_belief import PairBelief
 from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
+from tracking.papers.joint.belief_memory import remembered
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import STATE, FrameModel
@@ -70,8 +71,8 @@ class Joint:
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
     particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; together (K, K):
-    probability that each pair is in one group, mean over time, and paired (K,), the ids of its rows; events: those of
-    the reported groups; belief: of pairs; health: how many particles the weights are worth; draws, the random streams;
+    probability that each pair is in one group, and paired (K,), the ids of its rows; events: those of the reported
+    groups; belief: of pairs; health: how many particles the weights are worth; draws, the random streams;
     pixels: detector of blobs, None from points; shown (K, 4): boxes of the people reported last, px; plane, "ground" or
     "image"; context. All but config exist after `reset` only.
     """
@@ -96,12 +97,7 @@ class Joint:
             context = context.replace(px_per_m=self.pixels.scale)
         self.context = context
         self.frames = max(1, round(c.lag * context.fps))
-        shape = (c.particles, c.partitions)
-        self.nested = Nested(
-            np.zeros((c.particles, 0, STATE * self.frames)), np.zeros((*shape, 0), np.int64),
-            np.full(shape, -np.log(c.partitions)), np.zeros((c.particles, 0)), np.zeros(c.particles),
-            np.zeros((*shape, 0, c.memory)),
-        )  # fmt: skip
+        self.nested = Nested.empty((c.particles, c.partitions), STATE * self.frames, c.memory)
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
         self.together, self.paired = np.zeros((0, 0)), np.zeros(0, np.int64)
         self.events = ReportedEvents(context.fps)
@@ -183,15 +179,20 @@ class Joint:
         if not len(z):
             return
         draws = self.draws
-        model = FrameModel(
-            self.config, self.dt, self.noise, z, self.belief.log_odds, draws[MOTION], draws[CHOICES], draws[EVENTS]
-        )
+        beliefs = remembered(self.belief.log_odds, *self._before(), self.config.belief_memory)
+        model = FrameModel(self.config, self.dt, self.noise, z, beliefs, draws[MOTION], draws[CHOICES], draws[EVENTS])
         self.nested = decentralised_filter.advance(self.nested, model, draws[PARTITIONS].random(self.config.particles))
+
+    def _before(self) -> tuple[Ints, Array]:
+        """Returns the group (K,) of each person in the last frame, -1 for alone, and 1.0 for people reported then, else
+        0.0."""
+        id = self.people.id
+        known = np.isin(id, np.array(sorted(self.identities.people), np.int64)).astype(float)
+        return reported_groups.known_groups(self.identities, id), known
 
     def _resample(self) -> None:
         """Step 2."""
-        nested, draws = self.nested, self.draws[RESAMPLING]
-        people = nested.x.shape[1]
+        nested, draws, people = self.nested, self.draws[RESAMPLING], len(self.people.id)
         if not people:
             return
         self.health.weigh(nested, self.config.weights == "joint")
@@ -213,8 +214,7 @@ class Joint:
         if rows.all():
             return
         n = self.nested
-        label = n.z
-        kept = np.ascontiguousarray(label[..., rows])
+        kept = np.ascontiguousarray(n.z[..., rows])
         partition_kernels.relabel(kept)
         memory = np.ascontiguousarray(n.memory[:, :, rows])
         self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest, memory)
@@ -285,11 +285,8 @@ class Joint:
         weights = particle[:, None] * np.exp(n.log_q)
         now = np.empty((len(id), len(id)))
         partition_kernels.co_membership(n.z, weights, now)
-        share = np.exp(-self.dt / c.group_time) if c.group_time > 0 else 0.0
-        self.together = estimate.mean_over_time(now, id, seen, self.together, self.paired, share)
+        self.together = estimate.kept_while_missed(now, id, seen, self.together, self.paired)
         self.paired = id.copy()
         if c.estimate == "histogram":
             return estimate.histogram_partition(n.z, weights)
-        before = reported_groups.known_groups(self.identities, id)
-        known = np.isin(id, np.array(sorted(self.identities.people), np.int64)).astype(float)
-        return estimate.binder_partition(self.together, n.z, before, c.inertia * np.outer(known, known))
+        return estimate.binder_partition(self.together, n.z, self._before()[0])

@@ -123,22 +123,12 @@ def test_the_estimate_has_the_least_binder_loss_of_all_partitions():
         label, weights = sampled(rng, 5, 12), rng.dirichlet(np.ones(12))[None]
         together = np.empty((5, 5))
         partition_kernels.co_membership(label, weights, together)
-        found = binder_partition(together, label, alone, 0.0)
+        found = binder_partition(together, label, alone)
         members = {int(k) for rows in found for k in rows}
         parts = [rows.tolist() for rows in found] + [[k] for k in range(5) if k not in members]
         gains = [binder_gain(together - 0.5, p) for p in all_partitions(5)]
         best += binder_gain(together - 0.5, parts) > max(gains) - 1e-9
     assert best >= 58
-
-
-def test_inertia_keeps_a_pair_and_keeps_others_apart():
-    def groups(c, before, inertia):
-        together = np.array([[1, c], [c, 1.0]])
-        found = binder_partition(together, np.zeros((1, 1, 2), np.int64), np.array(before), inertia)
-        return [rows.tolist() for rows in found]
-
-    assert groups(0.55, [-1, -1], 0.0) == groups(0.45, [4, 4], 0.1) == groups(0.65, [-1, -1], 0.1) == [[0, 1]]
-    assert groups(0.55, [-1, -1], 0.1) == groups(0.35, [4, 4], 0.1) == groups(0.45, [-1, -1], 0.0) == []
 
 
 def test_the_histogram_takes_each_persons_label_of_most_weight():

@@ -165,14 +165,15 @@ def test_a_member_who_is_missed_stays_in_the_group():
     assert [len(t.id) for t in tracks[24:36]] == [3] * 12
 
 
-def test_the_mean_over_time_delays_groups():
-    """A pair that is sure from one frame on has the probability 1 - exp(-t / group_time)."""
-    points = [np.array([[0, 0], [0, 6 - min(0.2 * k, 5.3)]]) for k in range(60)]
-    found = [
-        next(t.index for t in stepped(Joint(JointConfig(group_time=time)), points) if (t.group >= 0).any())
-        for time in (0.0, 1.5)
-    ]
-    assert found[0] + 5 <= found[1] <= 60
+def test_with_a_memory_people_join_and_part_later():
+    """Two people come near each other, stand, and walk apart slowly."""
+    gap = np.concatenate([np.linspace(4, 0.7, 40), np.full(60, 0.7), np.linspace(0.7, 6, 60)])
+    together = []
+    for memory in (0.0, 0.4):
+        tracks = stepped(Joint(JointConfig(belief_memory=memory)), [np.array([[0, 0], [0, g]]) for g in gap])
+        together.append([t.index for t in tracks if (t.group >= 0).any()])
+    assert together[0][0] < together[1][0] <= 100
+    assert together[0][-1] < together[1][-1] < 160
 
 
 def test_pairs_of_a_group_count_with_their_belief():
