@@ -70,13 +70,13 @@ DEPARTURES = (
     "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
     "size_prior=none", "velocity_time=0", "lag=0.1", "parts_sharpness=0", "scatter_people=0", "normaliser=sampled",
     "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
-    "estimate=histogram", "validity=bayesian validity_rate=4", "partition_dynamics=dirichlet",
+    "estimate=histogram", "validity=bayesian", "partition_dynamics=dirichlet",
     "partition_dynamics=dirichlet memory_time=2",
 )  # fmt: skip
 """Settings of the mode ablation."""
 PROCESS = (
-    "", "validity=bayesian validity_rate=4", "partition_dynamics=dirichlet",
-    "validity=bayesian validity_rate=4 partition_dynamics=dirichlet",
+    "", "validity=bayesian", "partition_dynamics=dirichlet",
+    "validity=bayesian partition_dynamics=dirichlet",
 )  # fmt: skip
 """Settings of the mode process, run with beliefs and without."""
 

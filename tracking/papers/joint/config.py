@@ -132,6 +132,13 @@ class JointConfig(BackgroundSettings):
     validity_rate: float = param(
         20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"
     )
+    evidence_rate: float = param(
+        4.0,
+        (0.0, 100.0),
+        "1/s",
+        "of validity bayesian: weight of log p(Z, X), per second; it takes the place of validity_rate (ours)",
+        before=4.0,
+    )
     belief_rate: float = param(
         20.0, (0.0, 100.0), "1/s", "weight of the beliefs of pairs in log p(Z | X), per second (ours)", before=0.0
     )

@@ -111,15 +111,15 @@ class FrameModel:
         return out, memory
 
     def energy(self, new: Array, z: Ints) -> Array:
-        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), or lambda_cl log p(Z_t, X_t) of the Dirichlet process
-        mixture (ours), with lambda_cl per second, plus the belief of the pairs in one group (ours); 0 in VAR3."""
+        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), or log p(Z_t, X_t) of the Dirichlet process mixture
+        (ours), both with a weight per second, plus the belief of the pairs in one group (ours); 0 in VAR3."""
         c = self.config
         out = np.zeros(z.shape[:2])
         if c.variant == "VAR3":
             return out
         if c.validity == "bayesian":
             cluster_evidence_kernels.log_evidences(_states(new), z, c.mixture, out)
-            out *= c.validity_rate * self.dt
+            out *= c.evidence_rate * self.dt
         else:
             partition_kernels.validities(self._points(_states(new)), z, c.scales, out)
             out *= -c.validity_rate * self.dt
