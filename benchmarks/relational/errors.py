@@ -21,6 +21,7 @@ from tracking.stats import mean_interval, paired
 from tracking.tracker_registry import find
 
 FILTERS = ("particle", "relational")
+DIFFERENCE = "relational − particle"
 NOISES = (1.5, 3.0, 6.0)
 """Values of noise_scale from which the baseline's best is taken for each number of particles."""
 TRAINING = range(700, 703)
@@ -83,9 +84,9 @@ def particles(given: argparse.Namespace) -> None:
         print(f"\n{entry.name}: error per person and frame, m; seeds {given.seeds.start}:{given.seeds.stop}\n")
         tables.head(
             ["particles", "noise of the baseline", "particle, RMSE", "relational, RMSE", *FILTERS,
-             "relational − particle", "the same, hidden people", "difference of sums, m"]
+             DIFFERENCE, "the same, hidden people", "difference of sums, m"]
         )  # fmt: skip
-        curves: dict[str, list[Array]] = {name: [] for name in FILTERS}
+        curves: dict[str, list[Array]] = {name: [] for name in (*FILTERS, DIFFERENCE)}
         for count in given.counts:
             base = config_of("particle", count, given)
             tried = {
@@ -93,10 +94,14 @@ def particles(given: argparse.Namespace) -> None:
                 for noise in NOISES
             }
             noise = min(tried, key=tried.__getitem__)
-            for name, values in _compare(count, noise, test, given).items():
-                curves[name].append(np.array(mean_interval(np.array(values))))
+            compared = {name: np.array(values) for name, values in _compare(count, noise, test, given).items()}
+            for name, values in compared.items():
+                curves[name].append(np.array(mean_interval(values)))
+            curves[DIFFERENCE].append(np.array(paired(*(compared[name] for name in FILTERS))))
         shown = {name: tuple(np.array(values).T) for name, values in curves.items()}
+        apart = {DIFFERENCE: shown.pop(DIFFERENCE)}
         panels.append(chart.Panel(f"{entry.name}: error, m", given.counts, shown, "particles"))
+        panels.append(chart.Panel(f"{entry.name}: difference of errors, m", given.counts, apart, "particles"))
     if given.chart:
         chart.lines(panels, given.chart)
 
@@ -168,7 +173,7 @@ def pair(seed: int, length: float) -> tuple[Array, Iterator[Frame]]:
 def hidden(given: argparse.Namespace) -> None:
     """Prints a table: rows are lengths of the occlusion, columns the error of the hidden person in its last frame."""
     print("\nerror of the hidden one of two people in the last frame of the occlusion, m, at most 2\n")
-    tables.head(["occlusion, s", *FILTERS, "relational − particle"])
+    tables.head(["occlusion, s", *FILTERS, DIFFERENCE])
     curves: dict[str, list[Array]] = {name: [] for name in FILTERS}
     for length in LENGTHS:
         mean = {name: [] for name in FILTERS}
@@ -213,7 +218,7 @@ def hiding_frames(truth: Truth, seed: int, fps: float) -> tuple[Bools, list[Fram
 
 def recordings(given: argparse.Namespace) -> None:
     """Prints a table: rows are recordings, columns the errors of both filters in hidden and in other rows."""
-    tables.head(["recording", "people", *FILTERS, "relational − particle"])
+    tables.head(["recording", "people", *FILTERS, DIFFERENCE])
     for label, path in (("seq_hotel", HOTEL), ("zara01", ZARA), ("Meet_WalkTogether1", WALK_TOGETHER)):
         (q,) = open_source(given.recordings / path)
         found: dict[str, dict[str, list[float]]] = {

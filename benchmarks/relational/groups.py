@@ -28,10 +28,10 @@ from tracking.stats import paired
 
 COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
 DEPARTURES = (
-    "", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0", "weights=joint", "kernel_width=0",
-    "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0", "hidden_time=0.3", "noise_scale=1",
-    "resample_share=1", "resampling=systematic", "newcomer_share=0", "least_existence=0", "birth_doubt=0.9",
-    "clutter_density=0.02",
+    "", "relation_evidence=state", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0",
+    "weights=joint", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
+    "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
+    "least_existence=0", "birth_doubt=0.9", "clutter_density=0.02",
 )  # fmt: skip
 """Settings of the ablation; the first one is the defaults."""
 NEAR = 1.0
@@ -51,9 +51,11 @@ def _sequences(given: argparse.Namespace, suite: str) -> Iterator[tuple[str, int
             yield entry.name, seed, simulate(entry.scenario, seed, 0, ())
 
 
-def _tracked(name: str, seed: int, sequence: Sequence, given: argparse.Namespace) -> list[Tracks]:
+def _tracked(
+    name: str, seed: int, sequence: Sequence, given: argparse.Namespace, mode: str = "file", sensor: Any = None
+) -> list[Tracks]:
     config = None if name == "blob" else config_of(name, given.counts[0], given)
-    ready = prepare(name, sequence, params=config, detections="file")
+    ready = prepare(name, sequence, params=config, detections=mode, sensor=sensor, seed=seed)
     ready.reset(seed)
     return [ready.step(frame) for frame in ready.frames()]
 
@@ -110,7 +112,9 @@ def reliability(given: argparse.Namespace) -> None:
 
 def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argparse.Namespace) -> None:
     """Prints the table of some sequences with their seeds and settings of the sensor, none for stored detections."""
-    rows: dict[str, list[Array]] = {"relational": [], "belief on particle": [], "belief on relational": []}
+    boxes = runs[0][1].camera is not None
+    trackers = ("relational", "particle", *(["blob"] if boxes else []))  # blob takes boxes
+    rows: dict[str, list[Array]] = {"relational": [], **{f"belief on {name}": [] for name in trackers}}
     for seed, q, sensor in runs:
         mode = "truth" if sensor else "file"
         found = {}
@@ -129,10 +133,8 @@ def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argpar
             pairs = [(a, b) for a in true for b in true if a < b]
             known = [(together[place[a], place[b]], _same(true[a], true[b])) for a, b in pairs]
             rows["relational"].append(np.array(known).reshape(-1, 2))
-        config = config_of("particle", given.counts[0], given)
-        ready = prepare("particle", q, params=config, detections=mode, sensor=sensor, seed=seed)
-        ready.reset(seed)
-        found["particle"] = [ready.step(frame) for frame in ready.frames()]
+        for name in trackers[1:]:
+            found[name] = _tracked(name, seed, q, given, mode, sensor)
         for name, bare in found.items():
             rows[f"belief on {name}"].append(_believed(q, bare))
     tables.head(["pairs", *(f"{k / BINS:g} to {(k + 1) / BINS:g}" for k in range(BINS)), "F1 at 1/2", "mean gap"])
@@ -146,11 +148,16 @@ def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argpar
 
 
 def _believed(q: Sequence, tracks: list[Tracks]) -> Array:
-    """Returns the probability of each pair by the belief and whether the two belong together, (N, 2)."""
+    """Returns the probability of each pair by the belief, 0 for pairs 4 m and more apart, and whether the two belong
+    together, (N, 2)."""
     found = pair_probabilities(tracks, q.fps, q.px_per_m, default_belief())
-    people = {t.index: _people_of(q.truth, t) for t in tracks}
-    joined = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), found.probability.tolist(), strict=True)
-    known = [(p, _same(people[f][a], people[f][b])) for f, a, b, p in joined if a in people[f] and b in people[f]]
+    joined = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
+    said = dict(zip(joined, found.probability.tolist(), strict=True))
+    known = []
+    for t in tracks:
+        true = _people_of(q.truth, t)
+        pairs = [(a, b) for a in true for b in true if a < b]
+        known += [(said.get((t.index, a, b), 0.0), _same(true[a], true[b])) for a, b in pairs]
     return np.array(known).reshape(-1, 2)
 
 

@@ -28,10 +28,11 @@ class PairBelief:
     """The log-odds that each pair of K people belongs together.
 
     State: log_odds (K, K): of the last step, or, of new people, of their first frame; UNSEEN for pairs that are 4 m
-    apart or more. total (K, 3): sums of x, y, m, and of time, s, over the frames of the current step; count (K,): of
-    these frames. past: means of `total` in the last steps, (K, 3), nan where there are none. first (K,): step in which
-    each person was seen first, nan before its end. first_distance (K, K): m, in the first step of both, nan if unknown.
-    means: of the evidence, for K x K pairs. frames, steps: how many there were.
+    apart or more, or of whom one was not seen in the last step. total (K, 3): sums of x, y, m, and of time, s, over the
+    frames of the current step in which each was seen; count (K,): of these frames. past: means of `total` in the last
+    steps, (K, 3), nan where there are none. first (K,): step in which each person was seen first, nan before its end.
+    first_distance (K, K): m, in the first step of both, nan if unknown. means: of the evidence, for K x K pairs.
+    frames, steps: how many there were.
     """
 
     def __init__(self, fps: float) -> None:
@@ -44,7 +45,7 @@ class PairBelief:
         self.means = ExponentialMeans(0, len(QUANTITIES), self.seconds)
 
     def add(self, state: Array) -> None:
-        """Add people as the last rows; state (K, 4): x, y, m, vx, vy, m/s, of all people now.
+        """Add people as the last rows; state (K, 4): x, y, m, vx, vy, m/s, of all people now, nan for those not seen.
 
         The evidence of a pair with a new person is that of this moment.
         """
@@ -65,19 +66,27 @@ class PairBelief:
         self._reorder(np.flatnonzero(rows))
 
     def see(self, pos: Array) -> None:
-        """Go on by a frame, with the places (K, 2), m."""
-        self.total += np.column_stack([pos, np.full(len(pos), self.frames / self.fps)])
-        self.count += 1
+        """Go on by a frame, with the places (K, 2), m, nan for people who are not seen."""
+        seen = np.isfinite(pos[:, 0])
+        self.total[seen] += np.column_stack([pos[seen], np.full(int(seen.sum()), self.frames / self.fps)])
+        self.count += seen
         if self.frames % self.size == 0:
             self._end_step()
         self.frames += 1
 
+    def seen(self) -> Bools:
+        """Return which people were seen in the last step, (K,); nobody before its end."""
+        none = np.zeros(len(self.count), bool)
+        return np.isfinite(self.past[-1][:, 0]) if self.past else none
+
     def _end_step(self) -> None:
         n = len(self.count)
-        now = self.total / self.count[:, None]
+        now = np.full((n, 3), np.nan)
+        np.divide(self.total, self.count[:, None], out=now, where=self.count[:, None] > 0)
         self.past.append(now)
         self.total, self.count = np.zeros((n, 3)), np.zeros(n)
-        pos, fresh = now[:, :2], np.isnan(self.first)
+        pos = now[:, :2]
+        fresh = np.isnan(self.first) & np.isfinite(pos[:, 0])
         self.first[fresh] = self.steps
         apart, new = np.hypot(*(pos[:, None] - pos).transpose(2, 0, 1)), fresh[:, None] | fresh
         self.first_distance[new] = apart[new] if self.steps > 0 else np.nan
@@ -102,9 +111,10 @@ class PairBelief:
         self.log_odds[i, j] = self.log_odds[j, i] = default_belief().log_odds(values)
 
     def _pairs(self, pos: Array) -> tuple[Ints, Ints]:
-        """Returns the pairs i < j (R,) of people less than 4 m apart; pos (K, 2)."""
-        i, j = close_pairs(np.zeros(len(pos), np.int64), pos, REACH)
-        return np.minimum(i, j), np.maximum(i, j)
+        """Returns the pairs i < j (R,) of people less than 4 m apart; pos (K, 2), nan where not seen."""
+        seen = np.flatnonzero(np.isfinite(pos[:, 0]))
+        i, j = close_pairs(np.zeros(len(seen), np.int64), pos[seen], REACH)
+        return seen[np.minimum(i, j)], seen[np.maximum(i, j)]
 
     def _reorder(self, old: Ints) -> None:
         """Makes the people those of the rows `old` (K',), -1 for a new one."""

@@ -202,8 +202,8 @@ class ParticleConfig(BackgroundSettings):
 class RelationalConfig(ParticleConfig):
     """The parameters of the tracker `relational`: those of `particle` and those of the relation "walking together".
 
-    Two people start or stop walking together with hazards whose equilibrium is the probability 1 / (1 + exp(-l)), l =
-    relation_bias - relation_distance d - relation_velocity |v1 - v2|.
+    The state of two people says that they walk together with the probability 1 / (1 + exp(-l)), l = relation_bias -
+    relation_distance d - relation_velocity |v1 - v2|.
     """
 
     tracker: ClassVar[str] = "relational"
@@ -223,6 +223,16 @@ class RelationalConfig(ParticleConfig):
         "of the variance of the velocity's noise, that people who walk together have in common (ours); 0: none "
         "(sec. 3.2)",
         before=0.0,
+    )
+    relation_evidence: str = param(
+        "belief",
+        ("belief", "state"),
+        "",
+        "what says how probably a pair walks together in the long run; belief: that of the grouping about their tracks "
+        "so far; state: their distance and velocity difference in the particle (ours)",
+        "categorical",
+        online=False,
+        before="state",
     )
     relation_rate: float = param(
         1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"

@@ -19,9 +19,10 @@ Departures, all ours:
 - The speed table is learned from simulated people without errors; a row is a drift and a diffusion, so that it holds at
   any frame rate. Table 3, of measured boxes at 25 frames/s, is the preset caviar-25fps.
 - People who walk together approach their mean velocity with a time constant, and have a part of the noise in common. In
-  the paper they have the mean velocity in each frame, and noise of their own.
+  the paper they have the mean velocity in each frame, and noise of their own. Partners count by how alike they move.
 - Relations change by hazards per second; the paper does not say how. Each pair is a chain of two states, and groups are
-  connected components: this needs no labels, and gives the probability that two people walk together.
+  connected components: this needs no labels, and gives the probability that two people walk together. The equilibrium
+  of a pair is the belief of tracking.grouping about their tracks so far.
 - People have slots that are common to all particles. That a person exists is a probability in each particle, and not
   drawn: particles with and without each of many newcomers would be few.
 - The sensor has missed people and false alarms. A person not measured in the last frame is measured with a smaller
@@ -46,6 +47,8 @@ from sim.rng import rng
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
+from tracking.grouping.belief import UNSEEN
+from tracking.grouping.pair_belief import PairBelief
 from tracking.image_scale import required
 from tracking.papers.relational import report, sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
@@ -53,7 +56,10 @@ from tracking.papers.relational.occluders import covered_by_people, hidden_share
 from tracking.papers.relational.particle_diversity import ParticleDiversity
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.slots import Slots
+from tracking.papers.relational.transition_kernels import DISTANCE, VELOCITY
 
+ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
+"""Rules of transition_kernels by which every partner counts fully, as in the paper."""
 MOTION, BIRTHS, RESAMPLING, RELATIONS, JOINING, COUPLING = range(6)
 """Keys of the random streams. Relations have streams of their own, so that they change no other draw."""
 
@@ -150,9 +156,9 @@ class Particle:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        shared, coupling = self._coupling()
+        shared, coupling, alike = self._coupling()
         table = c.speed_table(self.dt)
-        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, self.dt)
+        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, self.dt)
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
         behind, self.cut = covered_by_people(p, camera, c.body_radius)
@@ -165,10 +171,10 @@ class Particle:
         camera = self.context.camera if self.plane == "ground" else None
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
-    def _coupling(self) -> tuple[Array, Array]:
-        """Returns the normals that groups have in common (P, K, 2), and the coupling (2,) of transition_kernels; people
-        of `particle` have none."""
-        return np.zeros(self.particles.pos.shape), np.zeros(2)
+    def _coupling(self) -> tuple[Array, Array, Array]:
+        """Returns the normals that groups have in common (P, K, 2), and the coupling (2,) and the rules (4,) by which
+        partners count of transition_kernels; people of `particle` have none."""
+        return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4)
 
     def _relate(self) -> None:
         """Draw new relations; people of `particle` have none."""
@@ -235,6 +241,7 @@ class Particle:
         place, velocity, cov, exist = report.estimates(self.particles)
         rows = exist >= self.config.report_existence
         self.slots.name(rows)
+        self._follow(np.where(rows[:, None], np.concatenate([place, velocity], axis=1), np.nan))
         pos, vel, cov = place[rows], velocity[rows], cov[rows]
         score, id = np.minimum(exist[rows], 1.0), self.slots.id[rows]
         if self.plane == "image":
@@ -242,12 +249,17 @@ class Particle:
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
         return Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
 
+    def _follow(self, state: Array) -> None:
+        """Take note of the mean states (K, 4) of a frame, x, y, m, vx, vy, m/s, nan for people who are not reported;
+        `particle` has no use for them."""
+
 
 class Relational(Particle):
     """The tracker `relational`: the particle filter of `particle` with the relation "walking together" in it.
 
-    together (K, K): probability that each pair walks together, in the last frame, by slots; 1 on the diagonal. The rest
-    of the state is that of Particle.
+    together (K, K): probability that each pair walks together, in the last frame, by slots; 1 on the diagonal. belief:
+    that of tracking.grouping about the slots' tracks so far, kept only if relations come from it. The rest of the state
+    is that of Particle.
     """
 
     config_class: ClassVar[type[ParticleConfig]] = RelationalConfig
@@ -257,6 +269,7 @@ class Relational(Particle):
         """Forget everything and start a sequence, as `Particle.reset`."""
         super().reset(context, seed)
         self.together = np.zeros((0, 0))
+        self.belief = PairBelief(context.fps) if self.config.relation_evidence == "belief" else None
 
     @property
     def _rules(self) -> Array:
@@ -265,18 +278,39 @@ class Relational(Particle):
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
 
-    def _coupling(self) -> tuple[Array, Array]:
+    def _coupling(self) -> tuple[Array, Array, Array]:
         time = self.config.coupling_time
         follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
         shared = self.draws[COUPLING].standard_normal(self.particles.pos.shape)
-        return shared, np.array([follow, self.config.common_noise])
+        alike = ALWAYS if self.belief is None else self._rules
+        return shared, np.array([follow, self.config.common_noise]), alike
 
     def _relate(self) -> None:
-        p = self.particles
-        if p.people > 1:
-            pairs = transition_kernels.near_pairs(p.pos, np.asarray(p.related.any(axis=0)), self._rules)
-            uniforms = self.draws[RELATIONS].random((p.count, p.people, 2))
-            transition_kernels.relate(p.pos, p.vel, p.related, pairs, uniforms, self._rules)
+        p, rules = self.particles, self._rules
+        if p.people < 2:
+            return
+        some = np.asarray(p.related.any(axis=0))
+        if self.belief is None:
+            pairs = transition_kernels.near_pairs(p.pos, some, rules)
+            odds = np.full(len(pairs), self.config.relation_bias)
+        else:
+            seen, odds = self.belief.seen(), _log_odds(self.belief)
+            pairs = np.argwhere(np.triu(seen[:, None] & seen & (some | np.isfinite(odds)), 1))
+            odds = odds[pairs[:, 0], pairs[:, 1]]
+            rules = np.where(np.isin(range(4), (DISTANCE, VELOCITY)), 0.0, rules)
+        uniforms = self.draws[RELATIONS].random((p.count, p.people, 2))
+        transition_kernels.relate(p.pos, p.vel, p.related, pairs, odds, uniforms, rules)
+
+    def _follow(self, state: Array) -> None:
+        if self.belief is not None:
+            if len(state) > len(self.belief.count):
+                self.belief.add(state)
+            self.belief.see(state[:, :2])
+
+    def _keep(self, rows: Bools) -> None:
+        super()._keep(rows)
+        if self.belief is not None:
+            self.belief.keep(rows)
 
     def _relations_of_newcomer(self, point: Array) -> Bools:
         """Returns the relations (P, K) bool of a new person at `point` (2,), m: to all members of the group joined."""
@@ -286,15 +320,25 @@ class Relational(Particle):
         return np.asarray(label == group[:, None])
 
     def _report(self, frame: Frame) -> Tracks:
-        p = self.particles
-        self.together = transition_kernels.pairs_together(p.related, p.exist, p.weights, p.cluster)
-        return super()._report(frame)
+        tracks, p = super()._report(frame), self.particles
+        if self.belief is None:
+            self.together = transition_kernels.pairs_together(p.related, p.exist, p.weights, p.cluster)
+        else:
+            self.together = 1 / (1 + np.exp(-_log_odds(self.belief)))
+            np.fill_diagonal(self.together, 1.0)
+        return tracks
 
     def walking_together(self) -> tuple[Ints, Array]:
         """Return ids (R,) of the people reported last, and the probability (R, R) that two of them walk together.
 
-        It is the share of the weight of the particles in which the pair is related, given that both exist; 1 on the
-        diagonal.
+        By their state it is the share of the weight of the particles in which the pair is related, given that both
+        exist. The belief is the same in all particles, so that it is the probability itself; a share of particles would
+        be the belief with errors of sampling, and weights would count the detections twice. 1 on the diagonal.
         """
         rows = np.zeros(0, np.int64) if self.shown is None else np.flatnonzero(np.isin(self.slots.id, self.shown.id))
         return self.slots.id[rows], self.together[np.ix_(rows, rows)]
+
+
+def _log_odds(belief: PairBelief) -> Array:
+    """Returns the log-odds (K, K) that pairs belong together; -inf for pairs without evidence."""
+    return np.where(belief.log_odds == UNSEEN, -np.inf, belief.log_odds)

@@ -58,38 +58,43 @@ def group_labels(related: Bools, label: Ints) -> None:
 @njit(cache=True)
 def move(
     pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, shared: Array, table: Array, coupling: Array,
-    dt: float,
+    alike: Array, dt: float,
 ) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; related (P, K, K): old relations;
-    noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling (2,).
+    noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling (2,); alike (4,):
+    rules by which a partner counts.
 
     v_i = u - B u / |u| + C e_i, x_i = x_i + v_i dt, with B, C of the table's row for |u| (Table 3). For a person alone
-    u = v_i and e_i = noise. Otherwise m is the mean velocity of the person and of those who walk together with the
-    person, weighted by their existence (ours), and u = v_i + FOLLOW (m - v_i), e_i = sqrt(1 - COMMON) noise +
-    sqrt(COMMON) s_i, where s_i is the sum of `shared` of the same people over the root of their number. FOLLOW 1 and
-    COMMON 0: u = m and e_i = noise, as in the paper; other values are ours.
+    u = v_i and e_i = noise. A partner j who walks together with i counts with w_j = `belonging` by `alike` at their old
+    distance and velocity difference, the person itself with w_i = 1. With m the mean velocity of both, weighted by w
+    and existence, and c = COMMON max_j w_j: u = v_i + FOLLOW (m - v_i), e_i = sqrt(1 - c) noise + sqrt(c) s_i and s_i =
+    sum w shared / sqrt(sum w^2). The weights, FOLLOW and COMMON are ours; the paper: BIAS inf, so that w = 1, FOLLOW 1
+    and COMMON 0, so that u = m and e_i = noise.
     """
     particles, n, _ = pos.shape
-    own, old = math.sqrt(1.0 - coupling[COMMON]), np.empty((n, 2))
+    place, old = np.empty((n, 2)), np.empty((n, 2))
     for p in range(particles):
-        old[:] = vel[p]
+        place[:], old[:] = pos[p], vel[p]
         for i in range(n):
-            x, y, weight, partners = exist[p, i] * old[i, 0], exist[p, i] * old[i, 1], exist[p, i], 0
-            a, b = shared[p, i, 0], shared[p, i, 1]
+            x, y, weight = exist[p, i] * old[i, 0], exist[p, i] * old[i, 1], exist[p, i]
+            a, b, square, most = shared[p, i, 0], shared[p, i, 1], 1.0, 0.0
             for j in range(n):
                 if related[p, i, j]:
-                    x += exist[p, j] * old[j, 0]
-                    y += exist[p, j] * old[j, 1]
-                    a, b = a + shared[p, j, 0], b + shared[p, j, 1]
-                    weight += exist[p, j]
-                    partners += 1
+                    distance = math.hypot(place[i, 0] - place[j, 0], place[i, 1] - place[j, 1])
+                    w = belonging(distance, math.hypot(old[i, 0] - old[j, 0], old[i, 1] - old[j, 1]), alike)
+                    x += w * exist[p, j] * old[j, 0]
+                    y += w * exist[p, j] * old[j, 1]
+                    a, b = a + w * shared[p, j, 0], b + w * shared[p, j, 1]
+                    weight += w * exist[p, j]
+                    square += w * w
+                    most = max(most, w)
             ex, ey = noise[p, i, 0], noise[p, i, 1]
-            if partners > 0:
-                part = math.sqrt(coupling[COMMON] / (partners + 1))
+            if most > 0:
+                own, part = math.sqrt(1.0 - most * coupling[COMMON]), math.sqrt(most * coupling[COMMON] / square)
                 ex, ey = own * ex + part * a, own * ey + part * b
-            if partners > 0 and weight > 0:
+            if most > 0 and weight > 0:
                 x = old[i, 0] + coupling[FOLLOW] * (x / weight - old[i, 0])
                 y = old[i, 1] + coupling[FOLLOW] * (y / weight - old[i, 1])
             else:
@@ -107,7 +112,7 @@ def move(
 
 @njit(cache=True)
 def belonging(distance: float, difference: float, rules: Array) -> float:
-    """Return the equilibrium probability that two people walk together (ours).
+    """Return the probability that two people walk together by their states (ours); 1 if BIAS is inf.
 
     distance: between them, m; difference: of their velocities, m/s; rules (4,).
     """
@@ -140,14 +145,16 @@ def near_pairs(pos: Array, related: Bools, rules: Array) -> Ints:
 
 
 @njit(cache=True)
-def relate(pos: Array, vel: Array, related: Bools, pairs: Ints, uniforms: Array, rules: Array) -> None:
+def relate(
+    pos: Array, vel: Array, related: Bools, pairs: Ints, odds: Array, uniforms: Array, rules: Array
+) -> None:  # fmt: skip
     """Draw new relations of pairs: p(s^r_t | s^a_t, s^r_t-1), eq. 7; related (P, K, K) is changed.
 
-    pos (P, K, 2), m, and vel (P, K, 2), m/s: new places and velocities. pairs (N, 2): people i < j; uniforms (P, K, 2)
-    in [0, 1); rules (4,). The paper leaves this distribution open. Ours: a person reconsiders all relations with the
-    rate / 2, and walks together with those whose `belonging` g is above one uniform number. So each pair is a chain of
-    two states that starts and stops with the hazards rate g and rate (1 - g), and a person leaves or joins a group at
-    once.
+    pos (P, K, 2), m, and vel (P, K, 2), m/s: new places and velocities. pairs (N, 2): people i < j; odds (N,): log odds
+    of each pair, from which the losses of rules (4,) are taken; uniforms (P, K, 2) in [0, 1). The paper leaves this
+    distribution open. Ours: with g the probability that these log odds are, a person reconsiders all relations with the
+    rate / 2, and walks together with those whose g is above one uniform number. So each pair is a chain of two states
+    that starts and stops with the hazards rate g and rate (1 - g), and a person leaves or joins a group at once.
     """
     change = 1.0 - math.sqrt(1.0 - rules[RATE])
     for p in range(len(pos)):
@@ -158,7 +165,8 @@ def relate(pos: Array, vel: Array, related: Bools, pairs: Ints, uniforms: Array,
                     continue
                 dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
                 du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
-                g = belonging(math.sqrt(dx * dx + dy * dy), math.sqrt(du * du + dv * dv), rules)
+                lost = rules[DISTANCE] * math.sqrt(dx * dx + dy * dy) + rules[VELOCITY] * math.sqrt(du * du + dv * dv)
+                g = 1.0 / (1.0 + math.exp(lost - odds[k]))
                 related[p, i, j] = related[p, j, i] = uniforms[p, a, 1] < g
 
 

@@ -11,10 +11,13 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
+from tracking.grouping.belief import UNSEEN, default_belief
+from tracking.grouping.pair_evidence import frames_per_step
+from tracking.grouping.pair_probabilities import pair_probabilities
 from tracking.papers.relational import sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.tracker import Particle, Relational
+from tracking.papers.relational.tracker import ALWAYS, Particle, Relational
 from tracking.prepare import prepare
 
 AT_ONCE = np.array([1.0, 0.0])
@@ -28,11 +31,11 @@ def flat_table(diffusion):
     return {f"drift_{k}": 0.0 for k in rows} | {f"diffusion_{k}": diffusion for k in rows} | {"noise_scale": 1.0}
 
 
-def move(particles, noise, table, coupling, dt, shared=None):
+def move(particles, noise, table, coupling, dt, shared=None, alike=ALWAYS):
     """Move the particles by a step of dt s."""
     shared = np.zeros(noise.shape) if shared is None else shared
     transition_kernels.move(
-        particles.pos, particles.vel, particles.exist, particles.related, noise, shared, table, coupling, dt
+        particles.pos, particles.vel, particles.exist, particles.related, noise, shared, table, coupling, alike, dt
     )
 
 
@@ -117,7 +120,7 @@ def test_without_relations_it_is_the_baseline_to_the_last_bit():
     """Relations are drawn from streams of their own (E4)."""
     scene = simulate(load("cross", ["camera.fps=5", "duration=5"]), 40_002, 0, ())
     runs = []
-    for name, params in (("particle", {}), ("relational", {"relation_bias": -40.0})):
+    for name, params in (("particle", {}), ("relational", {"relation_evidence": "state", "relation_bias": -40.0})):
         ready = prepare(name, scene, detections="file", params={"particles": 200} | params)
         ready.reset(3)
         runs.append([ready.step(frame) for frame in ready.frames()])
@@ -244,7 +247,7 @@ def test_new_relations_depend_on_new_attributes_alone(monkeypatch):
     monkeypatch.setattr(transition_kernels, "move", to_new)
     found = []
     for seed in (0, 1):
-        tracker = Relational(RelationalConfig(particles=300))
+        tracker = Relational(RelationalConfig(relation_evidence="state", particles=300))
         tracker.reset(Context(10.0, float("nan")), 7)
         tracker.particles = placed(300, np.random.default_rng(seed).normal(0, 3, (4, 2)))
         tracker.particles.related[:, 0, 1] = tracker.particles.related[:, 1, 0] = True
@@ -257,7 +260,8 @@ def test_new_relations_depend_on_new_attributes_alone(monkeypatch):
 def reconsidered(particles, rules, rng):
     pairs = transition_kernels.near_pairs(particles.pos, particles.related.any(axis=0), rules)
     uniforms = rng.random((particles.count, particles.people, 2))
-    transition_kernels.relate(particles.pos, particles.vel, particles.related, pairs, uniforms, rules)
+    odds = np.full(len(pairs), rules[transition_kernels.BIAS])
+    transition_kernels.relate(particles.pos, particles.vel, particles.related, pairs, odds, uniforms, rules)
 
 
 def test_a_pairs_relation_approaches_its_equilibrium_at_its_rate():
@@ -360,8 +364,113 @@ def test_partners_have_a_share_of_the_noise_in_common():
     assert np.array_equal(particles.vel[:, 3], noise[:, 3])
 
 
+def test_partners_count_by_how_alike_they_are():
+    """A partner 1 m away with a velocity difference of 1 m/s has the weight w = 1 / (1 + e^2) in the mean, and the
+    noises of both have the correlation 2 c w / (1 + w^2), c = common_noise w."""
+    alike, w = np.array([0.0, 3.0, 2.0, 3.0]), 1 / (1 + np.exp(2))
+    particles = placed(1, [[0, 0], [0, 1]], [[2, 0], [1, 0]])
+    particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+    move(particles, np.zeros((1, 2, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), AT_ONCE, 1.0, None, alike)
+    np.testing.assert_allclose(particles.vel[0, :, 0], [(2 + w) / (1 + w), (1 + 2 * w) / (1 + w)], rtol=1e-12)
+    count, rng = 40_000, np.random.default_rng(5)
+    particles = placed(count, [[0, 0], [0, 1.3]])
+    particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+    noise, shared = rng.standard_normal((2, count, 2, 2))
+    coupling, w = np.array([0.5, 0.7]), 1 / (1 + np.exp(2 * 1.3 - 3))
+    move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), coupling, 1.0, shared, alike)
+    common = 2 * 0.7 * w**2 / (1 + w**2)
+    np.testing.assert_allclose(np.cov(particles.vel[..., 0].T), [[1, common], [common, 1]], atol=0.02)
+
+
 @pytest.mark.parametrize("name", ["paper", "caviar-25fps"])
 def test_presets_couple_velocities_as_the_paper(name):
     tracker = Relational(RelationalConfig.preset(name))
     tracker.reset(Context(25.0, float("nan")), 0)
-    assert tracker._coupling()[1].tolist() == AT_ONCE.tolist()
+    _, coupling, alike = tracker._coupling()
+    assert coupling.tolist() == AT_ONCE.tolist()
+    assert transition_kernels.belonging(50.0, 9.0, alike) == 1
+
+
+def test_the_equilibrium_of_a_pair_is_the_belief():
+    """Whatever the particles say; pairs without a belief, 4 m and more apart, do not walk together."""
+    tracker = Relational(RelationalConfig(particles=20_000, relation_rate=2.0))
+    tracker.reset(Context(10.0, float("nan")), 3)
+    place = np.array([[0, 0], [0.5, 0], [0, 0.5], [30, 0]])
+    tracker.particles = placed(20_000, place, np.array([[0, 0], [1, 0], [0, 0], [0, 0]]))
+    tracker.particles.related[:, 0, 3] = tracker.particles.related[:, 3, 0] = True
+    tracker._follow(np.concatenate([place, np.zeros((4, 2))], axis=1))
+    assert tracker.belief is not None
+    assert (tracker.belief.log_odds[3, :3] == UNSEEN).all()
+    tracker.belief.log_odds[:3, :3] = odds = np.array([[0, 1.0, -2.0], [1.0, 0, 0.5], [-2.0, 0.5, 0]])
+    for _ in range(60):
+        tracker._relate()
+    found = tracker.particles.related.mean(axis=0)
+    apart = ~np.eye(3, dtype=bool)
+    np.testing.assert_allclose(found[:3, :3][apart], (1 / (1 + np.exp(-odds)))[apart], atol=0.015)
+    assert found[3].max() == 0
+    gone = np.concatenate([place, np.zeros((4, 2))], axis=1)
+    gone[1] = np.nan
+    for _ in range(tracker.belief.size):
+        tracker._follow(gone)
+    before = tracker.particles.related[:, 1].copy()
+    for _ in range(60):
+        tracker._relate()
+    assert np.array_equal(tracker.particles.related[:, 1], before)  # who is not seen stays with the partners
+
+
+def test_the_probabilities_are_those_of_the_belief_over_the_reported_tracks():
+    scene = simulate(load("cross", ["camera.fps=5", "duration=8"]), 40_004, 0, ())
+    ready = prepare("relational", scene, detections="file", params={"particles": 200})
+    ready.reset(3)
+    tracks, said = [], {}
+    for frame in ready.frames():
+        tracks.append(ready.step(frame))
+        ids, together = ready.tracker.walking_together()
+        for i, a in enumerate(ids):
+            said |= {(frame.index, int(a), int(b)): together[i, j] for j, b in enumerate(ids) if a < b}
+    found = pair_probabilities(tracks, scene.fps, scene.px_per_m, default_belief())
+    rows = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), found.probability.tolist(), strict=True)
+    expected = {(f, a, b): p for f, a, b, p in rows}
+    known = [key for key in expected if (key[0] - 1) % frames_per_step(scene.fps) == 0]
+    assert len(known) > 100
+    np.testing.assert_allclose([said[key] for key in known], [expected[key] for key in known], atol=1e-9)
+
+
+def walked(evidence, apart, frames):
+    """The probability that two people walk together, in each frame, 10 frames/s: both walk at 1.2 m/s, the second one
+    apart(t) beside the first, m."""
+    tracker = Relational(RelationalConfig(relation_evidence=evidence, particles=500))
+    tracker.reset(Context(10.0, float("nan")), 1)
+    out = []
+    for k in range(frames):
+        x = 0.12 * k
+        tracker.step(Frame(k + 1, k / 10), detections(k + 1, (x, 0), (x, apart(k / 10))))
+        ids, together = tracker.walking_together()
+        out.append(together[0, 1] if len(ids) == 2 else np.nan)
+    return np.array(out)
+
+
+def test_the_belief_tells_who_passes_from_who_walks_along():
+    """Both are as near and as fast as partners after 6 s. Only the belief remembers that one has come from far."""
+
+    def passing(t):
+        return max(0.8, 6 - 1.3 * t)
+
+    for evidence in ("belief", "state"):
+        both = [walked(evidence, apart, 61)[-6:].mean() for apart in (lambda t: 0.8, passing)]
+        stays, comes = np.log(both) - np.log1p(-np.array(both))
+        assert stays > 2
+        assert (stays - comes > 2) == (evidence == "belief"), (evidence, stays, comes)
+
+
+def test_the_belief_has_the_rows_of_the_people():
+    """People come, are missed and go: each row of the belief stays that of the same person."""
+    tracker = Relational(RelationalConfig(particles=100, time_window=0.5))
+    tracker.reset(Context(10.0, float("nan")), 1)
+    for k in range(40):
+        there = [(0.1 * k, y) for y, first, last in ((0, 0, 40), (3, 2, 15), (6, 8, 40)) if first <= k < last]
+        tracker.step(Frame(k + 1, k / 10), detections(k + 1, *there))
+        assert tracker.belief is not None
+        assert len(tracker.belief.count) == tracker.particles.people
+    assert tracker.particles.people == 2
+    np.testing.assert_allclose(tracker.belief.past[-1][:, 1], [0, 6], atol=0.3)
