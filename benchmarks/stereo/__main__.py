@@ -10,6 +10,7 @@ contrast   the rendered ground beside real ground, without a matcher
 trajectories  the paths of groups in space, as in Figs. 5, 7 and 9 of the paper (an SVG)
 scenes     the paper's scenes: position errors (bias and scatter apart), group scores, events
 decisions  each decision of the tracker switched off: paired differences of F1 and of the position error
+points     decisions switched off where the tracker gets points, with misses and false alarms
 density    `stereo` in crowds of growing density, beside `group-pda` and `blob` on the left pictures (table and SVG)
 cost       time of matching inside the foreground over dense matching, against the foreground's share (table and SVG);
            frames per second
@@ -25,7 +26,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.stereo import contrast, cost, decalibration, density, photometric, pictures, real, scenes, trajectories
+from benchmarks.stereo import (
+    contrast,
+    cost,
+    decalibration,
+    density,
+    from_points,
+    photometric,
+    pictures,
+    real,
+    scenes,
+    trajectories,
+)
 from benchmarks.support.options import add_data, add_seeds, new_parser, one_thread, seeds_text
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
@@ -37,6 +49,7 @@ MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "trajectories": trajectories.trajectories,
     "scenes": scenes.scenes,
     "decisions": scenes.decisions,
+    "points": from_points.points,
     "density": density.density,
     "cost": cost.cost,
 }
@@ -47,7 +60,9 @@ def main() -> None:
     parser.add_argument("mode", choices=MODES)
     add_seeds(parser, "20000:20030")
     add_data(parser)
-    parser.add_argument("--only", help="scenes, separated by commas: cross, merge, stairs, crowded")
+    parser.add_argument(
+        "--only", help="scenes, separated by commas: cross, merge, stairs, crowded, split, pillar; points: scenarios"
+    )
     parser.add_argument("--options", help="decisions: parameters, separated by commas; scenes: stereo, preset paper")
     parser.add_argument(
         "--chart", type=Path, default=Path("stereo.svg"), help="trajectories, density, cost: the SVG to write"

@@ -26,6 +26,8 @@ LEAST_BLOCK = 5
 """px: least width of the compared block that OpenCV allows."""
 LEAST_UNIQUE = 5
 """Percent by which the best match must be better than the second best."""
+SHORT_BLOCK = 22
+"""px: widest block whose sums of differences, and 5 % more, are below 32768."""
 
 Disparities = NDArray[np.float32]
 
@@ -70,7 +72,8 @@ class SubtractionStereo:
         needed = runs(reach(own, half, mask.shape))
         filters = np.empty((2, high, wide), np.int16)
         filtered_pair(left, right, needed, half, D, filters)
-        block_match(own, needed, half, D, LEAST_UNIQUE, filters, found)
+        sad = np.empty((wide, D), np.int16 if self.block <= SHORT_BLOCK else np.int32)
+        block_match(own, needed, half, LEAST_UNIQUE, filters, sad, found)
         return Matched(found, D * int((needed[:, 2] - needed[:, 1]).sum()))
 
     def dense(self, left: Image, right: Image) -> Disparities:

@@ -19,6 +19,7 @@ from sim.types import Bools, Image
 
 Runs = NDArray[np.int32]
 Shorts = NDArray[np.int16]
+Sads = NDArray[np.int16] | NDArray[np.int32]
 CAP = 31
 """Largest absolute value of the filtered pictures, OpenCV's default."""
 STEPS = 16
@@ -36,38 +37,35 @@ def reach(runs: Runs, half: int, shape: tuple[int, int]) -> Bools:
 
 
 @njit(cache=True)
-def sobel(picture: Image, row: int, first: int, end: int, filtered: Shorts) -> None:
-    """Fills columns first to end of a row of `filtered` (H, W): 0 to 2 CAP, CAP at the first and last column.
+def sobel(picture: Image, row: int, first: int, end: int, filtered: Shorts, smooth: Shorts) -> None:
+    """Fills columns first to end of `filtered` (W,), a row of the filtered picture, -CAP to CAP.
 
-    Beyond the first and last row lies the next row inside.
+    It is 0 at the first and last column. Beyond the first and last row lies the next row inside. smooth (W,): work
+    space, the row smoothed down the columns.
     """
     high, wide = picture.shape
-    above = row - 1 if row > 0 else min(1, high - 1)
-    below = row + 1 if row < high - 1 else max(high - 2, 0)
+    above = picture[row - 1 if row > 0 else min(1, high - 1)]
+    here = picture[row]
+    below = picture[row + 1 if row < high - 1 else max(high - 2, 0)]
+    for x in range(max(first - 1, 0), min(end + 1, wide)):
+        smooth[x] = np.int16(int(above[x]) + int(below[x]) + 2 * int(here[x]))
     for x in range(max(first, 1), min(end, wide - 1)):
-        slope = int(picture[above, x + 1]) - int(picture[above, x - 1])
-        slope += 2 * (int(picture[row, x + 1]) - int(picture[row, x - 1]))
-        slope += int(picture[below, x + 1]) - int(picture[below, x - 1])
-        filtered[row, x] = min(max(slope, -CAP), CAP) + CAP
+        filtered[x] = np.int16(max(-CAP, min(CAP, int(smooth[x + 1]) - int(smooth[x - 1]))))
     if first == 0:
-        filtered[row, 0] = CAP
+        filtered[0] = 0
     if end == wide:
-        filtered[row, wide - 1] = CAP
+        filtered[wide - 1] = 0
 
 
 @njit(cache=True)
 def filtered_pair(left: Image, right: Image, needed: Runs, half: int, D: int, filters: Shorts) -> None:
     """Fills `filters` (2, H, W), the filtered left and right picture, where `row_sums` of the runs `needed` (R, 3)
     reads them."""
-    wide = left.shape[1]
-    k = 0
-    while k < len(needed):
+    smooth = np.empty(left.shape[1], np.int16)
+    for k in range(len(needed)):
         row, first, end = needed[k]
-        while k < len(needed) and needed[k, 0] == row:
-            end = needed[k, 2]
-            k += 1
-        sobel(left, row, first - half, end + half, filters[0])
-        sobel(right, row, max(first - half - D + 1, 0), min(end + half, wide), filters[1])
+        sobel(left, row, first - half, end + half, filters[0, row], smooth)
+        sobel(right, row, first - half - D + 1, end + half, filters[1, row], smooth)
 
 
 @njit(cache=True)
@@ -95,7 +93,7 @@ def row_sums(left: Shorts, right: Shorts, first: int, end: int, half: int, apart
 
 
 @njit(cache=True)
-def best(sad: NDArray[np.int32], unique: int) -> float:
+def best(sad: Sads, unique: int) -> float:
     """Returns the disparity, px, with the least of the SADs (D,), the largest disparity first; nan if there is none.
 
     There is none if another disparity more than 1 px away has a SAD at most `unique` % larger, or if the best is 0.
@@ -104,20 +102,20 @@ def best(sad: NDArray[np.int32], unique: int) -> float:
     least = sad[0]
     for d in range(1, D):
         least = min(least, sad[d])
-    limit = np.int32(least + least * unique // 100)
-    close = np.int32(0)
+    limit = sad.dtype.type(least + least * unique // 100)
+    close = sad.dtype.type(0)
     for d in range(D):
-        close += np.int32(sad[d] <= limit)
+        close += sad.dtype.type(sad[d] <= limit)
     k = 0
     while sad[k] != least:
         k += 1
     for d in range(max(k - 1, 0), min(k + 2, D)):
-        close -= np.int32(sad[d] <= limit)
+        close -= sad.dtype.type(sad[d] <= limit)
     if close:
         return np.nan
-    more = sad[k + 1] if k < D - 1 else sad[D - 2]
-    less = sad[k - 1] if k > 0 else sad[1]
-    bend = more + less - 2 * least + abs(more - less)
+    more = int(sad[k + 1] if k < D - 1 else sad[D - 2])
+    less = int(sad[k - 1] if k > 0 else sad[1])
+    bend = more + less - 2 * int(least) + abs(more - less)
     part = 0
     if bend:
         part = abs(more - less) * 256 // bend
@@ -128,18 +126,18 @@ def best(sad: NDArray[np.int32], unique: int) -> float:
 
 @njit(cache=True)
 def block_match(
-    runs: Runs, needed: Runs, half: int, D: int, unique: int, filters: Shorts, found: NDArray[np.float32]
+    runs: Runs, needed: Runs, half: int, unique: int, filters: Shorts, sad: Sads, found: NDArray[np.float32]
 ) -> None:
     """Fills `found` (H, W) with the disparities, px, at the pixels of the runs (R, 3), in raster order.
 
     needed (Q, 3): runs of the pixels at most `half` rows above or below them; filters (2, H, W): the filtered pictures.
+    sad (W, D): work space; its type must hold 2 CAP times the area of a block, and `unique` % more.
     Blocks and the columns of their matches must lie inside the pictures.
     """
-    wide = found.shape[1]
+    wide, D = sad.shape
     kept = 2 * half + 2
     sums = np.empty((kept, wide, D), np.int16)
     apart = np.empty((wide, D), np.int16)
-    sad = np.empty((wide, D), np.int32)
     at = np.full(wide, -2)
     q = 0
     for k in range(len(runs)):
@@ -148,17 +146,18 @@ def block_match(
             y = needed[q, 0]
             row_sums(filters[0, y], filters[1, y], needed[q, 1], needed[q, 2], half, apart, sums[y % kept])
             q += 1
+        one_more, one_less, line = sums[(row + half) % kept], sums[(row - half - 1) % kept], found[row]
         for x in range(first, end):
             total = sad[x]
             if at[x] == row - 1:
-                new, old = sums[(row + half) % kept, x], sums[(row - half - 1) % kept, x]
+                new, old = one_more[x], one_less[x]
                 for d in range(D):
-                    total[d] += np.int32(new[d]) - np.int32(old[d])
+                    total[d] += sad.dtype.type(np.int16(new[d] - old[d]))
             else:
                 total[:] = 0
                 for y in range(row - half, row + half + 1):
                     new = sums[y % kept, x]
                     for d in range(D):
-                        total[d] += np.int32(new[d])
+                        total[d] += sad.dtype.type(new[d])
             at[x] = row
-            found[row, x] = best(total, unique)
+            line[x] = best(total, unique)
