@@ -2,10 +2,10 @@
 
 The matcher is OpenCV's block matcher (`cv2.StereoBM`: grey values, sub-pixel by a parabola), written anew so that it
 works at the pixels of the foreground alone. Block matching is local, so that their disparities are those of the whole
-picture to the last bit.
+picture to the last bit. Its left-right check compares pixels of the foreground with each other only. It removes the
+parts of people that another person hides from the right camera.
 
-Ours: the background is subtracted from the left picture only. There is no left-right check: it finds places that one
-camera does not see, and these lie in the background beside people.
+Ours: the background is subtracted from the left picture only.
 """
 
 from __future__ import annotations
@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 
 from sim.types import Array, Bools, Image
 from tracking.detect.blobs_kernels import runs
-from tracking.detect.subtraction_stereo_kernels import STEPS, block_match, filtered_pair, reach
+from tracking.detect.subtraction_stereo_kernels import (
+    STEPS,
+    block_match,
+    filtered_pair,
+    left_right,
+    reach,
+)
 
 MULTIPLE = 16
 """Numbers of disparities are multiples of it, as those of OpenCV's matcher."""
@@ -73,14 +79,20 @@ class SubtractionStereo:
         filters = np.empty((2, high, wide), np.int16)
         filtered_pair(left, right, needed, half, D, filters)
         sad = np.empty((wide, D), np.int16 if self.block <= SHORT_BLOCK else np.int32)
-        block_match(own, needed, half, LEAST_UNIQUE, filters, sad, found)
+        cost = np.empty(mask.shape, np.int32)
+        block_match(own, needed, half, LEAST_UNIQUE, filters, sad, found, cost)
+        left_right(own, found, cost)
         return Matched(found, D * int((needed[:, 2] - needed[:, 1]).sum()))
 
     def dense(self, left: Image, right: Image) -> Disparities:
-        """Returns the disparities of the whole pictures (H, W), px, nan where there is none, by OpenCV's matcher."""
+        """Returns the disparities of the whole pictures (H, W), px, nan where there is none, by OpenCV's matcher.
+
+        They are those of `match` with a mask that is True everywhere.
+        """
         matcher = cv2.StereoBM.create(self.disparities, self.block)
         matcher.setUniquenessRatio(LEAST_UNIQUE)
         matcher.setTextureThreshold(0)
+        matcher.setDisp12MaxDiff(1)
         raw = matcher.compute(left, right)
         return np.where(raw > 0, raw.astype(np.float32) / STEPS, np.float32(np.nan))
 

@@ -20,6 +20,8 @@ from sim.types import Bools, Image
 Runs = NDArray[np.int32]
 Shorts = NDArray[np.int16]
 Sads = NDArray[np.int16] | NDArray[np.int32]
+Costs = NDArray[np.int32]
+Floats = NDArray[np.float32]
 CAP = 31
 """Largest absolute value of the filtered pictures, OpenCV's default."""
 STEPS = 16
@@ -126,9 +128,10 @@ def best(sad: Sads, unique: int) -> float:
 
 @njit(cache=True)
 def block_match(
-    runs: Runs, needed: Runs, half: int, unique: int, filters: Shorts, sad: Sads, found: NDArray[np.float32]
+    runs: Runs, needed: Runs, half: int, unique: int, filters: Shorts, sad: Sads, found: Floats, cost: Costs
 ) -> None:
-    """Fills `found` (H, W) with the disparities, px, at the pixels of the runs (R, 3), in raster order.
+    """Fills `found` (H, W) with the disparities, px, at the pixels of the runs (R, 3), in raster order, and `cost`
+    (H, W) with their SADs.
 
     needed (Q, 3): runs of the pixels at most `half` rows above or below them; filters (2, H, W): the filtered pictures.
     sad (W, D): work space; its type must hold 2 CAP times the area of a block, and `unique` % more.
@@ -161,3 +164,35 @@ def block_match(
                         total[d] += sad.dtype.type(new[d])
             at[x] = row
             line[x] = best(total, unique)
+            cost[row, x] = total.min()
+
+
+@njit(cache=True)
+def left_right(runs: Runs, found: Floats, cost: Costs) -> None:
+    """Sets `found` (H, W) to nan where another pixel of the runs (R, 3) matches the same place better, by `cost`.
+
+    It is OpenCV's check: a disparity d at column x stays if the best match of column x - d, rounded down or up, has a
+    disparity at most 1 px from d, or if there is none.
+    """
+    wide = found.shape[1]
+    price, match = np.empty(wide, np.int32), np.empty(wide, np.float32)
+    k = 0
+    while k < len(runs):
+        row, begun = runs[k, 0], k
+        match[:] = np.nan
+        while k < len(runs) and runs[k, 0] == row:
+            for x in range(runs[k, 1], runs[k, 2]):
+                d = found[row, x]
+                if not np.isnan(d):
+                    there = x - int(np.floor(d + 0.5))
+                    if np.isnan(match[there]) or cost[row, x] < price[there]:
+                        price[there], match[there] = cost[row, x], d
+            k += 1
+        for j in range(begun, k):
+            for x in range(runs[j, 1], runs[j, 2]):
+                d = found[row, x]
+                if np.isnan(d):
+                    continue
+                low, high = x - int(np.floor(d)), x - int(np.ceil(d))
+                if abs(match[low] - d) > 1 and abs(match[high] - d) > 1:
+                    found[row, x] = np.nan
