@@ -192,7 +192,7 @@ def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
     rows = {}
     for name in wanted:
         cells = []
-        for key in ("group_F1_hull", "error"):
+        for key in ("group_F1_hull", "group_MOTA", "error", "extra"):
             pairs = [
                 (by[name][s].get(key, np.nan), by["stereo"][s].get(key, np.nan))
                 for by in made.values()
@@ -202,5 +202,6 @@ def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
             off = off[np.isfinite(off)]
             cells.append(signed(*_mean(off)) if len(off) else "–")
         rows[name] = cells
-    table("Each decision switched off: difference to the defaults", "decision", ("group F1", "error, m"), rows)
+    columns = ("group F1", "MOTA", "error, m", "extra")
+    table("Each decision switched off: difference to the defaults", "decision", columns, rows)
     return made

@@ -95,10 +95,11 @@ def row_sums(left: Shorts, right: Shorts, first: int, end: int, half: int, apart
 
 
 @njit(cache=True)
-def best(sad: Sads, unique: int) -> float:
-    """Returns the disparity, px, with the least of the SADs (D,), the largest disparity first; nan if there is none.
+def best(sad: Sads, unique: int) -> tuple[float, int]:
+    """Returns the disparity, px, with the least of the SADs (D,), and that SAD; nan if there is no disparity.
 
-    There is none if another disparity more than 1 px away has a SAD at most `unique` % larger, or if the best is 0.
+    The largest of equal ones counts. There is none if another disparity more than 1 px away has a SAD at most `unique`
+    % larger, or if the best is 0.
     """
     D = len(sad)
     least = sad[0]
@@ -114,7 +115,7 @@ def best(sad: Sads, unique: int) -> float:
     for d in range(max(k - 1, 0), min(k + 2, D)):
         close -= sad.dtype.type(sad[d] <= limit)
     if close:
-        return np.nan
+        return np.nan, int(least)
     more = int(sad[k + 1] if k < D - 1 else sad[D - 2])
     less = int(sad[k - 1] if k > 0 else sad[1])
     bend = more + less - 2 * int(least) + abs(more - less)
@@ -123,7 +124,7 @@ def best(sad: Sads, unique: int) -> float:
         part = abs(more - less) * 256 // bend
         part = part if more > less else -part
     found = ((D - 1 - k) * 256 + part + 15) >> 4
-    return found / STEPS if found > 0 else np.nan
+    return (found / STEPS if found > 0 else np.nan), int(least)
 
 
 @njit(cache=True)
@@ -149,7 +150,8 @@ def block_match(
             y = needed[q, 0]
             row_sums(filters[0, y], filters[1, y], needed[q, 1], needed[q, 2], half, apart, sums[y % kept])
             q += 1
-        one_more, one_less, line = sums[(row + half) % kept], sums[(row - half - 1) % kept], found[row]
+        one_more, one_less = sums[(row + half) % kept], sums[(row - half - 1) % kept]
+        line, prices = found[row], cost[row]
         for x in range(first, end):
             total = sad[x]
             if at[x] == row - 1:
@@ -163,8 +165,7 @@ def block_match(
                     for d in range(D):
                         total[d] += sad.dtype.type(new[d])
             at[x] = row
-            line[x] = best(total, unique)
-            cost[row, x] = total.min()
+            line[x], prices[x] = best(total, unique)
 
 
 @njit(cache=True)
