@@ -24,7 +24,7 @@ from tracking.user_code import tracker_failed, user_code, what_was_raised
 REGISTRY = {
     "blob": "tracking.papers.blob.tracker:Blob",
     "group-pda": "tracking.papers.group_pda.tracker:GroupPda",
-    "relational": "tracking.papers.relational.tracker:Relational",
+    "relational": "tracking.papers.relational.relations:Relational",
     "particle": "tracking.papers.relational.tracker:Particle",
     "joint": "tracking.papers.joint.tracker:Joint",
     "stereo": "tracking.papers.stereo.tracker:Stereo",

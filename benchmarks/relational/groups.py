@@ -22,7 +22,7 @@ from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.pair_probabilities import pair_probabilities
-from tracking.papers.relational.tracker import Relational
+from tracking.papers.relational.relations import Relational
 from tracking.prepare import prepare
 from tracking.stats import paired
 

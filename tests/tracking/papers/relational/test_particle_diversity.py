@@ -8,7 +8,7 @@ import pytest
 from sim.types import Context, Detections, Frame
 from tracking.papers.relational.particle_diversity import ParticleDiversity
 from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.tracker import Relational
+from tracking.papers.relational.relations import Relational
 
 
 def two(count):

@@ -17,9 +17,12 @@ from tracking.grouping.pair_probabilities import pair_probabilities
 from tracking.papers.relational import sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.tracker import ALWAYS, Particle, Relational
+from tracking.papers.relational.relations import Relational
+from tracking.papers.relational.tracker import Particle
 from tracking.prepare import prepare
 
+ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
+"""The paper's rule: partners count fully."""
 AT_ONCE = np.array([1.0, 0.0])
 """The paper's coupling: members of a group have its mean velocity, and noise of their own."""
 CERTAIN = {"detect_prob": 1.0, "clutter_density": 0.0, "resample_share": 1.0}

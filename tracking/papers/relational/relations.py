@@ -1,0 +1,109 @@
+"""The tracker `relational`: the filter of `particle` with the relation "walking together" in its particles."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from sim.types import Array, Bools, Context, Frame, Ints, Tracks
+from tracking.grouping.belief import UNSEEN
+from tracking.grouping.pair_belief import PairBelief
+from tracking.papers.relational import transition_kernels
+from tracking.papers.relational.config import ParticleConfig, RelationalConfig
+from tracking.papers.relational.tracker import COUPLING, JOINING, RELATIONS, Particle
+from tracking.papers.relational.transition_kernels import DISTANCE, VELOCITY
+
+ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
+"""Rules of transition_kernels by which every partner counts fully, as in the paper."""
+
+
+class Relational(Particle):
+    """The tracker `relational`: the particle filter of `particle` with the relation "walking together" in it.
+
+    together (K, K): probability that each pair walks together, in the last frame, by slots; 1 on the diagonal. belief:
+    that of tracking.grouping about the slots' tracks so far, kept only if relations come from it. The rest of the state
+    is that of Particle.
+    """
+
+    config_class: ClassVar[type[ParticleConfig]] = RelationalConfig
+    config: RelationalConfig
+
+    def reset(self, context: Context, seed: int) -> None:
+        """Forget everything and start a sequence, as `Particle.reset`."""
+        super().reset(context, seed)
+        self.together = np.zeros((0, 0))
+        self.belief = PairBelief(context.fps) if self.config.relation_evidence == "belief" else None
+
+    @property
+    def _rules(self) -> Array:
+        """The parameters of relations (4,) as transition_kernels has them: RATE, BIAS, DISTANCE, VELOCITY."""
+        c = self.config
+        new = -np.expm1(-c.relation_rate * self.dt)
+        return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
+
+    def _coupling(self) -> tuple[Array, Array, Array]:
+        time = self.config.coupling_time
+        follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
+        shared = self.draws[COUPLING].standard_normal(self.particles.pos.shape)
+        alike = ALWAYS if self.belief is None else self._rules
+        return shared, np.array([follow, self.config.common_noise]), alike
+
+    def _relate(self) -> None:
+        p, rules = self.particles, self._rules
+        if p.people < 2:
+            return
+        some = np.asarray(p.related.any(axis=0))
+        if self.belief is None:
+            pairs = transition_kernels.near_pairs(p.pos, some, rules)
+            odds = np.full(len(pairs), self.config.relation_bias)
+        else:
+            seen, odds = self.belief.seen(), _log_odds(self.belief)
+            pairs = np.argwhere(np.triu(seen[:, None] & seen & (some | np.isfinite(odds)), 1))
+            odds = odds[pairs[:, 0], pairs[:, 1]]
+            rules = np.where(np.isin(range(4), (DISTANCE, VELOCITY)), 0.0, rules)
+        uniforms = self.draws[RELATIONS].random((p.count, p.people, 2))
+        transition_kernels.relate(p.pos, p.vel, p.related, pairs, odds, uniforms, rules)
+
+    def _follow(self, state: Array) -> None:
+        if self.belief is not None:
+            if len(state) > len(self.belief.count):
+                self.belief.add(state)
+            self.belief.see(state[:, :2])
+
+    def _keep(self, rows: Bools) -> None:
+        super()._keep(rows)
+        if self.belief is not None:
+            self.belief.keep(rows)
+
+    def _relations_of_newcomer(self, point: Array) -> Bools:
+        """Returns the relations (P, K) bool of a new person at `point` (2,), m: to all members of the group joined."""
+        p, label, share = self.particles, self.particles.labels(), self.config.newcomer_share
+        uniforms = self.draws[JOINING].random(p.count)
+        group = transition_kernels.join(p.pos, p.exist, label, point, share, uniforms, self._rules)
+        return np.asarray(label == group[:, None])
+
+    def _report(self, frame: Frame) -> Tracks:
+        tracks, p = super()._report(frame), self.particles
+        if self.belief is None:
+            self.together = transition_kernels.pairs_together(p.related, p.exist, p.weights, p.cluster)
+        else:
+            self.together = 1 / (1 + np.exp(-_log_odds(self.belief)))
+            np.fill_diagonal(self.together, 1.0)
+        return tracks
+
+    def walking_together(self) -> tuple[Ints, Array]:
+        """Return ids (R,) of the people reported last, and the probability (R, R) that two of them walk together.
+
+        By their state it is the share of the weight of the particles in which the pair is related, given that both
+        exist. The belief is the same in all particles, so that it is the probability itself; a share of particles would
+        be the belief with errors of sampling, and weights would count the detections twice. 1 on the diagonal.
+        """
+        rows = np.zeros(0, np.int64) if self.shown is None else np.flatnonzero(np.isin(self.slots.id, self.shown.id))
+        return self.slots.id[rows], self.together[np.ix_(rows, rows)]
+
+
+def _log_odds(belief: PairBelief) -> Array:
+    """Returns the log-odds (K, K) that pairs belong together; -inf for pairs without evidence."""
+    return np.where(belief.log_odds == UNSEEN, -np.inf, belief.log_odds)
