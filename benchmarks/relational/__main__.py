@@ -10,7 +10,7 @@ hidden       error of one of two people who walk together while nobody sees this
 recordings   error of one member of each labelled group in three recordings (--recordings) who is not detected for 2 s
              in every 6 s; positions err by 0.1 m
 groups       scores of people, groups and events on a suite, beside `blob`; groupings of the same tracks
-reliability  how often people who walk together with a probability belong together, beside the belief
+reliability  how often people who walk together with a probability belong together, beside the belief; --chart FILE.svg
 ablation     error, HOTA, IDF1 and pairwise F1 without each departure from the paper that has a parameter
 pixels       scores from pictures without each departure that concerns pixels, and with other constants
 boxes        scores on PETS and TUD-Campus (--recordings) from their detectors' boxes, beside `blob`
@@ -46,7 +46,9 @@ def main() -> None:
     parser.add_argument("--suite", default="standard", help="of modes groups, reliability, ablation and pixels")
     parser.add_argument("--entry", metavar="NAME", help="only these entries of the suite, a comma between them")
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="labelled recordings are there")
-    parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="modes particles and hidden: draw them")
+    parser.add_argument(
+        "--chart", type=Path, metavar="FILE.svg", help="modes particles, hidden and reliability: draw them"
+    )
     given = parser.parse_args()
     modes[given.mode](given)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import tracking
 from benchmarks.relational.errors import FILTERS, config_of, errors
-from benchmarks.support import tables
+from benchmarks.support import chart, tables
 from benchmarks.support.options import HOTEL, ZARA
 from scenarios.loading.resolve import resolve
 from sim.io.source import open_source
@@ -99,19 +99,43 @@ def _pooled(scored: list[dict[str, float]], kind: str) -> str:
 
 
 def reliability(given: argparse.Namespace) -> None:
-    """Prints a table: rows are probabilities of pairs, columns how often these belong together, and F1 at 1/2."""
+    """Prints a table: rows are probabilities of pairs, columns how often these belong together, and F1 at 1/2.
+
+    The chart has the latter against the mean probability, in each column.
+    """
+    panels = []
     if not given.recordings:
-        return _reliability([(seed, q, {}) for _, seed, q in _sequences(given, given.suite)], given)
-    for name, path in RECORDINGS.items():
+        runs = [(seed, q, dict[str, Any]()) for _, seed, q in _sequences(given, given.suite)]
+        panels.append(_panel(f"suite {given.suite}", _reliability(runs, given)))
+    for name, path in RECORDINGS.items() if given.recordings else ():
         (q,) = open_source(given.recordings / path)
         for label, sensor in (("exact", EXACT), ("errors of 0.1 m, 5 % missed", ROUGH)):
             print(f"\n{name}, {label}\n")
-            _reliability([(seed, q, sensor) for seed in given.seeds], given)
-    return None
+            found = _reliability([(seed, q, sensor) for seed in given.seeds], given)
+            panels.append(_panel(f"{name}, {label}", found))
+    if given.chart:
+        chart.lines(panels, given.chart)
 
 
-def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argparse.Namespace) -> None:
-    """Prints the table of some sequences with their seeds and settings of the sensor, none for stored detections."""
+def _panel(title: str, found: dict[str, Array]) -> chart.Panel:
+    """Returns a chart of the share of pairs that belong together against the range of their probability; found: by row
+    of the table, (N, 2), of probability and truth."""
+    middle = (np.arange(BINS) + 0.5) / BINS
+    curves: dict[str, Array] = {"as said": np.full(BINS, np.nan)}
+    for label, values in found.items():
+        p, same = values.T
+        k = np.minimum((p * BINS).astype(int), BINS - 1)
+        if label == "relational":
+            curves["as said"] = np.array([p[k == b].mean() if (k == b).any() else middle[b] for b in range(BINS)])
+        curves[label] = np.array([same[k == b].mean() if (k == b).any() else np.nan for b in range(BINS)])
+    return chart.Panel(title, middle.tolist(), curves, "probability", "share that belong together", (0.0, 1.0))
+
+
+def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argparse.Namespace) -> dict[str, Array]:
+    """Prints the table of some sequences with their seeds and settings of the sensor, none for stored detections.
+
+    Returns the probability of each pair and whether the two belong together, (N, 2), by row of the table.
+    """
     boxes = runs[0][1].camera is not None
     trackers = ("relational", "particle", *(["blob"] if boxes else []))  # blob takes boxes
     rows: dict[str, list[Array]] = {"relational": [], **{f"belief on {name}": [] for name in trackers}}
@@ -130,21 +154,23 @@ def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argpar
             ids, together = tracker.walking_together()
             place = {int(i): k for k, i in enumerate(ids)}
             true = _people_of(q.truth, tracks)
-            pairs = [(a, b) for a in true for b in true if a < b]
-            known = [(together[place[a], place[b]], _same(true[a], true[b])) for a, b in pairs]
+            both = [(a, b) for a in true for b in true if a < b]
+            known = [(together[place[a], place[b]], _same(true[a], true[b])) for a, b in both]
             rows["relational"].append(np.array(known).reshape(-1, 2))
         for name in trackers[1:]:
             found[name] = _tracked(name, seed, q, given, mode, sensor)
         for name, bare in found.items():
             rows[f"belief on {name}"].append(_believed(q, bare))
     tables.head(["pairs", *(f"{k / BINS:g} to {(k + 1) / BINS:g}" for k in range(BINS)), "F1 at 1/2", "mean gap"])
-    for label, parts in rows.items():
-        p, same = np.concatenate(parts).T
+    pairs = {label: np.concatenate(parts) for label, parts in rows.items()}
+    for label, values in pairs.items():
+        p, same = values.T
         k = np.minimum((p * BINS).astype(int), BINS - 1)
         cells = [f"{same[k == b].mean():.2f} ({(k == b).sum()})" if (k == b).any() else "" for b in range(BINS)]
         gap = sum(abs(same[k == b].mean() - p[k == b].mean()) * (k == b).mean() for b in range(BINS) if (k == b).any())
         hit, said = (same[p > 0.5]).sum(), (p > 0.5).sum()
         tables.row([label, *cells, f"{2 * hit / max(said + same.sum(), 1):.3f}", f"{gap:.3f}"])
+    return pairs
 
 
 def _believed(q: Sequence, tracks: list[Tracks]) -> Array:
