@@ -119,16 +119,25 @@ def reliability(given: argparse.Namespace) -> None:
 
 def _panel(title: str, found: dict[str, Array]) -> chart.Panel:
     """Returns a chart of the share of pairs that belong together against the range of their probability; found: by row
-    of the table, (N, 2), of probability and truth."""
+    of the table, (N, 2), of probability and truth. "as said" is the mean probability, of the first row."""
     middle = (np.arange(BINS) + 0.5) / BINS
-    curves: dict[str, Array] = {"as said": np.full(BINS, np.nan)}
-    for label, values in found.items():
-        p, same = values.T
-        k = np.minimum((p * BINS).astype(int), BINS - 1)
-        if label == "relational":
-            curves["as said"] = np.array([p[k == b].mean() if (k == b).any() else middle[b] for b in range(BINS)])
-        curves[label] = np.array([same[k == b].mean() if (k == b).any() else np.nan for b in range(BINS)])
+    shares = {label: _by_range(values) for label, values in found.items()}
+    said = next(iter(shares.values()))[:, 1]
+    curves = {"as said": np.where(np.isfinite(said), said, middle)} | {k: x[:, 2] for k, x in shares.items()}
     return chart.Panel(title, middle.tolist(), curves, "probability", "share that belong together", (0.0, 1.0))
+
+
+def _by_range(values: Array) -> Array:
+    """Returns for each range of probabilities the number of pairs, their mean probability and the share that belongs
+    together, (BINS, 3), nan without pairs; values (N, 2): probability and truth."""
+    k = np.minimum((values[:, 0] * BINS).astype(int), BINS - 1)
+    parts = [values[k == b] for b in range(BINS)]
+    return np.array([[len(part), *(part.mean(axis=0) if len(part) else (np.nan, np.nan))] for part in parts])
+
+
+def _pairs(true: dict[int, int]) -> list[tuple[int, int, float]]:
+    """Returns the pairs of tracks, a < b, and whether they belong together; true: group by track, as `_people_of`."""
+    return [(a, b, float(true[a] == true[b])) for a in true for b in true if a < b]
 
 
 def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argparse.Namespace) -> dict[str, Array]:
@@ -153,24 +162,22 @@ def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argpar
             found["relational"].append(tracks)
             ids, together = tracker.walking_together()
             place = {int(i): k for k, i in enumerate(ids)}
-            true = _people_of(q.truth, tracks)
-            both = [(a, b) for a in true for b in true if a < b]
-            known = [(together[place[a], place[b]], _same(true[a], true[b])) for a, b in both]
+            pairs = _pairs(_people_of(q.truth, tracks))
+            known = [(together[place[a], place[b]], same) for a, b, same in pairs]
             rows["relational"].append(np.array(known).reshape(-1, 2))
         for name in trackers[1:]:
             found[name] = _tracked(name, seed, q, given, mode, sensor)
         for name, bare in found.items():
             rows[f"belief on {name}"].append(_believed(q, bare))
     tables.head(["pairs", *(f"{k / BINS:g} to {(k + 1) / BINS:g}" for k in range(BINS)), "F1 at 1/2", "mean gap"])
-    pairs = {label: np.concatenate(parts) for label, parts in rows.items()}
-    for label, values in pairs.items():
-        p, same = values.T
-        k = np.minimum((p * BINS).astype(int), BINS - 1)
-        cells = [f"{same[k == b].mean():.2f} ({(k == b).sum()})" if (k == b).any() else "" for b in range(BINS)]
-        gap = sum(abs(same[k == b].mean() - p[k == b].mean()) * (k == b).mean() for b in range(BINS) if (k == b).any())
+    found_pairs = {label: np.concatenate(parts) for label, parts in rows.items()}
+    for label, values in found_pairs.items():
+        (p, same), (number, mean, share) = values.T, _by_range(values).T
+        cells = [f"{share[b]:.2f} ({int(number[b])})" if number[b] else "" for b in range(BINS)]
+        gap = np.nansum(abs(share - mean) * number) / len(values)
         hit, said = (same[p > 0.5]).sum(), (p > 0.5).sum()
         tables.row([label, *cells, f"{2 * hit / max(said + same.sum(), 1):.3f}", f"{gap:.3f}"])
-    return pairs
+    return found_pairs
 
 
 def _believed(q: Sequence, tracks: list[Tracks]) -> Array:
@@ -181,9 +188,7 @@ def _believed(q: Sequence, tracks: list[Tracks]) -> Array:
     said = dict(zip(joined, found.probability.tolist(), strict=True))
     known = []
     for t in tracks:
-        true = _people_of(q.truth, t)
-        pairs = [(a, b) for a in true for b in true if a < b]
-        known += [(said.get((t.index, a, b), 0.0), _same(true[a], true[b])) for a, b in pairs]
+        known += [(said.get((t.index, a, b), 0.0), same) for a, b, same in _pairs(_people_of(q.truth, t))]
     return np.array(known).reshape(-1, 2)
 
 
@@ -195,10 +200,6 @@ def _people_of(truth: Truth, tracks: Tracks) -> dict[int, int]:
     group, person = truth.group[rows], truth.id[rows]
     unit = np.where(group >= 0, group, -1 - person)
     return {int(tracks.id[j]): int(unit[i]) for i, j in zip(*optimal(away, NEAR), strict=True)}
-
-
-def _same(a: int, b: int) -> float:
-    return float(a == b)
 
 
 def ablation(given: argparse.Namespace) -> None:
