@@ -71,7 +71,6 @@ DEPARTURES = (
     "size_prior=none", "velocity_time=0", "lag=0.1", "parts_sharpness=0", "scatter_people=0", "normaliser=sampled",
     "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
     "estimate=histogram", "validity=bayesian", "partition_dynamics=dirichlet",
-    "partition_dynamics=dirichlet memory_time=2",
 )  # fmt: skip
 """Settings of the mode ablation."""
 PROCESS = (

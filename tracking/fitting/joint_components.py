@@ -18,14 +18,13 @@ from sim.rng import rng
 from sim.types import Array, Ints, Truth
 from tracking.fitting.joint_events import PLACE_ERROR, VELOCITY_ERROR
 from tracking.papers.joint.cluster_evidence_kernels import log_conditionals
-from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.config import MIXTURE, JointConfig, mixture_of
 from tracking.papers.joint.partition_kernels import canonical
 
 STRIDE = 1.0
 """Time between two partitions that are looked at, s."""
-NAMES = ("concentration", "spread_degrees", "place_spread", "velocity_spread")
-"""The fitted parameters, in the order of `mixture` of cluster_evidence_kernels."""
 START = (0.01, 5.0, 0.5, 0.5)
+"""Values of MIXTURE from which the search starts."""
 
 
 @dataclass(frozen=True)
@@ -77,19 +76,18 @@ def fit_components(parts: Sequence[TruePartition]) -> dict[str, float]:
         )  # fmt: skip
 
     def loss(logs: Array) -> float:
-        return component_scores(parts, dict(zip(NAMES, np.exp(logs).tolist(), strict=True)))["log_loss"]
+        return component_scores(parts, dict(zip(MIXTURE, np.exp(logs).tolist(), strict=True)))["log_loss"]
 
     declared = JointConfig.params()
-    ranges = [(math.log(declared[name].low), math.log(declared[name].high)) for name in NAMES]
+    ranges = [(math.log(declared[name].low), math.log(declared[name].high)) for name in MIXTURE]
     tolerance = {"xatol": 5e-3, "fatol": 1e-6, "maxiter": 400}
     found = minimize(loss, np.log(START), method="Nelder-Mead", bounds=ranges, options=tolerance)
-    return {name: float(f"{value:.4g}") for name, value in zip(NAMES, np.exp(found.x).tolist(), strict=True)}
+    return {name: float(f"{value:.4g}") for name, value in zip(MIXTURE, np.exp(found.x).tolist(), strict=True)}
 
 
 def _log_probabilities(parts: Sequence[TruePartition], values: dict[str, float]) -> Array:
     """Returns the log probability of each person's true label given all others, of all partitions, (R,)."""
-    concentration, *rest = (values[name] for name in NAMES)
-    mixture, found = np.array([math.log(concentration), *rest]), []
+    mixture, found = mixture_of(values), []
     for part in parts:
         out = np.empty(len(part.label))
         log_conditionals(part.state, part.label, mixture, out)

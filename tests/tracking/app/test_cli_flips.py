@@ -366,7 +366,7 @@ MIXTURE = {"partition_dynamics": "dirichlet"}
 CHOSEN = {("joint", "evidence_rate"): {"validity": "bayesian"}} | {
     ("joint", parameter): MIXTURE
     for parameter in (
-        "concentration", "spread_degrees", "place_spread", "velocity_spread", "redraw_rate", "memory_time",
+        "concentration", "spread_degrees", "place_spread", "velocity_spread", "redraw_rate",
     )
 }  # fmt: skip
 """Choices that a parameter belongs to, where they are not the defaults."""

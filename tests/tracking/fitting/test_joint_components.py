@@ -9,8 +9,7 @@ from scenarios.errors import InputError
 from tests.short_scene import SCENE
 from tracking.app.cli import run
 from tracking.fitting.joint_components import TruePartition, component_scores, fit_components
-from tracking.papers.joint.cluster_evidence_kernels import SUMS
-from tracking.papers.joint.config import FITTED_MIXTURE, JointConfig
+from tracking.papers.joint.config import FITTED_MIXTURE, JointConfig, mixture_of
 from tracking.papers.joint.dirichlet_process_kernels import propose
 
 TRUE = {"concentration": 0.02, "spread_degrees": 6.0, "place_spread": 0.6, "velocity_spread": 0.3}
@@ -20,10 +19,9 @@ def drawn(count, people=8):
     """Partitions of people who are anywhere, drawn from p(Z | X) by Gibbs sampling."""
     rng = np.random.default_rng(0)
     state = np.concatenate([rng.uniform(0, 5, (count, people, 2)), rng.uniform(0, 0.8, (count, people, 2))], axis=-1)
-    label, memory = np.zeros((count, 1, people), np.int64), np.zeros((count, 1, people, SUMS))
-    mixture = np.array([np.log(TRUE["concentration"]), *list(TRUE.values())[1:]])
+    label = np.zeros((count, 1, people), np.int64)
     for _ in range(60):
-        propose(state, label, memory, np.ones(people), rng.random((count, 1, people, 2)), mixture, np.zeros(3))
+        propose(state, label, np.ones(people), rng.random((count, 1, people, 2)), mixture_of(TRUE))
     return [TruePartition(x, z[0]) for x, z in zip(state, label, strict=True)]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -18,7 +19,6 @@ from sim.types import Array
 from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.papers.joint import group_events_kernels as events
-from tracking.papers.joint.cluster_evidence_kernels import SUMS
 
 FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8"))[
     "params"
@@ -31,6 +31,15 @@ TERMS = (
     "distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "bias",
 )  # fmt: skip
 """Terms of the event classifier, in the order of the features of group_events_kernels."""
+MIXTURE = ("concentration", "spread_degrees", "place_spread", "velocity_spread")
+"""Parameters of the Dirichlet process mixture, in the order of its slots in cluster_evidence_kernels."""
+
+
+def mixture_of(values: Mapping[str, float]) -> Array:
+    """Return the Dirichlet process mixture (4,), as cluster_evidence_kernels.LOG_NEW and the following; values: by the
+    names of MIXTURE."""
+    concentration, *rest = (values[name] for name in MIXTURE)
+    return np.array([math.log(concentration), *rest])
 
 
 def _weight(event: str, term: str, unit: str, meaning: str) -> Any:
@@ -188,15 +197,6 @@ class JointConfig(BackgroundSettings):
         1.0, (0.05, 20.0), "1/s", "Dirichlet process: rate at which a person's label is drawn anew (ours)", "log",
         before=1.0,
     )  # fmt: skip
-    memory_time: float = param(
-        0.0,
-        (0.0, 20.0),
-        "s",
-        "Dirichlet process: time constant with which components forget; of their past each second counts as one "
-        "observation; 0: no past (ours)",
-        online=False,
-        before=0.0,
-    )
 
     lag: float = param(0.4, (0.05, 3.0), "s", "between the two times of the features of events (ours)", online=False)
     event_rate: float = param(1.0, (0.05, 20.0), "", "factor of the rate of merges and splits (ours)", "log")
@@ -275,19 +275,8 @@ class JointConfig(BackgroundSettings):
 
     @property
     def mixture(self) -> Array:
-        """The Dirichlet process mixture (4,), as cluster_evidence_kernels has it."""
-        rest = self.spread_degrees, self.place_spread, self.velocity_spread
-        return np.array([math.log(self.concentration), *rest])
-
-    @property
-    def memory(self) -> int:
-        """Columns of the memory of components: 0 without a Dirichlet process or if components do not remember."""
-        return SUMS if self.partition_dynamics == "dirichlet" and self.memory_time > 0 else 0
-
-    def ageing(self, dt: float) -> Array:
-        """Return how components remember over dt s, (3,), as dirichlet_process_kernels has it."""
-        kept = math.exp(-dt / self.memory_time) if self.memory_time > 0 else 0.0
-        return np.array([dt, kept, (1 - kept) * self.memory_time])
+        """The Dirichlet process mixture (4,), as mixture_of has it."""
+        return mixture_of({name: getattr(self, name) for name in MIXTURE})
 
     def rules(self, dt: float, lag: float) -> Array:
         """Return the rules (6,) of events in a step of dt s, as group_events_kernels has them; lag: s."""

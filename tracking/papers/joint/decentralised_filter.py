@@ -31,8 +31,8 @@ class Distributions(Protocol):
     def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
         """Return the log (N_x, N_z) of p(X' | X, Z) / p_0(X' | X)."""
 
-    def groups(self, new: Array, x: Array, z: Ints, memory: Array) -> tuple[Ints, Array]:
-        """Step 7: return Z' (N_x, N_z, ...) drawn from pi(Z' | X', X, Z, y), and what it remembers of each Z'."""
+    def groups(self, new: Array, x: Array, z: Ints) -> Ints:
+        """Step 7: return Z' (N_x, N_z, ...) drawn from pi(Z' | X', X, Z, y)."""
 
     def energy(self, new: Array, z: Ints) -> Array:
         """Return the log (N_x, N_z) of p(Z' | X'), the part of p(y | X', Z') of eq. 4 that depends on Z'."""
@@ -43,8 +43,7 @@ class Nested:
     """The particles after steps 1 and 3 of a frame, before step 2.
 
     x (N_x, K, D): X. z (N_x, N_z, ...): Z. log_q (N_x, N_z): log of qbar (step 3), normalised over j. log_w (N_x, K):
-    what the components add to log w (step 1). log_rest (N_x,): what X as a whole adds. memory (N_x, N_z, K, M): what
-    the group proposal remembers of the past of each Z, of each component of X; M may be 0.
+    what the components add to log w (step 1). log_rest (N_x,): what X as a whole adds.
     """
 
     x: Array
@@ -52,14 +51,13 @@ class Nested:
     log_q: Array
     log_w: Array
     log_rest: Array
-    memory: Array
 
     @classmethod
-    def empty(cls, shape: tuple[int, int], size: int, memory: int) -> Nested:
-        """Return particles of no component; shape: N_x, N_z; size: D; memory: length of what a component remembers."""
+    def empty(cls, shape: tuple[int, int], size: int) -> Nested:
+        """Return particles of no component; shape: N_x, N_z; size: D."""
         log_q = np.full(shape, -np.log(shape[1]))
         x, z, log_w = np.zeros((shape[0], 0, size)), np.zeros((*shape, 0), np.int64), np.zeros((shape[0], 0))
-        return cls(x, z, log_q, log_w, np.zeros(shape[0]), np.zeros((*shape, 0, memory)))
+        return cls(x, z, log_q, log_w, np.zeros(shape[0]))
 
     def weights(self) -> Array:
         """Return the weights w of step 1, (N_x,), sum 1."""
@@ -83,12 +81,11 @@ def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
     log_q = old.log_q + model.dynamics(new, old.x, old.z)  # step 5
     log_dynamics = log_sum(log_q)  # p_{N_z}(X' | X) / p_0(X' | X)
     chosen = systematic_resample_rows(np.exp(log_q - log_dynamics[:, None]), uniforms)  # step 6
-    rows = np.arange(len(chosen))[:, None], chosen
-    z, memory = model.groups(new, old.x, old.z[rows], old.memory[rows])  # step 7
+    z = model.groups(new, old.x, old.z[np.arange(len(chosen))[:, None], chosen])  # step 7
     log_y = model.energy(new, z)
     log_group = log_sum(log_y)
     log_rest = log_dynamics + log_group - np.log(log_y.shape[1])  # step 1
-    return Nested(new, z, log_y - log_group[:, None], log_w, log_rest, memory)  # step 3
+    return Nested(new, z, log_y - log_group[:, None], log_w, log_rest)  # step 3
 
 
 def joint_indices(nested: Nested, uniform: float) -> Ints:

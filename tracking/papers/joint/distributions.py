@@ -86,29 +86,29 @@ class FrameModel:
         group_dynamics(late, early, z, precision, scale, self.dt, self.config.group_share, out)
         return np.asarray(out - own.sum(axis=1)[:, None])
 
-    def groups(self, new: Array, x: Array, z: Ints, memory: Array) -> tuple[Ints, Array]:
+    def groups(self, new: Array, x: Array, z: Ints) -> Ints:
         """Step 7: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7, or the Dirichlet process (ours); uniform over all
-        partitions in VAR2 and VAR3. memory: of the Dirichlet process, as dirichlet_process_kernels has it."""
+        partitions in VAR2 and VAR3."""
         c, shape = self.config, z.shape
         out = z.copy()
         if c.variant in ("VAR2", "VAR3"):
             partition_kernels.uniform_partitions(
                 stam_cumulated(shape[2]), self.events.random((*shape[:2], shape[2] + 1)), out
             )  # fmt: skip
-            return out, memory
+            return out
         if c.partition_dynamics == "dirichlet":
             chance = np.full(shape[2], -math.expm1(-c.redraw_rate * self.dt))
             dirichlet_process_kernels.propose(
-                _states(new), out, memory, chance, self.events.random((*shape, 2)), c.mixture, c.ageing(self.dt)
+                _states(new), out, chance, self.events.random((*shape, 2)), c.mixture
             )  # fmt: skip
-            return out, memory
+            return out
         late, early = _states(new), np.ascontiguousarray(x[..., -STATE:])
         uniforms = self.events.random((*shape, 3))
         lag = x.shape[-1] // STATE * self.dt
         group_events_kernels.propose(
             early, late, self._points(late), out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
         )  # fmt: skip
-        return out, memory
+        return out
 
     def energy(self, new: Array, z: Ints) -> Array:
         """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), or log p(Z_t, X_t) of the Dirichlet process mixture

@@ -10,9 +10,6 @@ from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import STATE, validity_points
 from tracking.papers.joint.division_kernels import place_newcomer
 
-NO_AGEING = np.array([0.0, 1.0, 0.0])
-"""Ageing of the memory of components within a frame: none."""
-
 
 def place(nested: Nested, new: int, config: JointConfig, draws: np.random.Generator) -> None:
     """Draw in all partitions whether each of the `new` last people, alone so far, joins a group or person; in place.
@@ -23,7 +20,7 @@ def place(nested: Nested, new: int, config: JointConfig, draws: np.random.Genera
     if c.partition_dynamics == "dirichlet":
         chance = (np.arange(people) >= people - new).astype(float)
         state, uniforms = np.ascontiguousarray(n.x[..., :STATE]), draws.random((*n.z.shape, 2))
-        dirichlet_process_kernels.propose(state, n.z, n.memory, chance, uniforms, c.mixture, NO_AGEING)
+        dirichlet_process_kernels.propose(state, n.z, chance, uniforms, c.mixture)
         return
     points = validity_points(n.x, c.velocity_time)
     for person in range(people - new, people):

@@ -97,7 +97,7 @@ class Joint:
             context = context.replace(px_per_m=self.pixels.scale)
         self.context = context
         self.frames = max(1, round(c.lag * context.fps))
-        self.nested = Nested.empty((c.particles, c.partitions), STATE * self.frames, c.memory)
+        self.nested = Nested.empty((c.particles, c.partitions), STATE * self.frames)
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
         self.together, self.paired = np.zeros((0, 0)), np.zeros(0, np.int64)
         self.events = ReportedEvents(context.fps)
@@ -206,7 +206,7 @@ class Joint:
         self.health.resample(own)
         self.nested = Nested(
             nested.x[own, columns], nested.z[chosen], nested.log_q[chosen], np.zeros_like(nested.log_w),
-            np.zeros_like(nested.log_rest), nested.memory[chosen],
+            np.zeros_like(nested.log_rest),
         )  # fmt: skip
 
     def _keep(self, rows: Bools) -> None:
@@ -216,8 +216,7 @@ class Joint:
         n = self.nested
         kept = np.ascontiguousarray(n.z[..., rows])
         partition_kernels.relabel(kept)
-        memory = np.ascontiguousarray(n.memory[:, :, rows])
-        self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest, memory)
+        self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest)
         self.people.keep(rows)
         self.belief.keep(rows)
         self.health.keep(rows)
@@ -245,7 +244,6 @@ class Joint:
         self.nested = Nested(
             np.concatenate([n.x, past], axis=1), np.concatenate([n.z, alone], axis=2), n.log_q,
             np.concatenate([n.log_w, np.zeros(past.shape[:2])], axis=1), n.log_rest,
-            np.concatenate([n.memory, np.zeros((*alone.shape, n.memory.shape[-1]))], axis=2),
         )  # fmt: skip
         self.people.add(self.newcomers.size[rows])
         self.belief.add(self.nested.x[..., :STATE].mean(axis=0))

@@ -34,8 +34,8 @@ class Toy:
         out = log_normal(new[..., 0], mean, Q[0]) - log_normal(new[..., 0], A[0, 0] * x[..., 0], WIDE)
         return out if self.ratio else out - log_sum(self.log_q + out)[:, None]
 
-    def groups(self, new, x, z, memory):
-        return A[1, 1] * z + Q[1] * self.draws.standard_normal(z.shape), memory
+    def groups(self, new, x, z):
+        return A[1, 1] * z + Q[1] * self.draws.standard_normal(z.shape)
 
     def energy(self, new, z):
         return log_normal(self.y, H[0] * new[..., 0] + H[1] * z, R)
@@ -69,7 +69,6 @@ def error(particles, partitions, ratio=True, frames=25, seeds=4):
         nested = Nested(
             rng.standard_normal((particles, 1, 1)), rng.standard_normal((particles, partitions)),
             np.full((particles, partitions), -np.log(partitions)), np.zeros((particles, 1)), np.zeros(particles),
-            np.zeros((particles, partitions, 1, 0)),
         )  # fmt: skip
         for y, exact in zip(ys, kalman(ys), strict=True):
             toy.y, toy.log_q = y, nested.log_q
@@ -79,7 +78,7 @@ def error(particles, partitions, ratio=True, frames=25, seeds=4):
             found.append([float(m[0]) if np.ndim(m) else float(m) for m in means] - exact)
             k = joint_indices(nested, rng.random())
             zero = np.zeros_like(nested.log_w), np.zeros_like(nested.log_rest)
-            nested = Nested(nested.x[k], nested.z[k], nested.log_q[k], *zero, nested.memory[k])
+            nested = Nested(nested.x[k], nested.z[k], nested.log_q[k], *zero)
     return float(np.sqrt(np.mean(np.square(found))))
 
 
@@ -105,7 +104,7 @@ def test_log_sums_and_weights():
 def test_components_are_resampled_by_their_own_weights():
     log_w = np.log(np.array([[1.0, 0.5], [1e-9, 0.5]]))
     parts = np.zeros((2, 2, 1)), np.zeros((2, 1, 2), int), np.zeros((2, 1))
-    nested = Nested(*parts, log_w, np.log([1e-9, 1.0]), np.zeros((2, 1, 2, 0)))
+    nested = Nested(*parts, log_w, np.log([1e-9, 1.0]))
     single, rest = decentralised_filter.component_indices(nested, np.full(3, 0.5))
     assert single.T.tolist() == [[0, 0], [0, 1]]
     assert rest.tolist() == [1, 1]

@@ -1,4 +1,4 @@
-"""The Dirichlet process as dynamics of partitions: Gibbs sampling, rates, memory of components, in the tracker."""
+"""The Dirichlet process as dynamics of partitions: Gibbs sampling, rates, in the tracker."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
-from tests.reference_joint import all_partitions, label_of, log_component, log_evidence
-from tracking.papers.joint.cluster_evidence_kernels import SUMS, VX, WEIGHT, X, Y, add_person
+from tests.reference_joint import all_partitions, label_of, log_evidence
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.dirichlet_process_kernels import propose
 from tracking.papers.joint.partition_kernels import canonical
@@ -18,31 +17,29 @@ from tracking.prepare import prepare
 
 C, NU, S, S_V = 0.05, 5.0, 0.5, 0.4
 MIXTURE = np.array([np.log(C), NU, S, S_V])
-NO_MEMORY = np.array([0.1, 0.0, 0.0])
 FOUR = np.array([[0, 0, 0.2, 0], [0.8, 0.1, 0, 0.1], [1.4, 0.9, 0.1, 0.3], [2.0, 0.2, -0.3, 0]])
 
 
 class Chains:
-    """Partitions of the same people, drawn again and again: state (K, 4), label and memory (1, count, ...)."""
+    """Partitions of the same people, drawn again and again: state (K, 4), label (1, count, K)."""
 
-    def __init__(self, state, label, count, seed=0, columns=SUMS):
+    def __init__(self, state, label, count, seed=0):
         self.state, self.rng = np.asarray(state, float), np.random.default_rng(seed)
         self.label = np.tile(np.asarray(label, np.int64), (1, count, 1))
-        self.memory = np.zeros((*self.label.shape, columns))
 
-    def step(self, chance, ageing=NO_MEMORY):
+    def step(self, chance):
         chance = np.broadcast_to(np.asarray(chance, float), len(self.state)).copy()
         uniforms = self.rng.random((*self.label.shape, 2))
-        propose(self.state[None], self.label, self.memory, chance, uniforms, MIXTURE, ageing)
+        propose(self.state[None], self.label, chance, uniforms, MIXTURE)
 
     def share(self, label):
         return float((self.label[0] == np.asarray(label)).all(axis=1).mean())
 
 
-@pytest.mark.parametrize(("chance", "columns"), [(1.0, SUMS), (0.4, 0)])
-def test_people_who_stand_have_the_partitions_of_the_posterior(chance, columns):
+@pytest.mark.parametrize("chance", [1.0, 0.4])
+def test_people_who_stand_have_the_partitions_of_the_posterior(chance):
     """Chi-squared of the 15 partitions of 4 people, 14 degrees of freedom; 36.1 is the quantile 0.999."""
-    chains = Chains(FOUR, [0, 0, 0, 0], 40_000, columns=columns)
+    chains = Chains(FOUR, [0, 0, 0, 0], 40_000)
     for _ in range(int(40 / chance)):
         chains.step(chance)
     parts = list(all_partitions(4))
@@ -60,7 +57,7 @@ def test_the_rate_of_changes_does_not_depend_on_the_frame_rate(fps):
     config = JointConfig(redraw_rate=0.6)
     chains = Chains([[0, 0, 0, 0], [30, 0, 0, 0]], [1, 1], 40_000)
     for _ in range(fps):
-        chains.step(-np.expm1(-config.redraw_rate / fps), config.ageing(1 / fps) * [1, 0, 0])
+        chains.step(-np.expm1(-config.redraw_rate / fps))
     assert chains.share([1, 1]) == pytest.approx(np.exp(-1.2), abs=0.012)
 
 
@@ -70,53 +67,16 @@ def test_nobody_changes_at_chance_zero():
     assert chains.share([1, 1, 0, 0]) == 1
 
 
-@pytest.mark.parametrize("fps", [10, 20])
-def test_components_remember_for_a_time(fps):
-    """After t s each member has added T (1 - exp(-t / T)), at the place where it would be now, and no scatter."""
-    config = JointConfig(memory_time=2.0)
-    chains = Chains([[0, 0, 1.0, 0], [0, 1, 1.0, 0], [9, 9, 0, 0]], [1, 1, 0], 3)
-    for k in range(3 * fps):
-        chains.state[:2, 0] = k / fps
-        chains.step(0.0, config.ageing(1 / fps))
-    past = chains.memory[0, 0]
-    assert past[:, WEIGHT] == pytest.approx(np.array([2, 2, 1]) * 2 * (1 - np.exp(-1.5)), rel=1e-9)
-    np.testing.assert_allclose(past[0, [X, Y, VX]] / past[0, WEIGHT], [chains.state[0, 0], 0.5, 1.0])
-    squares = past[0, -2] - (past[0, X] ** 2 + past[0, Y] ** 2) / past[0, WEIGHT]
-    assert squares == pytest.approx(past[0, WEIGHT] * 0.25)
-    assert (past[0] == past[1]).all()
-
-
-def test_what_a_component_remembers_counts_as_people_in_it():
-    """Of two people the second is redrawn: with a past of two observations as if two more were in the component."""
-    past = np.array([[0.3, 0.1, 0.1, 0], [0.5, -0.2, 0, 0.1]])
-    state = np.array([[0, 0, 0.2, 0], [0.9, 0.1, 0, 0.1]])
-    chains = Chains(state, [1, 1], 60_000)
-    for person in past:
-        for k in range(2):
-            add_person(chains.memory[0, 0, k], person, 1.0)
-    chains.memory[:] = chains.memory[0, 0]
-    chains.step([0.0, 1.0], np.array([0.0, 1.0, 0.0]))
-    known = np.concatenate([state[:1], past])
-    join = 3 * np.exp(log_component(np.concatenate([known, state[1:]]), NU, S, S_V) - log_component(known, NU, S, S_V))
-    assert chains.share([1, 1]) == pytest.approx(join / (join + C), abs=0.008)
-    parted = (chains.label[0] == 0).all(axis=1)
-    assert (chains.memory[0, parted, 1] == 0).all()
-    assert (chains.memory[0, parted, 0] == chains.memory[0, ~parted, 0][0]).all()
-    assert (chains.memory[0, ~parted, 1] == chains.memory[0, ~parted, 0]).all()
-
-
-def test_labels_keep_their_form_and_members_share_a_memory():
+def test_labels_keep_their_form():
     rng = np.random.default_rng(3)
     chains = Chains(rng.normal(0, 1, (7, 4)), [1, 1, 1, 0, 5, 5, 0], 200)
     for _ in range(10):
         chains.state += rng.normal(0, 0.1, (7, 4))
-        chains.step(0.5, np.array([0.1, 0.9, 0.1]))
-    for label, memory in zip(chains.label[0], chains.memory[0], strict=True):
+        chains.step(0.5)
+    for label in chains.label[0]:
         named = label.copy()
         canonical(named)
         assert np.array_equal(named, label)
-        for name in set(label.tolist()) - {0}:
-            assert np.ptp(memory[label == name], axis=0).max() == 0
 
 
 def test_the_order_of_people_does_not_matter():
@@ -130,13 +90,13 @@ def test_the_order_of_people_does_not_matter():
         assert first.share(label_of(p)) == pytest.approx(second.share(label_of(moved)), abs=0.015)
 
 
-@pytest.mark.parametrize(("newcomers", "memory_time"), [("validity", 1.0), ("alone", 0.0)])
-def test_the_tracker_follows_groups_with_the_process(newcomers, memory_time):
-    """People come and go; labels keep their form; the memory has a row for each person; groups are found."""
+@pytest.mark.parametrize("newcomers", ["validity", "alone"])
+def test_the_tracker_follows_groups_with_the_process(newcomers):
+    """People come and go; labels keep their form; groups are found."""
     scene = simulate(load("merge", ["camera.fps=5", "duration=10"]), 40_003, 0, ())
     params = {
         "partition_dynamics": "dirichlet", "validity": "bayesian", "belief_rate": 0.0, "newcomers": newcomers,
-        "memory_time": memory_time, "particles": 15, "partitions": 15,
+        "particles": 15, "partitions": 15,
     }  # fmt: skip
     ready = prepare("joint", scene, detections="file", params=params)
     ready.reset(0)
@@ -144,7 +104,6 @@ def test_the_tracker_follows_groups_with_the_process(newcomers, memory_time):
     for frame in ready.frames():
         groups += (ready.step(frame).group >= 0).sum()
         nested = ready.tracker.nested
-        assert nested.memory.shape == (*nested.z.shape, SUMS if memory_time else 0)
         for label in nested.z[:, 0]:
             named = label.copy()
             canonical(named)
