@@ -28,11 +28,11 @@ def label_of(parts: list[list[int]]) -> np.ndarray:
     return label
 
 
-def validity(points: np.ndarray, parts: list[list[int]], s0: float, nu: float, apart: float) -> float:
-    """Returns the Davies-Bouldin index with prior scatter s0, for nu people, and a virtual cluster at `apart`."""
+def validity(points: np.ndarray, parts: list[list[int]], s0: float, apart: float) -> float:
+    """Returns the Davies-Bouldin index with prior scatter s0, as of one person more, and a virtual cluster at `apart`."""
     centre = [points[part].mean(axis=0) for part in parts]
     scatter = [
-        (np.linalg.norm(points[part] - c, axis=1).sum() + nu * s0) / (len(part) + nu)
+        (np.linalg.norm(points[part] - c, axis=1).sum() + s0) / (len(part) + 1)
         for part, c in zip(parts, centre, strict=True)
     ]
     found = []

@@ -68,7 +68,7 @@ PX_PER_M = 40.0
 COUNTS = (10, 25, 50, 100)
 DEPARTURES = (
     "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
-    "size_prior=none", "velocity_time=0", "lag=0.1", "parts_sharpness=0", "scatter_people=0", "normaliser=sampled",
+    "size_prior=none", "velocity_time=0", "lag=0.1", "parts_sharpness=0", "normaliser=sampled",
     "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
     "estimate=histogram", "validity=bayesian", "partition_dynamics=dirichlet",
 )  # fmt: skip

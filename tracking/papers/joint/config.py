@@ -166,8 +166,9 @@ class JointConfig(BackgroundSettings):
         "energy: eq. 4 as printed; sampled: p(Z | X) sums to 1 over the partitions of a particle (ours)",
         "categorical",
     )
-    scatter: float = param(0.5, (0.05, 2.0), "m", "s_0: prior scatter of a cluster (ours)", "log")
-    scatter_people: float = param(1.0, (0.0, 5.0), "people", "nu: people that the prior scatter counts for (ours)")
+    scatter: float = param(
+        0.5, (0.05, 2.0), "m", "s_0: prior scatter of a cluster, as of one person more (ours)", "log"
+    )
     apart: float = param(2.0, (0.5, 10.0), "m", "D_0: distance of a virtual other cluster (ours)", "log")
     velocity_time: float = param(
         1.0, (0.0, 5.0), "s", "m per m/s: weight of velocities beside places in the validity (ours)"
@@ -270,8 +271,8 @@ class JointConfig(BackgroundSettings):
 
     @property
     def scales(self) -> Array:
-        """The scales (3,) of the validity, as partition_kernels has them: s_0, nu, D_0."""
-        return np.array([self.scatter, self.scatter_people, self.apart])
+        """The scales (2,) of the validity, as partition_kernels has them: s_0, D_0."""
+        return np.array([self.scatter, self.apart])
 
     @property
     def mixture(self) -> Array:

@@ -14,8 +14,8 @@ import numpy as np
 from sim.compiler import njit
 from sim.types import Array, Ints
 
-SCATTER, WEIGHT, APART = range(3)
-"""Slots of `scales` (3,): prior scatter s_0, number of people nu that it counts for, virtual distance D_0; m, 1, m."""
+SCATTER, APART = range(2)
+"""Slots of `scales` (2,): prior scatter s_0, virtual distance D_0; m."""
 
 
 @njit(cache=True)
@@ -76,15 +76,15 @@ def clusters(label: Ints, cluster: Ints, head: Ints) -> int:
 def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre: Array, scatter: Array) -> float:
     """Return d_cl(Z, X) of one partition: the Davies-Bouldin index with a floor of the scatter (ours).
 
-    points (K, D): m; cluster (K,): number of each person's cluster, below `count`; scales: as SCATTER, WEIGHT, APART.
-    centre (K, D), scatter (K,): work space. S_g = (sum |x - c_g| + nu s_0) / (n_g + nu); R_g = max(max_h (S_g + S_h) /
+    points (K, D): m; cluster (K,): number of each person's cluster, below `count`; scales: as SCATTER, APART.
+    centre (K, D), scatter (K,): work space. S_g = (sum |x - c_g| + s_0) / (n_g + 1); R_g = max(max_h (S_g + S_h) /
     max(|c_g - c_h|, s_0), S_g / D_0); the index is the mean of R_g over all clusters, people alone included.
     """
     n, dims = points.shape
-    s0, nu, apart = scales[SCATTER], scales[WEIGHT], scales[APART]
+    s0, apart = scales[SCATTER], scales[APART]
     size = np.zeros(count)
     for g in range(count):
-        scatter[g] = nu * s0
+        scatter[g] = s0
         for d in range(dims):
             centre[g, d] = 0.0
     for k in range(n):
@@ -102,7 +102,7 @@ def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre:
                 total += (points[k, d] - centre[g, d]) ** 2
             scatter[g] += math.sqrt(total)
     for g in range(count):
-        scatter[g] /= size[g] + nu
+        scatter[g] /= size[g] + 1
     worst = np.empty(count)
     for g in range(count):
         worst[g] = scatter[g] / apart

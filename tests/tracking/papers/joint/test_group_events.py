@@ -10,7 +10,7 @@ from tracking.papers.joint import division_kernels
 from tracking.papers.joint import group_events_kernels as events
 from tracking.papers.joint.config import JointConfig
 
-SCALES = np.array([0.5, 1.0, 2.0])
+SCALES = np.array([0.5, 2.0])
 BIAS = -1
 COUNT = 20_000
 
