@@ -52,7 +52,7 @@ from tracking.fitting.joint_events import event_rows
 from tracking.papers.joint.config import JointConfig
 from tracking.run import track
 from tracking.scoring import evaluate
-from tracking.stats import paired
+from tracking.stats import mean_interval, paired
 
 Row = dict[str, float]
 SHARES = ("1-FP", "1-FN", "GDSR", "MOTA")
@@ -64,11 +64,12 @@ PAPER = {
 }
 """Table 2 of the paper, on its own 28 sequences, %: 1-FP, 1-FN, GDSR, MOTA."""
 COMPARED = ("GDSR", "MOTA", "1-FN", "1-FP")
+RECORDED = ("group_GDSR", "group_MOTA", "pairwise_F1")
 PX_PER_M = 40.0
 COUNTS = (10, 25, 50, 100)
 DEPARTURES = (
     "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
-    "size_prior=none", "velocity_time=0", "lag=0.1", "parts_sharpness=0", "normaliser=sampled",
+    "size_prior=none", "velocity_time=0", "lag=0.1", "normaliser=sampled",
     "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
     "estimate=histogram", "validity=bayesian", "partition_dynamics=dirichlet",
 )  # fmt: skip
@@ -199,7 +200,7 @@ def difference(first: Sequence[Row], second: Sequence[Row], key: str) -> str:
 
 
 def recordings(given: argparse.Namespace) -> None:
-    """Prints a table for each recording."""
+    """Prints a table for each recording, and differences to its first row."""
     noisy = {"detect_prob": 0.95, "noise_m": 0.1}
     compared = [Variant("full"), *(Variant(n, params={"variant": n}) for n in ("VAR1", "VAR3")), VARIANTS[6]]
     compared.append(Variant("particle + default grouping", "particle"))
@@ -207,18 +208,29 @@ def recordings(given: argparse.Namespace) -> None:
     for path in (HOTEL, ZARA, WALK_TOGETHER):
         (sequence,) = open_source(given.data / path)
         sensor = noisy if sequence.truth is not None and sequence.truth.pos is not None else {"detect_prob": 0.95}
-        cells = {}
+        found: dict[str, list[Row]] = {v.name: [] for v in compared}
         for v in compared:
             params = JointConfig.from_dict(dict(v.params)).with_set(*given.set) if v.tracker == "joint" else None
-            rows = []
             for seed in given.filter_seeds:
                 run = track(v.tracker, sequence, params=params, detections="truth", sensor=sensor, seed=seed)
-                rows.append({**evaluate(sequence.truth, run), "speed": run.info["frames_per_second"]})
-            mean = mean_row(rows)
-            shares = [f"{100 * mean[f'group_{k}']:.1f}" for k in SHARES]
-            cells[v.name] = [*shares, tables.number(mean["group_MOTP"], 2), tables.number(mean["pairwise_F1"])]
+                found[v.name].append(evaluate(sequence.truth, run))
         title = f"{path}: sensor {sensor}, filter seeds {seeds_text(given.filter_seeds)}, means"
-        tables.table(title, "tracker", [*(f"{k}, %" for k in SHARES), "MOTP", "pairwise F1"], cells)
+        columns = [*(f"{k}, %" for k in SHARES), "MOTP", "pairwise F1"]
+        tables.table(title, "tracker", columns, {name: over_seeds(rows) for name, rows in found.items()})
+        first, *rest = found
+        cells = {f"{first} − {name}": [difference(found[first], found[name], key) for key in RECORDED] for name in rest}
+        tables.table("differences, paired by filter seed", "", ["GDSR", "MOTA", "pairwise F1"], cells)
+
+
+def over_seeds(rows: Sequence[Row]) -> list[str]:
+    """Returns cells of the columns of Table 3b and pairwise F1: means over filter seeds with 95 % intervals."""
+    keys = [*(f"group_{k}" for k in SHARES), "group_MOTP", "pairwise_F1"]
+    values = np.array([[row[key] for key in keys] for row in rows]) * [100, 100, 100, 100, 1, 1]
+    cells = []
+    for mean, low, high, digits in zip(*mean_interval(values), (1, 1, 1, 1, 2, 3), strict=True):
+        ends = f" [{low:.{digits}f}, {high:.{digits}f}]" if np.isfinite(low) else ""
+        cells.append(tables.number(float(mean), digits) + ends)
+    return cells
 
 
 def classifier(given: argparse.Namespace) -> None:
@@ -254,18 +266,20 @@ def particles(given: argparse.Namespace) -> None:
 
 
 def events(given: argparse.Namespace) -> None:
-    """Prints a table of events on a suite: means of event F1 over sequences, sums of hits, false alarms and misses."""
+    """Prints a table of events on a suite: means of event F1 over sequences, sums of hits, false alarms and misses;
+    and differences to its first row, of means over sequences."""
     compared = [Variant("joint"), Variant("group-pda", "group-pda", seeds=False)]
     compared += [Variant(f"{name} + default grouping", name, seeds=name != "blob") for name in ("particle", "blob")]
     compared = [v for v in compared if not given.only or v.name in given.only.split(",")]
     rows: dict[str, list[Row]] = {v.name: [] for v in compared}
     for sequence in sequences(given.seeds, given.suite):
         for v in compared:
-            rows[v.name].append(mean_row(measured(sequence, v, given.filter_seeds, given.set)))
+            mean = mean_row(measured(sequence, v, given.filter_seeds, given.set))
+            rows[v.name].append({**mean, "false": mean["merge_FP"] + mean["split_FP"]})
     cells = {}
     for name, found in rows.items():
         counts = [
-            " / ".join(f"{np.nansum([row[f'{kind}_{k}'] for row in found]):.0f}" for k in ("TP", "FP", "FN"))
+            " / ".join(f"{np.nansum([row[f'{kind}_{k}'] for row in found]):.1f}" for k in ("TP", "FP", "FN"))
             for kind in ("merge", "split")
         ]
         latency = [row["event_latency"] for row in found if np.isfinite(row["event_latency"])]
@@ -273,12 +287,12 @@ def events(given: argparse.Namespace) -> None:
         median = tables.number(float(np.median(latency))) if latency else "–"
         cells[name] = [*map(tables.number, means), *counts, median]
     columns = ["event F1", "group F1", "pairwise F1", "merges: hits / false / missed", "splits", "latency, s (median)"]
-    tables.table(
-        f"{given.suite}, {len(rows[compared[0].name])} sequences, seeds {seeds_text(given.seeds)}",
-        "tracker",
-        columns,
-        cells,
-    )
+    title = f"{given.suite}, {len(rows[compared[0].name])} sequences, seeds {seeds_text(given.seeds)}, "
+    tables.table(title + f"filter seeds {seeds_text(given.filter_seeds)}", "tracker", columns, cells)
+    first, *rest = (v.name for v in compared)
+    keys = {"event F1": "event_F1", "group F1": "group_F1", "pairwise F1": "pairwise_F1", "false events": "false"}
+    cells = {f"{first} − {name}": [difference(rows[first], rows[name], key) for key in keys.values()] for name in rest}
+    tables.table("differences of means over sequences", "", list(keys), cells)
 
 
 def ablation(given: argparse.Namespace) -> None:
