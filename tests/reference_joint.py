@@ -29,7 +29,7 @@ def label_of(parts: list[list[int]]) -> np.ndarray:
 
 
 def validity(points: np.ndarray, parts: list[list[int]], s0: float, apart: float) -> float:
-    """Returns the Davies-Bouldin index with prior scatter s0, as of one person more, and a virtual cluster at `apart`."""
+    """Returns the Davies-Bouldin index: prior scatter s0, as of one person more, and a virtual cluster at `apart`."""
     centre = [points[part].mean(axis=0) for part in parts]
     scatter = [
         (np.linalg.norm(points[part] - c, axis=1).sum() + s0) / (len(part) + 1)

@@ -201,12 +201,6 @@ class JointConfig(BackgroundSettings):
 
     lag: float = param(0.4, (0.05, 3.0), "s", "between the two times of the features of events (ours)", online=False)
     event_rate: float = param(1.0, (0.05, 20.0), "", "factor of the rate of merges and splits (ours)", "log")
-    parts_sharpness: float = param(
-        8.0,
-        (0.0, 50.0),
-        "",
-        "weight of the validity where the parts of a split, or the group of a new person, are drawn (ours)",
-    )
     newcomers: str = param(
         "validity",
         ("validity", "alone"),
@@ -279,7 +273,13 @@ class JointConfig(BackgroundSettings):
         """The Dirichlet process mixture (4,), as mixture_of has it."""
         return mixture_of({name: getattr(self, name) for name in MIXTURE})
 
+    @property
+    def sharpness(self) -> float:
+        """Weight of the validity where the parts of a split, or the group of a new person, are drawn: lambda_cl over
+        the lag, the time in which an event happens."""
+        return self.validity_rate * self.lag
+
     def rules(self, dt: float, lag: float) -> Array:
         """Return the rules (6,) of events in a step of dt s, as group_events_kernels has them; lag: s."""
         size = SIZE_PRIORS[self.size_prior]
-        return np.array([dt / lag, self.parts_sharpness, self.event_rate, size, self.size_mean, self.size_std])
+        return np.array([dt / lag, self.sharpness, self.event_rate, size, self.size_mean, self.size_std])

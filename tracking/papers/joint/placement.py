@@ -24,4 +24,4 @@ def place(nested: Nested, new: int, config: JointConfig, draws: np.random.Genera
         return
     points = validity_points(n.x, c.velocity_time)
     for person in range(people - new, people):
-        place_newcomer(points, n.z, person, draws.random(n.log_q.shape), c.parts_sharpness, c.scales)
+        place_newcomer(points, n.z, person, draws.random(n.log_q.shape), c.sharpness, c.scales)

@@ -96,6 +96,11 @@ def test_a_group_splits_into_all_pairs_of_parts_by_their_validity():
         assert share(drawn, label_of(p)) == pytest.approx(probability, abs=0.012)
 
 
+def test_parts_are_drawn_with_the_weight_of_the_validity_over_the_lag():
+    config = JointConfig(validity_rate=30.0, lag=0.2)
+    assert config.rules(0.1, 0.2)[events.SHARPNESS] == pytest.approx(6.0)
+
+
 def test_of_a_large_group_the_cut_between_two_clumps_is_found():
     rng = np.random.default_rng(1)
     pos = np.concatenate([rng.normal(0, 0.3, (5, 2)), rng.normal([3, 0], 0.3, (4, 2))])
