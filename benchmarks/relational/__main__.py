@@ -11,7 +11,8 @@ recordings   error of one member of each labelled group in three recordings (--r
              in every 6 s; positions err by 0.1 m
 groups       scores of people, groups and events on a suite, beside `blob`; groupings of the same tracks
 reliability  how often people who walk together with a probability belong together, beside the belief; --chart FILE.svg
-ablation     error, HOTA, IDF1 and pairwise F1 without each departure from the paper that has a parameter
+ablation     errors, HOTA, IDF1, group and pairwise F1 without each departure from the paper that has a parameter, and
+             differences to the defaults
 pixels       scores from pictures without each departure that concerns pixels, and with other constants
 boxes        scores on PETS and TUD-Campus (--recordings) from their detectors' boxes, beside `blob`
 speed        frames per second, errors, effective particles and distinct ancestors against the number of people, with a
@@ -20,7 +21,8 @@ sums         belief propagation beside exact sums over mappings, on random clust
 
 The error of a frame is the sum, over the true people, of the distance to the track that an optimal assignment gives
 them, at most 2 m, which is also the cost of a missing track. Both filters have the same detections and the same seeds;
-the filter's seed is that of the scene. Differences are paired, with 95 % intervals of means over seeds.
+the filter's seed is that of the scene, and further ones with --filter-seeds. Differences are paired, with 95 %
+intervals of means over seeds.
 """
 
 from __future__ import annotations
@@ -40,6 +42,7 @@ def main() -> None:
     }  # fmt: skip
     parser.add_argument("mode", choices=modes)
     add_seeds(parser, "20000:20030")
+    add_seeds(parser, "0:1", "--filter-seeds", "modes groups and ablation: of the filter, beside that of the scene; ")
     parser.add_argument("--counts", type=lambda x: [int(n) for n in x.split(",")], default=[500, 1000, 2000, 4000])
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of both filters")
     parser.add_argument("--params", help="preset of both filters, as paper")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import tracking
-from benchmarks.relational.errors import FILTERS, config_of, errors
+from benchmarks.relational.errors import HIDDEN, config_of, errors
 from benchmarks.support import chart, tables
 from benchmarks.support.options import HOTEL, ZARA
 from scenarios.loading.resolve import resolve
@@ -29,11 +29,14 @@ from tracking.stats import paired
 COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
 DEPARTURES = (
     "", "relation_evidence=state", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0",
-    "weights=joint", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
+    "relation_bias=40 newcomer_share=0", "weights=joint", "kernel_width=0",
+    "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
     "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
     "least_existence=0", "birth_doubt=0.9", "clutter_density=0.02",
 )  # fmt: skip
-"""Settings of the ablation; the first one is the defaults."""
+"""Settings of the ablation; the first one is the defaults. With relation_bias 40 partners count fully."""
+OFFSET = 1_000_000
+"""The seed of a filter is that of the scene, and so much more for each further filter seed."""
 NEAR = 1.0
 """m: a track farther than this from a person is not this person's."""
 BINS = 5
@@ -52,42 +55,49 @@ def _sequences(given: argparse.Namespace, suite: str) -> Iterator[tuple[str, int
 
 
 def _tracked(
-    name: str, seed: int, sequence: Sequence, given: argparse.Namespace, mode: str = "file", sensor: Any = None
-) -> list[Tracks]:
+    name: str, seed: int, sequence: Sequence, given: argparse.Namespace, mode: str = "file", sensor: Any = None,
+    further: int = 0,
+) -> list[Tracks]:  # fmt: skip
     config = None if name == "blob" else config_of(name, given.counts[0], given)
     ready = prepare(name, sequence, params=config, detections=mode, sensor=sensor, seed=seed)
-    ready.reset(seed)
+    ready.reset(seed + further * OFFSET)
     return [ready.step(frame) for frame in ready.frames()]
 
 
 def scores(given: argparse.Namespace) -> None:
     """Prints a table: rows are trackers and groupings, columns mean scores, and merges and splits of all sequences.
 
-    A second table has the paired differences of both filters.
+    A sequence has the means over the filter seeds, and events are summed over them. A second table has the paired
+    differences of both filters.
     """
     warnings.simplefilter("ignore")
-    values: dict[str, list[dict[str, float]]] = {}
+    values: dict[str, list[list[dict[str, float]]]] = {}
     for _, seed, q in _sequences(given, given.suite):
-        found = {name: _tracked(name, seed, q, given) for name in ("blob", "particle", "relational")}
-        bare = {name: without_groups(t) for name, t in found.items()}
-        rows = {f"{name}, rule": with_groups(t, q.fps, q.px_per_m, LinkRule()) for name, t in bare.items()}
-        rows |= {f"{name}, belief": with_groups(t, q.fps, q.px_per_m, default_belief()) for name, t in bare.items()}
-        for label, tracks in rows.items():
-            values.setdefault(label, []).append(tracking.evaluate(q.truth, tracks))
-    count = len(next(iter(values.values())))
-    print(f"\nsuite {given.suite}, {count} sequences, {given.counts[0]} particles\n")
+        runs = [_grouped(seed, k, q, given) for k in given.filter_seeds]
+        for label in runs[0]:
+            values.setdefault(label, []).append([run[label] for run in runs])
+    means = {
+        label: np.array([np.nanmean([[s.get(key, np.nan) for key in COLUMNS] for s in runs], axis=0) for runs in rows])
+        for label, rows in values.items()
+    }
+    _title(given, len(next(iter(values.values()))))
     tables.head(["tracks, groups", *COLUMNS, "merge F1", "split F1"])
-    for label, scored in values.items():
-        means = [f"{np.nanmean([s.get(key, np.nan) for s in scored]):.3f}" for key in COLUMNS]
-        tables.row([label, *means, *(_pooled(scored, kind) for kind in ("merge", "split"))])
+    for label, rows in values.items():
+        scored = [s for runs in rows for s in runs]
+        cells = (f"{value:.3f}" for value in np.nanmean(means[label], axis=0))
+        tables.row([label, *cells, *(_pooled(scored, kind) for kind in ("merge", "split"))])
     print()
     tables.head(["relational − particle, belief", *COLUMNS])
-    before, after = (
-        np.array([[s.get(key, np.nan) for key in COLUMNS] for s in values[f"{name}, belief"]]) for name in FILTERS
-    )
-    known = [np.isfinite(a) & np.isfinite(b) for a, b in zip(before.T, after.T, strict=True)]
-    pairs = [paired(a[k], b[k]) for a, b, k in zip(before.T, after.T, known, strict=True)]
-    tables.row(["paired", *(tables.signed(*map(float, p)) for p in pairs)])
+    tables.row(["paired", *_differences(means["particle, belief"], means["relational, belief"])])
+
+
+def _grouped(seed: int, further: int, q: Sequence, given: argparse.Namespace) -> dict[str, dict[str, float]]:
+    """Returns the scores of each tracker and grouping."""
+    found = {name: _tracked(name, seed, q, given, further=further) for name in ("blob", "particle", "relational")}
+    bare = {name: without_groups(t) for name, t in found.items()}
+    rows = {f"{name}, rule": with_groups(t, q.fps, q.px_per_m, LinkRule()) for name, t in bare.items()}
+    rows |= {f"{name}, belief": with_groups(t, q.fps, q.px_per_m, default_belief()) for name, t in bare.items()}
+    return {label: tracking.evaluate(q.truth, tracks) for label, tracks in rows.items()}
 
 
 def _pooled(scored: list[dict[str, float]], kind: str) -> str:
@@ -203,18 +213,42 @@ def _people_of(truth: Truth, tracks: Tracks) -> dict[int, int]:
 
 
 def ablation(given: argparse.Namespace) -> None:
-    """Prints a table: rows are settings, columns the error and scores on a suite, means; groups by the belief."""
+    """Prints a table: rows are settings, columns errors and scores on a suite, and paired differences to the defaults.
+
+    Groups are those of the belief. A sequence has the means over the filter seeds.
+    """
     warnings.simplefilter("ignore")
     sequences = list(_sequences(given, given.suite))
-    print(f"\nsuite {given.suite}, {len(sequences)} sequences, {given.counts[0]} particles\n")
-    tables.head(["setting", "error, m", *COLUMNS])
+    names = ("error, m", "hidden people, m", *COLUMNS)
+    _title(given, len(sequences))
+    tables.head(["setting", *names, *(f"Δ {name}" for name in names)])
+    defaults = None
     for setting in DEPARTURES:
         changed = argparse.Namespace(**{**vars(given), "set": [*given.set, *setting.split()]})
-        rows = []
-        for _, seed, q in sequences:
-            tracks = _tracked("relational", seed, q, changed)
-            bare = without_groups(tracks)
-            scored = tracking.evaluate(q.truth, with_groups(bare, q.fps, q.px_per_m, default_belief()))
-            rows.append([errors(q.truth, tracks).mean(), *(scored.get(key, np.nan) for key in COLUMNS)])
-        means = np.nanmean(np.array(rows), axis=0)
-        tables.row([setting or "defaults", *(f"{value:.3f}" for value in means)])
+        runs = [[_scored(seed, k, q, changed) for k in given.filter_seeds] for _, seed, q in sequences]
+        rows = np.nanmean(np.array(runs), axis=1)
+        defaults = rows if defaults is None else defaults
+        means = (f"{value:.3f}" for value in np.nanmean(rows, axis=0))
+        tables.row([setting or "defaults", *means, *_differences(defaults, rows)])
+
+
+def _scored(seed: int, further: int, q: Sequence, given: argparse.Namespace) -> list[float]:
+    """Returns the error, that of hidden people, m, and the COLUMNS of one run."""
+    tracks = _tracked("relational", seed, q, given, further=further)
+    scored = tracking.evaluate(q.truth, with_groups(without_groups(tracks), q.fps, q.px_per_m, default_belief()))
+    assert q.truth.visibility is not None
+    away = errors(q.truth, tracks)
+    hidden = away[q.truth.visibility < HIDDEN]
+    return [away.mean(), hidden.mean() if len(hidden) else np.nan, *(scored.get(key, np.nan) for key in COLUMNS)]
+
+
+def _title(given: argparse.Namespace, count: int) -> None:
+    print(f"\nsuite {given.suite}, {count} sequences, {given.counts[0]} particles, "
+          f"filter seeds {given.filter_seeds.start}:{given.filter_seeds.stop}\n")  # fmt: skip
+
+
+def _differences(before: Array, after: Array) -> list[str]:
+    """Returns the paired differences of each column over the sequences (N, C) in which both values are known."""
+    known = np.isfinite(before) & np.isfinite(after)
+    pairs = [paired(a[k], b[k]) for a, b, k in zip(before.T, after.T, known.T, strict=True)]
+    return [tables.signed(*map(float, p)) for p in pairs]

@@ -59,6 +59,15 @@ class ParticleSet:
         """The least slot of each cluster, ascending."""
         return np.unique(self.cluster)
 
+    def estimates(self) -> tuple[Array, Array, Array]:
+        """Return means (K, 4) and covariances (K, 4, 4) of x, y, m, vx, vy, m/s, and the existence (K,).
+
+        They are moments over the particles, each weighted by its weight and the person's existence in it.
+        """
+        mean, cov, exist = np.zeros((self.people, 4)), np.zeros((self.people, 4, 4)), np.zeros(self.people)
+        transition_kernels.moments(self.pos, self.vel, self.exist, self.weights, mean, cov, exist)
+        return mean, cov, exist
+
     def labels(self) -> Ints:
         """Return the group of each person in each particle, (P, K): the least slot in it."""
         label = np.empty(self.exist.shape, np.int64)

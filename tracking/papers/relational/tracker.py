@@ -8,7 +8,7 @@ together. z are the detections of a frame, w the weights. The steps of a frame:
               s^r ~ p(s^r_t | s^a_t, s^r_t-1)    relations from new attributes  eq. 7                transition_kernels
     weight    w = w p(z_t | s^a_t)               sum over all mappings          eqs 6, 12, sec. 3.3  sensor
     births    x ~ N(z, .), v ~ N(0, .)           relations of newcomers         secs. 2.1.1, 3.2     tracker, relations
-    estimate  means over particles                                                                   report
+    estimate  means over particles                                                                   particle_set
     resample  residual sampling                                                 sec. 2.1             filters.particles
 
 Readings of the paper: eq. 2 and eq. 8 condition on all earlier states, s_1:t-1; the last factor of eq. 14 is p(s^a_t-1,
@@ -47,7 +47,7 @@ from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
 from tracking.image_scale import required
-from tracking.papers.relational import report, sensor, transition_kernels
+from tracking.papers.relational import sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig
 from tracking.papers.relational.occluders import covered_by_people, hidden_share
 from tracking.papers.relational.particle_diversity import ParticleDiversity
@@ -150,9 +150,9 @@ class Particle:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        shared, coupling, alike = self._coupling()
+        shared, coupling, counts = self._coupling()
         table = c.speed_table(self.dt)
-        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, self.dt)
+        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, counts, self.dt)
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
         behind, self.cut = covered_by_people(p, camera, c.body_radius)
@@ -166,9 +166,10 @@ class Particle:
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
     def _coupling(self) -> tuple[Array, Array, Array]:
-        """Returns the normals that groups have in common (P, K, 2), and the coupling (2,) and the rules (4,) by which
-        partners count of transition_kernels; people of `particle` have none."""
-        return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4)
+        """Returns the normals that groups have in common (P, K, 2), and the coupling (2,) and the weights of partners
+        (K, K) of transition_kernels; people of `particle` have none."""
+        p = self.particles
+        return np.zeros(p.pos.shape), np.zeros(2), np.zeros((p.people, p.people))
 
     def _relate(self) -> None:
         """Draw new relations; people of `particle` have none."""
@@ -232,17 +233,17 @@ class Particle:
     def _report(self, frame: Frame) -> Tracks:
         """Returns the Tracks of the frame: people who exist with at least `report_existence`, on the ground in m, in
         the image in px."""
-        place, velocity, cov, exist = report.estimates(self.particles)
+        mean, cov, exist = self.particles.estimates()
         rows = exist >= self.config.report_existence
         self.slots.name(rows)
-        self._follow(np.where(rows[:, None], np.concatenate([place, velocity], axis=1), np.nan))
-        pos, vel, cov = place[rows], velocity[rows], cov[rows]
+        self._follow(mean, cov, rows)
+        pos, vel, cov = mean[rows, :2], mean[rows, 2:], cov[rows]
         score, id = np.minimum(exist[rows], 1.0), self.slots.id[rows]
         if self.plane == "image":
             pos, vel, cov = pos * self.unit, vel * self.unit, cov * self.unit**2
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
         return Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
 
-    def _follow(self, state: Array) -> None:
-        """Take note of the mean states (K, 4) of a frame, x, y, m, vx, vy, m/s, nan for people who are not reported;
-        `particle` has no use for them."""
+    def _follow(self, mean: Array, cov: Array, shown: Bools) -> None:
+        """Take note of the states of a frame: mean (K, 4) x, y, m, vx, vy, m/s, and covariance (K, 4, 4) over the
+        particles, and who is reported, (K,); `particle` has no use for them."""

@@ -58,32 +58,30 @@ def group_labels(related: Bools, label: Ints) -> None:
 @njit(cache=True)
 def move(
     pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, shared: Array, table: Array, coupling: Array,
-    alike: Array, dt: float,
+    counts: Array, dt: float,
 ) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; related (P, K, K): old relations;
-    noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling (2,); alike (4,):
-    rules by which a partner counts.
+    noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling (2,); counts (K, K):
+    how much each person's partners count, from 0 to 1.
 
     v_i = u - B u / |u| + C e_i, x_i = x_i + v_i dt, with B, C of the table's row for |u| (Table 3). For a person alone
-    u = v_i and e_i = noise. A partner j who walks together with i counts with w_j = `belonging` by `alike` at their old
-    distance and velocity difference, the person itself with w_i = 1. With m the mean velocity of both, weighted by w
-    and existence, and c = COMMON max_j w_j: u = v_i + FOLLOW (m - v_i), e_i = sqrt(1 - c) noise + sqrt(c) s_i and s_i =
-    sum w shared / sqrt(sum w^2). The weights, FOLLOW and COMMON are ours; the paper: BIAS inf, so that w = 1, FOLLOW 1
-    and COMMON 0, so that u = m and e_i = noise.
+    u = v_i and e_i = noise. A partner j who walks together with i has the weight w_j = counts[i, j], the person itself
+    w_i = 1. With m the mean velocity of all these, weighted by w and existence, and c = COMMON max_j w_j: u = v_i +
+    FOLLOW (m - v_i), e_i = sqrt(1 - c) noise + sqrt(c) s_i and s_i = sum w shared / sqrt(sum w^2). The weights, FOLLOW
+    and COMMON are ours; the paper: w = 1, FOLLOW 1 and COMMON 0, so that u = m and e_i = noise.
     """
     particles, n, _ = pos.shape
-    place, old = np.empty((n, 2)), np.empty((n, 2))
+    old = np.empty((n, 2))
     for p in range(particles):
-        place[:], old[:] = pos[p], vel[p]
+        old[:] = vel[p]
         for i in range(n):
             x, y, weight = exist[p, i] * old[i, 0], exist[p, i] * old[i, 1], exist[p, i]
             a, b, square, most = shared[p, i, 0], shared[p, i, 1], 1.0, 0.0
             for j in range(n):
                 if related[p, i, j]:
-                    distance = math.hypot(place[i, 0] - place[j, 0], place[i, 1] - place[j, 1])
-                    w = belonging(distance, math.hypot(old[i, 0] - old[j, 0], old[i, 1] - old[j, 1]), alike)
+                    w = counts[i, j]
                     x += w * exist[p, j] * old[j, 0]
                     y += w * exist[p, j] * old[j, 1]
                     a, b = a + w * shared[p, j, 0], b + w * shared[p, j, 1]
@@ -112,11 +110,29 @@ def move(
 
 @njit(cache=True)
 def belonging(distance: float, difference: float, rules: Array) -> float:
-    """Return the probability that two people walk together by their states (ours); 1 if BIAS is inf.
+    """Return the probability that two people walk together by their states (ours).
 
     distance: between them, m; difference: of their velocities, m/s; rules (4,).
     """
     return 1.0 / (1.0 + math.exp(rules[DISTANCE] * distance + rules[VELOCITY] * difference - rules[BIAS]))
+
+
+@njit(cache=True)
+def partner_weights(mean: Array, cov: Array, rules: Array) -> Array:
+    """Return how much people count for each other if they walk together, (K, K): the belonging of their mean states.
+
+    mean (K, 4): x, y, m, vx, vy, m/s, over the particles; cov (K, 4, 4): their covariances; rules (4,). The errors of
+    the estimates make two people seem farther apart and less alike than they are: on average they add the sum of the
+    variances of both to the squared differences. It is taken off, down to 0 (ours).
+    """
+    n = len(mean)
+    out = np.ones((n, n))
+    for i in range(n):
+        for j in range(i):
+            square = (mean[i] - mean[j]) ** 2 - np.diag(cov[i]) - np.diag(cov[j])
+            distance, difference = math.sqrt(max(square[:2].sum(), 0.0)), math.sqrt(max(square[2:].sum(), 0.0))
+            out[i, j] = out[j, i] = belonging(distance, difference, rules)
+    return out
 
 
 @njit(cache=True)

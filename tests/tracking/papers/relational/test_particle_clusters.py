@@ -9,7 +9,6 @@ from tracking.papers.relational import sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import sparse_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.report import estimates
 
 
 def sight(detect, missed=None, cut=None, eye=(np.nan, np.nan)):
@@ -170,9 +169,9 @@ def test_existence_by_bayes():
 def test_moments_are_weighted_by_existence():
     particles = three()
     particles.exist[:200, 0] = 0.0
-    pos, vel, cov, exist = estimates(particles)
+    mean, cov, exist = particles.estimates()
     kept = np.concatenate([particles.pos[200:, 0], particles.vel[200:, 0]], axis=1)
-    np.testing.assert_allclose(np.concatenate([pos[0], vel[0]]), kept.mean(axis=0), rtol=1e-9)
+    np.testing.assert_allclose(mean[0], kept.mean(axis=0), rtol=1e-9)
     np.testing.assert_allclose(cov[0], np.cov(kept.T, bias=True), rtol=1e-9)
     assert exist[0] == pytest.approx(0.45)
 
