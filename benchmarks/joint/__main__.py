@@ -16,8 +16,9 @@ process     friends-meet: the Dirichlet process as validity and as dynamics of p
             paired differences to the paper's validity and events
 
 A row of table2 holds a sequence's scores, means over filter seeds. Group scores are pooled over the frames of all
-sequences together, strict and core; differences are of the means over sequences, with 95 % intervals. Detections are
-the points of the simulated detector; `.2` has true positions, as in the paper.
+sequences together, strict and core, and of the first variant by kind of sequence; differences are of the means over
+sequences, with 95 % intervals. Detections are the points of the simulated detector; `.2` has true positions, as in the
+paper.
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ DEPARTURES = (
     "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
     "size_prior=none", "velocity_time=0", "lag=0.1", "normaliser=sampled",
     "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
-    "estimate=histogram", "validity=bayesian", "partition_dynamics=dirichlet",
+    "estimate=histogram", "validity=bayesian", "validity=bayesian evidence_rate=20", "partition_dynamics=dirichlet",
+    "partition_dynamics=dirichlet redraw_rate=4",
 )  # fmt: skip
 """Settings of the mode ablation."""
 PROCESS = (
@@ -174,7 +176,9 @@ def table2(given: argparse.Namespace) -> None:
     """Prints the table of variants and the paired differences."""
     chosen = [v for v in VARIANTS if not given.only or v.name in given.only.split(",")]
     rows: dict[str, list[Row]] = {v.name: [] for v in chosen}
+    kinds = []
     for sequence in sequences(given.seeds):
+        kinds.append(sequence.name.rstrip("-0123456789"))
         for v in chosen:
             rows[v.name].append(mean_row(measured(sequence, v, given.filter_seeds, given.set)))
     title = f"{len(rows[chosen[0].name])} sequences, seeds {seeds_text(given.seeds)}, "
@@ -190,6 +194,12 @@ def table2(given: argparse.Namespace) -> None:
             cells[f"{first} − {second}"] = [difference(rows[first], rows[second], f"group_{k}") for k in COMPARED]
     if cells:
         tables.table("differences of means over sequences, strict", "", COMPARED, cells)
+    first = chosen[0].name
+    cells = {
+        kind: pooled([row for row, name in zip(rows[first], kinds, strict=True) if name == kind], "_core")[:4]
+        for kind in dict.fromkeys(kinds)
+    }
+    tables.table(f"core, {first}, by sequence: {title}", "sequences", [f"{name}, %" for name in SHARES], cells)
 
 
 def difference(first: Sequence[Row], second: Sequence[Row], key: str) -> str:
@@ -298,13 +308,16 @@ def events(given: argparse.Namespace) -> None:
 def ablation(given: argparse.Namespace) -> None:
     """Prints a table: rows are settings, columns scores pooled over frames and paired differences to the defaults."""
     made, base = list(sequences(given.seeds)), []
-    tables.head(["setting", *(f"{name}, %" for name in SHARES), "event F1", "Δ GDSR", "Δ MOTA", "Δ event F1"])
+    deltas = {"GDSR": "group_GDSR", "MOTA": "group_MOTA", "event F1": "event_F1"}
+    shown = "event F1", "of the least person"
+    tables.head(["setting", *(f"{name}, %" for name in SHARES), *shown, *(f"Δ {name}" for name in deltas)])
     for setting in ("", *(given.only.split(",") if given.only else DEPARTURES)):
         v = Variant("")
         rows = [mean_row(measured(s, v, given.filter_seeds, [*given.set, *setting.split()])) for s in made]
         base = base or rows
-        differences = [difference(rows, base, key) for key in ("group_GDSR", "group_MOTA", "event_F1")]
-        tables.row([setting or "defaults", *pooled(rows, "_core")[:4], others(rows)[0], *differences])
+        differences = [difference(rows, base, key) for key in deltas.values()]
+        own = dict(zip(OTHERS, others(rows), strict=True))
+        tables.row([setting or "defaults", *pooled(rows, "_core")[:4], *(own[name] for name in shown), *differences])
 
 
 def process(given: argparse.Namespace) -> None:
