@@ -62,6 +62,8 @@ class Picture(Model):
     """Texture, noise, blur and artefacts; they change pictures only.
 
     - texture: contrast of the patterns on ground and walls, 0 to 1.
+    - samples: rays along each axis of a pixel whose colours are averaged, in the empty scene, 1 to 4. Patterns are as
+      fine as the distance of the rays, so that more rays show finer grain.
     - noise: standard deviation per pixel and channel at grey level 128, grey levels. shot: share of its variance that
       is proportional to the brightness: at level x the variance is noise² (1 - shot + shot x / 128).
     - blur_px: standard deviation of the blur, px. jpeg: quality 0 to 100; 0 = no compression.
@@ -73,6 +75,9 @@ class Picture(Model):
     """
 
     texture: Share = Field(0.5, description="contrast of the patterns on ground and walls")
+    samples: Annotated[int, Field(ge=1, le=4)] = Field(
+        1, description="rays along each axis of a pixel of the empty scene, averaged; with more, patterns are finer"
+    )
     noise: NonNegative = Field(
         3.0,
         description="standard deviation of the noise of each pixel and colour channel at grey level 128, grey levels",

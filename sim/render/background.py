@@ -43,7 +43,7 @@ class PixelGeometry:
 
 @dataclass(frozen=True)
 class EmptyScene:
-    """The painted empty scene, float32; per pixel the mean of 2 x 2 rays at edges, else the ray through its centre.
+    """The painted empty scene, float32; per pixel the mean of `picture.samples` rays each way, at least 2 at edges.
 
     colour (H, W, 3)   BGR in grey levels, 0 or more, not clipped at 255; lit, without plants' sway and noise
     direct (H, W)      share of direct sun in the pixel's light, 0 to 1; 0 for sky and where a solid thing hides the sun
@@ -76,14 +76,15 @@ def paint_empty_scene(
     plants: Foliage | None,
     seed: int,
     repeat: int = 0,
+    samples: int = 1,
 ) -> EmptyScene:
     """Return the EmptyScene: colours, shares of sun and of plants in the empty scene under steady light, with unmoved
     plants.
 
     light: direction of the sun, shadow share and penumbra are used. texture: contrast of the patterns, 0 to 1. plants:
     the Foliage, None for none. seed, repeat (number of the suite entry's copy, 0 without copies): name the random
-    stream of colours, width of the paving slabs and patterns. Lens distortion is ignored. Raises ValueError for a
-    negative seed.
+    stream of colours, width of the paving slabs and patterns. samples: rays along each axis of a pixel. Lens distortion
+    is ignored. Raises ValueError for a negative seed.
     """
     from sim.render.background_kernels import paint_pixels
 
@@ -99,7 +100,8 @@ def paint_empty_scene(
     # In the order of the slots CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL.
     style = np.array([texture, slab, *((plants.key, plants.level) if plants else (0.0, np.inf))])
     paint_pixels(
-        (rays.origin, rays.direction), signed_scale(camera), light.sun, light.shadow, light.penumbra, solids_of(scene),
-        np.array(scene.size, dtype=float), style, np.clip(palette, 20, 240), key, colour, direct, green,
+        (rays.origin, rays.direction), samples, signed_scale(camera), light.sun, light.shadow, light.penumbra,
+        solids_of(scene), np.array(scene.size, dtype=float), style, np.clip(palette, 20, 240), key,
+        colour, direct, green,
     )  # fmt: skip
     return EmptyScene(colour, direct, green)

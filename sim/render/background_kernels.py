@@ -197,31 +197,56 @@ def _point_colour(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _mean_of_rays(  # type: ignore[no-untyped-def]
+    u, v, many, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c, colour,
+    direct, plants,
+):  # fmt: skip
+    """Set colour, direct and plants of the pixel in column u and row v to the means over many x many rays, spread
+    evenly over the pixel.
+
+    Returns a whole number that is equal for pixels whose last ray meets the same surface, lit alike. c (3,): scratch.
+    The other arguments are as for `_point_colour` and `paint_pixels`.
+    """
+    share, surface = 1.0 / (many * many), 0
+    colour[v, u], direct[v, u], plants[v, u] = 0.0, 0.0, 0.0
+    for ray in range(many * many):
+        x, y = u + (ray % many + 0.5) / many, v + (ray // many + 0.5) / many
+        sunny, green, surface = _point_colour(
+            x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c
+        )  # fmt: skip
+        direct[v, u] += share * sunny
+        plants[v, u] += share * green
+        for k in range(3):
+            colour[v, u, k] += share * c[k]
+    return surface
+
+
+@njit(cache=True)
 def paint_pixels(  # type: ignore[no-untyped-def]
-    rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, colour, direct, plants
+    rays, samples, scale, sun, shadow, penumbra, solids, size, style, palette, key, colour, direct, plants
 ):
     """Set colour (H, W, 3) BGR in grey levels, direct (H, W), the share of direct sun, and plants (H, W), the share of
     plants.
 
-    A pixel takes the ray through its centre, as patterns are no finer than pixels. Where it differs from a neighbour in
-    surface or sunlight, it takes the mean of 2 x 2 rays. rays: origin and direction, each (3, 3), of PixelRays. scale:
-    px per m at a depth of 1 m, or minus px per m for a camera from above. sun (3,): unit vector to the sun. shadow: the
-    sun's share of the light, 0 to 1. penumbra: width of a shadow's soft edge, m. solids: a `raycast.Solids`. size (2,)
-    m: of the world. style (4,): contrast (0 to 1), slab width (m), key of the plant pattern, level above which plants
-    grow (inf: no plants). palette (6, 3): BGR of paving, grass, bricks, stone, steps, sky. key: of the random patterns.
-    Returns nothing.
+    A pixel takes the mean of samples x samples rays, and patterns are no finer than the distance of these. With one ray
+    per pixel, pixels that differ from a neighbour in surface or sunlight take the mean of 2 x 2. rays: origin and
+    direction, each (3, 3), of PixelRays. scale: px per m at a depth of 1 m, or minus px per m for a camera from above.
+    sun (3,): unit vector to the sun. shadow: the sun's share of the light, 0 to 1. penumbra: width of a shadow's soft
+    edge, m. solids: a `raycast.Solids`. size (2,) m: of the world. style (4,): contrast (0 to 1), slab width (m), key
+    of the plant pattern, level above which plants grow (inf: no plants). palette (6, 3): BGR of paving, grass, bricks,
+    stone, steps, sky. key: of the random patterns. Returns nothing.
     """
     height, width = direct.shape
     o, d, hit, more, c = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), np.empty((4, HIT_SLOTS)), np.empty(3)
     surface = np.empty((height, width), np.int64)
     for v in range(height):
         for u in range(width):
-            x, y = u + 0.5, v + 0.5
-            direct[v, u], plants[v, u], surface[v, u] = _point_colour(
-                x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c
+            surface[v, u] = _mean_of_rays(
+                u, v, samples, rays, samples * scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d,
+                hit, more, c, colour, direct, plants,
             )  # fmt: skip
-            for k in range(3):
-                colour[v, u, k] = c[k]
+    if samples > 1:
+        return
     for v in range(height):
         for u in range(width):
             here = surface[v, u]
@@ -232,13 +257,7 @@ def paint_pixels(  # type: ignore[no-untyped-def]
                 and here == surface[v, min(u + 1, width - 1)]
             ):
                 continue
-            colour[v, u], direct[v, u], plants[v, u] = 0.0, 0.0, 0.0
-            for sub in range(4):
-                x, y = u + 0.25 + 0.5 * (sub % 2), v + 0.25 + 0.5 * (sub // 2)
-                sunny, green, _ = _point_colour(
-                    x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c
-                )  # fmt: skip
-                direct[v, u] += 0.25 * sunny
-                plants[v, u] += 0.25 * green
-                for k in range(3):
-                    colour[v, u, k] += 0.25 * c[k]
+            _mean_of_rays(
+                u, v, 2, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c,
+                colour, direct, plants,
+            )  # fmt: skip

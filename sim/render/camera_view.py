@@ -81,8 +81,8 @@ class CameraView:
 
         The first access raises ValueError if the Motion's seed is negative.
         """
-        m = self.motion
-        return paint_empty_scene(self.camera, m.scene, self.light, self.picture.texture, self.plants, m.seed, m.repeat)
+        m, p = self.motion, self.picture
+        return paint_empty_scene(self.camera, m.scene, self.light, p.texture, self.plants, m.seed, m.repeat, p.samples)
 
     @cached_property
     def empty_canvas(self) -> NDArray[np.int16]:

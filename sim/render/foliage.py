@@ -72,9 +72,8 @@ def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repea
     width, height = camera.image
     pattern, cover = np.empty((2, -(-height // SAMPLE_STEP), -(-width // SAMPLE_STEP)))
     rays, size = pixel_rays(camera), np.array(scene.size, dtype=float)
-    sample_plants(
-        (rays.origin, rays.direction), signed_scale(camera), SAMPLE_STEP, solids_of(scene), size, key, pattern, cover
-    )
+    scale = picture.samples * signed_scale(camera)  # leaves show farther away
+    sample_plants((rays.origin, rays.direction), scale, SAMPLE_STEP, solids_of(scene), size, key, pattern, cover)
     order = np.argsort(-pattern, axis=None, kind="stable")
     covered = np.cumsum(cover.ravel()[order])
     if covered[-1] == 0:

@@ -49,6 +49,15 @@ def test_plants_cover_the_share_that_is_wanted(view: str, share: float) -> None:
     assert found == pytest.approx([share] * 3, abs=0.01)
 
 
+def test_more_samples_show_leaves_farther_away_and_cover_the_same_share() -> None:
+    near, far = (
+        make_renderer(motion_in(1), VIEWS["high"], DARK, Picture(foliage=0.08, samples=n)).left_view for n in (1, 3)
+    )
+    assert far.empty_scene.plants.mean() == pytest.approx(0.08, abs=0.01)
+    reach = [view.geometry.depth[view.empty_scene.plants > 0].max() for view in (near, far)]
+    assert reach[1] > reach[0]
+
+
 def test_plants_grow_outside_the_world_first() -> None:
     made = make_renderer(motion_in(1), VIEWS["high"], DARK, Picture(foliage=0.08)).left_view
     x, y = np.moveaxis(made.geometry.place[..., :2], -1, 0)
@@ -213,6 +222,20 @@ def test_the_plate_is_that_of_finer_rays() -> None:
     off = np.abs(mean - coarse).max(axis=2)
     assert off.mean() < 0.25
     assert np.percentile(off, 99.9) < 25
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("samples", [2, 3])
+def test_a_pixel_is_the_mean_of_its_samples(view: str, samples: int) -> None:
+    """Against as many times more pixels, each with one ray, on ground without grass."""
+    motion = crowd(3, people=0, frames=1, scene=Scene(np.array([2000.0, 2000.0])))
+    camera, picture = VIEWS[view], Picture(texture=0.8)
+    camera = camera.replace(position=camera.position + np.array([1000.0, 1000.0, 0.0]))
+    made = make_renderer(motion, camera, DARK, picture.model_copy(update={"samples": samples})).left_view.empty_scene
+    fine = make_renderer(motion, small(camera, samples), DARK, picture).left_view.empty_scene
+    height, width = made.direct.shape
+    mean = fine.colour.reshape(height, samples, width, samples, 3).mean(axis=(1, 3))
+    assert np.abs(mean - made.colour).max() < 1e-3
 
 
 def test_what_cannot_be_is_refused() -> None:

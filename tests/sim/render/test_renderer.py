@@ -262,12 +262,13 @@ def test_a_misaligned_right_camera_turns_and_moves_its_picture_only() -> None:
     assert np.median(off) < 0.4 * np.median(np.abs(plain.right.astype(float) - wrong.right)[inside])
 
 
-def test_a_matcher_finds_the_true_disparity() -> None:
+@pytest.mark.parametrize("samples", [1, 3])
+def test_a_matcher_finds_the_true_disparity(samples: int) -> None:
     import cv2
 
     motion = crowd(3, people=14, frames=3)
     camera = pinhole(40.0).replace(baseline=0.3)
-    made = make_renderer(motion, camera, Light(), Picture())
+    made = make_renderer(motion, camera, Light(), Picture(samples=samples))
     shown = made.draw(2, right=True, pixels=True, disparity=True)
     assert shown.pixels is not None
     assert shown.pixels.disparity is not None

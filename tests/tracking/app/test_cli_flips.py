@@ -189,6 +189,7 @@ PICTURES = {
     "light.switch[].gain": (LAMP, LAMP.replace("0.5", "0.7")),
     "light.switch[].ramp": (LAMP, LAMP.replace("gain", "ramp = 0.6, gain")),
     "picture.texture": ("", "picture.texture=0.9"),
+    "picture.samples": ("", "picture.samples=3"),
     "picture.noise": ("", "picture.noise=6"),
     "picture.blur_px": ("", "picture.blur_px=1.5"),
     "picture.jpeg": ("", "picture.jpeg=50"),

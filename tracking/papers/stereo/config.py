@@ -60,7 +60,7 @@ class StereoConfig(BackgroundSettings):
         0.3, (0.02, 3.0), "px", "from pixels: standard deviation of a feature's u and v", "log", sees="pixels"
     )
     surface_offset: float = param(
-        0.14, (0.0, 0.4), "m",
+        0.12, (0.0, 0.4), "m",
         "from pixels: people's middle lies so far behind their visible surface; all points are moved by it (ours)",
         sees="pixels",
     )  # fmt: skip
