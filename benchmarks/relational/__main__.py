@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from benchmarks.relational import cost, errors, groups, pixels
+from benchmarks.relational import ablation, cost, errors, groups, pixels
 from benchmarks.support.options import add_seeds, new_parser, one_thread
 
 
@@ -37,7 +37,7 @@ def main() -> None:
     parser = new_parser(__doc__)
     modes = {
         "particles": errors.particles, "hidden": errors.hidden, "recordings": errors.recordings,
-        "groups": groups.scores, "reliability": groups.reliability, "ablation": groups.ablation, "speed": cost.speed,
+        "groups": groups.scores, "reliability": groups.reliability, "ablation": ablation.ablation, "speed": cost.speed,
         "sums": cost.sums, "pixels": pixels.scores, "boxes": pixels.boxes,
     }  # fmt: skip
     parser.add_argument("mode", choices=modes)
@@ -48,6 +48,7 @@ def main() -> None:
     parser.add_argument("--params", help="preset of both filters, as paper")
     parser.add_argument("--suite", default="standard", help="of modes groups, reliability, ablation and pixels")
     parser.add_argument("--entry", metavar="NAME", help="only these entries of the suite, a comma between them")
+    parser.add_argument("--only", metavar="SETTING,…", help="mode ablation: these settings beside the defaults")
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="labelled recordings are there")
     parser.add_argument(
         "--chart", type=Path, metavar="FILE.svg", help="modes particles, hidden and reliability: draw them"

@@ -1,4 +1,4 @@
-"""Groups and events of `relational`, its probabilities of pairs, and its departures one by one."""
+"""Groups and events of `relational`, and its probabilities of pairs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import tracking
-from benchmarks.relational.errors import HIDDEN, config_of, errors
+from benchmarks.relational.errors import config_of
 from benchmarks.support import chart, tables
 from benchmarks.support.options import HOTEL, ZARA
 from scenarios.loading.resolve import resolve
@@ -27,14 +27,6 @@ from tracking.prepare import prepare
 from tracking.stats import paired
 
 COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
-DEPARTURES = (
-    "", "relation_evidence=state", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0",
-    "relation_bias=40 newcomer_share=0", "weights=joint", "kernel_width=0",
-    "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
-    "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "newcomer_share=0",
-    "least_existence=0", "birth_doubt=0.9", "clutter_density=0.02",
-)  # fmt: skip
-"""Settings of the ablation; the first one is the defaults. With relation_bias 40 partners count fully."""
 OFFSET = 1_000_000
 """The seed of a filter is that of the scene, and so much more for each further filter seed."""
 NEAR = 1.0
@@ -48,16 +40,18 @@ ROUGH = EXACT | {"noise_m": 0.1, "detect_prob": 0.95}
 """Detections of labelled people in mode reliability --recordings: without errors, and with; no false alarms."""
 
 
-def _sequences(given: argparse.Namespace, suite: str) -> Iterator[tuple[str, int, Sequence]]:
+def sequences(given: argparse.Namespace, suite: str) -> Iterator[tuple[str, int, Sequence]]:
+    """Yields the name, the seed and the sequence of each entry asked for."""
     for entry in (e for e in resolve(f"suite:{suite}") if not given.entry or e.name in given.entry.split(",")):
         for seed in given.seeds:
             yield entry.name, seed, simulate(entry.scenario, seed, 0, ())
 
 
-def _tracked(
+def tracked(
     name: str, seed: int, sequence: Sequence, given: argparse.Namespace, mode: str = "file", sensor: Any = None,
     further: int = 0,
 ) -> list[Tracks]:  # fmt: skip
+    """Returns the tracks of a tracker; mode, sensor: as of `tracking.prepare`; further: number of the filter seed."""
     config = None if name == "blob" else config_of(name, given.counts[0], given)
     ready = prepare(name, sequence, params=config, detections=mode, sensor=sensor, seed=seed)
     ready.reset(seed + further * OFFSET)
@@ -72,7 +66,7 @@ def scores(given: argparse.Namespace) -> None:
     """
     warnings.simplefilter("ignore")
     values: dict[str, list[list[dict[str, float]]]] = {}
-    for _, seed, q in _sequences(given, given.suite):
+    for _, seed, q in sequences(given, given.suite):
         runs = [_grouped(seed, k, q, given) for k in given.filter_seeds]
         for label in runs[0]:
             values.setdefault(label, []).append([run[label] for run in runs])
@@ -80,7 +74,7 @@ def scores(given: argparse.Namespace) -> None:
         label: np.array([np.nanmean([[s.get(key, np.nan) for key in COLUMNS] for s in runs], axis=0) for runs in rows])
         for label, rows in values.items()
     }
-    _title(given, len(next(iter(values.values()))))
+    title(given, len(next(iter(values.values()))))
     tables.head(["tracks, groups", *COLUMNS, "merge F1", "split F1"])
     for label, rows in values.items():
         scored = [s for runs in rows for s in runs]
@@ -88,12 +82,12 @@ def scores(given: argparse.Namespace) -> None:
         tables.row([label, *cells, *(_pooled(scored, kind) for kind in ("merge", "split"))])
     print()
     tables.head(["relational − particle, belief", *COLUMNS])
-    tables.row(["paired", *_differences(means["particle, belief"], means["relational, belief"])])
+    tables.row(["paired", *differences(means["particle, belief"], means["relational, belief"])])
 
 
 def _grouped(seed: int, further: int, q: Sequence, given: argparse.Namespace) -> dict[str, dict[str, float]]:
     """Returns the scores of each tracker and grouping."""
-    found = {name: _tracked(name, seed, q, given, further=further) for name in ("blob", "particle", "relational")}
+    found = {name: tracked(name, seed, q, given, further=further) for name in ("blob", "particle", "relational")}
     bare = {name: without_groups(t) for name, t in found.items()}
     rows = {f"{name}, rule": with_groups(t, q.fps, q.px_per_m, LinkRule()) for name, t in bare.items()}
     rows |= {f"{name}, belief": with_groups(t, q.fps, q.px_per_m, default_belief()) for name, t in bare.items()}
@@ -115,7 +109,7 @@ def reliability(given: argparse.Namespace) -> None:
     """
     panels = []
     if not given.recordings:
-        runs = [(seed, q, dict[str, Any]()) for _, seed, q in _sequences(given, given.suite)]
+        runs = [(seed, q, dict[str, Any]()) for _, seed, q in sequences(given, given.suite)]
         panels.append(_panel(f"suite {given.suite}", _reliability(runs, given)))
     for name, path in RECORDINGS.items() if given.recordings else ():
         (q,) = open_source(given.recordings / path)
@@ -176,7 +170,7 @@ def _reliability(runs: list[tuple[int, Sequence, dict[str, Any]]], given: argpar
             known = [(together[place[a], place[b]], same) for a, b, same in pairs]
             rows["relational"].append(np.array(known).reshape(-1, 2))
         for name in trackers[1:]:
-            found[name] = _tracked(name, seed, q, given, mode, sensor)
+            found[name] = tracked(name, seed, q, given, mode, sensor)
         for name, bare in found.items():
             rows[f"belief on {name}"].append(_believed(q, bare))
     tables.head(["pairs", *(f"{k / BINS:g} to {(k + 1) / BINS:g}" for k in range(BINS)), "F1 at 1/2", "mean gap"])
@@ -212,42 +206,13 @@ def _people_of(truth: Truth, tracks: Tracks) -> dict[int, int]:
     return {int(tracks.id[j]): int(unit[i]) for i, j in zip(*optimal(away, NEAR), strict=True)}
 
 
-def ablation(given: argparse.Namespace) -> None:
-    """Prints a table: rows are settings, columns errors and scores on a suite, and paired differences to the defaults.
-
-    Groups are those of the belief. A sequence has the means over the filter seeds.
-    """
-    warnings.simplefilter("ignore")
-    sequences = list(_sequences(given, given.suite))
-    names = ("error, m", "hidden people, m", *COLUMNS)
-    _title(given, len(sequences))
-    tables.head(["setting", *names, *(f"Δ {name}" for name in names)])
-    defaults = None
-    for setting in DEPARTURES:
-        changed = argparse.Namespace(**{**vars(given), "set": [*given.set, *setting.split()]})
-        runs = [[_scored(seed, k, q, changed) for k in given.filter_seeds] for _, seed, q in sequences]
-        rows = np.nanmean(np.array(runs), axis=1)
-        defaults = rows if defaults is None else defaults
-        means = (f"{value:.3f}" for value in np.nanmean(rows, axis=0))
-        tables.row([setting or "defaults", *means, *_differences(defaults, rows)])
-
-
-def _scored(seed: int, further: int, q: Sequence, given: argparse.Namespace) -> list[float]:
-    """Returns the error, that of hidden people, m, and the COLUMNS of one run."""
-    tracks = _tracked("relational", seed, q, given, further=further)
-    scored = tracking.evaluate(q.truth, with_groups(without_groups(tracks), q.fps, q.px_per_m, default_belief()))
-    assert q.truth.visibility is not None
-    away = errors(q.truth, tracks)
-    hidden = away[q.truth.visibility < HIDDEN]
-    return [away.mean(), hidden.mean() if len(hidden) else np.nan, *(scored.get(key, np.nan) for key in COLUMNS)]
-
-
-def _title(given: argparse.Namespace, count: int) -> None:
+def title(given: argparse.Namespace, count: int) -> None:
+    """Prints what a table of scores is of; count: of its sequences."""
     print(f"\nsuite {given.suite}, {count} sequences, {given.counts[0]} particles, "
           f"filter seeds {given.filter_seeds.start}:{given.filter_seeds.stop}\n")  # fmt: skip
 
 
-def _differences(before: Array, after: Array) -> list[str]:
+def differences(before: Array, after: Array) -> list[str]:
     """Returns the paired differences of each column over the sequences (N, C) in which both values are known."""
     known = np.isfinite(before) & np.isfinite(after)
     pairs = [paired(a[k], b[k]) for a, b, k in zip(before.T, after.T, known.T, strict=True)]
