@@ -9,6 +9,7 @@ photometric   left against right picture at the true disparity, without a matche
 contrast   the rendered ground beside real ground, without a matcher
 trajectories  the paths of groups in space, as in Figs. 5, 7 and 9 of the paper (an SVG)
 scenes     the paper's scenes: position errors (bias and scatter apart), group scores, events
+causes     position errors with true disparities, and with people that count alike
 decisions  each decision of the tracker switched off: paired differences of F1 and of the position error
 points     decisions switched off where the tracker gets points, with misses and false alarms
 density    `stereo` in crowds of growing density, beside `group-pda` and `blob` on the left pictures (table and SVG)
@@ -27,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.stereo import (
+    causes,
     contrast,
     cost,
     decalibration,
@@ -48,6 +50,7 @@ MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "contrast": contrast.contrast,
     "trajectories": trajectories.trajectories,
     "scenes": scenes.scenes,
+    "causes": causes.causes,
     "decisions": scenes.decisions,
     "points": from_points.points,
     "density": density.density,
@@ -67,7 +70,9 @@ def main() -> None:
     parser.add_argument(
         "--chart", type=Path, default=Path("stereo.svg"), help="trajectories, density, cost: the SVG to write"
     )
-    parser.add_argument("--store", type=Path, help="scenes, decisions, density: JSON of rows; measured ones are kept")
+    parser.add_argument(
+        "--store", type=Path, help="scenes, causes, decisions, density: JSON of rows; measured ones are kept"
+    )
     parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")
     args = parser.parse_args()
     one_thread()

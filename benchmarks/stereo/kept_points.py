@@ -1,13 +1,15 @@
 """Points of `stereo` that several variants share: those whose image processing is the same get the same points.
 
 Image processing knows nothing of groups. So its points are made once per sequence and set of its parameters, and the
-tracks are the same as without sharing. The training on a background sample is shared, too.
+tracks are the same as without sharing. `surface_offset` moves finished points. The training on a background sample is
+shared, too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from unittest import mock
 
 from sim.types import Context, Image
@@ -16,16 +18,16 @@ from tracking.detect.background_training import train
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import tracker
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.picture_points import PicturePoints, stereo_camera
+from tracking.papers.stereo.picture_points import PicturePoints, moved_away, stereo_camera
 
 TRACKING = frozenset({
     "gate", "position_weight", "velocity_weight", "attach", "point_covariance",
     "person_spread", "velocity_spread", "spread_weight", "spread_time", "accel_noise", "centroid_noise",
     "density_width", "radius", "point_radius", "point_noise", "least_group",
     "least_features", "merge_gate", "split", "split_time", "split_speed", "confirm_time", "coast_time",
-    "report_coast",
+    "report_coast", "surface_offset",
 })  # fmt: skip
-"""Parameters that change no points."""
+"""Parameters that change no points, or move finished points."""
 
 
 @contextmanager
@@ -40,15 +42,16 @@ def shared_points() -> Iterator[None]:
         def __init__(self, config: StereoConfig, context: Context) -> None:
             self.config, self.camera = config, stereo_camera(context.camera)
             key = tuple((name, value) for name, value in config.as_dict().items() if name not in TRACKING)
-            self.source = None if key in known else PicturePoints(config, context)
+            still = replace(config, surface_offset=0.0)
+            self.source = None if key in known else PicturePoints(still, context)
             self.made = known.setdefault(key, [])
             self.given = iter(self.made)
 
         def points(self, image: Image, right: Image) -> SpacePoints | None:
-            if self.source is None:
-                return next(self.given)
-            self.made.append(self.source.points(image, right))
-            return self.made[-1]
+            if self.source is not None:
+                self.made.append(self.source.points(image, right))
+            points = next(self.given)
+            return None if points is None else moved_away(points, self.camera, self.config.surface_offset)
 
     def once(sample, rate, follow_gain):  # type: ignore[no-untyped-def]
         if (rate, follow_gain) not in trained:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import cv2
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Array, Camera, Context, Image
+from sim.types import Camera, Context, Image
 from tracking.detect.blobs import odd
 from tracking.detect.features import FeatureRules, Features, SpacePoints
 from tracking.detect.foreground import Foreground
@@ -63,13 +64,15 @@ class PicturePoints:
         spacing = c.feature_spacing * self.foreground.scale
         rules = FeatureRules(c.window_time, spacing, c.back_check, deviations, c.most_features)
         found = self.features.step(left, people, disparity, rules)
-        return SpacePoints(found.id, self._moved(found.pos), found.cov, found.vel, found.vel_cov)
+        return moved_away(found, self.camera, c.surface_offset)
 
-    def _moved(self, pos: Array) -> Array:
-        """Returns the points (M, 3) moved away from the camera, horizontally, by `surface_offset`, m."""
-        away = pos[:, :2] - self.camera.position[:2]
-        shift = self.config.surface_offset * away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
-        return np.column_stack([pos[:, :2] + shift, pos[:, 2]])
+
+def moved_away(points: SpacePoints, camera: Camera, offset: float) -> SpacePoints:
+    """Return M points moved away from the camera, horizontally, by `offset`, m."""
+    away = points.pos[:, :2] - camera.position[:2]
+    shift = offset * away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
+    pos = np.column_stack([points.pos[:, :2] + shift, points.pos[:, 2]])
+    return replace(points, pos=pos)
 
 
 def stereo_camera(camera: Camera | None) -> Camera:
