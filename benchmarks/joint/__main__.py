@@ -73,7 +73,6 @@ DEPARTURES = (
     "size_prior=none", "velocity_time=0", "lag=0.1", "normaliser=sampled",
     "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
     "estimate=histogram", "validity=bayesian", "validity=bayesian evidence_rate=20", "partition_dynamics=dirichlet",
-    "partition_dynamics=dirichlet redraw_rate=4",
 )  # fmt: skip
 """Settings of the mode ablation."""
 PROCESS = (
