@@ -15,13 +15,16 @@ from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.tracker import COUPLING, JOINING, RELATIONS, Particle
 from tracking.papers.relational.transition_kernels import DISTANCE, VELOCITY
 
+ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
+"""Rules of transition_kernels by which every partner counts fully, as in the paper."""
+
 
 class Relational(Particle):
     """The tracker `relational`: the particle filter of `particle` with the relation "walking together" in it.
 
-    By slots: together (K, K): probability that each pair walks together, in the last frame, 1 on the diagonal; counts
-    (K, K): how much partners count in the next frame; belief: that of tracking.grouping about the tracks so far, kept
-    only if relations come from it. The rest of the state is that of Particle.
+    together (K, K): probability that each pair walks together, in the last frame, by slots; 1 on the diagonal. belief:
+    that of tracking.grouping about the slots' tracks so far, kept only if relations come from it. The rest of the state
+    is that of Particle.
     """
 
     config_class: ClassVar[type[ParticleConfig]] = RelationalConfig
@@ -30,7 +33,7 @@ class Relational(Particle):
     def reset(self, context: Context, seed: int) -> None:
         """Forget everything and start a sequence, as `Particle.reset`."""
         super().reset(context, seed)
-        self.together, self.counts = np.zeros((0, 0)), np.ones((0, 0))
+        self.together = np.zeros((0, 0))
         self.belief = PairBelief(context.fps) if self.config.relation_evidence == "belief" else None
 
     @property
@@ -40,11 +43,17 @@ class Relational(Particle):
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
 
-    def _coupling(self) -> tuple[Array, Array, Array]:
-        time = self.config.coupling_time
+    def _coupling(self) -> tuple[Array, Array, Array, Array]:
+        p, time = self.particles, self.config.coupling_time
         follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
-        shared = self.draws[COUPLING].standard_normal(self.particles.pos.shape)
-        return shared, np.array([follow, self.config.common_noise]), self.counts
+        shared, coupling = (
+            self.draws[COUPLING].standard_normal(p.pos.shape),
+            np.array([follow, self.config.common_noise]),
+        )
+        if self.belief is None:
+            return shared, coupling, ALWAYS, np.zeros((p.people, p.people, 2))
+        pairs = np.argwhere(np.triu(p.related.any(axis=0)))
+        return shared, coupling, self._rules, transition_kernels.pair_spread(p.pos, p.vel, pairs)
 
     def _relate(self) -> None:
         p, rules = self.particles, self._rules
@@ -62,15 +71,11 @@ class Relational(Particle):
         uniforms = self.draws[RELATIONS].random((p.count, p.people, 2))
         transition_kernels.relate(p.pos, p.vel, p.related, pairs, odds, uniforms, rules)
 
-    def _follow(self, mean: Array, cov: Array, shown: Bools) -> None:
-        if self.belief is None:
-            self.counts = np.ones((len(mean), len(mean)))
-            return
-        state = np.where(shown[:, None], mean, np.nan)
-        if len(state) > len(self.belief.count):
-            self.belief.add(state)
-        self.belief.see(state[:, :2])
-        self.counts = transition_kernels.partner_weights(mean, cov, self._rules)
+    def _follow(self, state: Array) -> None:
+        if self.belief is not None:
+            if len(state) > len(self.belief.count):
+                self.belief.add(state)
+            self.belief.see(state[:, :2])
 
     def _keep(self, rows: Bools) -> None:
         super()._keep(rows)

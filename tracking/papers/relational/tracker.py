@@ -150,9 +150,9 @@ class Particle:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        shared, coupling, counts = self._coupling()
+        coupled = self._coupling()
         table = c.speed_table(self.dt)
-        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, counts, self.dt)
+        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, coupled[0], table, *coupled[1:], self.dt)
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
         behind, self.cut = covered_by_people(p, camera, c.body_radius)
@@ -165,11 +165,11 @@ class Particle:
         camera = self.context.camera if self.plane == "ground" else None
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
-    def _coupling(self) -> tuple[Array, Array, Array]:
-        """Returns the normals that groups have in common (P, K, 2), and the coupling (2,) and the weights of partners
-        (K, K) of transition_kernels; people of `particle` have none."""
+    def _coupling(self) -> tuple[Array, Array, Array, Array]:
+        """Returns the normals that groups have in common (P, K, 2), and the coupling (2,), the rules (4,) by which
+        partners count and the spread of pairs (K, K, 2) of transition_kernels; people of `particle` have none."""
         p = self.particles
-        return np.zeros(p.pos.shape), np.zeros(2), np.zeros((p.people, p.people))
+        return np.zeros(p.pos.shape), np.zeros(2), np.zeros(4), np.zeros((p.people, p.people, 2))
 
     def _relate(self) -> None:
         """Draw new relations; people of `particle` have none."""
@@ -236,7 +236,7 @@ class Particle:
         mean, cov, exist = self.particles.estimates()
         rows = exist >= self.config.report_existence
         self.slots.name(rows)
-        self._follow(mean, cov, rows)
+        self._follow(np.where(rows[:, None], mean, np.nan))
         pos, vel, cov = mean[rows, :2], mean[rows, 2:], cov[rows]
         score, id = np.minimum(exist[rows], 1.0), self.slots.id[rows]
         if self.plane == "image":
@@ -244,6 +244,6 @@ class Particle:
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
         return Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
 
-    def _follow(self, mean: Array, cov: Array, shown: Bools) -> None:
-        """Take note of the states of a frame: mean (K, 4) x, y, m, vx, vy, m/s, and covariance (K, 4, 4) over the
-        particles, and who is reported, (K,); `particle` has no use for them."""
+    def _follow(self, state: Array) -> None:
+        """Take note of the mean states (K, 4) of a frame, x, y, m, vx, vy, m/s, nan for people who are not reported;
+        `particle` has no use for them."""

@@ -58,30 +58,32 @@ def group_labels(related: Bools, label: Ints) -> None:
 @njit(cache=True)
 def move(
     pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, shared: Array, table: Array, coupling: Array,
-    counts: Array, dt: float,
+    alike: Array, spread: Array, dt: float,
 ) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; related (P, K, K): old relations;
-    noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling (2,); counts (K, K):
-    how much each person's partners count, from 0 to 1.
+    noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling (2,); alike (4,):
+    rules by which a partner counts; spread (K, K, 2): of `pair_spread`.
 
     v_i = u - B u / |u| + C e_i, x_i = x_i + v_i dt, with B, C of the table's row for |u| (Table 3). For a person alone
-    u = v_i and e_i = noise. A partner j who walks together with i has the weight w_j = counts[i, j], the person itself
-    w_i = 1. With m the mean velocity of all these, weighted by w and existence, and c = COMMON max_j w_j: u = v_i +
-    FOLLOW (m - v_i), e_i = sqrt(1 - c) noise + sqrt(c) s_i and s_i = sum w shared / sqrt(sum w^2). The weights, FOLLOW
-    and COMMON are ours; the paper: w = 1, FOLLOW 1 and COMMON 0, so that u = m and e_i = noise.
+    u = v_i and e_i = noise. A partner j who walks together with i counts with w_j = `belonging` by `alike` at their old
+    distance and velocity difference, of whose squares `spread` is taken off, down to 0; the person itself with w_i = 1.
+    With m the mean velocity of all these, weighted by w and existence, and c = COMMON max_j w_j: u = v_i + FOLLOW (m -
+    v_i), e_i = sqrt(1 - c) noise + sqrt(c) s_i and s_i = sum w shared / sqrt(sum w^2). The weights, FOLLOW and COMMON
+    are ours; the paper: BIAS inf, so that w = 1, FOLLOW 1 and COMMON 0, so that u = m and e_i = noise.
     """
     particles, n, _ = pos.shape
-    old = np.empty((n, 2))
+    place, old = np.empty((n, 2)), np.empty((n, 2))
     for p in range(particles):
-        old[:] = vel[p]
+        place[:], old[:] = pos[p], vel[p]
         for i in range(n):
             x, y, weight = exist[p, i] * old[i, 0], exist[p, i] * old[i, 1], exist[p, i]
             a, b, square, most = shared[p, i, 0], shared[p, i, 1], 1.0, 0.0
             for j in range(n):
                 if related[p, i, j]:
-                    w = counts[i, j]
+                    distance = _least_length(place[i] - place[j], spread[i, j, 0])
+                    w = belonging(distance, _least_length(old[i] - old[j], spread[i, j, 1]), alike)
                     x += w * exist[p, j] * old[j, 0]
                     y += w * exist[p, j] * old[j, 1]
                     a, b = a + w * shared[p, j, 0], b + w * shared[p, j, 1]
@@ -110,7 +112,7 @@ def move(
 
 @njit(cache=True)
 def belonging(distance: float, difference: float, rules: Array) -> float:
-    """Return the probability that two people walk together by their states (ours).
+    """Return the probability that two people walk together by their states (ours); 1 if BIAS is inf.
 
     distance: between them, m; difference: of their velocities, m/s; rules (4,).
     """
@@ -118,20 +120,32 @@ def belonging(distance: float, difference: float, rules: Array) -> float:
 
 
 @njit(cache=True)
-def partner_weights(mean: Array, cov: Array, rules: Array) -> Array:
-    """Return how much people count for each other if they walk together, (K, K): the belonging of their mean states.
+def _least_length(difference: Array, spread: float) -> float:
+    """Returns the length of a difference (2,) without what errors add to its square."""
+    return math.sqrt(max(difference[0] ** 2 + difference[1] ** 2 - spread, 0.0))
 
-    mean (K, 4): x, y, m, vx, vy, m/s, over the particles; cov (K, 4, 4): their covariances; rules (4,). The errors of
-    the estimates make two people seem farther apart and less alike than they are: on average they add the sum of the
-    variances of both to the squared differences. It is taken off, down to 0 (ours).
+
+@njit(cache=True)
+def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
+    """Return what the filter's uncertainty adds on average to the squared distance, m^2, and to the squared velocity
+    difference, m^2/s^2, of pairs in a particle, (K, K, 2): twice their variances over the particles, as a particle
+    deviates from the mean, and the mean from the truth; 0 for other pairs (ours).
+
+    pos (P, K, 2), m; vel (P, K, 2), m/s; pairs i < j (N, 2).
     """
-    n = len(mean)
-    out = np.ones((n, n))
-    for i in range(n):
-        for j in range(i):
-            square = (mean[i] - mean[j]) ** 2 - np.diag(cov[i]) - np.diag(cov[j])
-            distance, difference = math.sqrt(max(square[:2].sum(), 0.0)), math.sqrt(max(square[2:].sum(), 0.0))
-            out[i, j] = out[j, i] = belonging(distance, difference, rules)
+    particles, n, _ = pos.shape
+    out = np.zeros((n, n, 2))
+    for k in range(len(pairs)):
+        i, j = pairs[k]
+        first, second = np.zeros(4), np.zeros(4)
+        for p in range(particles):
+            for d in range(2):
+                apart, faster = pos[p, i, d] - pos[p, j, d], vel[p, i, d] - vel[p, j, d]
+                first[d], second[d] = first[d] + apart, second[d] + apart * apart
+                first[d + 2], second[d + 2] = first[d + 2] + faster, second[d + 2] + faster * faster
+        twice = 2 * np.maximum(second / particles - (first / particles) ** 2, 0.0)
+        out[i, j, 0] = out[j, i, 0] = twice[0] + twice[1]
+        out[i, j, 1] = out[j, i, 1] = twice[2] + twice[3]
     return out
 
 

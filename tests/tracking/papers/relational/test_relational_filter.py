@@ -21,6 +21,8 @@ from tracking.papers.relational.relations import Relational
 from tracking.papers.relational.tracker import Particle
 from tracking.prepare import prepare
 
+ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
+"""The paper's rule: partners count fully."""
 AT_ONCE = np.array([1.0, 0.0])
 """The paper's coupling: members of a group have its mean velocity, and noise of their own."""
 CERTAIN = {"detect_prob": 1.0, "clutter_density": 0.0, "resample_share": 1.0}
@@ -32,13 +34,11 @@ def flat_table(diffusion):
     return {f"drift_{k}": 0.0 for k in rows} | {f"diffusion_{k}": diffusion for k in rows} | {"noise_scale": 1.0}
 
 
-def move(particles, noise, table, coupling, dt, shared=None, weight=1.0):
-    """Move the particles by a step of dt s; all partners have one weight, the paper's is 1."""
-    shared = np.zeros(noise.shape) if shared is None else shared
-    counts = np.full((particles.people, particles.people), weight)
-    transition_kernels.move(
-        particles.pos, particles.vel, particles.exist, particles.related, noise, shared, table, coupling, counts, dt
-    )
+def move(particles, noise, table, coupling, dt, shared=None, alike=ALWAYS, spread=0.0):
+    """Move the particles by a step of dt s; spread: of the squares of distances and velocity differences."""
+    p, shared = particles, np.zeros(noise.shape) if shared is None else shared
+    spread = np.full((p.people, p.people, 2), spread)
+    transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, spread, dt)
 
 
 def detections(index, *points):
@@ -366,64 +366,65 @@ def test_partners_have_a_share_of_the_noise_in_common():
     assert np.array_equal(particles.vel[:, 3], noise[:, 3])
 
 
-def test_partners_count_by_their_weight():
-    """A partner of weight w has it in the mean velocity, and the noises of both have the correlation 2 c w / (1 + w^2),
-    c = common_noise w."""
-    w = 0.3
+def test_partners_count_by_how_alike_they_are():
+    """A partner 1 m away with a velocity difference of 1 m/s has the weight w = 1 / (1 + e^2) in the mean, and the
+    noises of both have the correlation 2 c w / (1 + w^2), c = common_noise w."""
+    alike, w = np.array([0.0, 3.0, 2.0, 3.0]), 1 / (1 + np.exp(2))
     particles = placed(1, [[0, 0], [0, 1]], [[2, 0], [1, 0]])
     particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
-    move(particles, np.zeros((1, 2, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), AT_ONCE, 1.0, None, w)
+    move(particles, np.zeros((1, 2, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), AT_ONCE, 1.0, None, alike)
     np.testing.assert_allclose(particles.vel[0, :, 0], [(2 + w) / (1 + w), (1 + 2 * w) / (1 + w)], rtol=1e-12)
     count, rng = 40_000, np.random.default_rng(5)
     particles = placed(count, [[0, 0], [0, 1.3]])
     particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
     noise, shared = rng.standard_normal((2, count, 2, 2))
-    coupling = np.array([0.5, 0.7])
-    move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), coupling, 1.0, shared, w)
+    coupling, w = np.array([0.5, 0.7]), 1 / (1 + np.exp(2 * 1.3 - 3))
+    move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), coupling, 1.0, shared, alike)
     common = 2 * 0.7 * w**2 / (1 + w**2)
     np.testing.assert_allclose(np.cov(particles.vel[..., 0].T), [[1, common], [common, 1]], atol=0.02)
 
 
-def test_the_weight_of_a_partner_is_the_belonging_of_the_mean_states():
-    """1 m apart with a velocity difference of 1 m/s: 1 / (1 + e^2). What errors add to the squares is taken off."""
-    rules, mean = np.array([0.0, 3.0, 2.0, 3.0]), np.array([[0.0, 0, 2, 0], [0, 1, 1, 0], [0, 1, 1, 0]])
-    cov = np.zeros((3, 4, 4))
-    cov[0, 0, 2] = cov[0, 2, 0] = 9.0  # only variances count
-    found = transition_kernels.partner_weights(mean, cov, rules)
-    np.testing.assert_allclose(found[0, 1:], 1 / (1 + np.exp(2)), rtol=1e-12)
-    np.testing.assert_allclose(found[1, 2], 1 / (1 + np.exp(-3)), rtol=1e-12)
-    assert np.array_equal(found, found.T)
-    cov[1, 0, 0], cov[0, 1, 1] = 0.16, 0.2
-    cov[1, 2, 2], cov[0, 3, 3] = 0.25, 0.5
-    found = transition_kernels.partner_weights(mean, cov, rules)
-    np.testing.assert_allclose(found[0, 1], 1 / (1 + np.exp(2 * 0.8 + 3 * 0.5 - 3)), rtol=1e-12)
-    cov[0, 3, 3] = 4.0
-    assert transition_kernels.partner_weights(mean, cov, rules)[0, 1] == pytest.approx(1 / (1 + np.exp(2 * 0.8 - 3)))
+def test_what_uncertainty_adds_to_the_squares_is_taken_off():
+    """Two people 1 m apart, with a velocity difference of 1 m/s, whose squares are lowered by 0.36."""
+    alike, w = np.array([0.0, 3.0, 2.0, 3.0]), 1 / (1 + np.exp(5 * 0.8 - 3))
+    particles = placed(1, [[0, 0], [0, 1]], [[2, 0], [1, 0]])
+    particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+    table = ParticleConfig(**flat_table(0.0)).speed_table(1.0)
+    move(particles, np.zeros((1, 2, 2)), table, AT_ONCE, 1.0, None, alike, 0.36)
+    np.testing.assert_allclose(particles.vel[0, :, 0], [(2 + w) / (1 + w), (1 + 2 * w) / (1 + w)], rtol=1e-12)
 
 
-def test_uncertain_states_do_not_part_partners():
-    """Two people walk together at 2.5 frames/s; the mean over seeds and frames of the weight is that of people who are
-    0.7 m apart with equal velocities, and not that of the difference of the estimates, which their errors make."""
-    count, plain = [], []
-    for seed in range(8):
-        rng = np.random.default_rng(seed)
-        tracker = Relational(RelationalConfig(particles=500))
-        walk = np.arange(20)[:, None, None] * np.array([0.5, 0.0]) + np.array([[0.0, 0.0], [0.0, 0.7]])
-        stepped(tracker, 2.5, *(walk + rng.normal(0, 0.1, walk.shape)), seed=seed)
-        mean, _, _ = tracker.particles.estimates()
-        count.append(tracker.counts[0, 1])
-        plain.append(transition_kernels.partner_weights(mean, np.zeros((2, 4, 4)), tracker._rules)[0, 1])
-    assert np.mean(count) > 0.95
-    assert np.mean(plain) < np.mean(count) - 0.03
+def test_the_spread_of_a_pair_is_twice_its_variance():
+    """That of the particles' differences: what partners have in common does not count."""
+    rng = np.random.default_rng(6)
+    pos, vel = rng.normal(0, 1, (2, 500, 4, 2)) + rng.normal(0, 3, (2, 500, 1, 2))
+    found = transition_kernels.pair_spread(pos, vel, np.array([[0, 1], [1, 3]]))
+    for i, j in ((0, 1), (1, 3)):
+        expected = [2 * np.var(x[:, i] - x[:, j], axis=0).sum() for x in (pos, vel)]
+        np.testing.assert_allclose(found[i, j], expected, rtol=1e-9)
+        np.testing.assert_allclose(found[j, i], expected, rtol=1e-9)
+    assert not found[[0, 0, 2], [2, 3, 3]].any()
+
+
+def test_the_squares_of_partners_who_move_alike_are_those_of_their_errors():
+    """Estimates with errors of the filter's variance, and particles about them with the same: |v_i - v_j|^2 of two
+    people of equal velocity is `pair_spread` on average."""
+    rng, squares, spreads = np.random.default_rng(7), [], []
+    for _ in range(400):
+        vel = rng.normal(0, 0.5, (1, 2, 2)) + rng.normal(0, 0.5, (300, 2, 2))
+        squares.append(np.square(vel[:, 0] - vel[:, 1]).sum(axis=1).mean())
+        spreads.append(transition_kernels.pair_spread(vel, vel, np.array([[0, 1]]))[0, 1, 1])
+    assert np.mean(squares) == pytest.approx(np.mean(spreads), rel=0.1)
 
 
 @pytest.mark.parametrize("name", ["paper", "caviar-25fps"])
 def test_presets_couple_velocities_as_the_paper(name):
     tracker = Relational(RelationalConfig.preset(name))
-    stepped(tracker, 25.0, [(0, 0), (50, 9)])
-    _, coupling, counts = tracker._coupling()
+    tracker.reset(Context(25.0, float("nan")), 0)
+    _, coupling, alike, spread = tracker._coupling()
     assert coupling.tolist() == AT_ONCE.tolist()
-    assert np.array_equal(counts, np.ones((2, 2)))
+    assert transition_kernels.belonging(50.0, 9.0, alike) == 1
+    assert not spread.any()
 
 
 def test_the_equilibrium_of_a_pair_is_the_belief():
@@ -433,8 +434,7 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
     place = np.array([[0, 0], [0.5, 0], [0, 0.5], [30, 0]])
     tracker.particles = placed(20_000, place, np.array([[0, 0], [1, 0], [0, 0], [0, 0]]))
     tracker.particles.related[:, 0, 3] = tracker.particles.related[:, 3, 0] = True
-    mean, cov, shown = np.concatenate([place, np.zeros((4, 2))], axis=1), np.zeros((4, 4, 4)), np.ones(4, bool)
-    tracker._follow(mean, cov, shown)
+    tracker._follow(np.concatenate([place, np.zeros((4, 2))], axis=1))
     assert tracker.belief is not None
     assert (tracker.belief.log_odds[3, :3] == UNSEEN).all()
     tracker.belief.log_odds[:3, :3] = odds = np.array([[0, 1.0, -2.0], [1.0, 0, 0.5], [-2.0, 0.5, 0]])
@@ -444,9 +444,10 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
     apart = ~np.eye(3, dtype=bool)
     np.testing.assert_allclose(found[:3, :3][apart], (1 / (1 + np.exp(-odds)))[apart], atol=0.015)
     assert found[3].max() == 0
-    shown[1] = False
+    gone = np.concatenate([place, np.zeros((4, 2))], axis=1)
+    gone[1] = np.nan
     for _ in range(tracker.belief.size):
-        tracker._follow(mean, cov, shown)
+        tracker._follow(gone)
     before = tracker.particles.related[:, 1].copy()
     for _ in range(60):
         tracker._relate()
