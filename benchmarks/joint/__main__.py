@@ -235,11 +235,7 @@ def over_seeds(rows: Sequence[Row]) -> list[str]:
     """Returns cells of the columns of Table 3b and pairwise F1: means over filter seeds with 95 % intervals."""
     keys = [*(f"group_{k}" for k in SHARES), "group_MOTP", "pairwise_F1"]
     values = np.array([[row[key] for key in keys] for row in rows]) * [100, 100, 100, 100, 1, 1]
-    cells = []
-    for mean, low, high, digits in zip(*mean_interval(values), (1, 1, 1, 1, 2, 3), strict=True):
-        ends = f" [{low:.{digits}f}, {high:.{digits}f}]" if np.isfinite(low) else ""
-        cells.append(tables.number(float(mean), digits) + ends)
-    return cells
+    return [tables.interval(*cell) for cell in zip(*mean_interval(values), (1, 1, 1, 1, 2, 3), strict=True)]
 
 
 def classifier(given: argparse.Namespace) -> None:

@@ -20,14 +20,13 @@ from tracking.grouping.grouped_tracks import with_groups, without_groups
 from tracking.papers.relational import sensor, sensor_kernels, transition_kernels
 
 DEPARTURES = (
-    "", "relation_evidence=state", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0",
+    "relation_evidence=state", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0",
     "relation_bias=40 newcomer_share=0", "newcomer_share=0", "weights=joint", "NOBODY_SHARES", "NO_FACTORS",
     "PAIR_BY_PAIR", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
     "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "least_existence=0",
     "birth_doubt=0.9", "clutter_density=0.02",
 )  # fmt: skip
-"""Settings of the ablation; the first one is the defaults. With relation_bias 40 partners count fully. Capitals: of
-SWITCHES."""
+"""Settings of the ablation beside the defaults. With relation_bias 40 partners count fully. Capitals: of SWITCHES."""
 
 
 def _pair_by_pair(
@@ -61,7 +60,7 @@ def ablation(given: argparse.Namespace) -> None:
     title(given, len(made))
     tables.head(["setting", *names, *(f"Δ {name}" for name in names)])
     defaults = None
-    for setting in (d for d in DEPARTURES if not d or not given.only or d in given.only.split(",")):
+    for setting in ("", *(given.only.split(",") if given.only else DEPARTURES)):
         own = [] if setting in SWITCHES else setting.split()
         changed = argparse.Namespace(**{**vars(given), "set": [*given.set, *own]})
         with SWITCHES.get(setting, nullcontext)():

@@ -30,11 +30,11 @@ def table(title: str, first: str, columns: Sequence[str], rows: Mapping[str, Seq
         row([name, *cells])
 
 
-def interval(mean: float, low: float, high: float) -> str:
+def interval(mean: float, low: float, high: float, digits: int = 3) -> str:
     """Returns "mean [low, high]"; without the ends if they are not finite; a dash if the mean is not."""
     if not np.isfinite(mean):
         return "–"
-    return f"{mean:.3f}" + (f" [{low:.3f}, {high:.3f}]" if np.isfinite(low) else "")
+    return f"{mean:.{digits}f}" + (f" [{low:.{digits}f}, {high:.{digits}f}]" if np.isfinite(low) else "")
 
 
 def signed(mean: float, low: float, high: float) -> str:

@@ -3,8 +3,7 @@ repetition.
 
 The value of a lattice point is a hash of its indices. A pattern is therefore a pure function of place, and both cameras
 of a pair see the same pattern. Scales finer than twice a pixel's footprint are left out: they would flicker and differ
-between the views. A footprint is the size of a pixel on the surface, in m, or of a sample if
-a pixel has several.
+between the views. A footprint is the size of a pixel on the surface, in m, or of a sample if a pixel has several.
 """
 
 from __future__ import annotations

@@ -46,10 +46,8 @@ class Relational(Particle):
     def _coupling(self) -> tuple[Array, Array, Array, Array]:
         p, time = self.particles, self.config.coupling_time
         follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
-        shared, coupling = (
-            self.draws[COUPLING].standard_normal(p.pos.shape),
-            np.array([follow, self.config.common_noise]),
-        )
+        coupling = np.array([follow, self.config.common_noise])
+        shared = self.draws[COUPLING].standard_normal(p.pos.shape)
         if self.belief is None:
             return shared, coupling, ALWAYS, np.zeros((p.people, p.people, 2))
         pairs = np.argwhere(np.triu(p.related.any(axis=0)))

@@ -150,9 +150,11 @@ class Particle:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        coupled = self._coupling()
+        shared, coupling, alike, spread = self._coupling()
         table = c.speed_table(self.dt)
-        transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, coupled[0], table, *coupled[1:], self.dt)
+        transition_kernels.move(
+            p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, spread, self.dt
+        )
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
         behind, self.cut = covered_by_people(p, camera, c.body_radius)
