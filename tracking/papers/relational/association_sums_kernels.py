@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from sim.compiler import njit
-from sim.types import Array, Ints
+from sim.types import Array
 
 EXACT_BITS = 12
 """Largest number of columns of an exact sum; above it sums are propagated."""
@@ -161,15 +161,14 @@ def dense_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
 
 
 @njit(cache=True)
-def sparse_sum(W: Array, miss: Array, spare: Array, cluster: Ints, log_sums: Array, marginals: Array) -> None:
-    """Write the logs of the sums over all mappings of each cluster (n,), and the marginals (n, m).
+def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
+    """Return the log of the sum over all mappings, -inf if it is 0, and write the marginals (n, m).
 
-    Arguments as of `exact_sum`. Rows and columns with a pair of weight above 0 are linked; a sum is the product over
-    connected components of `dense_sum`. cluster (n,): a row for each row; that of a component's first row has its log.
-    Columns without a row count in the cluster of row 0. Without rows nothing is written.
+    Arguments as of `exact_sum`. Rows and columns with a pair of weight above 0 are linked; the sum is the product over
+    connected components of `dense_sum`.
     """
     n, m = W.shape
-    marginals[:], log_sums[:] = 0.0, 0.0
+    marginals[:], log_sum = 0.0, 0.0
     row_done, column_done = np.zeros(n, np.bool_), np.zeros(m, np.bool_)
     rows, columns = np.empty(n, np.int64), np.empty(m, np.int64)
     for start in range(n):
@@ -190,10 +189,11 @@ def sparse_sum(W: Array, miss: Array, spare: Array, cluster: Ints, log_sums: Arr
                             row_done[k] = True
                             rows[count] = k
                             count += 1
-        log_sums[cluster[start]] += _component_sum(W, miss, spare, marginals, rows[:count], columns[:width])
+        log_sum += _component_sum(W, miss, spare, marginals, rows[:count], columns[:width])
     for j in range(m):
-        if n > 0 and not column_done[j]:
-            log_sums[cluster[0]] += math.log(spare[j]) if spare[j] > 0 else -math.inf
+        if not column_done[j]:
+            log_sum += math.log(spare[j]) if spare[j] > 0 else -math.inf
+    return log_sum
 
 
 @njit(cache=True)

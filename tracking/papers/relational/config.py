@@ -56,8 +56,7 @@ class ParticleConfig(BackgroundSettings):
         "factorised",
         ("factorised", "joint"),
         "",
-        "factorised: people whose detections are clear have weights of their own (ours); joint: a "
-        "particle has one weight (the paper)",
+        "factorised: people have weights of their own (ours); joint: a particle has one weight (the paper)",
         "categorical",
         before="joint",
     )

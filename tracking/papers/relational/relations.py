@@ -10,7 +10,7 @@ import numpy as np
 from sim.types import Array, Bools, Context, Frame, Ints, Tracks
 from tracking.grouping.belief import UNSEEN
 from tracking.grouping.pair_belief import PairBelief
-from tracking.papers.relational import transition_kernels
+from tracking.papers.relational import particle_set_kernels, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.tracker import COUPLING, JOINING, RELATIONS, Particle
 from tracking.papers.relational.transition_kernels import DISTANCE, VELOCITY
@@ -43,15 +43,15 @@ class Relational(Particle):
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
 
-    def _coupling(self) -> tuple[Array, Array, Array, Array]:
+    def _coupling(self) -> tuple[Array, Array, Array, Ints, Array]:
         p, time = self.particles, self.config.coupling_time
         follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
         coupling = np.array([follow, self.config.common_noise])
         shared = self.draws[COUPLING].standard_normal(p.pos.shape)
-        if self.belief is None:
-            return shared, coupling, ALWAYS, np.zeros((p.people, p.people, 2))
         pairs = np.argwhere(np.triu(p.related.any(axis=0)))
-        return shared, coupling, self._rules, transition_kernels.pair_spread(p.pos, p.vel, pairs)
+        if self.belief is None:
+            return shared, coupling, ALWAYS, pairs, np.zeros(pairs.shape)
+        return shared, coupling, self._rules, pairs, transition_kernels.pair_spread(p.pos, p.vel, pairs)
 
     def _relate(self) -> None:
         p, rules = self.particles, self._rules
@@ -90,7 +90,7 @@ class Relational(Particle):
     def _report(self, frame: Frame) -> Tracks:
         tracks, p = super()._report(frame), self.particles
         if self.belief is None:
-            self.together = transition_kernels.pairs_together(p.related, p.exist, p.weights, p.cluster)
+            self.together = particle_set_kernels.pairs_together(p.related, p.exist, p.weights, p.one_weight)
         else:
             self.together = 1 / (1 + np.exp(-_log_odds(self.belief)))
             np.fill_diagonal(self.together, 1.0)

@@ -13,7 +13,6 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.papers.relational import sensor_kernels
-from tracking.papers.relational.association_sums_kernels import sparse_sum
 from tracking.papers.relational.config import ParticleConfig
 from tracking.papers.relational.particle_set import ParticleSet
 
@@ -23,8 +22,6 @@ are no pair (ours)."""
 UNLIKELY = 1e-3
 """A person and a detection are no pair if it is, among all detections and none, the person's with less than this
 probability (ours)."""
-CONTESTED = 0.02
-"""Probability above which a detection must be each of two people's for them to be in one cluster (ours)."""
 LEAST_LOG = -745.0
 """Log of the smallest float: the paper's weights are 0 below it."""
 
@@ -62,34 +59,34 @@ class Sight:
 def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig) -> Weighing:
     """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say.
 
-    points (M, 2): m; noise: standard deviation of a point per axis, m. Clusters, weights and existence of the particles
-    are changed. If all weights vanish, which only the paper's sensor can bring about, they
-    are not.
+    points (M, 2): m; noise: standard deviation of a point per axis, m. Weights and existence of the particles are
+    changed, and whether a particle has one weight. If all weights vanish, which only the paper's sensor can bring
+    about, they are not.
     """
-    people, detect, certain = particles.people, sight.detect, config.certain_sensor
+    people, count, certain = particles.people, len(points), config.certain_sensor
     if not people:
-        return Weighing(False, np.zeros((0, len(points))), np.zeros(0), np.ones(len(points)))
+        return Weighing(False, np.zeros((0, count)), np.zeros(0), np.ones(count))
+    particles.share_weights(config.one_weight)
     pairs, density = _pairs(particles, points, sight, noise, config)
-    particles.regroup(_linked(particles, pairs, density, len(points), detect, config))
-    if config.one_weight:
-        free = np.ones((people, len(points)))
+    person, marginals = pairs[:, 0], np.empty(density.shape)
+    given = density, pairs, particles.exist, sight.detect, config.clutter_density
+    if particles.one_weight:
+        logs = np.empty((particles.count, 1))
+        sensor_kernels.particle_sums(*given, count, logs, marginals)
+        if certain and logs.max() < LEAST_LOG:
+            return Weighing(True, np.zeros((people, count)), np.zeros(people), np.ones(count))
     else:
-        mean, miss = _means(particles, pairs, density, len(points), detect, config)
-        free = sensor_kernels.free_detections(mean, miss, particles.cluster)
-    log_sums, marginals = np.empty(particles.exist.shape), np.empty((*particles.exist.shape, len(points)))
-    sensor_kernels.particle_sums(
-        density, pairs, particles.exist, detect, config.clutter_density, particles.cluster, free, log_sums, marginals
-    )
-    if certain and log_sums[:, particles.heads].max(axis=0).min() < LEAST_LOG:
-        return Weighing(True, np.zeros((people, len(points))), np.zeros(people), np.ones(len(points)))
-    if not config.one_weight:
-        sensor_kernels.partner_factors(particles.related, particles.weights, sight.missed, particles.cluster, log_sums)
-    particles.weigh(log_sums)
-    measured = marginals.sum(axis=2)
+        logs, free = np.empty(particles.exist.shape), _free(particles, pairs, density, count, sight.detect, config)
+        sensor_kernels.person_sums(*given, free, logs, marginals)
+        sensor_kernels.partner_factors(particles.related, particles.weights, sight.missed, logs)
+    particles.weigh(logs)
+    measured = sensor_kernels.measured(marginals, pairs, people)
     if not certain:
-        unseen = particles.exist * (1 - detect) / np.maximum(1 - particles.exist * detect, np.finfo(float).tiny)
+        missing = 1 - sight.detect
+        unseen = particles.exist * missing / np.maximum(1 - particles.exist * sight.detect, np.finfo(float).tiny)
         particles.exist = np.minimum(measured + (1 - measured) * unseen, 1.0)
-    found = np.einsum("pk,pkm->km", particles.weights, marginals)
+    found = np.zeros((people, count))
+    found[person, pairs[:, 1]] = np.einsum("pn,pn->n", particles.weights[:, person], marginals)
     exist = particles.existence
     seen = np.divide((particles.weights * measured).sum(axis=0), exist, out=np.zeros(people), where=exist > 0)
     return Weighing(False, found, seen, 1.0 - found.sum(axis=0))
@@ -120,30 +117,15 @@ def _pairs(
     return pairs[likely], density[:, likely]
 
 
-def _means(
+def _free(
     particles: ParticleSet, pairs: Ints, density: Array, count: int, detect: Array, config: ParticleConfig
-) -> tuple[Array, Array]:
-    """Returns the mean weight over the particles of each person and detection, (K, M), and of no detection, (K,)."""
+) -> Array:
+    """Returns the probability (K, M) that nobody else has a detection, for each person, means over the particles.
+
+    pairs (N, 2): a person and a detection that are possible; density (P, N); count: M.
+    """
     person = pairs[:, 0]
     mean = np.zeros((particles.people, count))
     found = np.einsum("pn,pn->n", (particles.weights * particles.exist)[:, person], density)
     mean[person, pairs[:, 1]] = found * detect[person] / config.clutter_density
-    return mean, np.maximum(1 - particles.existence * detect, 0.0)
-
-
-def _linked(
-    particles: ParticleSet, pairs: Ints, density: Array, count: int, detect: Array, config: ParticleConfig
-) -> Bools:
-    """Returns which people (K, K) must be in one cluster: all in joint mode and with the paper's sensor; else those who
-    may both have the same detection.
-
-    pairs (N, 2): a person and a detection that are possible; density (P, N); count: M.
-    """
-    people = particles.people
-    if config.one_weight:
-        return np.ones((people, people), bool)
-    mean, miss = _means(particles, pairs, density, count, detect, config)
-    logs, marginals = np.empty(people), np.empty((people, count))
-    sparse_sum(mean, miss, np.ones(count), np.zeros(people, np.int64), logs, marginals)
-    may = (marginals > CONTESTED).astype(float)
-    return np.asarray(may @ may.T > 0)
+    return sensor_kernels.free_detections(mean, np.maximum(1 - particles.existence * detect, 0.0))

@@ -53,112 +53,105 @@ def densities(
 
 
 @njit(cache=True)
-def free_detections(W: Array, miss: Array, cluster: Ints) -> Array:
-    """Return the probability that no person of another cluster has a detection, (K, M), for the cluster of each person.
+def free_detections(W: Array, miss: Array) -> Array:
+    """Return the probability that nobody else has a detection, (K, M), for each person: that of the sum over all
+    mappings of the other people.
 
     W (K, M): mean weight of each person and detection; miss (K,): mean weight of the person without detection; both
-    over the particles; spare weights are 1. cluster (K,): the least slot of each slot's cluster. For a cluster it
-    is that of the sum over all mappings of the other people.
+    over the particles; spare weights are 1.
     """
     n, m = W.shape
-    free = np.ones((n, m))
-    first, logs, found = np.zeros(n, np.int64), np.empty(n), np.empty((n, m))
-    for head in range(n):
-        if cluster[head] != head:
-            continue
-        contested = False
-        for k in range(n):
+    free, others, found, spare = np.ones((n, m)), np.zeros((n, m)), np.empty((n, m)), np.ones(m)
+    linked, waiting = np.empty(n, np.bool_), np.empty(n, np.int64)
+    for k in range(n):
+        linked[:] = False
+        linked[k] = True
+        waiting[0], count, head = k, 1, 0
+        while head < count:
+            i = waiting[head]
+            head += 1
             for j in range(m):
-                if cluster[k] == head and W[k, j] > 0:
-                    for other in range(n):
-                        contested |= cluster[other] != head and W[other, j] > 0
-        if not contested:
+                for other in range(n):
+                    if W[i, j] > 0 and W[other, j] > 0 and not linked[other]:
+                        linked[other] = True
+                        waiting[count] = other
+                        count += 1
+        if count == 1:
             continue
-        others = W.copy()
-        for k in range(n):
-            if cluster[k] == head:
-                others[k] = 0.0
-        sparse_sum(others, miss, np.ones(m), first, logs, found)
+        for i in range(n):
+            others[i] = W[i] if linked[i] and i != k else np.zeros(m)
+        sparse_sum(others, miss, spare, found)
         for j in range(m):
-            left = max(1.0 - found[:, j].sum(), 0.0)
-            for k in range(n):
-                if cluster[k] == head:
-                    free[k, j] = left
+            free[k, j] = max(1.0 - found[:, j].sum(), 0.0)
     return free
 
 
 @njit(cache=True)
-def particle_sums(
-    density: Array, pairs: Ints, exist: Array, detect: Array, clutter: float, cluster: Ints, free: Array,
-    log_sums: Array, marginals: Array,
-) -> None:  # fmt: skip
-    """Write log-likelihoods (P, K) of each particle's clusters and its marginals (P, K, M): the probability of each
-    pair.
+def person_sums(
+    density: Array, pairs: Ints, exist: Array, detect: Array, clutter: float, free: Array, logs: Array, marginals: Array
+) -> None:
+    """Write the log-likelihoods (P, K) of each person in each particle, all others averaged, and the marginals (P, N):
+    the probability of each pair.
 
     density (P, N): of the N pairs (N, 2) of a person and a point, all others are impossible, as `densities` gives it;
     exist (P, K): probability that each person exists; detect (K,): probability that each is measured if existing;
-    clutter: false alarms per m^2. cluster (K,): the least slot of each slot's cluster, whose column has the cluster's
-    log-likelihood. free (K, M): probability that no person of another cluster has the detection.
+    clutter: false alarms per m^2, above 0; free (K, M): of `free_detections`.
 
-    W = exist detect g free / clutter, miss = 1 - exist detect, spare = 1. A person who shares no detection with others
-    of the cluster has the sum miss + sum of W. Without clutter (the paper's sensor) W = g and mappings are complete:
-    the smaller side is mapped wholly.
+    The sum over all mappings is linear in a person's weights: with W = exist detect g free / clutter it is 1 - exist
+    detect + sum of W.
     """
-    particles, n, m = marginals.shape
-    marginals[:], log_sums[:] = 0.0, 0.0
-    alone = _alone(pairs, cluster, n, m) if clutter > 0.0 else np.zeros(n, np.bool_)
-    place, total = np.full(n, -1), np.empty(n)
-    W, miss, spare = np.zeros((n, m)), np.empty(n), np.ones(m)
-    logs, found, first = np.empty(n), np.empty((n, m)), np.zeros(n, np.int64)
-    order, cut, count = np.empty(n, np.int64), [0], 0
-    for head in range(n):
-        for k in range(n):
-            if cluster[k] == head and not alone[k]:
-                order[count], place[k] = k, count
-                count += 1
-        if count > cut[-1]:
-            cut.append(count)
+    particles, n = exist.shape
+    total = np.empty(n)
     for p in range(particles):
         for k in range(n):
             total[k] = 1.0 - exist[p, k] * detect[k]
-        for a in range(count):
-            miss[a] = total[order[a]]
         for c in range(len(pairs)):
             k, j = pairs[c]
-            weight = density[p, c] if clutter == 0.0 else exist[p, k] * detect[k] * density[p, c] * free[k, j] / clutter
-            if alone[k]:
-                total[k] += weight
-                marginals[p, k, j] = weight
-            else:
-                W[place[k], j] = weight
+            marginals[p, c] = exist[p, k] * detect[k] * density[p, c] * free[k, j] / clutter
+            total[k] += marginals[p, c]
+        for c in range(len(pairs)):
+            if total[pairs[c, 0]] > 0.0:
+                marginals[p, c] /= total[pairs[c, 0]]
         for k in range(n):
-            if alone[k] and total[k] > 0.0:
-                marginals[p, k] /= total[k]
-                log_sums[p, cluster[k]] += math.log(total[k])
-            elif alone[k]:
-                log_sums[p, cluster[k]] = -math.inf
-        if clutter == 0.0:
-            miss[:] = 0.0 if n <= m else 1.0
-            spare[:] = 0.0 if n > m else 1.0
-        for part in range(len(cut) - 1):
-            low, high = cut[part], cut[part + 1]
-            sparse_sum(W[low:high], miss[low:high], spare, first[: high - low], logs[low:high], found[low:high])
-            log_sums[p, cluster[order[low]]] += logs[low:high].sum()
-            for a in range(low, high):
-                marginals[p, order[a]] = found[a]
+            logs[p, k] = math.log(total[k]) if total[k] > 0.0 else -math.inf
 
 
 @njit(cache=True)
-def _alone(pairs: Ints, cluster: Ints, n: int, m: int) -> Bools:
-    """Returns which of n people (n,) have no pair whose detection, of m, has a pair with another person of the
-    cluster."""
-    count, alone = np.zeros((n, m), np.int64), np.ones(n, np.bool_)
-    for c in range(len(pairs)):
-        count[cluster[pairs[c, 0]], pairs[c, 1]] += 1
-    for c in range(len(pairs)):
-        if count[cluster[pairs[c, 0]], pairs[c, 1]] > 1:
-            alone[pairs[c, 0]] = False
-    return alone
+def particle_sums(
+    density: Array, pairs: Ints, exist: Array, detect: Array, clutter: float, count: int, logs: Array, marginals: Array
+) -> None:
+    """Write the log-likelihoods (P, 1) of each particle, the sum over all mappings, and the marginals (P, N).
+
+    Arguments as of `person_sums`; count: M. W = exist detect g / clutter, miss = 1 - exist detect, spare = 1. Without
+    clutter (the paper's sensor) W = g and mappings are complete: the smaller side is mapped wholly.
+    """
+    particles, n = exist.shape
+    W, miss, spare, found = np.zeros((n, count)), np.ones(n), np.ones(count), np.empty((n, count))
+    if clutter == 0.0 and n <= count:
+        miss[:] = 0.0
+    if clutter == 0.0 and n > count:
+        spare[:] = 0.0
+    for p in range(particles):
+        for c in range(len(pairs)):
+            k, j = pairs[c]
+            W[k, j] = density[p, c] if clutter == 0.0 else exist[p, k] * detect[k] * density[p, c] / clutter
+        if clutter > 0.0:
+            for k in range(n):
+                miss[k] = 1.0 - exist[p, k] * detect[k]
+        logs[p, 0] = sparse_sum(W, miss, spare, found)
+        for c in range(len(pairs)):
+            marginals[p, c] = found[pairs[c, 0], pairs[c, 1]]
+
+
+@njit(cache=True)
+def measured(marginals: Array, pairs: Ints, people: int) -> Array:
+    """Return the probability that each person is measured, in each particle, (P, K): the sum of the marginals (P, N) of
+    the person's pairs (N, 2)."""
+    out = np.zeros((len(marginals), people))
+    for p in range(len(marginals)):
+        for c in range(len(pairs)):
+            out[p, pairs[c, 0]] += marginals[p, c]
+    return out
 
 
 @njit(cache=True)
@@ -188,30 +181,29 @@ def near_detections(pos: Array, points: Array, most: float) -> Bools:
 
 
 @njit(cache=True)
-def partner_factors(related: Bools, weights: Array, missed: Bools, cluster: Ints, log_sums: Array) -> None:
+def partner_factors(related: Bools, weights: Array, missed: Bools, logs: Array) -> None:
     """Add to the log-likelihoods of each missed person those of the partners: what is seen of them tells where the
     person is.
 
     related (P, K, K): who walks together, before the frame's relations; weights (P, K): of the particles before the
-    frame; missed (K,); cluster (K,); log_sums (P, K): log-likelihoods, in the column of each cluster's least slot;
-    changed.
+    frame; missed (K,); logs (P, K): log-likelihoods of each person; changed.
 
     The factor of a partner is l(p) / mean l in the particles in which the two walk together, 1 in all others. So the
     person has the posterior of the joint filter if the partner's is independent of it.
     """
     particles, n, _ = related.shape
-    own = log_sums.copy()
+    if not missed.any():
+        return
+    own = logs.copy()
     for v in range(n):
-        top, mean = -np.inf, 0.0
-        for p in range(particles):
-            top = max(top, own[p, cluster[v]])
+        top, mean = own[:, v].max(), 0.0
         if top == -np.inf:
             continue
         for p in range(particles):
-            mean += weights[p, v] * math.exp(own[p, cluster[v]] - top)
+            mean += weights[p, v] * math.exp(own[p, v] - top)
         level = top + math.log(max(mean, 1e-300))
         for h in range(n):
-            if missed[h] and cluster[h] != cluster[v]:
+            if missed[h] and h != v:
                 for p in range(particles):
                     if related[p, h, v]:
-                        log_sums[p, cluster[h]] += own[p, cluster[v]] - level
+                        logs[p, h] += own[p, v] - level

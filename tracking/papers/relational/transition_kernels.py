@@ -1,4 +1,4 @@
-"""Kernels of `relational`: motion given relations (sec. 3.2), relations given motion, and what pairs have in common.
+"""Kernels of `relational`: motion given relations (sec. 3.2), and relations given motion.
 
 Arrays are over P particles and K people. related (P, K, K) bool, symmetric, is the relation "walking together" of each
 pair; the groups of a particle are the connected components of its related pairs. The columns of the speed table are
@@ -30,41 +30,16 @@ NEGLIGIBLE = 1e-4
 
 
 @njit(cache=True)
-def group_labels(related: Bools, label: Ints) -> None:
-    """Write the group of each person in each particle, (P, K): the least number of a person in it.
-
-    related (P, K, K): which pairs are related, of each particle. Groups are connected components; a person alone has
-    the own number.
-    """
-    particles, n, _ = related.shape
-    waiting = np.empty(n, np.int64)
-    for p in range(particles):
-        label[p] = -1
-        for start in range(n):
-            if label[p, start] >= 0:
-                continue
-            label[p, start] = start
-            waiting[0], count, head = start, 1, 0
-            while head < count:
-                i = waiting[head]
-                head += 1
-                for j in range(start + 1, n):
-                    if label[p, j] < 0 and related[p, i, j]:
-                        label[p, j] = start
-                        waiting[count] = j
-                        count += 1
-
-
-@njit(cache=True)
 def move(
     pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, shared: Array, table: Array, coupling: Array,
-    alike: Array, spread: Array, dt: float,
+    alike: Array, pairs: Ints, spread: Array, dt: float,
 ) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; related (P, K, K): old relations;
     noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling (2,); alike (4,):
-    rules by which a partner counts; spread (K, K, 2): of `pair_spread`.
+    rules by which a partner counts; pairs (N, 2): people i < j who walk together in some particle; spread (N, 2): of
+    `pair_spread`.
 
     v_i = u - B u / |u| + C e_i, x_i = x_i + v_i dt, with B, C of the table's row for |u| (Table 3). For a person alone
     u = v_i and e_i = noise. A partner j who walks together with i counts with w_j = `belonging` by `alike` at their old
@@ -74,31 +49,35 @@ def move(
     are ours; the paper: BIAS inf, so that w = 1, FOLLOW 1 and COMMON 0, so that u = m and e_i = noise.
     """
     particles, n, _ = pos.shape
-    place, old = np.empty((n, 2)), np.empty((n, 2))
+    sums = np.empty((n, 7))
     for p in range(particles):
-        place[:], old[:] = pos[p], vel[p]
         for i in range(n):
-            x, y, weight = exist[p, i] * old[i, 0], exist[p, i] * old[i, 1], exist[p, i]
-            a, b, square, most = shared[p, i, 0], shared[p, i, 1], 1.0, 0.0
-            for j in range(n):
-                if related[p, i, j]:
-                    distance = _least_length(place[i] - place[j], spread[i, j, 0])
-                    w = belonging(distance, _least_length(old[i] - old[j], spread[i, j, 1]), alike)
-                    x += w * exist[p, j] * old[j, 0]
-                    y += w * exist[p, j] * old[j, 1]
-                    a, b = a + w * shared[p, j, 0], b + w * shared[p, j, 1]
-                    weight += w * exist[p, j]
-                    square += w * w
-                    most = max(most, w)
-            ex, ey = noise[p, i, 0], noise[p, i, 1]
+            sums[i, 0], sums[i, 1], sums[i, 2] = exist[p, i] * vel[p, i, 0], exist[p, i] * vel[p, i, 1], exist[p, i]
+            sums[i, 3], sums[i, 4], sums[i, 5], sums[i, 6] = shared[p, i, 0], shared[p, i, 1], 1.0, 0.0
+        for k in range(len(pairs)):
+            i, j = pairs[k]
+            if related[p, i, j]:
+                dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
+                du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
+                distance = math.sqrt(max(dx * dx + dy * dy - spread[k, 0], 0.0))
+                w = belonging(distance, math.sqrt(max(du * du + dv * dv - spread[k, 1], 0.0)), alike)
+                for a, b in ((i, j), (j, i)):
+                    sums[a, 0] += w * exist[p, b] * vel[p, b, 0]
+                    sums[a, 1] += w * exist[p, b] * vel[p, b, 1]
+                    sums[a, 2] += w * exist[p, b]
+                    sums[a, 3] += w * shared[p, b, 0]
+                    sums[a, 4] += w * shared[p, b, 1]
+                    sums[a, 5] += w * w
+                    sums[a, 6] = max(sums[a, 6], w)
+        for i in range(n):
+            x, y, ex, ey = vel[p, i, 0], vel[p, i, 1], noise[p, i, 0], noise[p, i, 1]
+            weight, square, most = sums[i, 2], sums[i, 5], sums[i, 6]
             if most > 0:
                 own, part = math.sqrt(1.0 - most * coupling[COMMON]), math.sqrt(most * coupling[COMMON] / square)
-                ex, ey = own * ex + part * a, own * ey + part * b
+                ex, ey = own * ex + part * sums[i, 3], own * ey + part * sums[i, 4]
             if most > 0 and weight > 0:
-                x = old[i, 0] + coupling[FOLLOW] * (x / weight - old[i, 0])
-                y = old[i, 1] + coupling[FOLLOW] * (y / weight - old[i, 1])
-            else:
-                x, y = old[i, 0], old[i, 1]
+                x += coupling[FOLLOW] * (sums[i, 0] / weight - x)
+                y += coupling[FOLLOW] * (sums[i, 1] / weight - y)
             speed = math.sqrt(x * x + y * y)
             row = 0
             while speed > table[row, SPEED]:
@@ -120,21 +99,14 @@ def belonging(distance: float, difference: float, rules: Array) -> float:
 
 
 @njit(cache=True)
-def _least_length(difference: Array, spread: float) -> float:
-    """Returns the length of a difference (2,) without what errors add to its square."""
-    return math.sqrt(max(difference[0] ** 2 + difference[1] ** 2 - spread, 0.0))
-
-
-@njit(cache=True)
 def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
     """Return what the filter's uncertainty adds on average to the squared distance, m^2, and to the squared velocity
-    difference, m^2/s^2, of pairs in a particle, (K, K, 2): twice their variances over the particles, as a particle
-    deviates from the mean, and the mean from the truth; 0 for other pairs (ours).
+    difference, m^2/s^2, of pairs in a particle, (N, 2): twice their variances over the particles, as a particle
+    deviates from the mean, and the mean from the truth (ours).
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; pairs i < j (N, 2).
     """
-    particles, n, _ = pos.shape
-    out = np.zeros((n, n, 2))
+    particles, out = len(pos), np.zeros((len(pairs), 2))
     for k in range(len(pairs)):
         i, j = pairs[k]
         first, second = np.zeros(4), np.zeros(4)
@@ -144,8 +116,7 @@ def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
                 first[d], second[d] = first[d] + apart, second[d] + apart * apart
                 first[d + 2], second[d + 2] = first[d + 2] + faster, second[d + 2] + faster * faster
         twice = 2 * np.maximum(second / particles - (first / particles) ** 2, 0.0)
-        out[i, j, 0] = out[j, i, 0] = twice[0] + twice[1]
-        out[i, j, 1] = out[j, i, 1] = twice[2] + twice[3]
+        out[k] = twice[0] + twice[1], twice[2] + twice[3]
     return out
 
 
@@ -186,18 +157,22 @@ def relate(
     rate / 2, and walks together with those whose g is above one uniform number. So each pair is a chain of two states
     that starts and stops with the hazards rate g and rate (1 - g), and a person leaves or joins a group at once.
     """
-    change = 1.0 - math.sqrt(1.0 - rules[RATE])
+    change, n = 1.0 - math.sqrt(1.0 - rules[RATE]), pos.shape[1]
+    of, count = np.empty((n, n), np.int64), np.zeros(n, np.int64)
+    for k in range(len(pairs)):
+        for a in pairs[k]:
+            of[a, count[a]] = k
+            count[a] += 1
     for p in range(len(pos)):
-        for k in range(len(pairs)):
-            i, j = pairs[k]
-            for a in (i, j):
-                if uniforms[p, a, 0] >= change:
-                    continue
+        for a in range(n):
+            if uniforms[p, a, 0] >= change:
+                continue
+            for k in of[a, : count[a]]:
+                i, j = pairs[k]
                 dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
                 du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
                 lost = rules[DISTANCE] * math.sqrt(dx * dx + dy * dy) + rules[VELOCITY] * math.sqrt(du * du + dv * dv)
-                g = 1.0 / (1.0 + math.exp(lost - odds[k]))
-                related[p, i, j] = related[p, j, i] = uniforms[p, a, 1] < g
+                related[p, i, j] = related[p, j, i] = uniforms[p, a, 1] < 1.0 / (1.0 + math.exp(lost - odds[k]))
 
 
 @njit(cache=True)
@@ -224,66 +199,3 @@ def join(pos: Array, exist: Array, label: Ints, place: Array, share: float, unif
                 chosen[p] = g
                 break
     return chosen
-
-
-@njit(cache=True)
-def pairs_together(related: Bools, exist: Array, weights: Array, cluster: Ints) -> Array:
-    """Return the probability (K, K) that i and j walk together, given that both exist; 1 on the diagonal.
-
-    related (P, K, K): relations; exist (P, K): probabilities of existence; weights (P, K): of the particles; cluster
-    (K,): people with equal numbers have one weight, others the product of theirs. 0 for a pair that does not exist.
-    """
-    particles, n = exist.shape
-    out = np.eye(n)
-    for i in range(n):
-        for j in range(i):
-            some = False
-            for p in range(particles):
-                if related[p, i, j]:
-                    some = True
-                    break
-            if not some:
-                continue
-            both, same = 0.0, 0.0
-            for p in range(particles):
-                w = weights[p, i] * exist[p, i] * exist[p, j]
-                if cluster[i] != cluster[j]:
-                    w *= weights[p, j]
-                both += w
-                if related[p, i, j]:
-                    same += w
-            if both > 0:
-                out[i, j] = out[j, i] = same / both
-    return out
-
-
-@njit(cache=True)
-def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, cov: Array, total: Array) -> None:
-    """Write mean (K, 4) and covariance (K, 4, 4) of each person's x, y, vx, vy, and the probability of existence (K,).
-
-    Particles count by weight times existence, or by weight alone for a person who exists in none. pos, vel (P, K, 2), m
-    and m/s; exist (P, K); weights (P, K), sum 1 for each person.
-    """
-    particles, n = exist.shape
-    state = np.empty(4)
-    for k in range(n):
-        for p in range(particles):
-            total[k] += weights[p, k] * exist[p, k]
-        alone = total[k] <= 0.0
-        whole = 1.0 if alone else total[k]
-        for p in range(particles):
-            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
-            mean[k, 0] += w * pos[p, k, 0]
-            mean[k, 1] += w * pos[p, k, 1]
-            mean[k, 2] += w * vel[p, k, 0]
-            mean[k, 3] += w * vel[p, k, 1]
-        for p in range(particles):
-            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
-            for d in range(2):
-                state[d], state[d + 2] = pos[p, k, d] - mean[k, d], vel[p, k, d] - mean[k, d + 2]
-            for a in range(4):
-                for b in range(a + 1):
-                    cov[k, a, b] += w * state[a] * state[b]
-        for a in range(4):
-            for b in range(a):
-                cov[k, b, a] = cov[k, a, b]

@@ -12,7 +12,7 @@ from tracking.papers.relational.relations import Relational
 
 
 def two(count):
-    """Two people far from each other, each a cluster of its own."""
+    """Two people far from each other."""
     made = ParticleSet.empty(count)
     for x in (0.0, 50.0):
         made.add(np.full((count, 2), x), np.zeros((count, 2)), 1.0, np.zeros(made.exist.shape, bool))

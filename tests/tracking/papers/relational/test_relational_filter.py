@@ -37,8 +37,9 @@ def flat_table(diffusion):
 def move(particles, noise, table, coupling, dt, shared=None, alike=ALWAYS, spread=0.0):
     """Move the particles by a step of dt s; spread: of the squares of distances and velocity differences."""
     p, shared = particles, np.zeros(noise.shape) if shared is None else shared
-    spread = np.full((p.people, p.people, 2), spread)
-    transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, spread, dt)
+    pairs = np.argwhere(np.triu(p.related.any(axis=0)))
+    spread = np.full(pairs.shape, spread)
+    transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, pairs, spread, dt)
 
 
 def detections(index, *points):
@@ -398,12 +399,11 @@ def test_the_spread_of_a_pair_is_twice_its_variance():
     """That of the particles' differences: what partners have in common does not count."""
     rng = np.random.default_rng(6)
     pos, vel = rng.normal(0, 1, (2, 500, 4, 2)) + rng.normal(0, 3, (2, 500, 1, 2))
-    found = transition_kernels.pair_spread(pos, vel, np.array([[0, 1], [1, 3]]))
-    for i, j in ((0, 1), (1, 3)):
+    pairs = np.array([[0, 1], [1, 3]])
+    found = transition_kernels.pair_spread(pos, vel, pairs)
+    for row, (i, j) in zip(found, pairs.tolist(), strict=True):
         expected = [2 * np.var(x[:, i] - x[:, j], axis=0).sum() for x in (pos, vel)]
-        np.testing.assert_allclose(found[i, j], expected, rtol=1e-9)
-        np.testing.assert_allclose(found[j, i], expected, rtol=1e-9)
-    assert not found[[0, 0, 2], [2, 3, 3]].any()
+        np.testing.assert_allclose(row, expected, rtol=1e-9)
 
 
 def test_the_squares_of_partners_who_move_alike_are_those_of_their_errors():
@@ -413,7 +413,7 @@ def test_the_squares_of_partners_who_move_alike_are_those_of_their_errors():
     for _ in range(400):
         vel = rng.normal(0, 0.5, (1, 2, 2)) + rng.normal(0, 0.5, (300, 2, 2))
         squares.append(np.square(vel[:, 0] - vel[:, 1]).sum(axis=1).mean())
-        spreads.append(transition_kernels.pair_spread(vel, vel, np.array([[0, 1]]))[0, 1, 1])
+        spreads.append(transition_kernels.pair_spread(vel, vel, np.array([[0, 1]]))[0, 1])
     assert np.mean(squares) == pytest.approx(np.mean(spreads), rel=0.1)
 
 
@@ -421,9 +421,12 @@ def test_the_squares_of_partners_who_move_alike_are_those_of_their_errors():
 def test_presets_couple_velocities_as_the_paper(name):
     tracker = Relational(RelationalConfig.preset(name))
     tracker.reset(Context(25.0, float("nan")), 0)
-    _, coupling, alike, spread = tracker._coupling()
+    tracker.particles = placed(50, np.random.default_rng(0).normal(0, 3, (4, 2)))
+    tracker.particles.related[:25, 0, 1] = tracker.particles.related[:25, 1, 0] = True
+    _, coupling, alike, pairs, spread = tracker._coupling()
     assert coupling.tolist() == AT_ONCE.tolist()
     assert transition_kernels.belonging(50.0, 9.0, alike) == 1
+    assert pairs.tolist() == [[0, 1]]
     assert not spread.any()
 
 

@@ -1,4 +1,4 @@
-"""Clusters of people with weights of their own: what joins and divides, and that no weight counts twice."""
+"""Weights of each person and one weight of a particle: that no weight counts twice, and what the detections say."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracking.papers.relational import sensor, sensor_kernels
-from tracking.papers.relational.association_sums_kernels import sparse_sum
+from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
 
@@ -20,7 +20,7 @@ def sight(detect, missed=None, cut=None, eye=(np.nan, np.nan)):
 
 
 def three(count=400, seed=0):
-    """Three people in particles that differ, each a cluster with equal weights."""
+    """Three people in particles that differ, with equal weights."""
     rng, made = np.random.default_rng(seed), ParticleSet.empty(count)
     for x in (0.0, 0.4, 8.0):
         pos = rng.normal([x, 0.0], 0.1, (count, 2))
@@ -28,76 +28,80 @@ def three(count=400, seed=0):
     return made
 
 
-def pairs(*linked):
-    out = np.eye(3, dtype=bool)
-    for a, b in linked:
-        out[a, b] = out[b, a] = True
-    return out
-
-
 def weighed(particles, seed):
-    """The particles with the log-likelihoods of each cluster, (P, K)."""
+    """The particles with the log-likelihoods of each person, (P, K)."""
     logs = np.random.default_rng(seed).normal(0, 1, particles.exist.shape)
     particles.weigh(logs)
     return logs
 
 
-def test_clusters_that_join_have_the_product_of_their_weights():
+def test_one_weight_is_the_product_of_the_peoples():
     particles = three()
     logs = weighed(particles, 1)
-    particles.regroup(pairs((0, 1)))
-    assert particles.cluster.tolist() == [0, 0, 2]
-    product = np.exp(logs[:, 0] + logs[:, 1])
-    np.testing.assert_allclose(particles.weights[:, 0], product / product.sum(), rtol=1e-12)
-    assert np.array_equal(particles.weights[:, 0], particles.weights[:, 1])
-    alone = np.exp(logs[:, 2])
-    np.testing.assert_allclose(particles.weights[:, 2], alone / alone.sum(), rtol=1e-12)
+    np.testing.assert_allclose(particles.weights, np.exp(logs) / np.exp(logs).sum(axis=0), rtol=1e-12)
+    particles.share_weights(True)
+    product = np.exp(logs.sum(axis=1))
+    np.testing.assert_allclose(particles.weights, np.repeat((product / product.sum())[:, None], 3, axis=1), rtol=1e-12)
+    particles.weigh(logs[:, :1])
+    product *= np.exp(logs[:, 0])
+    np.testing.assert_allclose(particles.weights[:, 2], product / product.sum(), rtol=1e-12)
 
 
-def test_a_cluster_divides_only_after_resampling():
+def test_people_get_weights_of_their_own_only_after_resampling():
     particles = three()
-    particles.regroup(pairs((0, 1)))
-    weighed(particles, 2)
+    particles.share_weights(True)
+    particles.weigh(np.random.default_rng(2).normal(0, 1, (400, 1)))
     before = particles.weights.copy()
-    particles.regroup(pairs())
-    assert particles.cluster.tolist() == [0, 0, 2]
+    particles.share_weights(False)
+    assert particles.one_weight
     assert np.array_equal(particles.weights, before)
     particles.resample(1.0, "residual", 0.0, np.random.default_rng(0))
-    particles.regroup(pairs())
-    assert particles.cluster.tolist() == [0, 1, 2]
+    particles.share_weights(False)
+    assert not particles.one_weight
 
 
-def test_a_cluster_is_resampled_as_a_whole_and_others_are_left():
+def test_with_one_weight_particles_are_resampled_as_a_whole():
     particles = three()
-    particles.regroup(pairs((0, 1)))
+    particles.share_weights(True)
     particles.related[:, 0, 1] = particles.related[:, 1, 0] = np.random.default_rng(3).random(400) < 0.5
-    weighed(particles, 4)
-    particles.weights[:, 2] = 1 / 400
-    old = {tuple(row) for row in particles.pos[:, :2].reshape(400, 4)}
-    third = particles.pos[:, 2].copy()
+    particles.weigh(np.random.default_rng(4).normal(0, 1, (400, 1)))
+    old = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related, strict=True)}
     particles.resample(0.9, "systematic", 0.0, np.random.default_rng(0))
-    assert {tuple(row) for row in particles.pos[:, :2].reshape(400, 4)} < old
-    assert np.array_equal(particles.pos[:, 2], third)
+    new = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related, strict=True)}
+    assert new < old
+
+
+def test_a_person_is_resampled_alone_and_takes_the_own_relations():
+    """The others stay in their particles, and the relations stay symmetric."""
+    particles, few = three(), np.arange(400) < 40
+    particles.related[:, 0, 1] = particles.related[:, 1, 0] = few
+    particles.related[:, 1, 2] = particles.related[:, 2, 1] = ~few
+    particles.weights[:, 0] = few / 40
+    old = {tuple(x) for x in particles.pos[few, 0]}
+    others = particles.pos[:, 1:].copy()
+    particles.resample(0.9, "residual", 0.0, np.random.default_rng(0))
+    assert {tuple(x) for x in particles.pos[:, 0]} <= old
+    assert np.array_equal(particles.pos[:, 1:], others)
+    assert particles.related[:, 0, 1].all()
+    assert np.array_equal(particles.related[:, 1, 2], ~few)
     assert np.array_equal(particles.related, particles.related.transpose(0, 2, 1))
 
 
-@pytest.mark.parametrize("removed", range(3))
-def test_removing_a_person_keeps_the_others_together(removed):
+def test_a_new_person_has_the_one_weight_of_the_particles():
     particles = three()
-    particles.regroup(pairs((0, 1), (1, 2)))
-    particles.keep(np.arange(3) != removed)
-    assert particles.cluster.tolist() == [0, 0]
+    particles.share_weights(True)
+    particles.weigh(np.random.default_rng(5).normal(0, 1, (400, 1)))
+    particles.add(np.zeros((400, 2)), np.zeros((400, 2)), 0.5, np.zeros((400, 3), bool))
+    assert np.array_equal(particles.weights[:, 3], particles.weights[:, 0])
 
 
-def test_weights_of_clusters_multiply_to_the_joint_weight():
-    """Far from each other, the joint likelihood is the product of the clusters' likelihoods."""
-    points = np.array([[0.2, 0.05], [0.22, -0.02], [8.1, 0.0]])
-    joint, apart = three(), three()
-    sensor.weigh(joint, points, sight([0.9] * 3), 0.08, ParticleConfig(weights="joint"))
-    sensor.weigh(apart, points, sight([0.9] * 3), 0.08, ParticleConfig())
-    assert joint.cluster.tolist() == [0, 0, 0]
-    assert apart.cluster.tolist() == [0, 0, 2]
-    product = apart.weights[:, 0] * apart.weights[:, 2]
+def test_weights_of_people_far_from_each_other_multiply_to_the_joint_weight():
+    points, joint, apart = np.array([[0.2, 0.05], [8.1, 0.0]]), three(), three()
+    for made in (joint, apart):
+        made.keep(np.array([True, False, True]))
+    sensor.weigh(joint, points, sight([0.9] * 2), 0.08, ParticleConfig(weights="joint"))
+    sensor.weigh(apart, points, sight([0.9] * 2), 0.08, ParticleConfig())
+    product = apart.weights.prod(axis=1)
     np.testing.assert_allclose(joint.weights[:, 0], product / product.sum(), rtol=1e-9)
     np.testing.assert_allclose(joint.exist, apart.exist, rtol=1e-12)
 
@@ -114,7 +118,6 @@ def test_weights_of_a_person_are_those_of_the_joint_filter_with_the_others_avera
             made.add(places[:, k], np.zeros((made.count, 2)), 0.9, np.zeros(made.exist.shape, bool))
     sensor.weigh(every, points, sight([0.9] * 2), 0.08, ParticleConfig(weights="joint"))
     sensor.weigh(alone, points, sight([0.9] * 2), 0.08, ParticleConfig())
-    assert alone.cluster.tolist() == [0, 1]
     joint = every.weights[:, 0].reshape(count, count)
     np.testing.assert_allclose(alone.weights[:, 0], joint.sum(axis=1), rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(alone.weights[:, 1], joint.sum(axis=0), rtol=1e-6, atol=1e-9)
@@ -126,7 +129,6 @@ def test_a_missed_person_has_the_weights_of_the_partners():
     particles.related[:200, 0, 2] = particles.related[:200, 2, 0] = True
     points, missed = particles.pos[:1, 0], np.array([False, False, True])
     sensor.weigh(particles, points, sight([0.9, 0.9, 0.0], missed), 0.08, RelationalConfig())
-    assert particles.cluster.tolist() == [0, 1, 2]
     own, other = particles.weights[:200, 0], particles.weights[:200, 2]
     np.testing.assert_allclose(other / other.sum(), own / own.sum(), rtol=1e-9)
     np.testing.assert_allclose(particles.weights[200:, 2], particles.weights[200, 2], rtol=1e-9)
@@ -176,22 +178,57 @@ def test_moments_are_weighted_by_existence():
     assert exist[0] == pytest.approx(0.45)
 
 
-def test_sums_of_people_alone_are_those_of_all_mappings():
-    """People who share no detection are summed by themselves: the same as the sums over all mappings."""
-    rng = np.random.default_rng(4)
+def candidates(seed):
+    """Densities of 9 pairs of 6 people and 5 points in 20 particles, existence and detection; people 0 to 2 and 3 to 5
+    share points."""
+    rng = np.random.default_rng(seed)
     pos, points = rng.normal(0, 2, (20, 6, 2)), rng.normal(0, 2, (5, 2))
     exist, detect = rng.uniform(0.2, 1, (20, 6)), rng.uniform(0.5, 1, 6)
-    pairs = np.array([[0, 0], [1, 1], [1, 2], [2, 2], [3, 3], [3, 4]])
+    pairs = np.array([[0, 0], [0, 1], [1, 1], [1, 2], [2, 2], [3, 3], [3, 4], [4, 4], [5, 4]])
     density = sensor_kernels.densities(pos, points, pairs, 0.5, 1.0, np.full(6, 0.1), np.full(2, np.nan), np.inf)
-    cluster, logs, found = np.array([0, 1, 1, 3, 4, 0]), np.empty((20, 6)), np.empty((20, 6, 5))
-    sensor_kernels.particle_sums(density, pairs, exist, detect, 0.01, cluster, np.ones((6, 5)), logs, found)
+    return density, pairs, exist, detect
+
+
+def weights_of(density, pairs, exist, detect, clutter, p):
+    """W (K, M) of a particle."""
+    W = np.zeros((6, 5))
+    W[pairs[:, 0], pairs[:, 1]] = (exist[p] * detect)[pairs[:, 0]] * density[p] / clutter
+    return W
+
+
+def test_sums_of_particles_are_those_of_all_mappings():
+    density, pairs, exist, detect = candidates(4)
+    logs, found = np.empty((20, 1)), np.empty(density.shape)
+    sensor_kernels.particle_sums(density, pairs, exist, detect, 0.01, 5, logs, found)
     for p in range(20):
-        seen, W = exist[p] * detect, np.zeros((6, 5))
-        W[pairs[:, 0], pairs[:, 1]] = seen[pairs[:, 0]] * density[p] / 0.01
-        log, marginals = np.empty(6), np.empty((6, 5))
-        sparse_sum(W, 1 - seen, np.ones(5), cluster, log, marginals)
-        np.testing.assert_allclose(logs[p, [0, 1, 3, 4]], log[[0, 1, 3, 4]], rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(found[p], marginals, rtol=1e-12, atol=1e-15)
+        log, marginals = reference_sum(weights_of(density, pairs, exist, detect, 0.01, p), 1 - exist[p] * detect)
+        assert logs[p, 0] == pytest.approx(log, rel=1e-10)
+        np.testing.assert_allclose(found[p], marginals[pairs[:, 0], pairs[:, 1]], rtol=1e-10, atol=1e-15)
+
+
+def test_sums_of_people_are_those_of_all_mappings_with_the_others_averaged():
+    """All mappings of the person in the particle and of the others' mean weights, up to a factor of the others."""
+    density, pairs, exist, detect = candidates(5)
+    W = np.array([weights_of(density, pairs, exist, detect, 0.01, p) for p in range(20)])
+    mean, miss = W.mean(axis=0), 1 - (exist * detect).mean(axis=0)
+    free = sensor_kernels.free_detections(mean, miss)
+    logs, found = np.empty((20, 6)), np.empty(density.shape)
+    sensor_kernels.person_sums(density, pairs, exist, detect, 0.01, free, logs, found)
+    for k in range(6):
+        rest = np.delete(np.arange(6), k)
+        others = reference_sum(mean[rest], miss[rest])[0]
+        for p in range(20):
+            mixed, missed = mean.copy(), miss.copy()
+            mixed[k], missed[k] = W[p, k], 1 - exist[p, k] * detect[k]
+            log, marginals = reference_sum(mixed, missed)
+            assert logs[p, k] == pytest.approx(log - others, abs=1e-9)
+            own = pairs[:, 0] == k
+            np.testing.assert_allclose(found[p, own], marginals[k, pairs[own, 1]], rtol=1e-8, atol=1e-15)
+
+
+def reference_sum(W, miss):
+    found = np.empty(W.shape)
+    return exact_sum(W, miss, np.ones(W.shape[1]), found), found
 
 
 def test_a_displaced_point_is_the_persons_only_if_points_may_be_displaced():
