@@ -32,6 +32,7 @@ from benchmarks.stereo import (
     contrast,
     cost,
     decalibration,
+    decisions,
     density,
     from_points,
     photometric,
@@ -51,7 +52,7 @@ MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "trajectories": trajectories.trajectories,
     "scenes": scenes.scenes,
     "causes": causes.causes,
-    "decisions": scenes.decisions,
+    "decisions": decisions.decisions,
     "points": from_points.points,
     "density": density.density,
     "cost": cost.cost,
@@ -66,7 +67,9 @@ def main() -> None:
     parser.add_argument(
         "--only", help="scenes, separated by commas: cross, merge, stairs, crowded, split, pillar; points: scenarios"
     )
-    parser.add_argument("--options", help="decisions: parameters, separated by commas; scenes: stereo, preset paper")
+    parser.add_argument(
+        "--options", help="decisions: names of decisions, separated by commas; scenes: stereo, preset paper"
+    )
     parser.add_argument(
         "--chart", type=Path, default=Path("stereo.svg"), help="trajectories, density, cost: the SVG to write"
     )

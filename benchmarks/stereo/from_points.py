@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from benchmarks.stereo.scenes import ABLATIONS
+from benchmarks.stereo.decisions import ABLATIONS
 from benchmarks.support.tables import interval, signed, table
 from scenarios.loading.resolve import resolve
 from sim.sequence import simulate

@@ -13,7 +13,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
+from unittest import mock
 
 import numpy as np
 
@@ -21,7 +23,7 @@ from benchmarks.stereo.further_scenes import further_entries
 from benchmarks.stereo.kept_points import shared_points
 from benchmarks.stereo.stored_rows import Row, Stored
 from benchmarks.support.in_memory import in_memory
-from benchmarks.support.tables import interval, number, signed, table
+from benchmarks.support.tables import interval, number, table
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry, resolve
 from sim.sequence import simulate
@@ -38,27 +40,19 @@ PAPER = {"cross": "0.119 ± 0.077", "stairs": "0.105 ± 0.076"}
 COLUMNS = (
     "error, m", "± sd", "paper", "along", "± sd", "across ± sd", "found", "group F1", "merge F1", "extra", "frames/s"
 )  # fmt: skip
-ABLATIONS: Mapping[str, Mapping[str, object]] = {
-    "surface_offset": {"surface_offset": 0.0},
-    "density_width": {"density_width": 20.0},
-    "point_covariance": {"point_covariance": False},
-    "attach": {"attach": False},
-    "velocity_weight": {"velocity_weight": 0.0},
-    "back_check": {"back_check": 5.0},
-    "spread_weight": {"spread_weight": 0.1},
-    "split": {"split": False},
-    "confirm_time": {"confirm_time": 0.0},
-    "coast_time": {"coast_time": 10.0, "report_coast": 5.0},
-    "person or not": {"least_height": 0.0, "least_width": 0.0, "most_height": 10.0},
-}
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A set of parameters with a name."""
+    """A set of parameters with a name.
+
+    replaced: attributes of the tracker's code that are replaced while it runs: owner, name, value. They must not change
+    points, which variants share.
+    """
 
     name: str
     params: Mapping[str, object] = field(default_factory=dict)
+    replaced: tuple[tuple[object, str, object], ...] = ()
 
 
 def entries(only: str | None) -> dict[str, Entry]:
@@ -86,7 +80,10 @@ def recordings(entry: Entry, seeds: Iterable[int]) -> Iterator[tuple[int, Record
 
 def row_of(sequence: Recording, variant: Variant) -> Row:
     """Returns position errors and scores of one sequence."""
-    run = track("stereo", sequence, params=variant.params or None, detections="image")
+    with ExitStack() as replaced:
+        for owner, name, value in variant.replaced:
+            replaced.enter_context(mock.patch.object(owner, name, value))
+        run = track("stereo", sequence, params=variant.params or None, detections="image")
     truth = sequence.truth
     assert truth is not None
     scores = evaluate(truth, run)
@@ -164,7 +161,8 @@ def scenes(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
     return made
 
 
-def _mean(values: np.ndarray) -> tuple[float, float, float]:
+def mean_of(values: np.ndarray) -> tuple[float, float, float]:
+    """Returns the mean of values (N,) and the ends of its 95 % interval."""
     mean, low, high = mean_interval(values[:, None])
     return float(mean[0]), float(low[0]), float(high[0])
 
@@ -177,31 +175,9 @@ def _cells(name: str, rows: list[Row]) -> list[str]:
     def with_interval(key: str) -> str:
         values = np.array([r.get(key, np.nan) for r in rows])
         values = values[np.isfinite(values)]
-        return interval(*_mean(values)) if len(values) else "–"
+        return interval(*mean_of(values)) if len(values) else "–"
 
     return [
         with_interval("error"), mean("sd"), PAPER.get(name, "–"), mean("along"), mean("along sd"), mean("across sd"),
         mean("found"), with_interval("group_F1_hull"), mean("merge_F1"), mean("extra", 2), mean("frames/s", 0),
     ]  # fmt: skip
-
-
-def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
-    """Prints, for each decision switched off, the paired difference over all scenes, and returns the rows."""
-    wanted = ABLATIONS if args.options is None else {k: ABLATIONS[k] for k in args.options.split(",")}
-    made = measured(args, (Variant("stereo"), *(Variant(name, params) for name, params in wanted.items())))
-    rows = {}
-    for name in wanted:
-        cells = []
-        for key in ("group_F1_hull", "group_MOTA", "error", "extra"):
-            pairs = [
-                (by[name][s].get(key, np.nan), by["stereo"][s].get(key, np.nan))
-                for by in made.values()
-                for s in by[name]
-            ]
-            off = np.array([a - b for a, b in pairs])
-            off = off[np.isfinite(off)]
-            cells.append(signed(*_mean(off)) if len(off) else "–")
-        rows[name] = cells
-    columns = ("group F1", "MOTA", "error, m", "extra")
-    table("Each decision switched off: difference to the defaults", "decision", columns, rows)
-    return made

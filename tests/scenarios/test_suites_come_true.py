@@ -66,3 +66,14 @@ def test_subtraction_stereo(entry: str, frames: int) -> None:
     else:
         assert sequence.truth.z.max() == pytest.approx(1.6, abs=0.01)
         assert sequence.truth.z[sequence.truth.frame == 1].max() < 0.3
+
+
+@pytest.mark.parametrize("seed", [957, 961])
+def test_everybody_climbs_the_stairs(seed: int) -> None:
+    """Members who walk at the outside of their group, too: nobody passes beside the flight or the landing."""
+    (found,) = [e for e in resolve("suite:subtraction-stereo") if e.name == "stereo-stairs"]
+    truth = simulate(found.scenario, seed, streams=()).truth
+    assert truth is not None
+    z = truth.z[truth.pos[:, 1] < 5.9]
+    assert len(z) > 100
+    assert z.min() == pytest.approx(1.6, abs=0.01)

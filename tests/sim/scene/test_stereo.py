@@ -37,6 +37,7 @@ def test_there_and_back(pose) -> None:
     assert np.allclose(uvd[:, :2], uv, atol=1e-9)
     assert np.allclose(uvd[:, 2], disparity(camera, depth), atol=1e-9)
     assert np.allclose(back_project(camera, uvd), X, atol=1e-9)
+    assert np.allclose(project_pair(camera, back_project(camera, uvd)), uvd, atol=1e-9)
     right = camera.replace(position=camera.position + camera.baseline * camera.rotation[0])
     assert np.allclose(uv[:, 0] - project(right, X)[0][:, 0], uvd[:, 2], atol=1e-9)
 

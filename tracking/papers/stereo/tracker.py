@@ -3,8 +3,8 @@
 Y. Hoshikawa, Y. Hashimoto, A. Moro, K. Terabayashi, K. Umeda: "Tracking of Human Groups Using Subtraction Stereo", SICE
 Journal of Control, Measurement, and System Integration 4 (3), 2011, sections 2 and 3. Lengths are m, times s.
 
-State of a group: an extended Kalman filter of position and velocity, X = (x, x', y, y', z, z'); Sigma, the covariance
-of its points' positions and velocities; N, the number of its points.
+State of a group: an extended Kalman filter of position and velocity, X = (x, x', y, y', z, z') (eq. 1); Sigma, the
+covariance of its points' positions and velocities; N, the number of its points.
 
     X_k+1 = Phi X_k + noise                                eqs 2, 3            space_group
     Z = (u, v, d) = f(X) + noise                           eqs 4 to 6          measurement, sim.scene.stereo

@@ -15,8 +15,9 @@ from tracking.filters.ellipsoid_overlap import separation
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import POS, PairMeasurement
-from tracking.papers.stereo.merging import pooled
+from tracking.papers.stereo.merging import overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera
+from tracking.papers.stereo.space_group import motion_model, newborn
 from tracking.papers.stereo.tracker import Stereo
 
 FPS = 30.0
@@ -136,6 +137,23 @@ def test_groups_of_one_velocity_merge_and_opposite_ones_never() -> None:
         a = walkers(4, 20, [-1.5, 5.0, 1], [1.0, 0, 0], 100)
         b = walkers(5, 20, [1.8, y, 1], [-1.0, 0, 0], 100, first=100)
         assert "merge" not in kinds(scripted(together(a, b))[1])
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.1, 0.5, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("direction", [0.0, 0.8, 1.6])
+def test_regions_of_opposite_groups_overlap_at_no_distance(distance: float, direction: float) -> None:
+    """Walkers in space at 0.9 m/s, by eq. 13; of the same velocity they overlap when they are near."""
+    config, r = StereoConfig(), np.random.default_rng(3)
+    along, motion = np.array([np.cos(direction), np.sin(direction), 0.0]), motion_model(config, 1 / FPS)
+
+    def group(at: float, speed: float):
+        pos = np.array([at, 5.0, 1.0]) + 0.25 * r.standard_normal((15, 3))
+        vel = speed * along + 0.1 * r.standard_normal((15, 3))
+        cov = np.repeat(4e-4 * np.eye(3)[None], 15, 0)
+        return newborn(SpacePoints(np.arange(15), pos, cov, vel, 25 * cov), motion, 0.0)
+
+    assert not overlap(group(0.0, 0.9), group(distance, -0.9), config.merge_gate)
+    assert overlap(group(0.0, 0.9), group(distance, 0.9), config.merge_gate) == (distance < 1.5)
 
 
 def test_a_hidden_group_merges_with_nobody() -> None:

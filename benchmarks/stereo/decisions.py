@@ -1,0 +1,91 @@
+"""Decisions of `stereo`, each switched off: paired differences to the defaults.
+
+`ABLATIONS` are decisions that have a parameter. `RULES` have none, so that code of the tracker is replaced: `mean in
+space` measures the mean of the points' (u, v, d); `expected places` puts hulls round the measured places of points;
+`settled` counts merges of groups that were there for less than 1 s; `children` takes no new group for the child of one
+that had its points.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+
+import numpy as np
+
+from benchmarks.stereo.scenes import Variant, mean_of, measured
+from benchmarks.stereo.stored_rows import Row
+from benchmarks.support.tables import signed, table
+from sim.scene.stereo import back_project, project_pair
+from sim.types import Array, Ints
+from tracking.detect.features import SpacePoints
+from tracking.grouping.whole_groups import NO_ID
+from tracking.papers.stereo import merging, space_group, tracker
+from tracking.papers.stereo.config import StereoConfig
+from tracking.papers.stereo.measurement import PairMeasurement
+from tracking.papers.stereo.tracker import Stereo
+
+ABLATIONS: Mapping[str, Mapping[str, object]] = {
+    "surface_offset": {"surface_offset": 0.0},
+    "density_width": {"density_width": 20.0},
+    "point_covariance": {"point_covariance": False},
+    "attach": {"attach": False},
+    "velocity_weight": {"velocity_weight": 0.0},
+    "back_check": {"back_check": 5.0},
+    "spread_weight": {"spread_weight": 0.1},
+    "split": {"split": False},
+    "confirm_time": {"confirm_time": 0.0},
+    "centroid_noise": {"centroid_noise": 0.005},
+    "coast_time": {"coast_time": 10.0, "report_coast": 5.0},
+    "person or not": {"least_height": 0.0, "least_width": 0.0, "most_height": 10.0},
+}
+
+
+def _mean_in_the_image(points: SpacePoints, measurement: PairMeasurement, config: StereoConfig) -> Array:
+    """Returns the place (3,), m, whose (u, v, d) are the means of those of the points, with the tracker's weights."""
+    weights = measurement.weights(points, config.density_width)
+    mean = np.average(project_pair(measurement.camera, points.pos), axis=0, weights=weights)
+    return np.asarray(back_project(measurement.camera, mean[None])[0])
+
+
+def _measured_places(offset: Array, cov: Array, spread: Array) -> Array:
+    del cov, spread
+    return offset
+
+
+def _no_parent(self: Stereo, id: Ints) -> Ints:
+    del self
+    return np.full(len(id), NO_ID)
+
+
+RULES: Mapping[str, tuple[object, str, object]] = {
+    "mean in space": (space_group, "mean_position", _mean_in_the_image),
+    "expected places": (tracker, "expected_places", _measured_places),
+    "settled": (merging, "SETTLED", 0.0),
+    "children": (Stereo, "_former", _no_parent),
+}
+"""Owner, name and replacement by the name of the row."""
+
+
+def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
+    """Prints, for each decision switched off, the paired difference over all scenes, and returns the rows."""
+    every = {name: Variant(name, params) for name, params in ABLATIONS.items()}
+    every |= {name: Variant(name, replaced=(change,)) for name, change in RULES.items()}
+    wanted = list(every) if args.options is None else args.options.split(",")
+    made = measured(args, (Variant("stereo"), *(every[name] for name in wanted)))
+    rows = {}
+    for name in wanted:
+        cells = []
+        for key in ("group_F1_hull", "group_MOTA", "error", "extra"):
+            pairs = [
+                (by[name][s].get(key, np.nan), by["stereo"][s].get(key, np.nan))
+                for by in made.values()
+                for s in by[name]
+            ]
+            off = np.array([a - b for a, b in pairs])
+            off = off[np.isfinite(off)]
+            cells.append(signed(*mean_of(off)) if len(off) else "–")
+        rows[name] = cells
+    columns = ("group F1", "MOTA", "error, m", "extra")
+    table("Each decision switched off: difference to the defaults", "decision", columns, rows)
+    return made
