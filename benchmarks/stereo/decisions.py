@@ -2,8 +2,8 @@
 
 `ABLATIONS` are decisions that have a parameter. `RULES` have none, so that code of the tracker is replaced: `mean in
 space` measures the mean of the points' (u, v, d); `expected places` puts hulls round the measured places of points;
-`settled` counts merges of groups that were there for less than 1 s; `children` takes no new group for the child of one
-that had its points.
+`settled` counts merges of groups that were there for less than 1 s. With --store, rows of earlier runs count, too, so
+that decisions may have different numbers of sequences.
 """
 
 from __future__ import annotations
@@ -17,13 +17,11 @@ from benchmarks.stereo.scenes import Variant, mean_of, measured
 from benchmarks.stereo.stored_rows import Row
 from benchmarks.support.tables import signed, table
 from sim.scene.stereo import back_project, project_pair
-from sim.types import Array, Ints
+from sim.types import Array
 from tracking.detect.features import SpacePoints
-from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo import merging, space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.measurement import PairMeasurement
-from tracking.papers.stereo.tracker import Stereo
 
 ABLATIONS: Mapping[str, Mapping[str, object]] = {
     "surface_offset": {"surface_offset": 0.0},
@@ -53,16 +51,10 @@ def _measured_places(offset: Array, cov: Array, spread: Array) -> Array:
     return offset
 
 
-def _no_parent(self: Stereo, id: Ints) -> Ints:
-    del self
-    return np.full(len(id), NO_ID)
-
-
 RULES: Mapping[str, tuple[object, str, object]] = {
     "mean in space": (space_group, "mean_position", _mean_in_the_image),
     "expected places": (tracker, "expected_places", _measured_places),
     "settled": (merging, "SETTLED", 0.0),
-    "children": (Stereo, "_former", _no_parent),
 }
 """Owner, name and replacement by the name of the row."""
 
@@ -75,7 +67,7 @@ def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
     made = measured(args, (Variant("stereo"), *(every[name] for name in wanted)))
     rows = {}
     for name in wanted:
-        cells = []
+        cells = [str(sum(len(by[name]) for by in made.values()))]
         for key in ("group_F1_hull", "group_MOTA", "error", "extra"):
             pairs = [
                 (by[name][s].get(key, np.nan), by["stereo"][s].get(key, np.nan))
@@ -86,6 +78,6 @@ def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
             off = off[np.isfinite(off)]
             cells.append(signed(*mean_of(off)) if len(off) else "–")
         rows[name] = cells
-    columns = ("group F1", "MOTA", "error, m", "extra")
+    columns = ("sequences", "group F1", "MOTA", "error, m", "extra")
     table("Each decision switched off: difference to the defaults", "decision", columns, rows)
     return made

@@ -6,8 +6,6 @@ measured for `coast_time`, a tentative one for `confirm_time`, is deleted.
 
 from __future__ import annotations
 
-import numpy as np
-
 from sim.types import Ints
 from tracking.detect.features import SpacePoints
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
@@ -15,21 +13,12 @@ from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.space_group import Motion3D, SpaceGroup, newborn
 
 
-def born(points: SpacePoints, group: Ints, former: Ints, motion: Motion3D, t: float) -> list[SpaceGroup]:
+def born(points: SpacePoints, group: Ints, motion: Motion3D, t: float) -> list[SpaceGroup]:
     """Return the tentative groups that free points form (sec. 3.4).
 
-    group (M,): number of each point's group by eq. 12, -1 for none; former (M,): id of the confirmed group that had
-    the point in the last frame, NO_ID for none. t: s. A group most of whose points another group had
-    is its child (ours).
+    group (M,): number of each point's group by eq. 12, -1 for none. t: s.
     """
-    made = []
-    for k in range(int(group.max(initial=-1)) + 1):
-        mine = group == k
-        new = newborn(points.at(mine), motion, t)
-        ids, count = np.unique(former[mine], return_counts=True)
-        new.parent = int(ids[count.argmax()])
-        made.append(new)
-    return made
+    return [newborn(points.at(group == k), motion, t) for k in range(int(group.max(initial=-1)) + 1)]
 
 
 def confirm(groups: list[SpaceGroup], config: StereoConfig, t: float, ids: GroupIds) -> list[WholeGroupEvent]:

@@ -99,7 +99,7 @@ class StereoConfig(BackgroundSettings):
     )
     centroid_noise: float = param(
         0.1, (0.005, 1.0), "m",
-        "measurement noise of a group's mean beside that of its points, as points come and go (ours)", "log",
+        "v of eq. 5: measurement noise of a group's mean beside that of its points, as points come and go", "log",
     )  # fmt: skip
     density_width: float = param(
         0.15, (0.05, 20.0), "m",

@@ -32,11 +32,11 @@ LEAST_VARIANCE = 1e-6
 class SpaceGroup:
     """A group.
 
-    ekf: filter with the state x (6, 1), order x, x', y, y', z, z', and its covariance P. spread (6, 6): Sigma, in the
-    same order. count: N, number of its points in its last measured frame. id: NO_ID while tentative. first_seen,
-    last_seen: s; measured_time: s. parent: id of the group that had its points, or NO_ID. members (K, 3): its points
-    relative to its position, m, when it was measured last. apart_since: s since when its points have been unlinked
-    parts, nan if they are not.
+    ekf: filter with the state x (6, 1), order x, x', y, y', z, z', and its covariance P. spread (6, 6): Sigma, in
+    the same order. count: N, number of its points in its last measured frame. id: NO_ID while tentative.
+    first_seen, last_seen: s; measured_time: s. parent: id of the group that it split from, or NO_ID. members (K,
+    3): its points relative to its position, m, when it was measured last. apart_since: s since when its points have
+    been unlinked parts, nan if they are not.
     """
 
     ekf: ExtendedKalmanFilter

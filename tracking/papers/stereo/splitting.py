@@ -11,7 +11,6 @@ import numpy as np
 
 from sim.types import Ints
 from tracking.detect.features import SpacePoints
-from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo.measurement import VEL
 from tracking.papers.stereo.space_group import Motion3D, SpaceGroup, newborn
 
@@ -42,5 +41,5 @@ def split(group: SpaceGroup, points: SpacePoints, part: Ints, motion: Motion3D, 
     group.ekf, group.spread, group.count, group.members = own.ekf, own.spread, own.count, own.members
     group.apart_since = float("nan")
     for child in born:
-        child.parent = group.id if group.id != NO_ID else child.parent
+        child.parent = group.id
     return born

@@ -25,9 +25,9 @@ from typing import ClassVar
 import numpy as np
 
 from sim.geometry.footprints import FOOTPRINT
-from sim.types import Context, Detections, Frame, Ints, Plane, Tracks
+from sim.types import Context, Detections, Frame, Plane, Tracks
 from tracking.detect.features import SpacePoints
-from tracking.grouping.whole_groups import NO_ID, GroupIds
+from tracking.grouping.whole_groups import GroupIds
 from tracking.image_scale import required
 from tracking.papers.stereo.association import associated
 from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost
@@ -49,8 +49,8 @@ class Stereo:
     """The tracker `stereo`: groups of people in space, from pairs of pictures or from points.
 
     State: config, which may be replaced between two frames; groups, a list; ids; pictures: from pictures to points,
-    None from points; links: from detections to points; motion: the model of a step; had: ids of the points of the last
-    frame and of the confirmed groups that had them; plane; context. All but config exist after `reset` only.
+    None from points; links: from detections to points; motion: the model of a step; plane; context. All but config
+    exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("stereo", "points")
@@ -75,7 +75,6 @@ class Stereo:
         self.measurement: Measurement = (
             PlaceMeasurement() if self.pictures is None else PairMeasurement(self.pictures.camera)
         )
-        self.had: tuple[Ints, Ints] = (np.zeros(0, np.int64), np.zeros(0, np.int64))
         flat = context.camera is None and context.px_per_m > 0
         self.plane: Plane = "space" if self.pictures is not None else "image" if flat else "ground"
         self.scale = 1.0
@@ -127,7 +126,6 @@ class Stereo:
         radius, least, update = (
             (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.least_group, c.least_features)
         )
-        former = self._former(points.id)
         owner = associated(self.groups, points, c, radius)
         children: list[SpaceGroup] = []
         for k, group in enumerate(self.groups):
@@ -140,21 +138,5 @@ class Stereo:
                 group.members = expected_places(group.members, mine.cov, flat)
             if c.split:
                 children += split(group, mine, sphere_groups(mine.pos, radius, least), motion, t)
-        self._remember(points, owner)
-        free = owner < 0
-        loose = points.at(free)
-        children += born(loose, sphere_groups(loose.pos, radius, least), former[free], motion, t)
-        self.groups += children
-
-    def _former(self, id: Ints) -> Ints:
-        """Returns for each point the id of the confirmed group that had it in the last frame, (M,), or NO_ID."""
-        known, group = self.had
-        if not len(known):
-            return np.full(len(id), NO_ID)
-        place = np.minimum(np.searchsorted(known, id), len(known) - 1)
-        return np.where(known[place] == id, group[place], NO_ID)
-
-    def _remember(self, points: SpacePoints, owner: Ints) -> None:
-        ids = np.array([*(g.id for g in self.groups), NO_ID], np.int64)
-        order = np.argsort(points.id)
-        self.had = points.id[order], ids[owner][order]
+        loose = points.at(owner < 0)
+        self.groups += children + born(loose, sphere_groups(loose.pos, radius, least), motion, t)

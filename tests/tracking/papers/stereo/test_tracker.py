@@ -192,6 +192,14 @@ def test_a_group_whose_points_part_splits() -> None:
     assert "split" not in kinds(scripted(together(walkers(0, 20, [0, 5, 1], [0.8, 0, 0], 150)))[1])
 
 
+def test_points_that_appear_far_from_their_group_enter() -> None:
+    """They are no part that splits, as the group has not moved apart."""
+    seen = together(walkers(0, 20, [0, 5, 1], [0, 0, 0], 30))
+    far = together(walkers(0, 10, [0, 5, 1], [0, 0, 0], 30), walkers(1, 10, [5, 5, 1], [0, 0, 0], 30, first=11))
+    _, tracks = scripted([*seen, *far])
+    assert kinds(tracks) == ["enter", "enter"]
+
+
 def test_a_group_that_is_gone_is_deleted() -> None:
     steps = together(walkers(0, 12, [1, 5, 1], [1, 0, 0], 30))
     tracker, tracks = scripted([*steps, *[SpacePoints.none()] * 60])
