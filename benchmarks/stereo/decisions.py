@@ -57,14 +57,17 @@ RULES: Mapping[str, tuple[object, str, object]] = {
     "settled": (merging, "SETTLED", 0.0),
 }
 """Owner, name and replacement by the name of the row."""
+VARIANTS: Mapping[str, Variant] = {
+    **{name: Variant(name, params) for name, params in ABLATIONS.items()},
+    **{name: Variant(name, replaced=(change,)) for name, change in RULES.items()},
+}
+"""The tracker without a decision, by the name of the row."""
 
 
 def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
     """Prints, for each decision switched off, the paired difference over all scenes, and returns the rows."""
-    every = {name: Variant(name, params) for name, params in ABLATIONS.items()}
-    every |= {name: Variant(name, replaced=(change,)) for name, change in RULES.items()}
-    wanted = list(every) if args.options is None else args.options.split(",")
-    made = measured(args, (Variant("stereo"), *(every[name] for name in wanted)))
+    wanted = list(VARIANTS) if args.options is None else args.options.split(",")
+    made = measured(args, (Variant("stereo"), *(VARIANTS[name] for name in wanted)))
     rows = {}
     for name in wanted:
         cells = [str(sum(len(by[name]) for by in made.values()))]

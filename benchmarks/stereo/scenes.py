@@ -27,10 +27,10 @@ from benchmarks.support.tables import interval, number, table
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry, resolve
 from sim.sequence import simulate
+from sim.types import DetectionMode, Tracks
 from sim.types import Sequence as Recording
-from sim.types import Tracks
 from tracking.papers.stereo.config import StereoConfig
-from tracking.run import track
+from tracking.run import TrackingRun, track
 from tracking.scoring import evaluate
 from tracking.stats import mean_interval
 
@@ -78,12 +78,17 @@ def recordings(entry: Entry, seeds: Iterable[int]) -> Iterator[tuple[int, Record
         yield seed, in_memory(live)
 
 
-def row_of(sequence: Recording, variant: Variant) -> Row:
-    """Returns position errors and scores of one sequence."""
+def tracked(sequence: Recording, variant: Variant, detections: DetectionMode) -> TrackingRun:
+    """Returns the tracks of one sequence by a variant."""
     with ExitStack() as replaced:
         for owner, name, value in variant.replaced:
             replaced.enter_context(mock.patch.object(owner, name, value))
-        run = track("stereo", sequence, params=variant.params or None, detections="image")
+        return track("stereo", sequence, params=variant.params or None, detections=detections)
+
+
+def row_of(sequence: Recording, variant: Variant) -> Row:
+    """Returns position errors and scores of one sequence."""
+    run = tracked(sequence, variant, "image")
     truth = sequence.truth
     assert truth is not None
     scores = evaluate(truth, run)
