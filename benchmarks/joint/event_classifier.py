@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.joint.runs import sequences
 from benchmarks.support import tables
-from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA
+from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, seeds_text
 from sim.io.source import open_source
 from sim.types import Array, Truth
 from tracking.fitting.joint_events import (
@@ -23,6 +25,16 @@ from tracking.fitting.joint_events import (
 from tracking.papers.joint.config import FITTED, TERMS, JointConfig
 
 CHORD = 0.5  # s over which velocities of boxes are measured
+
+
+def classifier(given: argparse.Namespace) -> None:
+    """Prints the scores of the event classifier on true partitions of unseen seeds, or of recordings."""
+    if given.recordings:
+        recordings(given.data)
+        return
+    truths = [sequence.truth for sequence in sequences(given.seeds)]
+    rows = [event_rows(t, JointConfig().lag, k, wrong=False) for k, t in enumerate(truths) if t is not None]
+    report(f"friends-meet, seeds {seeds_text(given.seeds)}", rows, truths[0].fps if truths[0] else 1.0)
 
 
 def report(title: str, parts: Iterable[EventRows], fps: float) -> None:

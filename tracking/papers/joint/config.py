@@ -18,7 +18,6 @@ import numpy as np
 from sim.types import Array
 from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
-from tracking.papers.joint import group_events_kernels as events
 
 FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8"))[
     "params"
@@ -26,7 +25,6 @@ FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classif
 FITTED_MIXTURE: dict[str, float] = tomllib.loads(
     Path(__file__).with_name("dirichlet_process.toml").read_text(encoding="utf-8")
 )["params"]
-SIZE_PRIORS = {"none": events.SIZE_NONE, "merge": events.SIZE_MERGE, "all": events.SIZE_ALL}
 TERMS = (
     "distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "bias",
 )  # fmt: skip
@@ -170,9 +168,6 @@ class JointConfig(BackgroundSettings):
         0.5, (0.05, 2.0), "m", "s_0: prior scatter of a cluster, as of one person more (ours)", "log"
     )
     apart: float = param(2.0, (0.5, 10.0), "m", "D_0: distance of a virtual other cluster (ours)", "log")
-    velocity_time: float = param(
-        1.0, (0.0, 5.0), "s", "m per m/s: weight of velocities beside places in the validity (ours)"
-    )
 
     partition_dynamics: str = param(
         "classifier",
@@ -211,9 +206,9 @@ class JointConfig(BackgroundSettings):
     )
     size_prior: str = param(
         "merge",
-        ("merge", "all", "none"),
+        ("merge", "all"),
         "",
-        "events on which the prior over group sizes acts; all: the paper, merge and none: ours",
+        "events on which the prior over group sizes acts; all: the paper, merge: ours",
         "categorical",
     )
     size_mean: float = param(1.0, (0.0, 20.0), "people", "mu of the prior over group sizes")
@@ -281,5 +276,5 @@ class JointConfig(BackgroundSettings):
 
     def rules(self, dt: float, lag: float) -> Array:
         """Return the rules (6,) of events in a step of dt s, as group_events_kernels has them; lag: s."""
-        size = SIZE_PRIORS[self.size_prior]
-        return np.array([dt / lag, self.sharpness, self.event_rate, size, self.size_mean, self.size_std])
+        every = self.size_prior == "all"
+        return np.array([dt / lag, self.sharpness, self.event_rate, every, self.size_mean, self.size_std])

@@ -52,7 +52,7 @@ class FrameModel:
 
     def individuals(self, x: Array) -> tuple[Array, Array]:
         """Step 4: pi(X_{t+1} | X_{0:t}, y)."""
-        c, old = self.config, _states(x)
+        c, old = self.config, newest(x)
         shape = x.shape[0], x.shape[1]
         normals, uniforms = self.motion.standard_normal((*shape, STATE)), self.choices.random(shape)
         proposal = Proposal(self.sigma, self.noise, self.dt, c.alpha, c.proposal == "informed")
@@ -75,7 +75,7 @@ class FrameModel:
         out = np.zeros(z.shape[:2])
         if variant in ("VAR1", "VAR2", "VAR3"):
             return out
-        late, early = _states(new), _states(x)
+        late, early = newest(new), newest(x)
         precision, scale = precision_of(self.sigma)
         own = np.empty(late.shape[:2])
         own_dynamics(late, early, precision, scale, self.dt, own)
@@ -99,14 +99,14 @@ class FrameModel:
         if c.partition_dynamics == "dirichlet":
             chance = np.full(shape[2], -math.expm1(-c.redraw_rate * self.dt))
             dirichlet_process_kernels.propose(
-                _states(new), out, chance, self.events.random((*shape, 2)), c.mixture
+                newest(new), out, chance, self.events.random((*shape, 2)), c.mixture
             )  # fmt: skip
             return out
-        late, early = _states(new), np.ascontiguousarray(x[..., -STATE:])
+        late, early = newest(new), np.ascontiguousarray(x[..., -STATE:])
         uniforms = self.events.random((*shape, 3))
         lag = x.shape[-1] // STATE * self.dt
         group_events_kernels.propose(
-            early, late, self._points(late), out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
+            early, late, out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
         )  # fmt: skip
         return out
 
@@ -118,10 +118,10 @@ class FrameModel:
         if c.variant == "VAR3":
             return out
         if c.validity == "bayesian":
-            cluster_evidence_kernels.log_evidences(_states(new), z, c.mixture, out)
+            cluster_evidence_kernels.log_evidences(newest(new), z, c.mixture, out)
             out *= c.evidence_rate * self.dt
         else:
-            partition_kernels.validities(self._points(_states(new)), z, c.scales, out)
+            partition_kernels.validities(newest(new), z, c.scales, out)
             out *= -c.validity_rate * self.dt
         if c.belief_rate > 0:
             worth = np.empty_like(out)
@@ -131,20 +131,9 @@ class FrameModel:
             out -= log_sum(out)[:, None] - math.log(z.shape[1])
         return np.asarray(out)
 
-    def _points(self, state: Array) -> Array:
-        """Returns states (N_x, K, 4) as the validity sees them: places, and velocities as lengths, m."""
-        return validity_points(state, self.config.velocity_time)
 
-
-def validity_points(x: Array, velocity_time: float) -> Array:
-    """Return the newest states of X (N_x, K, 4 or more) as the validity sees them, (N_x, K, 4): velocities as m."""
-    points = _states(x).copy()
-    points[..., 2:] *= velocity_time
-    return points
-
-
-def _states(x: Array) -> Array:
-    """Returns the newest states of X, (N_x, K, 4)."""
+def newest(x: Array) -> Array:
+    """Return the newest states of X, (N_x, K, 4), contiguous."""
     return np.ascontiguousarray(x[..., :STATE])
 
 

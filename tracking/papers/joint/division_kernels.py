@@ -23,9 +23,9 @@ ONE, TWO = np.int64(1), np.int64(2)
 def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: float, scales: Array, label: Ints) -> None:
     """Divide cluster g into two parts, drawn with probabilities exp(-sharpness d_cl) of the two parts (ours).
 
-    points (K, D): m; cluster (K,); uniform in [0, 1); label (K,): changed in place. Up to MOST_LISTED people all
-    divisions are candidates; of larger groups those that leave one person out, and cuts across the first principal axis
-    of the points.
+    points (K, D): as validity_of; cluster (K,); uniform in [0, 1); label (K,): changed in place. Up to MOST_LISTED
+    people all divisions are candidates; of larger groups those that leave one person out, and cuts across the first
+    principal axis of the points.
     """
     members = members_of(cluster, g)
     n, dims = len(members), points.shape[1]
@@ -133,8 +133,8 @@ def candidates(points: Array) -> Ints:
 def place_newcomer(points: Array, label: Ints, person: int, uniforms: Array, sharpness: float, scales: Array) -> None:
     """Draw whether a person joins the nearest cluster, in all partitions in which the person is alone (ours).
 
-    points (N_x, K, D): m; label (N_x, N_z, K): changed in place; uniforms (N_x, N_z). The probabilities of apart and
-    together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one.
+    points (N_x, K, D): as validity_of; label (N_x, N_z, K): changed in place; uniforms (N_x, N_z). The probabilities of
+    apart and together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one.
     """
     particles, partitions, n = label.shape
     cluster, head = np.empty(n, np.int64), np.empty(n, np.int64)

@@ -25,11 +25,9 @@ LOG_KL_MOST = 8.0
 """Largest log(1 + d_KL); also its value without another group."""
 FEATURES = 6
 """d_KL, d_v, d_intra at the earlier time, then at the later one."""
-RATIO, SHARPNESS, RATE, SIZE_MODE, SIZE_MEAN, SIZE_STD = range(6)
+RATIO, SHARPNESS, RATE, SIZE_OF_ALL, SIZE_MEAN, SIZE_STD = range(6)
 """Slots of `rules` (6,): time step over lag; weight of the validity in the choice of parts; factor of the rate of
-events; where the size prior acts; its mean and standard deviation, people."""
-SIZE_NONE, SIZE_MERGE, SIZE_ALL = range(3)
-"""Values of rules[SIZE_MODE]: the size prior acts on no event, on Merge alone, on every event."""
+events; 1 if the size prior acts on all events, 0 if on Merge alone; its mean and standard deviation, people."""
 ORDER, EVENT, PARTS = range(3)
 """Slots of a person's uniforms: place of its group in the order of visits; event; parts of a split."""
 
@@ -132,13 +130,11 @@ def event_probabilities(
     for k in range(FEATURES):
         scores[0] += weights[0, k] * features[k]
         scores[1] += weights[1, k] * features[k]
-    mode = rules[SIZE_MODE]
-    if mode != SIZE_NONE:
-        mean, spread = rules[SIZE_MEAN], rules[SIZE_STD]
-        scores[0] -= ((size + other - mean) / spread) ** 2 / 2
-        if mode == SIZE_ALL:
-            scores[1] -= ((size / 2 - mean) / spread) ** 2 / 2
-            scores[2] -= ((size - mean) / spread) ** 2 / 2
+    mean, spread = rules[SIZE_MEAN], rules[SIZE_STD]
+    scores[0] -= ((size + other - mean) / spread) ** 2 / 2
+    if rules[SIZE_OF_ALL]:
+        scores[1] -= ((size / 2 - mean) / spread) ** 2 / 2
+        scores[2] -= ((size - mean) / spread) ** 2 / 2
     if other == 0:
         scores[0] = -np.inf
     if size < 2:
@@ -157,7 +153,6 @@ def event_probabilities(
 def propose(
     early: Array,
     late: Array,
-    points: Array,
     label: Ints,
     uniforms: Array,
     weights: Array,
@@ -166,9 +161,9 @@ def propose(
 ) -> None:
     """Draw Z_{t+1} from the joint group proposal for all particles: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7.
 
-    early, late (N_x, K, 4): states at both times; points (N_x, K, D): the later ones as the validity sees them, m;
-    label (N_x, N_z, K): Z_t, changed in place; uniforms (N_x, N_z, K, 3): of the heads of groups. weights, rules: as
-    event_probabilities; scales: as partition_kernels.SCATTER and the following.
+    early, late (N_x, K, 4): states at both times; label (N_x, N_z, K): Z_t, changed in place; uniforms (N_x, N_z, K,
+    3): of the heads of groups. weights, rules: as event_probabilities; scales: as partition_kernels.SCATTER and the
+    following.
 
     Groups are visited in random order. A group that an event has changed is not visited. A pair of groups that are each
     other's nearest draws its merge once, so that the probability is the pair's (ours).
@@ -217,4 +212,4 @@ def propose(
                             label[i, j, k] = name
                 elif u < p_merge + p_split:
                     changed[g] = True
-                    divide(points[i], cluster, g, uniforms[i, j, head[g], PARTS], rules[SHARPNESS], scales, label[i, j])
+                    divide(late[i], cluster, g, uniforms[i, j, head[g], PARTS], rules[SHARPNESS], scales, label[i, j])

@@ -76,8 +76,9 @@ def clusters(label: Ints, cluster: Ints, head: Ints) -> int:
 def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre: Array, scatter: Array) -> float:
     """Return d_cl(Z, X) of one partition: the Davies-Bouldin index with a floor of the scatter (ours).
 
-    points (K, D): m; cluster (K,): number of each person's cluster, below `count`; scales: as SCATTER, APART.
-    centre (K, D), scatter (K,): work space. S_g = (sum |x - c_g| + s_0) / (n_g + 1); R_g = max(max_h (S_g + S_h) /
+    points (K, D): the data that are clustered; the tracker gives the paper's X: states x, y, m, and vx, vy, m/s.
+    cluster (K,): number of each person's cluster, below `count`; scales: as SCATTER, APART. centre (K, D), scatter
+    (K,): work space. S_g = (sum |x - c_g| + s_0) / (n_g + 1); R_g = max(max_h (S_g + S_h) /
     max(|c_g - c_h|, s_0), S_g / D_0); the index is the mean of R_g over all clusters, people alone included.
     """
     n, dims = points.shape
@@ -119,7 +120,10 @@ def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre:
 
 @njit(cache=True)
 def validities(points: Array, label: Ints, scales: Array, out: Array) -> None:
-    """Write d_cl(Z, X) of each partition, (N_x, N_z); points (N_x, K, D), m; label (N_x, N_z, K)."""
+    """Write d_cl(Z, X) of each partition, (N_x, N_z); points (N_x, K, D); label (N_x, N_z, K).
+
+    points: as validity_of.
+    """
     particles, partitions, n = label.shape
     cluster, head = np.empty(n, np.int64), np.empty(n, np.int64)
     centre, scatter = np.empty((n, points.shape[2])), np.empty(n)

@@ -7,7 +7,7 @@ import numpy as np
 from tracking.papers.joint import dirichlet_process_kernels
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
-from tracking.papers.joint.distributions import STATE, validity_points
+from tracking.papers.joint.distributions import newest
 from tracking.papers.joint.division_kernels import place_newcomer
 
 
@@ -19,9 +19,9 @@ def place(nested: Nested, new: int, config: JointConfig, draws: np.random.Genera
     n, c, people = nested, config, nested.x.shape[1]
     if c.partition_dynamics == "dirichlet":
         chance = (np.arange(people) >= people - new).astype(float)
-        state, uniforms = np.ascontiguousarray(n.x[..., :STATE]), draws.random((*n.z.shape, 2))
-        dirichlet_process_kernels.propose(state, n.z, chance, uniforms, c.mixture)
+        uniforms = draws.random((*n.z.shape, 2))
+        dirichlet_process_kernels.propose(newest(n.x), n.z, chance, uniforms, c.mixture)
         return
-    points = validity_points(n.x, c.velocity_time)
+    state = newest(n.x)
     for person in range(people - new, people):
-        place_newcomer(points, n.z, person, draws.random(n.log_q.shape), c.sharpness, c.scales)
+        place_newcomer(state, n.z, person, draws.random(n.log_q.shape), c.sharpness, c.scales)

@@ -24,7 +24,7 @@ Departures, all ours:
 - The proposal is a mixture for each person, not of products. Its second part is p(x' | x, y), the product of dynamics
   and likelihood. Sigma is made of two noises per root second.
 - Each person is resampled by the own part of the weight, and the particles by the rest.
-- The Davies-Bouldin index has a prior scatter and a virtual other cluster, sees velocities, and acts per second.
+- The Davies-Bouldin index has a prior scatter and a virtual other cluster, and acts per second.
 - People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
   features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
 - p(Z | X) also has the beliefs of pairs (`tracking.grouping.pair_belief`), with a memory of the groups reported.

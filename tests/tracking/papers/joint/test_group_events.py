@@ -21,8 +21,8 @@ def weights(merge=-100.0, split=-100.0):
     return table
 
 
-def rules(ratio=0.25, sharpness=8.0, rate=1.0, mode=events.SIZE_NONE, mean=1.0, std=1.5):
-    return np.array([ratio, sharpness, rate, mode, mean, std])
+def rules(ratio=0.25, sharpness=8.0, rate=1.0, every=False, mean=1.0, std=np.inf):
+    return np.array([ratio, sharpness, rate, every, mean, std])
 
 
 def proposed(pos, label, table, rule=None, count=COUNT, seed=0):
@@ -31,7 +31,7 @@ def proposed(pos, label, table, rule=None, count=COUNT, seed=0):
     state = np.concatenate([pos, np.zeros_like(pos)], axis=1)[None]
     labels = np.tile(np.asarray(label, np.int64), (1, count, 1))
     uniforms = np.random.default_rng(seed).random((1, count, len(pos), 3))
-    events.propose(state, state, state, labels, uniforms, table, rules() if rule is None else rule, SCALES)
+    events.propose(state, state, labels, uniforms, table, rules() if rule is None else rule, SCALES)
     return labels[0]
 
 
@@ -75,14 +75,14 @@ def test_over_a_lag_the_probabilities_are_the_classifiers():
 def test_the_size_prior_acts_on_merges_or_on_all_events():
     features, table = np.zeros(8), weights(0.0, 0.0)
 
-    def odds(mode, size, other):
-        merge, split = events.event_probabilities(features, size, other, table, rules(1.0, mode=mode))
+    def odds(every, size, other, std=1.5):
+        merge, split = events.event_probabilities(features, size, other, table, rules(1.0, every=every, std=std))
         return merge / (1 - merge - split), split / (1 - merge - split)
 
-    assert odds(events.SIZE_NONE, 3, 3) == pytest.approx((1, 1))
-    assert odds(events.SIZE_MERGE, 3, 3) == pytest.approx((np.exp(-(25 / 4.5)), 1))
-    assert odds(events.SIZE_ALL, 6, 1)[1] == pytest.approx(106, rel=0.01)
-    assert odds(events.SIZE_ALL, 4, 1)[1] == pytest.approx(5.9, rel=0.02)
+    assert odds(True, 3, 3, std=np.inf) == pytest.approx((1, 1))
+    assert odds(False, 3, 3) == pytest.approx((np.exp(-(25 / 4.5)), 1))
+    assert odds(True, 6, 1)[1] == pytest.approx(106, rel=0.01)
+    assert odds(True, 4, 1)[1] == pytest.approx(5.9, rel=0.02)
 
 
 def test_a_group_splits_into_all_pairs_of_parts_by_their_validity():

@@ -7,7 +7,8 @@ import pytest
 
 from tests.reference_joint import all_partitions, binder_gain, label_of, validity
 from tracking.papers.joint import partition_kernels
-from tracking.papers.joint.distributions import stam_cumulated
+from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.distributions import FrameModel, stam_cumulated
 from tracking.papers.joint.estimate import binder_partition, groups_of, histogram_partition
 
 SCALES = np.array([0.5, 2.0])
@@ -61,6 +62,17 @@ def test_the_true_partition_is_the_best_of_all(points):
 def test_the_example_of_two_pairs():
     labels = [label_of(p) for p in ([[0, 1], [2, 3]], [[0, 2], [1, 3]], [[0], [1], [2], [3]], [[0, 1, 2, 3]])]
     assert validities(PAIRS, labels)[[0, 2, 3]] == pytest.approx([0.2, 0.71, 2.05], abs=0.01)
+
+
+def test_the_data_of_the_validity_are_the_states():
+    """Eq. 4: d_cl(Z, X) with X in m and m/s, so that people who pass each other are no cluster."""
+    config = JointConfig(belief_rate=0.0, validity_rate=3.0)
+    model = FrameModel(config, 0.1, 0.1, np.full((4, 2), np.nan), np.zeros((4, 4)), *np.random.default_rng(0).spawn(3))
+    state = np.array([[0, 0, 1, 0], [0, 0.7, 1, 0], [5, 0, 1, 0], [5, 0.7, -1, 0]])
+    parts = list(all_partitions(4))
+    found = model.energy(state[None], np.array([[label_of(p) for p in parts]]))[0]
+    np.testing.assert_allclose(found, [-0.3 * validity(state, p, *SCALES) for p in parts])
+    assert sorted(map(sorted, parts[int(found.argmax())])) == [[0, 1], [2], [3]]
 
 
 def test_a_pair_is_better_together_below_a_distance():

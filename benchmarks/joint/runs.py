@@ -1,0 +1,104 @@
+"""Runs of `joint` and of what it is compared with on simulated sequences, and the cells of their tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from benchmarks.support import tables
+from scenarios.errors import FlockscopeError
+from scenarios.loading.resolve import resolve
+from sim.sequence import simulate
+from sim.types import DetectionMode
+from sim.types import Sequence as Recording
+from tracking.papers.joint.config import JointConfig
+from tracking.run import track
+from tracking.scoring import evaluate
+from tracking.stats import paired
+
+Row = dict[str, float]
+SHARES = ("1-FP", "1-FN", "GDSR", "MOTA")
+PX_PER_M = 40.0
+OTHERS = (
+    "event F1", "latency, s (median)", "pairwise F1", "HOTA", "effective share", "of the least person", "ancestors",
+    "frames/s",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A tracker, its parameters and its detections; seeds: False if its seed has no effect."""
+
+    name: str
+    tracker: str = "joint"
+    params: Mapping[str, object] = field(default_factory=dict)
+    detections: DetectionMode = "file"
+    seeds: bool = True
+
+
+def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settings: Sequence[str] = ()) -> list[Row]:
+    """Returns the scores of a variant for each filter seed, with frames/s and the tracker's diagnostics."""
+    params: object = variant.params
+    if variant.tracker == "joint":
+        params = JointConfig.from_dict(dict(variant.params)).with_set(*settings)
+    rows = []
+    for seed in list(seeds)[: None if variant.seeds else 1]:
+        run = track(variant.tracker, sequence, params=params, detections=variant.detections, seed=seed)
+        own = {k: v for k, v in run.info.get("diagnostics", {}).items() if v is not None}
+        rows.append({**evaluate(sequence.truth, run), **own, "speed": run.info["frames_per_second"]})
+    return rows
+
+
+def mean_row(rows: Sequence[Row]) -> Row:
+    """Returns the mean of each score over filter seeds; nan where a seed has none."""
+    return {key: float(np.mean([row.get(key, np.nan) for row in rows])) for key in rows[0]}
+
+
+def sequences(seeds: Iterable[int], suite: str = "friends-meet") -> Iterable[Recording]:
+    """Yields the sequences of a suite; entries whose script is not fulfilled for a seed are named and left out."""
+    for entry in resolve(f"suite:{suite}"):
+        for seed in seeds:
+            try:
+                made = simulate(entry.scenario, seed, entry.repeat, ())
+                assert made.truth is not None
+            except FlockscopeError as error:
+                print(f"{entry.name}, seed {seed}, left out: {error.line()}", flush=True)
+                continue
+            yield made
+
+
+def pooled(rows: Sequence[Row], end: str) -> list[str]:
+    """Returns cells of 1-FP, 1-FN, GDSR and MOTA of the frames of all sequences together, %, and MOTP, px."""
+
+    def total(name: str) -> float:
+        return float(np.nansum([row[f"group_{name}{end}"] for row in rows]))
+
+    there = total("TP") + total("FN")
+    found = [(r[f"group_TP{end}"], r[f"group_FN{end}"], r[f"group_GDSR{end}"], r[f"group_MOTP{end}"]) for r in rows]
+    success = sum((tp + fn) * gdsr for tp, fn, gdsr, _ in found if tp + fn)
+    place = sum(tp * motp for tp, _, _, motp in found if tp) / max(total("TP"), 1)
+    wrong = total("FP") + total("FN") + total("IDSW")
+    shares = 1 - total("FP") / there, total("TP") / there, success / there, 1 - wrong / there
+    return [*(f"{100 * x:.1f}" for x in shares), f"{PX_PER_M * place:.1f}"]
+
+
+def others(rows: Sequence[Row]) -> list[str]:
+    """Returns cells of event F1, latency, pairwise F1, HOTA, effective shares, ancestors and frames/s: means."""
+
+    def mean(key: str) -> str:
+        values = [row.get(key, np.nan) for row in rows]
+        return tables.number(float(np.nanmean(values)) if np.isfinite(values).any() else np.nan)
+
+    latency = [row["event_latency"] for row in rows if np.isfinite(row["event_latency"])]
+    keys = ("pairwise_F1", "HOTA", "effective_particles", "effective_particles_of_a_person", "distinct_ancestors")
+    median = tables.number(float(np.median(latency))) if latency else "–"
+    return [mean("event_F1"), median, *(mean(key) for key in keys), mean("speed").partition(".")[0]]
+
+
+def difference(first: Sequence[Row], second: Sequence[Row], key: str) -> str:
+    """Returns the cell of the paired difference of a score, first minus second."""
+    a, b = (np.array([row[key] for row in rows]) for rows in (first, second))
+    both = np.isfinite(a) & np.isfinite(b)
+    return tables.signed(*map(float, paired(b[both], a[both])))

@@ -1,0 +1,88 @@
+"""Scores on friends-meet with other parameters: departures, the Dirichlet process, numbers of particles."""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+from benchmarks.joint.runs import (
+    OTHERS,
+    SHARES,
+    Row,
+    Variant,
+    difference,
+    mean_row,
+    measured,
+    others,
+    pooled,
+    sequences,
+)
+from benchmarks.support import chart, tables
+
+COUNTS = (10, 25, 50, 100)
+DEPARTURES = (
+    "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
+    "size_std=1.5", "size_std=50", "lag=0.1", "normaliser=sampled",
+    "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
+    "estimate=histogram", "validity=bayesian", "validity=bayesian evidence_rate=20", "partition_dynamics=dirichlet",
+)  # fmt: skip
+"""Settings of the mode ablation."""
+PROCESS = (
+    "", "validity=bayesian", "partition_dynamics=dirichlet",
+    "validity=bayesian partition_dynamics=dirichlet",
+)  # fmt: skip
+"""Settings of the mode process, run with beliefs and without."""
+
+
+def ablation(given: argparse.Namespace) -> None:
+    """Prints a table: rows are settings, columns scores pooled over frames and paired differences to the defaults."""
+    made, base = list(sequences(given.seeds)), []
+    deltas = {"GDSR": "group_GDSR", "MOTA": "group_MOTA", "event F1": "event_F1"}
+    shown = "event F1", "of the least person"
+    tables.head(["setting", *(f"{name}, %" for name in SHARES), *shown, *(f"Δ {name}" for name in deltas)])
+    for setting in ("", *(given.only.split(",") if given.only else DEPARTURES)):
+        v = Variant("")
+        rows = [mean_row(measured(s, v, given.filter_seeds, [*given.set, *setting.split()])) for s in made]
+        base = base or rows
+        differences = [difference(rows, base, key) for key in deltas.values()]
+        own = dict(zip(OTHERS, others(rows), strict=True))
+        tables.row([setting or "defaults", *pooled(rows, "_core")[:4], *(own[name] for name in shown), *differences])
+
+
+def process(given: argparse.Namespace) -> None:
+    """Prints a table: rows are settings with and without beliefs, with differences to the first row of each half."""
+    made = list(sequences(given.seeds))
+    deltas = ("GDSR", "MOTA", "1-FP", "1-FN")
+    tables.head(["setting", *(f"{k}, %" for k in SHARES), *OTHERS, *(f"Δ {k}" for k in deltas), "Δ event F1"])
+    for belief in ("", "belief_rate=0"):
+        base: list[Row] = []
+        for setting in given.only.split(",") if given.only else PROCESS:
+            words = [*given.set, *setting.split(), *belief.split()]
+            rows = [mean_row(measured(s, Variant(""), given.filter_seeds, words)) for s in made]
+            base = base or rows
+            differences = [difference(rows, base, key) for key in (*(f"group_{k}" for k in deltas), "event_F1")]
+            name = " ".join([setting, belief]).strip() or "defaults"
+            tables.row([name, *pooled(rows, "_core")[:4], *others(rows), *differences])
+
+
+def particles(given: argparse.Namespace) -> None:
+    """Prints a table over N_x and N_z."""
+    made, found = list(sequences(given.seeds)), {}
+    tables.head(["N_x", "N_z", "GDSR, %", "MOTA, %", *OTHERS])
+    for n_x, n_z in [(n, 50) for n in COUNTS] + [(50, n) for n in COUNTS if n != 50]:
+        v = Variant("", params={"particles": n_x, "partitions": n_z})
+        rows = [mean_row(measured(s, v, given.filter_seeds, given.set)) for s in made]
+        shares, speed = pooled(rows, "")[2:4], float(np.mean([row["speed"] for row in rows]))
+        found[n_x, n_z] = [*map(float, shares), speed]
+        tables.row([str(n_x), str(n_z), *shares, *others(rows)])
+    if given.chart:
+        lines = {
+            "over N_x, N_z = 50": [found[n, 50] for n in COUNTS],
+            "over N_z, N_x = 50": [found[50, n] for n in COUNTS],
+        }
+        panels = [
+            chart.Panel(name, COUNTS, {k: np.array(v)[:, column] for k, v in lines.items()}, "particles")
+            for column, name in enumerate(("GDSR, %", "MOTA, %", "frames/s"))
+        ]
+        chart.lines(panels, given.chart, columns=3)
