@@ -1,7 +1,7 @@
 """Algorithm 1: the decentralised particle filter of a state (X, Z), for any four distributions.
 
-N_x particles of X, and under each of them N_z particles of Z. A frame runs steps 4 to 7 and then 1 to 3, as the
-proposal of X uses the new frame. p_{N_z} are sums over the nested particles:
+N_x particles of X, and under each of them N_z particles of Z: p(Z, X | y) = p(Z | X, y) p(X | y) (eq. 2). A frame
+runs steps 4 to 7 and then 1 to 3, as the proposal of X uses the new frame. p_{N_z} are sums over the nested particles:
 
     p_{N_z}(y | X)  = 1/N_z sum_j p(y | X, Z_j)
     p_{N_z}(X' | X) = sum_j qbar_j p(X' | X, Z_j),   which is the normaliser of step 5

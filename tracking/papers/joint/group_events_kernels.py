@@ -124,7 +124,8 @@ def event_probabilities(
 
     features (6,); size, other: people in g and g', other = 0 if a merge is excluded; weights (2, 7): of Merge and
     Split, the constant last; rules: as RATIO and the following. The classifier gives probabilities over the lag,
-    against None; they are turned into those of a step as hazards (ours). One person does not split.
+    against None; they are turned into those of a step as hazards (ours). The prior N(|e|; mu, sigma) of sec. 4
+    multiplies them: |e| is the size after the event, of a split the mean of the two parts. One person does not split.
     """
     scores = np.array([weights[0, FEATURES], weights[1, FEATURES], 0.0])
     for k in range(FEATURES):
