@@ -1,10 +1,11 @@
 """What does the second eye earn? `stereo` beside `group-pda` and `blob` on the left pictures alone.
 
 In the crowded scene of the suite, with more or fewer groups (the chart), and on its stairs, where a single eye that
-takes everybody to stand on z = 0 is wrong. `people`: mean number of people in a frame, in all sequences of a row.
-`group-pda` tracks whole groups; the people of `blob` are grouped by the default belief. Group scores are by hulls, as
-`stereo` names no members: `group F1` (group_F1_hull), `1-FP`, `1-FN` and `MOTA` of groups, in strict frames. On the
-stairs also `error` of positions, m, and `found`, as in the mode `scenes`, for tracks in the world.
+takes everybody to stand on z = 0 is wrong. `people`: mean number of people in a frame, in all `sequences` of a row;
+with --store, those of earlier runs count, too. `group-pda` tracks whole groups; the people of `blob` are grouped by the
+default belief. Group scores are by hulls, as `stereo` names no members: `group F1` (group_F1_hull), `1-FP`, `1-FN` and
+`MOTA` of groups, in strict frames. On the stairs also `error` of positions, m, and `found`, as in the mode `scenes`,
+for tracks in the world.
 
 Hulls of `stereo` and `blob` are compared on the ground, those of `group-pda` in the image, where errors of depth hardly
 count. So `stereo, in the image` has the hulls of its groups projected to the image. `stereo - this`: paired differences
@@ -61,7 +62,7 @@ def density(args: argparse.Namespace) -> dict[str, list[str]]:
                 stored.add(scene, name, seed, found)
             stored.write()
             print(f"{scene} {seed}", file=sys.stderr, flush=True)
-    head(("scene", "people", "tracker", *KEYS, "stereo - this, group F1"))
+    head(("scene", "people", "sequences", "tracker", *KEYS, "stereo - this, group F1"))
     made: dict[str, list[str]] = {}
     people: list[float] = []
     curves: Curves = {title: {name: [] for name in ROWS} for title in SCORES}
@@ -77,7 +78,7 @@ def density(args: argparse.Namespace) -> dict[str, list[str]]:
             less = _interval([own[s]["group_F1_hull"] - by[name][s]["group_F1_hull"] for s in by[name]])
             cells = [*(interval(*v) for v in values.values()), signed(*less) if name in RIVALS else "–"]
             made[f"{scene} {name}"] = cells
-            row([scene, f"{people[-1]:.1f}", name, *cells])
+            row([scene, f"{people[-1]:.1f}", str(len(by[name])), name, *cells])
     _chart(args, people[: len(CROWDS)], curves)
     return made
 
