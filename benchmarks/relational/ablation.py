@@ -17,11 +17,11 @@ from benchmarks.support import tables
 from sim.types import Array, Bools, Ints, Sequence
 from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
-from tracking.papers.relational import sensor_kernels, tracker, transition_kernels
+from tracking.papers.relational import sensor_kernels, transition_kernels
 
 DEPARTURES = (
     "relation_evidence=state", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0",
-    "relation_bias=40 newcomer_share=0", "newcomer_share=0", "weights=joint", "NO_FACTORS", "NO_EDGE",
+    "relation_bias=40 newcomer_share=0", "newcomer_share=0", "weights=joint", "NO_FACTORS",
     "PAIR_BY_PAIR", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
     "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "least_existence=0",
     "birth_doubt=0.9", "clutter_density=0.02",
@@ -42,11 +42,10 @@ def _pair_by_pair(
 
 SWITCHES: dict[str, Any] = {
     "NO_FACTORS": lambda: patch.object(sensor_kernels, "partner_factors", lambda *arguments: None),
-    "NO_EDGE": lambda: patch.object(tracker, "inside", lambda pos, *_: np.ones(pos.shape[:-1], bool)),
     "PAIR_BY_PAIR": lambda: patch.object(transition_kernels, "relate", _pair_by_pair),
 }
-"""Departures without a parameter: a missed person has no factors of partners; people exist outside the picture; a
-person does not reconsider all relations at once."""
+"""Departures without a parameter: a missed person has no factors of partners; a person does not reconsider all
+relations at once."""
 
 
 def ablation(given: argparse.Namespace) -> None:

@@ -10,9 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Camera, Scene
-from tracking.detect.field_of_view import MIDDLE
 from tracking.papers.relational import occluder_kernels
 from tracking.papers.relational.particle_set import ParticleSet
+
+MIDDLE = 0.85
+"""Height of the middle of a body, m."""
 
 
 def hidden_share(pos: Array, weights: Array, camera: Camera | None, scene: Scene | None) -> Array:

@@ -29,7 +29,6 @@ Departures, all ours:
   probability, as people are hidden for a while.
 - Nobody is measured, dies or counts as missed behind pillars and walls of a known scene and behind other people. Hidden
   feet displace a point away from the camera.
-- Nobody exists outside the camera's picture.
 - A detection that is probably nobody's starts a person, who has no weight until the next frame.
 - People have weights of their own (factorised): sums over mappings in which all others are averaged. A missed person
   has those of the partners as factors. Particles are resampled if they are worth few, and drawn apart by a kernel.
@@ -45,7 +44,6 @@ import numpy as np
 
 from sim.rng import rng
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
-from tracking.detect.field_of_view import inside
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
 from tracking.image_scale import required
@@ -157,8 +155,6 @@ class Particle:
         transition_kernels.move(
             p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, pairs, spread, self.dt
         )
-        if not c.certain_sensor:
-            p.exist *= inside(p.pos, self.plane, self.context, self.unit)
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
         behind, self.cut = covered_by_people(p, camera, c.body_radius)

@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context, Detections, Frame, Scene
 from tracking.papers.relational.occluders import covered_by_people, hidden_share
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.tracker import Particle
 
-CAMERA = Camera(
-    "pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([0.0, -10.0, 3.0]), camera_rotation(0.2, 0.0)
-)
+CAMERA = Camera("pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([0.0, -10.0, 3.0]), np.eye(3))
 PILLAR = Scene(np.array([20.0, 20.0]), pillars=np.array([[0.0, 0.0, 0.3]]))
 WALL = Scene(np.array([20.0, 20.0]), walls=np.array([[[-1.0, 0.0], [1.0, 0.0]]]))
 

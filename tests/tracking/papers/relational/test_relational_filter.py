@@ -315,19 +315,6 @@ def test_the_papers_sensor_breaks_down_and_goes_on():
     assert ours.vanished == 0
 
 
-def test_who_leaves_the_picture_is_gone():
-    """Walking towards the edge of the picture and over it; somebody who is missed inside it is still there."""
-    for known in (True, False):
-        tracker = Particle()
-        tracker.reset(Context(10.0, 20.0, image_size=(200, 200) if known else None), 0)
-        for k in range(45):
-            walker = [(20.0 * (7 + 0.12 * k), 100.0)] if k < 25 else []
-            found = detections(k + 1, *walker, *([(40.0, 40.0)] if k < 25 else []))
-            tracks = tracker.step(Frame(k + 1, k / 10), dataclasses.replace(found, plane="image"))
-        outside = tracks.pos[:, 0] > 200
-        assert (len(outside), outside.sum()) == ((1, 0) if known else (2, 1))
-
-
 def test_a_sensor_without_false_alarms_misses_nobody():
     with pytest.raises(InputError, match="clutter_density"):
         ParticleConfig(clutter_density=0.0, detect_prob=0.9)
