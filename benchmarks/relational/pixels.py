@@ -10,6 +10,7 @@ import numpy as np
 
 import tracking
 from benchmarks.relational.errors import config_of
+from benchmarks.relational.groups import differences
 from benchmarks.support import tables
 from benchmarks.support.options import CAMPUS, PETS
 from scenarios.loading.resolve import resolve
@@ -53,18 +54,23 @@ def scores(given: argparse.Namespace) -> None:
 
 
 def boxes(given: argparse.Namespace) -> None:
-    """Prints a table: rows are recordings and trackers, columns scores from the boxes of the recording's detector."""
+    """Prints a table: rows are recordings and trackers, columns scores from the boxes of the recording's detector; the
+    last row of a recording has the differences of both filters, paired by seed."""
     warnings.simplefilter("ignore")
-    tables.head(["recording", "tracker", *COLUMNS, "MOTA"])
+    names = (*COLUMNS, "MOTA")
+    tables.head(["recording", "tracker", *names])
     for path in (PETS, CAMPUS):
         (sequence,) = open_source(given.recordings / path, images=False)
+        found = {}
         for name in ("blob", "particle", "relational"):
-            found = []
+            runs = []
             for seed in given.seeds if name != "blob" else given.seeds[:1]:
                 config = None if name == "blob" else config_of(name, given.counts[0], given)
                 ready = prepare(name, sequence, params=config, detections="file")
                 ready.reset(seed)
                 tracks = [ready.step(frame) for frame in ready.frames()]
                 scored = tracking.evaluate(sequence.truth, tracks, similarity="boxes")
-                found.append([scored[key] for key in (*COLUMNS, "MOTA")])
-            tables.row([path, name, *(f"{x:.3f}" for x in np.mean(np.array(found), axis=0))])
+                runs.append([scored[key] for key in names])
+            found[name] = np.array(runs)
+            tables.row([path, name, *(f"{x:.3f}" for x in found[name].mean(axis=0))])
+        tables.row([path, "relational − particle", *differences(found["particle"], found["relational"])])
