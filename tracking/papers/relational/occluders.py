@@ -1,8 +1,8 @@
 """Who is hidden from the camera: the belief in occlusion of sec. 2.1.1.
 
 A person is taken as hidden if the line from a pinhole camera to the middle of the body meets a pillar or a wall of a
-known scene, or if the bodies of others leave too little of the own to be seen. Without a pinhole camera nobody is
-hidden.
+known scene, or if the body of another person leaves too little of the own to be seen. Without a pinhole camera nobody
+is hidden.
 """
 
 from __future__ import annotations

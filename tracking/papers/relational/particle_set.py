@@ -71,10 +71,13 @@ class ParticleSet:
     def share_weights(self, one_weight: bool) -> None:
         """Give each particle one weight, the product of the people's, or each person weights of the own.
 
+        Products that are 0 in all particles, by underflow, become equal weights.
         The latter begins while all weights are equal only, as after resampling: so no weight counts twice.
         """
         if one_weight and not self.one_weight and self.people:
             weights = self.weights.prod(axis=1)
+            if not weights.sum() > 0:
+                weights = np.ones(self.count)
             self.weights[:] = (weights / weights.sum())[:, None]
         self.one_weight = one_weight or (self.one_weight and bool(np.ptp(self.weights) > 1e-12 / self.count))
 

@@ -41,6 +41,9 @@ def group_labels(related: Bools, label: Ints) -> None:
 def redraw_relations(related: Bools, people: Ints, chosen: Ints) -> None:
     """Replace the relations of resampled people, one after the other; related (P, K, K) is changed.
 
+    What the partners' weights say of a relation is lost where the person alone is resampled: the particles of both are
+    independent then.
+
     people (R,): who; chosen (P, R): the particle from which each takes the own relations.
     """
     particles, n, _ = related.shape

@@ -22,6 +22,8 @@ are no pair (ours)."""
 UNLIKELY = 1e-3
 """A person and a detection are no pair if it is, among all detections and none, the person's with less than this
 probability (ours)."""
+ALMOST = 1 - 1e-9
+"""Largest probability of a detection, but with the paper's sensor (ours)."""
 LEAST_LOG = -745.0
 """Log of the smallest float: the paper's weights are 0 below it."""
 
@@ -61,7 +63,8 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
 
     points (M, 2): m; noise: standard deviation of a point per axis, m. Weights and existence of the particles are
     changed, and whether a particle has one weight. If all weights vanish, which only the paper's sensor can bring
-    about, they are not.
+    about, they are not, and the detections are nobody's. Without it nobody is detected for certain (ALMOST), so that a
+    miss leaves weights.
     """
     people, count, certain = particles.people, len(points), config.certain_sensor
     if not people:
@@ -69,21 +72,21 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
     particles.share_weights(config.one_weight)
     pairs, density = _pairs(particles, points, sight, noise, config)
     person, marginals = pairs[:, 0], np.empty(density.shape)
-    given = density, pairs, particles.exist, sight.detect, config.clutter_density
+    detect = sight.detect if certain else np.minimum(sight.detect, ALMOST)
+    given = density, pairs, particles.exist, detect, config.clutter_density
     if particles.one_weight:
         logs = np.empty((particles.count, 1))
         sensor_kernels.particle_sums(*given, count, logs, marginals)
-        if certain and logs.max() < LEAST_LOG:
+        if certain and logs[particles.weights[:, 0] > 0].max() < LEAST_LOG:
             return Weighing(True, np.zeros((people, count)), np.zeros(people), np.ones(count))
     else:
-        logs, free = np.empty(particles.exist.shape), _free(particles, pairs, density, count, sight.detect, config)
+        logs, free = np.empty(particles.exist.shape), _free(particles, pairs, density, count, detect, config)
         sensor_kernels.person_sums(*given, free, logs, marginals)
         sensor_kernels.partner_factors(particles.related, particles.weights, sight.missed, logs)
     particles.weigh(logs)
     measured = sensor_kernels.measured(marginals, pairs, people)
     if not certain:
-        missing = 1 - sight.detect
-        unseen = particles.exist * missing / np.maximum(1 - particles.exist * sight.detect, np.finfo(float).tiny)
+        unseen = particles.exist * (1 - detect) / np.maximum(1 - particles.exist * detect, np.finfo(float).tiny)
         particles.exist = np.minimum(measured + (1 - measured) * unseen, 1.0)
     found = np.zeros((people, count))
     found[person, pairs[:, 1]] = np.einsum("pn,pn->n", particles.weights[:, person], marginals)

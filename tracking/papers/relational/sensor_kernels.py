@@ -185,7 +185,7 @@ def partner_factors(related: Bools, weights: Array, missed: Bools, logs: Array) 
     """Add to the log-likelihoods of each missed person those of the partners: what is seen of them tells where the
     person is.
 
-    related (P, K, K): who walks together, before the frame's relations; weights (P, K): of the particles before the
+    related (P, K, K): who walks together by the frame's relations; weights (P, K): of the particles before the
     frame; missed (K,); logs (P, K): log-likelihoods of each person; changed.
 
     The factor of a partner is l(p) / mean l in the particles in which the two walk together, 1 in all others. So the

@@ -14,9 +14,9 @@ from tracking.detect.point_detections import followed_sizes
 class Slots:
     """The people of a sequence, one row for each of K slots of the particles (all ours).
 
-    id (K,): the track's id, -1 until the person is first reported. missed (K,): time since the last measurement, s, 0
-    if measured in this frame. size (K, 2): width and height of the box, px, nan if none was measured. next_id: the next
-    new id.
+    id (K,): the track's id, -1 until the person is first reported. missed (K,): time without a measurement in which the
+    person could have been seen, s, 0 if measured in this frame. size (K, 2): width and height of the box, px, nan if
+    none was measured. next_id: the next new id.
     """
 
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))

@@ -59,10 +59,11 @@ MOTION, BIRTHS, RESAMPLING, RELATIONS, JOINING, COUPLING = range(6)
 
 
 class Particle:
-    """The tracker `particle`: a joint particle filter of people who do not know of each other.
+    """The tracker `particle`: a particle filter of people who do not know of each other.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
-    the people; hidden (K,): probability that each person is behind a known pillar or wall; pixels: detector of blobs,
+    the people; hidden (K,): probability that each person is behind a known pillar or wall, or behind
+    another person; cut (K,): that the feet are behind another person; pixels: detector of blobs,
     None from points; shown: the tracks reported last, None before; plane, "ground" or "image"; context; draws, the
     random streams; vanished: number of frames in which all weights were 0; diversity: how many particles the weights
     are worth. All but config exist after `reset` only.
@@ -191,14 +192,14 @@ class Particle:
         self.diversity.weigh(self.particles)
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
-        for j in np.flatnonzero(said.nobody > self.config.birth_doubt).tolist():
+        for j in np.flatnonzero(said.nobody >= self.config.birth_doubt).tolist():
             self._start(points[j], np.full(2, np.nan) if sizes is None else sizes[j])
 
     def _detection_probability(self) -> Array:
         """Returns the probability (K,) that each person is measured if existing (ours).
 
         A person who was missed in the last frame is measured again at the rate 1 / hidden_time. A person behind a known
-        pillar or wall is not measured, except by the paper's sensor.
+        pillar or wall, or behind another person, is not measured, except by the paper's sensor, nor counts as missed.
         """
         c = self.config
         again = c.detect_prob if c.certain_sensor else min(c.detect_prob, -np.expm1(-self.dt / c.hidden_time))

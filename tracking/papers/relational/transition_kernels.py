@@ -46,7 +46,8 @@ def move(
     distance and velocity difference, of whose squares `spread` is taken off, down to 0; the person itself with w_i = 1.
     With m the mean velocity of all these, weighted by w and existence, and c = COMMON max_j w_j: u = v_i + FOLLOW (m -
     v_i), e_i = sqrt(1 - c) noise + sqrt(c) s_i and s_i = sum w shared / sqrt(sum w^2). The weights, FOLLOW and COMMON
-    are ours; the paper: BIAS inf, so that w = 1, FOLLOW 1 and COMMON 0, so that u = m and e_i = noise.
+    are ours; the paper: BIAS inf, so that w = 1, FOLLOW 1 and COMMON 0, so that u = m and e_i = noise. If a group's
+    pairs are not all related, m is not yet the group's mean velocity.
     """
     particles, n, _ = pos.shape
     sums = np.empty((n, 7))

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sim.types import Context, Detections, Frame
 from tracking.papers.relational import sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
+from tracking.papers.relational.tracker import Particle
 
 
 def sight(detect, missed=None, cut=None, eye=(np.nan, np.nan)):
@@ -246,3 +248,32 @@ def placed_alone(place):
     particles = ParticleSet.empty(200)
     particles.add(np.tile(place, (200, 1)), np.zeros((200, 2)), 1.0, np.zeros((200, 0), bool))
     return particles
+
+
+@pytest.mark.parametrize("weights", ["factorised", "joint"])
+def test_a_miss_leaves_weights_if_everybody_who_exists_is_detected(weights):
+    particles = three()
+    particles.exist[:] = 1.0
+    config = ParticleConfig(detect_prob=1.0, weights=weights)
+    for _ in range(2):
+        said = sensor.weigh(particles, particles.pos[0, :2], sight([1.0] * 3), 0.08, config)
+        assert not said.vanished
+        np.testing.assert_allclose(particles.weights.sum(axis=0), 1.0, rtol=1e-9)
+    np.testing.assert_allclose(particles.existence, 1.0, rtol=1e-6)  # who certainly exists is hidden
+
+
+def test_products_of_weights_that_are_0_everywhere_become_equal():
+    particles = three()
+    particles.weights[:] = 0.0
+    particles.weights[:200, 0] = particles.weights[200:, 1] = particles.weights[:200, 2] = 1 / 200
+    particles.share_weights(True)
+    np.testing.assert_allclose(particles.weights, 1 / 400, rtol=1e-12)
+
+
+def test_a_detection_that_is_certainly_nobodys_starts_a_person_at_the_largest_doubt():
+    tracker = Particle(ParticleConfig(birth_doubt=1.0))
+    tracker.reset(Context(10.0, float("nan")), 0)
+    for k in range(5):
+        found = Detections(k + 1, k / 10, "ground", np.zeros((1, 2)), None, None, np.ones(1))
+        tracks = tracker.step(Frame(k + 1, k / 10), found)
+    assert len(tracks.id) == 1
