@@ -6,7 +6,7 @@ import argparse
 
 import numpy as np
 
-from benchmarks.joint.runs import Row, Variant, difference, mean_row, measured, sequences
+from benchmarks.joint.runs import Row, Variant, difference, mean_row, measured, median_latency, sequences
 from benchmarks.support import tables
 from benchmarks.support.options import seeds_text
 
@@ -28,10 +28,8 @@ def events(given: argparse.Namespace) -> None:
             " / ".join(f"{np.nansum([row[f'{kind}_{k}'] for row in found]):.1f}" for k in ("TP", "FP", "FN"))
             for kind in ("merge", "split")
         ]
-        latency = [row["event_latency"] for row in found if np.isfinite(row["event_latency"])]
         means = [float(np.nanmean([row[key] for row in found])) for key in ("event_F1", "group_F1", "pairwise_F1")]
-        median = tables.number(float(np.median(latency))) if latency else "–"
-        cells[name] = [*map(tables.number, means), *counts, median]
+        cells[name] = [*map(tables.number, means), *counts, median_latency(found)]
     columns = ["event F1", "group F1", "pairwise F1", "merges: hits / false / missed", "splits", "latency, s (median)"]
     title = f"{given.suite}, {len(rows[compared[0].name])} sequences, seeds {seeds_text(given.seeds)}, "
     tables.table(title + f"filter seeds {seeds_text(given.filter_seeds)}", "tracker", columns, cells)

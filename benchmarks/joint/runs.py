@@ -91,10 +91,14 @@ def others(rows: Sequence[Row]) -> list[str]:
         values = [row.get(key, np.nan) for row in rows]
         return tables.number(float(np.nanmean(values)) if np.isfinite(values).any() else np.nan)
 
-    latency = [row["event_latency"] for row in rows if np.isfinite(row["event_latency"])]
     keys = ("pairwise_F1", "HOTA", "effective_particles", "effective_particles_of_a_person", "distinct_ancestors")
-    median = tables.number(float(np.median(latency))) if latency else "–"
-    return [mean("event_F1"), median, *(mean(key) for key in keys), mean("speed").partition(".")[0]]
+    return [mean("event_F1"), median_latency(rows), *(mean(key) for key in keys), mean("speed").partition(".")[0]]
+
+
+def median_latency(rows: Sequence[Row]) -> str:
+    """Returns the cell of the median latency of events over the sequences that have one, s."""
+    latency = [row["event_latency"] for row in rows if np.isfinite(row["event_latency"])]
+    return tables.number(float(np.median(latency))) if latency else "–"
 
 
 def difference(first: Sequence[Row], second: Sequence[Row], key: str) -> str:

@@ -63,9 +63,8 @@ def _recording(entry: Entry, seed: int) -> Recording:
 
 
 def _cells(rows: list[Row]) -> list[str]:
-    mean, low, high = mean_interval(np.array([[r["error"]] for r in rows]))
     others = [number(float(np.mean([r[k] for r in rows]))) for k in ("sd", "along", "along sd", "across sd")]
-    return [interval(float(mean[0]), float(low[0]), float(high[0])), *others]
+    return [interval(*map(float, mean_interval(np.array([r["error"] for r in rows])))), *others]
 
 
 @contextmanager

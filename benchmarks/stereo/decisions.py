@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from benchmarks.stereo.scenes import Variant, mean_of, measured
+from benchmarks.stereo.scenes import Variant, measured
 from benchmarks.stereo.stored_rows import Row
 from benchmarks.support.tables import signed, table
 from sim.scene.stereo import back_project, project_pair
@@ -22,6 +22,7 @@ from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import merging, space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.measurement import PairMeasurement
+from tracking.stats import mean_interval
 
 ABLATIONS: Mapping[str, Mapping[str, object]] = {
     "surface_offset": {"surface_offset": 0.0},
@@ -72,14 +73,12 @@ def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
     for name in wanted:
         cells = [str(sum(len(by[name]) for by in made.values()))]
         for key in ("group_F1_hull", "group_MOTA", "error", "extra"):
-            pairs = [
-                (by[name][s].get(key, np.nan), by["stereo"][s].get(key, np.nan))
+            off = [
+                row.get(key, np.nan) - by["stereo"][s].get(key, np.nan)
                 for by in made.values()
-                for s in by[name]
+                for s, row in by[name].items()
             ]
-            off = np.array([a - b for a, b in pairs])
-            off = off[np.isfinite(off)]
-            cells.append(signed(*mean_of(off)) if len(off) else "–")
+            cells.append(signed(*map(float, mean_interval(np.array(off)))))
         rows[name] = cells
     columns = ("sequences", "group F1", "MOTA", "error, m", "extra")
     table("Each decision switched off: difference to the defaults", "decision", columns, rows)

@@ -137,11 +137,8 @@ def in_image(tracks: Tracks, camera: Camera) -> Tracks:
 
 
 def _interval(values: list[float]) -> tuple[float, float, float]:
-    known = np.array(values)[np.isfinite(values)]
-    if not len(known):
-        return np.nan, np.nan, np.nan
-    mean, low, high = mean_interval(known[:, None])
-    return float(mean[0]), float(low[0]), float(high[0])
+    mean, low, high = map(float, mean_interval(np.array(values)))
+    return mean, low, high
 
 
 def _chart(args: argparse.Namespace, people: list[float], curves: Curves) -> None:

@@ -42,13 +42,8 @@ def points(args: argparse.Namespace) -> dict[str, list[list[float]]]:
                     made[name].append([*(scores[key] for key in KEYS), float(false)])
                 print(f"{entry.name} {seed}", file=sys.stderr, flush=True)
     usual = np.array(made["defaults"])
-    rows = {"defaults": [interval(*_bounds(column)) for column in usual.T]}
+    rows = {"defaults": [interval(*map(float, mean_interval(column))) for column in usual.T]}
     for name in list(wanted)[1:]:
-        rows[name] = [signed(*_bounds(column)) for column in (np.array(made[name]) - usual).T]
+        rows[name] = [signed(*map(float, mean_interval(column))) for column in (np.array(made[name]) - usual).T]
     table("Decisions from points", "off", COLUMNS, rows)
     return made
-
-
-def _bounds(values: np.ndarray) -> tuple[float, float, float]:
-    mean, low, high = mean_interval(values[np.isfinite(values)][:, None])
-    return float(mean[0]), float(low[0]), float(high[0])

@@ -166,21 +166,13 @@ def scenes(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
     return made
 
 
-def mean_of(values: np.ndarray) -> tuple[float, float, float]:
-    """Returns the mean of values (N,) and the ends of its 95 % interval."""
-    mean, low, high = mean_interval(values[:, None])
-    return float(mean[0]), float(low[0]), float(high[0])
-
-
 def _cells(name: str, rows: list[Row]) -> list[str]:
     def mean(key: str, digits: int = 3) -> str:
         values = np.array([r.get(key, np.nan) for r in rows])
         return number(float(np.nanmean(values)), digits) if np.isfinite(values).any() else "–"
 
     def with_interval(key: str) -> str:
-        values = np.array([r.get(key, np.nan) for r in rows])
-        values = values[np.isfinite(values)]
-        return interval(*mean_of(values)) if len(values) else "–"
+        return interval(*map(float, mean_interval(np.array([r.get(key, np.nan) for r in rows]))))
 
     return [
         with_interval("error"), mean("sd"), PAPER.get(name, "–"), mean("along"), mean("along sd"), mean("across sd"),

@@ -71,8 +71,8 @@ class ParticleSet:
     def share_weights(self, one_weight: bool) -> None:
         """Give each particle one weight, the product of the people's, or each person weights of the own.
 
-        Products that are 0 in all particles, by underflow, become equal weights.
-        The latter begins while all weights are equal only, as after resampling: so no weight counts twice.
+        The latter begins while all weights are equal only, as after resampling: so no weight counts twice. Products
+        that are 0 in all particles, by underflow, become equal weights.
         """
         if one_weight and not self.one_weight and self.people:
             weights = self.weights.prod(axis=1)
