@@ -28,7 +28,6 @@ ABLATIONS: Mapping[str, Mapping[str, object]] = {
     "surface_offset": {"surface_offset": 0.0},
     "density_width": {"density_width": 20.0},
     "point_covariance": {"point_covariance": False},
-    "attach": {"attach": False},
     "velocity_weight": {"velocity_weight": 0.0},
     "back_check": {"back_check": 5.0},
     "spread_weight": {"spread_weight": 0.1},

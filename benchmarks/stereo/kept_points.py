@@ -21,7 +21,7 @@ from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.picture_points import PicturePoints, moved_away, stereo_camera
 
 TRACKING = frozenset({
-    "gate", "position_weight", "velocity_weight", "attach", "point_covariance",
+    "gate", "position_weight", "velocity_weight", "point_covariance",
     "person_spread", "velocity_spread", "spread_weight", "spread_time", "accel_noise", "centroid_noise",
     "density_width", "radius", "point_radius", "point_noise", "least_group",
     "least_features", "merge_gate", "split", "split_time", "split_speed", "confirm_time", "coast_time",

@@ -75,12 +75,6 @@ class StereoConfig(BackgroundSettings):
     velocity_weight: float = param(
         1.0, (0.0, 3.0), "", "k_v of eq. 10 as an exponent: as a factor it has no effect (ours)"
     )
-    attach: bool = param(
-        True, (True, False), "",
-        "points in no region whose sphere overlaps that of a group's point, with a velocity in the region of the "
-        "group's velocities, are the group's (ours)",
-        "categorical",
-    )  # fmt: skip
     point_covariance: bool = param(
         True, (True, False), "",
         "points have covariances of their own, which count in regions and probabilities and not in the spread (ours)",

@@ -126,7 +126,7 @@ class Stereo:
         radius, least, update = (
             (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.least_group, c.least_features)
         )
-        owner = associated(self.groups, points, c, radius)
+        owner = associated(self.groups, points, c)
         children: list[SpaceGroup] = []
         for k, group in enumerate(self.groups):
             mine = points.at(owner == k)

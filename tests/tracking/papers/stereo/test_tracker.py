@@ -12,10 +12,11 @@ from sim.types import Context, Frame
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.filters.ellipsoid_overlap import separation
+from tracking.papers.stereo.association import associated
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import POS, PairMeasurement
-from tracking.papers.stereo.merging import overlap, pooled
+from tracking.papers.stereo.merging import merge, overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera
 from tracking.papers.stereo.space_group import motion_model, newborn
 from tracking.papers.stereo.tracker import Stereo
@@ -105,6 +106,18 @@ def test_a_group_is_found_with_its_place_and_velocity() -> None:
     assert tracker.groups[0].count == 20
 
 
+@pytest.mark.parametrize(("away", "owner"), [(0.9, 0), (1.4, -1)])
+def test_a_point_in_no_region_belongs_to_nobody(away: float, owner: int) -> None:
+    """Its sphere overlaps those of the group's points, and its velocity is the group's (eq. 8)."""
+    (step,) = together(walkers(0, 12, [1, 5, 1], [1, 0, 0], 1))
+    config = StereoConfig()
+    group = newborn(step, motion_model(config, 1 / FPS), 0.0)
+    cov = 4e-4 * np.eye(3)[None]
+    point = SpacePoints(np.array([99]), group.pos[None] + [away, 0, 0], cov, group.vel[None], 25 * cov)
+    assert sphere_groups(np.concatenate([step.pos, point.pos]), config.radius, 1).tolist() == [0] * 13
+    assert associated([group], point, config).tolist() == [owner]
+
+
 def crossing(seed: int, **params: object) -> bool:
     """Whether both of two groups that walk through each other have their ids afterwards."""
     frames = 100
@@ -117,7 +130,7 @@ def crossing(seed: int, **params: object) -> bool:
 
 def test_velocity_keeps_crossing_groups_apart() -> None:
     kept = sum(crossing(seed) for seed in range(6))
-    without = sum(crossing(seed, velocity_weight=0.0, attach=False) for seed in range(6))
+    without = sum(crossing(seed, velocity_weight=0.0) for seed in range(6))
     assert kept == 6
     assert without < 4
 
@@ -137,6 +150,19 @@ def test_groups_of_one_velocity_merge_and_opposite_ones_never() -> None:
         a = walkers(4, 20, [-1.5, 5.0, 1], [1.0, 0, 0], 100)
         b = walkers(5, 20, [1.8, y, 1], [-1.0, 0, 0], 100, first=100)
         assert "merge" not in kinds(scripted(together(a, b))[1])
+
+
+@pytest.mark.parametrize(("before", "event"), [(1.1, "merge"), (0.7, "enter")])
+def test_a_group_that_has_just_come_enters_with_the_other_one(before: float, event: str) -> None:
+    """before: s for which the second group was there when the two merge."""
+    config, t = StereoConfig(), 5.0
+    model, groups = motion_model(config, 1 / FPS), []
+    for id, first_seen in ((1, 0.0), (2, t - before)):
+        (step,) = together(walkers(id, 12, [1, 5, 1], [1, 0, 0], 1))
+        groups.append(newborn(step, model, first_seen))
+        groups[-1].id = id
+    assert [e.kind for e in merge(groups, config, t)] == [event]
+    assert [g.id for g in groups] == [1]
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.1, 0.5, 1.0, 2.0, 4.0])
