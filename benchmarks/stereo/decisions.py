@@ -2,8 +2,9 @@
 
 `ABLATIONS` are decisions that have a parameter. `RULES` have none, so that code of the tracker is replaced: `mean in
 space` measures the mean of the points' (u, v, d); `expected places` puts hulls round the measured places of points;
-`settled` counts merges of groups that were there for less than 1 s. With --store, rows of earlier runs count, too, so
-that decisions may have different numbers of sequences.
+`settled` counts merges of groups that were there for less than 1 s; `least density` takes densities of features as they
+are; `half a footprint` gives a feature a whole one. With --store, rows of earlier runs count, too, so that decisions
+may have different numbers of sequences.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from benchmarks.support.tables import signed, table
 from sim.scene.stereo import back_project, project_pair
 from sim.types import Array
 from tracking.detect.features import SpacePoints
-from tracking.papers.stereo import merging, space_group, tracker
+from tracking.papers.stereo import measurement, merging, space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.measurement import PairMeasurement
 from tracking.stats import mean_interval
@@ -32,6 +33,7 @@ ABLATIONS: Mapping[str, Mapping[str, object]] = {
     "back_check": {"back_check": 5.0},
     "spread_weight": {"spread_weight": 0.1},
     "split": {"split": False},
+    "split_speed": {"split_speed": 0.0},
     "confirm_time": {"confirm_time": 0.0},
     "centroid_noise": {"centroid_noise": 0.005},
     "coast_time": {"coast_time": 10.0, "report_coast": 5.0},
@@ -39,11 +41,11 @@ ABLATIONS: Mapping[str, Mapping[str, object]] = {
 }
 
 
-def _mean_in_the_image(points: SpacePoints, measurement: PairMeasurement, config: StereoConfig) -> Array:
+def _mean_in_the_image(points: SpacePoints, pair: PairMeasurement, config: StereoConfig) -> Array:
     """Returns the place (3,), m, whose (u, v, d) are the means of those of the points, with the tracker's weights."""
-    weights = measurement.weights(points, config.density_width)
-    mean = np.average(project_pair(measurement.camera, points.pos), axis=0, weights=weights)
-    return np.asarray(back_project(measurement.camera, mean[None])[0])
+    weights = pair.weights(points, config.density_width)
+    mean = np.average(project_pair(pair.camera, points.pos), axis=0, weights=weights)
+    return np.asarray(back_project(pair.camera, mean[None])[0])
 
 
 def _measured_places(offset: Array, cov: Array, spread: Array) -> Array:
@@ -55,6 +57,8 @@ RULES: Mapping[str, tuple[object, str, object]] = {
     "mean in space": (space_group, "mean_position", _mean_in_the_image),
     "expected places": (tracker, "expected_places", _measured_places),
     "settled": (merging, "SETTLED", 0.0),
+    "least density": (measurement, "LEAST_DENSITY", 0.0),
+    "half a footprint": (tracker, "FEATURE_OUTLINE", 1.0),
 }
 """Owner, name and replacement by the name of the row."""
 VARIANTS: Mapping[str, Variant] = {

@@ -56,11 +56,6 @@ class SpaceGroup:
         return np.asarray(self.ekf.x[POS, 0])
 
     @property
-    def vel(self) -> Array:
-        """Velocity (3,), m/s."""
-        return np.asarray(self.ekf.x[VEL, 0])
-
-    @property
     def confirmed(self) -> bool:
         """True if the group has an id."""
         return self.id != NO_ID

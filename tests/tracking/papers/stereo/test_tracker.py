@@ -15,7 +15,7 @@ from tracking.filters.ellipsoid_overlap import separation
 from tracking.papers.stereo.association import associated
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
-from tracking.papers.stereo.measurement import POS, PairMeasurement
+from tracking.papers.stereo.measurement import POS, VEL, PairMeasurement
 from tracking.papers.stereo.merging import merge, overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera
 from tracking.papers.stereo.space_group import motion_model, newborn
@@ -113,7 +113,7 @@ def test_a_point_in_no_region_belongs_to_nobody(away: float, owner: int) -> None
     config = StereoConfig()
     group = newborn(step, motion_model(config, 1 / FPS), 0.0)
     cov = 4e-4 * np.eye(3)[None]
-    point = SpacePoints(np.array([99]), group.pos[None] + [away, 0, 0], cov, group.vel[None], 25 * cov)
+    point = SpacePoints(np.array([99]), group.pos[None] + [away, 0, 0], cov, group.ekf.x[None, VEL, 0], 25 * cov)
     assert sphere_groups(np.concatenate([step.pos, point.pos]), config.radius, 1).tolist() == [0] * 13
     assert associated([group], point, config).tolist() == [owner]
 
