@@ -31,8 +31,8 @@ class PairBelief:
     apart or more, or of whom one was not seen in the last step. total (K, 3): sums of x, y, m, and of time, s, over the
     frames of the current step in which each was seen; count (K,): of these frames. past: means of `total` in the last
     steps, (K, 3), nan where there are none. first (K,): step in which each person was seen first, nan before its end.
-    first_distance (K, K): m, in the first step of both, nan if unknown. means: of the evidence, for K x K pairs.
-    frames, steps: how many there were.
+    first_distance (K, K): m, in the first step of both, or when the later one was added, nan if unknown. means: of the
+    evidence, for K x K pairs. frames, steps: how many there were.
     """
 
     def __init__(self, fps: float) -> None:
@@ -44,22 +44,30 @@ class PairBelief:
         self.total, self.count, self.first = np.zeros((0, 3)), np.zeros(0), np.zeros(0)
         self.means = ExponentialMeans(0, len(QUANTITIES), self.seconds)
 
-    def add(self, state: Array) -> None:
+    def add(self, state: Array, ago: Array | None = None) -> None:
         """Add people as the last rows; state (K, 4): x, y, m, vx, vy, m/s, of all people now, nan for those not seen.
 
-        The evidence of a pair with a new person is that of this moment.
+        ago (M,): time from the first sight of each new person to the last frame, s; None: they are first seen in the
+        next one. A person who was confirmed later than seen so has the time of the first sight. The evidence of a pair
+        with a new person is that of this moment.
         """
         old, n = len(self.count), len(state)
         self._reorder(np.concatenate([np.arange(old), np.full(n - old, -1)]))
-        i, j = self._pairs(state[:, :2])
-        fresh = j >= old
-        i, j = i[fresh], j[fresh]
-        self.log_odds[old:] = self.log_odds[:, old:] = UNSEEN
+        pos = state[:, :2]
+        if ago is not None:
+            frame = np.maximum(self.frames - 1 - np.rint(ago * self.fps), 0)
+            self.first[old:] = np.ceil(frame / self.size)
+        came = np.nan_to_num(self.first, nan=self.steps)
+        new = np.arange(n) >= old
+        pairs = new[:, None] | new
+        self.first_distance[pairs] = np.where(np.maximum(came[:, None], came) > 0, _distances(pos), np.nan)[pairs]
+        i, j = self._pairs(pos)
+        i, j = i[new[j]], j[new[j]]
+        self.log_odds[pairs] = UNSEEN
         if len(i):
-            distance, quantities = instant_evidence(state[:, :2], state[:, 2:], i, j)
-            came = np.nan_to_num(self.first, nan=self.steps)
-            known = self.steps > 0
-            self._judge(i, j, np.repeat(quantities, len(TIMES), axis=1), distance, came, distance if known else np.nan)
+            distance, quantities = instant_evidence(pos, state[:, 2:], i, j)
+            averaged = np.repeat(quantities, len(TIMES), axis=1)
+            self._judge(i, j, averaged, distance, came, self.first_distance[i, j])
 
     def keep(self, rows: Bools) -> None:
         """Remove all people but those where `rows` (K,) is True."""
@@ -88,8 +96,8 @@ class PairBelief:
         pos = now[:, :2]
         fresh = np.isnan(self.first) & np.isfinite(pos[:, 0])
         self.first[fresh] = self.steps
-        apart, new = np.hypot(*(pos[:, None] - pos).transpose(2, 0, 1)), fresh[:, None] | fresh
-        self.first_distance[new] = apart[new] if self.steps > 0 else np.nan
+        new = fresh[:, None] | fresh
+        self.first_distance[new] = _distances(pos)[new] if self.steps > 0 else np.nan
         vel = np.full((n, 2), np.nan)
         for before in list(self.past)[-2::-1]:
             chord = (pos - before[:, :2]) / (now[:, 2] - before[:, 2])[:, None]
@@ -102,12 +110,12 @@ class PairBelief:
             self._judge(i, j, averaged, distance, self.first, self.first_distance[i, j])
         self.steps += 1
 
-    def _judge(self, i: Ints, j: Ints, averaged: Array, distance: Array, came: Array, first: Array | float) -> None:
+    def _judge(self, i: Ints, j: Ints, averaged: Array, distance: Array, came: Array, first: Array) -> None:
         """Sets the log-odds of the pairs i, j (R,): averaged (R, Q), distance and first distance (R,), m; came (K,):
         step."""
         both = np.stack([came[i], came[j]])
         gap = np.where(both.min(axis=0) > 0, np.abs(both[0] - both[1]) * self.seconds, np.nan)
-        values = np.column_stack([averaged, distance, gap, np.broadcast_to(first, distance.shape)])
+        values = np.column_stack([averaged, distance, gap, first])
         self.log_odds[i, j] = self.log_odds[j, i] = default_belief().log_odds(values)
 
     def _pairs(self, pos: Array) -> tuple[Ints, Ints]:
@@ -135,3 +143,8 @@ class PairBelief:
         means.total = np.concatenate([means.total, np.zeros((1, *means.total.shape[1:]))])[pairs]
         means.weight = np.concatenate([means.weight, np.zeros((1, *means.weight.shape[1:]))])[pairs]
         means.last = np.append(means.last, 0)[pairs]
+
+
+def _distances(pos: Array) -> Array:
+    """Returns the distances (K, K) of all pairs, m; pos (K, 2)."""
+    return np.asarray(np.hypot(*(pos[:, None] - pos).transpose(2, 0, 1)))

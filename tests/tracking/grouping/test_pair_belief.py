@@ -77,3 +77,36 @@ def test_new_people_have_a_belief_at_once():
     assert kept.log_odds[1, 2] > kept.log_odds[0, 3] > UNSEEN
     assert kept.log_odds[1, 3] < 0
     assert (kept.log_odds[4, :4] == UNSEEN).all()
+
+
+def test_people_who_are_added_later_than_seen_have_the_time_of_their_first_sight():
+    """People who are there at the beginning have no arrival, whenever they are added; others have that of their sight.
+
+    The log-odds of a pair without arrival differ by the tables of "arrival gap" and "first distance".
+    """
+    state = np.array([[0, 0, 1, 0], [0, 0.7, 1, 0.0]])
+
+    def log_odds(added, ago=None):
+        """Of a pair whose people are added in the frames `added`, and seen from then on, after 10 s."""
+        kept = PairBelief(FPS)
+        for t in range(100):
+            if t in added:
+                new = np.array([t == x for x in added])
+                people = state[: len(kept.count) + int(new.sum())] + np.array([t / FPS, 0, 0, 0])
+                kept.add(people, None if ago is None else np.array(ago)[new])
+            kept.see(state[: len(kept.count), :2] + np.array([t / FPS, 0]))
+        return kept.log_odds[0, 1]
+
+    def arrival(gap, distance):
+        """What the tables of the arrival add, in log-odds, for two who walk among few others."""
+        tables = {table.name: table for table in default_belief().tables}
+        values = {"arrival gap": gap, "first distance": distance}
+        return sum(np.interp(x, tables[name].at, tables[name].log_odds[0]) for name, x in values.items())
+
+    at_start = log_odds((0, 0))
+    assert arrival(0.0, 0.7) > 0.3
+    np.testing.assert_allclose(log_odds((4, 4)) - at_start, arrival(0.0, 0.7), atol=1e-3)
+    np.testing.assert_allclose(log_odds((4, 4), (0.3, 0.3)), at_start, atol=1e-3)
+    np.testing.assert_allclose(log_odds((4, 7), (0.3, 0.6)), at_start, atol=1e-3)
+    np.testing.assert_allclose(log_odds((52, 60), (0.3, 1.1)), log_odds((52, 52)), atol=1e-3)
+    assert log_odds((52, 60), (0.3, 0.3)) < log_odds((52, 52)) - 0.1

@@ -246,7 +246,7 @@ class Joint:
             np.concatenate([n.log_w, np.zeros(past.shape[:2])], axis=1), n.log_rest,
         )  # fmt: skip
         self.people.add(self.newcomers.size[rows])
-        self.belief.add(self.nested.x[..., :STATE].mean(axis=0))
+        self.belief.add(self.nested.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
         self.health.add(past.shape[1])
         if c.newcomers == "validity":
             place(self.nested, past.shape[1], c, self.draws[PLACING])

@@ -231,3 +231,12 @@ def test_the_run_tells_what_the_particles_are_worth():
     assert 0.02 <= info["effective_particles"] <= 1
     assert 0.02 <= info["effective_particles_of_a_person"] <= 1
     assert Joint().config == JointConfig()
+
+
+def test_people_have_arrived_when_they_were_first_seen():
+    """The belief knows the step of the first sight, which is before the confirmation: 0 for those there at first."""
+    tracker = Joint(JointConfig(**QUIET))
+    frames = [row[:2] if t < 20 else row for t, row in enumerate(walk([(0, 0), (0, 0.8), (0, 5)], (1, 0), 40))]
+    stepped(tracker, frames)
+    assert len(tracker.people.id) == 3
+    assert tracker.belief.first.tolist() == [0, 0, 20 / tracker.belief.size]
