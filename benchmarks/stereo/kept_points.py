@@ -24,7 +24,7 @@ TRACKING = frozenset({
     "gate", "position_weight", "velocity_weight", "point_covariance",
     "person_spread", "velocity_spread", "spread_weight", "spread_time", "accel_noise", "centroid_noise",
     "density_width", "radius", "point_radius", "point_noise", "least_group",
-    "least_features", "merge_gate", "split", "split_time", "split_speed", "confirm_time", "coast_time",
+    "least_features", "merge_gate", "split", "split_time", "confirm_time", "coast_time",
     "report_coast", "surface_offset",
 })  # fmt: skip
 """Parameters that change no points, or move finished points."""

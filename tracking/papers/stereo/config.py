@@ -123,9 +123,6 @@ class StereoConfig(BackgroundSettings):
     split_time: float = param(
         0.5, (0.0, 3.0), "s", "time for which a group's points must be unlinked parts before it splits (ours)"
     )
-    split_speed: float = param(
-        0.5, (0.0, 3.0), "m/s", "standard deviation of a child's velocity about its parent's (ours)"
-    )
     confirm_time: float = param(0.3, (0.0, 3.0), "s", "a new group is confirmed after so long with measurements (ours)")
     coast_time: float = param(1.5, (0.0, 10.0), "s", "a group is deleted after so long without measurements (ours)")
     report_coast: float = param(

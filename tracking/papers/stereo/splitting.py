@@ -2,7 +2,7 @@
 
 A group splits if its points are two or more groups by eq. 12 for `split_time`. The part with most points (then the one
 nearest to the group's position) keeps the id; the others are its children: newborn from their points, with the parent's
-velocity.
+velocity and its covariance.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def split(group: SpaceGroup, points: SpacePoints, part: Ints, motion: Motion3D, 
     born = [newborn(points.at(part == k), motion, t) for k in range(count)]
     for child in born:
         child.ekf.x[VEL] = group.ekf.x[VEL]
-        child.ekf.P[np.ix_(VEL, VEL)] = group.ekf.P[np.ix_(VEL, VEL)] + motion.config.split_speed**2 * np.eye(3)
+        child.ekf.P[np.ix_(VEL, VEL)] = group.ekf.P[np.ix_(VEL, VEL)]
         child.first_seen, child.measured_time = group.apart_since, group.measured_time
     own = born.pop(largest)
     group.ekf, group.spread, group.count, group.members = own.ekf, own.spread, own.count, own.members

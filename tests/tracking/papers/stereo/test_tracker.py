@@ -19,6 +19,7 @@ from tracking.papers.stereo.measurement import POS, VEL, PairMeasurement
 from tracking.papers.stereo.merging import merge, overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera
 from tracking.papers.stereo.space_group import motion_model, newborn
+from tracking.papers.stereo.splitting import split
 from tracking.papers.stereo.tracker import Stereo
 
 FPS = 30.0
@@ -216,6 +217,19 @@ def test_a_group_whose_points_part_splits() -> None:
     last = dict(zip(tracks[-1].id.tolist(), tracks[-1].pos[:, 0].tolist(), strict=True))
     assert last[1] > 2, "the part with more points keeps the id"
     assert "split" not in kinds(scripted(together(walkers(0, 20, [0, 5, 1], [0.8, 0, 0], 150)))[1])
+
+
+def test_a_child_has_the_velocity_of_its_parent_and_its_covariance() -> None:
+    (step,) = together(walkers(0, 12, [0, 5, 1], [1, 0, 0], 1), walkers(1, 8, [4, 5, 1], [0, 1, 0], 1, first=100))
+    config = StereoConfig()
+    motion = motion_model(config, 1 / FPS)
+    group = newborn(step, motion, 0.0)
+    group.apart_since = 0.0
+    before = group.ekf
+    (child,) = split(group, step, sphere_groups(step.pos, config.radius, 1), motion, config.split_time)
+    assert child.count == 8
+    assert np.array_equal(child.ekf.x[VEL], before.x[VEL])
+    assert np.array_equal(child.ekf.P[np.ix_(VEL, VEL)], before.P[np.ix_(VEL, VEL)])
 
 
 def test_points_that_appear_far_from_their_group_enter() -> None:
