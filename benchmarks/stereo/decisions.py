@@ -33,6 +33,7 @@ ABLATIONS: Mapping[str, Mapping[str, object]] = {
     "back_check": {"back_check": 5.0},
     "spread_weight": {"spread_weight": 0.1},
     "split": {"split": False},
+    "split_time": {"split_time": 0.0},
     "confirm_time": {"confirm_time": 0.0},
     "centroid_noise": {"centroid_noise": 0.005},
     "coast_time": {"coast_time": 10.0, "report_coast": 5.0},

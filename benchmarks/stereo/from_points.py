@@ -21,7 +21,9 @@ from tracking.scoring import evaluate
 from tracking.stats import mean_interval
 
 SCENARIOS = "cross,merge,split,mixed"
-OPTIONS = "point_covariance,velocity_weight,spread_weight,split,confirm_time,centroid_noise,coast_time,settled"
+OPTIONS = (
+    "point_covariance,velocity_weight,spread_weight,split,split_time,confirm_time,centroid_noise,coast_time,settled"
+)
 KEYS = ("group_F1_hull", "group_1-FP", "group_1-FN")
 COLUMNS = ("group F1", "1-FP", "1-FN", "false events")
 
