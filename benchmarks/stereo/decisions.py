@@ -2,9 +2,9 @@
 
 `ABLATIONS` are decisions that have a parameter. `RULES` have none, so that code of the tracker is replaced: `mean in
 space` measures the mean of the points' (u, v, d); `expected places` puts hulls round the measured places of points;
-`settled` counts merges of groups that were there for less than 1 s; `least density` takes densities of features as they
-are; `half a footprint` gives a feature a whole one. With --store, rows of earlier runs count, too, so that decisions
-may have different numbers of sequences.
+`settled` counts merges of groups that were there for less than 1 s; `P of a mean` gives a merged group the P of its
+largest part; `half a footprint` gives a feature a whole one. `LIGHT` is for the scene light and run by --options only.
+With --store, rows of earlier runs count, too, so that decisions may have different numbers of sequences.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from benchmarks.support.tables import signed, table
 from sim.scene.stereo import back_project, project_pair
 from sim.types import Array
 from tracking.detect.features import SpacePoints
-from tracking.papers.stereo import measurement, merging, space_group, tracker
+from tracking.papers.stereo import merging, space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.measurement import PairMeasurement
 from tracking.stats import mean_interval
@@ -53,16 +53,26 @@ def _measured_places(offset: Array, cov: Array, spread: Array) -> Array:
     return offset
 
 
+LIGHT: Mapping[str, Mapping[str, object]] = {
+    "gain": {"gain": "none"},
+    "gain and most_foreground": {"gain": "none", "most_foreground": 1.0},
+}
+
+
+def _largest_part(n: Array, P: Array) -> Array:
+    return P[n.argmax()]
+
+
 RULES: Mapping[str, tuple[object, str, object]] = {
     "mean in space": (space_group, "mean_position", _mean_in_the_image),
     "expected places": (tracker, "expected_places", _measured_places),
     "settled": (merging, "SETTLED", 0.0),
-    "least density": (measurement, "LEAST_DENSITY", 0.0),
+    "P of a mean": (merging, "covariance_of_mean", _largest_part),
     "half a footprint": (tracker, "FEATURE_OUTLINE", 1.0),
 }
 """Owner, name and replacement by the name of the row."""
 VARIANTS: Mapping[str, Variant] = {
-    **{name: Variant(name, params) for name, params in ABLATIONS.items()},
+    **{name: Variant(name, params) for name, params in {**ABLATIONS, **LIGHT}.items()},
     **{name: Variant(name, replaced=(change,)) for name, change in RULES.items()},
 }
 """The tracker without a decision, by the name of the row."""
@@ -70,7 +80,7 @@ VARIANTS: Mapping[str, Variant] = {
 
 def decisions(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
     """Prints, for each decision switched off, the paired difference over all scenes, and returns the rows."""
-    wanted = list(VARIANTS) if args.options is None else args.options.split(",")
+    wanted = [*ABLATIONS, *RULES] if args.options is None else args.options.split(",")
     made = measured(args, (Variant("stereo"), *(VARIANTS[name] for name in wanted)))
     rows = {}
     for name in wanted:

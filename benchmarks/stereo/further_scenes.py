@@ -1,7 +1,8 @@
-"""Scenes beside the suite's, for decisions whose case is rare there: a group that splits, a pillar that hides groups.
+"""Scenes beside the suite's, for decisions whose case is rare there: a split, a pillar, a change of light.
 
 `split`: a group of three to five parts in two, with the camera of the suite's `merge`. `pillar`: the suite's `cross`
-with a pillar of 0.4 m radius where the groups meet.
+with a pillar of 0.4 m radius where the groups meet. `light`: the suite's `cross`; from one moment on it is brighter by
+half or more.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ PARTS = (
 ORDER = f'{{ id = "s", type = "split", group = "ab", parts = {PARTS}, when = {{ time = {{ uniform = [2, 5] }} }} }}'
 SETTINGS = {
     "split": ("merge", (f"group=[{GROUP}]", f"event=[{ORDER}]")),
+    "light": ("cross", ("light.switch=[{ at = { uniform = [3, 6] }, gain = { uniform = [1.5, 2.5] } }]",)),
     "pillar": ("cross", ("world.pillars=[[8, 6.8, 0.4]]",)),
 }
 

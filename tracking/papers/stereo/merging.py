@@ -5,8 +5,8 @@
 MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
 Two ellipsoids are tested exactly (tracking.filters.ellipsoid_overlap).
 
-Departures: only confirmed groups merge. The paper does not say what P of a merged group is: here it is that of a
-weighted mean, sum of n_i^2 P_i. The group with most points keeps its id.
+Tentative groups merge, too: without an event, as nobody knows of them. The paper does not say what P of a merged group
+is: here it is that of a weighted mean, sum of n_i^2 P_i. The confirmed group with most points keeps its id (ours).
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ SETTLED = 1.0
 
 
 def merge(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
-    """Merge groups of the list, in place, at time t (s) and return the events: merge, or enter.
-
-    An event is an enter if at most one of the groups has been there for 1 s.
+    """Merge groups of the list, in place, at time t (s), and return the events of unions of two or more confirmed
+    groups: merge, or enter if at most one of these has been there for 1 s.
     """
-    able = sorted((g for g in groups if g.confirmed), key=lambda g: g.id)
-    near = [(a.id, b.id) for a, b in _close_pairs(able, config.merge_gate) if overlap(a, b, config.merge_gate)]
-    return [_merge(groups, part, t) for part in (_connected(able, near) if near else ())]
+    gate = config.merge_gate
+    near = [(i, j) for i, j in _close_pairs(groups, gate) if overlap(groups[i], groups[j], gate)]
+    events = [_merge(groups, parts, t) for parts in (_connected(groups, near) if near else ())]
+    return [event for event in events if event is not None]
 
 
 def overlap(a: SpaceGroup, b: SpaceGroup, gate: float) -> bool:
@@ -43,8 +43,9 @@ def overlap(a: SpaceGroup, b: SpaceGroup, gate: float) -> bool:
     return separation(d, a.spread, b.spread) <= gate
 
 
-def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[SpaceGroup, SpaceGroup]]:
-    """Returns the pairs of groups whose regions may overlap: f(1/2) <= gate in tracking.filters.ellipsoid_overlap."""
+def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[int, int]]:
+    """Returns the pairs of indices of groups whose regions may overlap: f(1/2) <= gate in
+    tracking.filters.ellipsoid_overlap."""
     i, j = np.triu_indices(len(groups), 1)
     if not len(i):
         return []
@@ -52,7 +53,8 @@ def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[SpaceG
     A = np.stack([g.spread for g in groups])
     d = x[j] - x[i]
     half = (d * np.linalg.solve(A[i] + A[j], d)).sum((1, 2)) / 2
-    return [(groups[i[k]], groups[j[k]]) for k in np.flatnonzero(half <= gate).tolist()]
+    close = half <= gate
+    return list(zip(i[close].tolist(), j[close].tolist(), strict=True))
 
 
 def pooled(states: Array, spreads: Array, counts: Array) -> tuple[Array, Array]:
@@ -66,28 +68,37 @@ def pooled(states: Array, spreads: Array, counts: Array) -> tuple[Array, Array]:
     return X, np.einsum("k,kij->ij", n, spreads + away[:, :, None] * away[:, None])
 
 
-def _connected(able: Sequence[SpaceGroup], pairs: list[tuple[int, int]]) -> list[list[SpaceGroup]]:
-    """Returns the sets of two or more groups that are connected by pairs of ids."""
-    row = {g.id: k for k, g in enumerate(able)}
-    i, j = np.array([[row[a], row[b]] for a, b in pairs], np.int64).reshape(-1, 2).T
-    label = connected_components(coo_array((np.ones(len(i)), (i, j)), (len(able), len(able))), directed=False)[1]
-    return [[able[k] for k in np.flatnonzero(label == c).tolist()] for c in np.unique(label[i]).tolist()]
+def covariance_of_mean(n: Array, P: Array) -> Array:
+    """Return the covariance (D, D) of a mean with weights n (K,), sum 1, of states with covariances P (K, D, D)."""
+    return np.asarray(np.einsum("k,kij->ij", n**2, P))
 
 
-def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> WholeGroupEvent:
-    """Replaces the parts by their union in the list, and returns the event. The group with most points survives."""
-    kept = max(parts, key=lambda g: (g.count, -g.id))
+def _connected(groups: Sequence[SpaceGroup], pairs: list[tuple[int, int]]) -> list[list[SpaceGroup]]:
+    """Returns the sets of two or more groups that are connected by pairs of indices."""
+    i, j = np.array(pairs, np.int64).T
+    label = connected_components(coo_array((np.ones(len(i)), (i, j)), (len(groups), len(groups))), directed=False)[1]
+    return [[groups[k] for k in np.flatnonzero(label == c).tolist()] for c in np.unique(label[i]).tolist()]
+
+
+def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> WholeGroupEvent | None:
+    """Replaces the parts by their union in the list, and returns the event, None if at most one part is confirmed.
+
+    The confirmed part with most points survives; without one, the part with most points.
+    """
+    known = [g for g in parts if g.confirmed]
+    kept = max(known or parts, key=lambda g: (g.count, -g.id))
     counts = np.array([g.count for g in parts])
     n, old = counts / counts.sum(), [g.pos for g in parts]
     X, kept.spread = pooled(np.stack([g.ekf.x[:, 0] for g in parts]), np.stack([g.spread for g in parts]), counts)
-    kept.ekf.x, kept.ekf.P = X[:, None], np.einsum("k,kij->ij", n**2, np.stack([g.ekf.P for g in parts]))
+    kept.ekf.x, kept.ekf.P = X[:, None], covariance_of_mean(n, np.stack([g.ekf.P for g in parts]))
     kept.members = np.concatenate([g.members + p for g, p in zip(parts, old, strict=True)]) - kept.pos
-    kept.count, settled = float(counts.sum()), [g for g in parts if g.first_seen <= t - SETTLED]
+    kept.count, settled = float(counts.sum()), [g for g in known if g.first_seen <= t - SETTLED]
     kept.first_seen, kept.last_seen = min(g.first_seen for g in parts), max(g.last_seen for g in parts)
     kept.measured_time, kept.apart_since = max(g.measured_time for g in parts), float("nan")
-    before = tuple(sorted(g.id for g in parts))
     groups[:] = [g for g in groups if g is kept or g not in parts]
     x, y = kept.pos[:2].tolist()
+    if len(known) < 2:
+        return None
     if len(settled) < 2:
         return WholeGroupEvent("enter", t, (), (kept.id,), (x, y))
-    return WholeGroupEvent("merge", t, before, (kept.id,), (x, y))
+    return WholeGroupEvent("merge", t, tuple(sorted(g.id for g in known)), (kept.id,), (x, y))

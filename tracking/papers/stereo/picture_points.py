@@ -43,15 +43,17 @@ class PicturePoints:
     def points(self, image: Image, right: Image) -> SpacePoints | None:
         """Return the features of people as points in space; None if more is foreground than `most_foreground`.
 
-        image, right (H, W, 3) BGR uint8. The background model learns from the left picture except where people are.
-        Points are moved by `surface_offset` away from the camera, horizontally. Raises InputError if the left picture's
-        size or dtype is not the background sample's, or the right one's size is another.
+        image, right (H, W, 3) BGR uint8. The background model learns from the left picture except where people are, and
+        from all of it if there is too much foreground. Points are moved by `surface_offset` away from the camera,
+        horizontally. Raises InputError if the left picture's size or dtype is not the background sample's, or the right
+        one's size is another.
         """
         if right.shape != image.shape:
             expected = f"the left picture's shape {image.shape}"
             raise InputError(place="right picture", got=str(right.shape), expected=expected, remedy="give a pair")
         seen = self.foreground.segment(image)
         if not seen.plausible:
+            self.foreground.adapt(seen, np.zeros(self.foreground.shape, bool))
             self.features.forget()
             return None
         c, left = self.config, grey(image)

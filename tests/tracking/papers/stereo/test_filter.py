@@ -118,7 +118,7 @@ def test_depth_has_no_bias_where_members_stand_at_many_depths() -> None:
 
 
 def test_members_with_more_features_do_not_draw_the_mean_to_them() -> None:
-    """Two people 2 m apart in depth, one with three times as many features, and a wrong match 4 m behind them."""
+    """Two people 2 m apart in depth, one with three times as many features."""
     camera = rig(0.0, focal=246.0)
 
     def depth(width: float, *places: tuple[float, int]) -> float:
@@ -133,7 +133,6 @@ def test_members_with_more_features_do_not_draw_the_mean_to_them() -> None:
     two = (7.0, 60), (9.0, 20)
     assert depth(0.15, *two) == pytest.approx(8.0, abs=0.02)
     assert depth(20.0, *two) == pytest.approx(7.5, abs=0.02)
-    assert depth(0.15, *two, (13.0, 1)) < 8.2, "of four places the fourth part of the highest density counts"
 
 
 def test_the_spread_is_that_of_the_members_without_their_errors() -> None:

@@ -12,6 +12,7 @@ from sim.types import Context, Frame
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.filters.ellipsoid_overlap import separation
+from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo.association import associated
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
@@ -164,6 +165,18 @@ def test_a_group_that_has_just_come_enters_with_the_other_one(before: float, eve
         groups[-1].id = id
     assert [e.kind for e in merge(groups, config, t)] == [event]
     assert [g.id for g in groups] == [1]
+
+
+def test_tentative_groups_merge_without_an_event() -> None:
+    """One joins a confirmed group with fewer points, whose id stays; two become one."""
+    config, t = StereoConfig(), 5.0
+    model, groups = motion_model(config, 1 / FPS), []
+    for id, count, start in ((7, 10, 1.0), (NO_ID, 30, 1.0), (NO_ID, 10, 9.0), (NO_ID, 20, 9.0)):
+        (step,) = together(walkers(count, count, [start, 5, 1], [1, 0, 0], 1))
+        groups.append(newborn(step, model, t))
+        groups[-1].id = id
+    assert merge(groups, config, t) == []
+    assert [(g.id, g.count) for g in groups] == [(7, 40), (NO_ID, 30)]
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.1, 0.5, 1.0, 2.0, 4.0])

@@ -1,0 +1,28 @@
+"""Points from pairs of pictures: what the background model learns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Context
+from tests.sim.scene.test_stereo import rig
+from tracking.papers.stereo.config import StereoConfig
+from tracking.papers.stereo.picture_points import PicturePoints
+
+FPS = 10.0
+
+
+def test_a_picture_that_stays_bright_becomes_background() -> None:
+    """All of it is foreground at first, which is more than `most_foreground`."""
+    camera, r = rig(40.0), np.random.default_rng(0)
+    width, height = camera.image
+
+    def picture(grey: float) -> np.ndarray:
+        return np.clip(grey + 3 * r.standard_normal((height, width, 3)), 0, 255).astype(np.uint8)
+
+    context = Context(FPS, 30.0, camera=camera, background=np.stack([picture(80) for _ in range(20)]))
+    config = StereoConfig(gain="none", background_time=1.0, foreground_time=1.0)
+    source = PicturePoints(config, context)
+    found = [source.points(picture(180), picture(180)) for _ in range(80)]
+    assert found[0] is None
+    assert found[-1] is not None
