@@ -41,11 +41,12 @@ ABLATIONS: Mapping[str, Mapping[str, object]] = {
 }
 
 
-def _mean_in_the_image(points: SpacePoints, pair: PairMeasurement, config: StereoConfig) -> Array:
-    """Returns the place (3,), m, whose (u, v, d) are the means of those of the points, with the tracker's weights."""
+def _mean_in_the_image(points: SpacePoints, pair: PairMeasurement, config: StereoConfig) -> tuple[Array, Array]:
+    """Returns the place (3,), m, whose (u, v, d) are the means of those of the points, and the tracker's weights."""
     weights = pair.weights(points, config.density_width)
-    mean = np.average(project_pair(pair.camera, points.pos), axis=0, weights=weights)
-    return np.asarray(back_project(pair.camera, mean[None])[0])
+    weights = weights / weights.sum()
+    mean = weights @ project_pair(pair.camera, points.pos)
+    return np.asarray(back_project(pair.camera, mean[None])[0]), weights
 
 
 def _measured_places(offset: Array, cov: Array, spread: Array) -> Array:
@@ -65,7 +66,7 @@ def _largest_part(n: Array, P: Array) -> Array:
 
 RULES: Mapping[str, tuple[object, str, object]] = {
     "mean in space": (space_group, "mean_position", _mean_in_the_image),
-    "expected places": (tracker, "expected_places", _measured_places),
+    "expected places": (space_group, "expected_places", _measured_places),
     "settled": (merging, "SETTLED", 0.0),
     "P of a mean": (merging, "covariance_of_mean", _largest_part),
     "half a footprint": (tracker, "FEATURE_OUTLINE", 1.0),

@@ -33,7 +33,7 @@ TRACKING = frozenset({
 @contextmanager
 def shared_points() -> Iterator[None]:
     """Shares points and training between all runs of `stereo` within the context, which are of one sequence."""
-    known: dict[tuple[object, ...], list[SpacePoints | None]] = {}
+    known: dict[tuple[object, ...], list[SpacePoints]] = {}
     trained = {}
 
     class Kept:
@@ -47,11 +47,10 @@ def shared_points() -> Iterator[None]:
             self.made = known.setdefault(key, [])
             self.given = iter(self.made)
 
-        def points(self, image: Image, right: Image) -> SpacePoints | None:
+        def points(self, image: Image, right: Image) -> SpacePoints:
             if self.source is not None:
                 self.made.append(self.source.points(image, right))
-            points = next(self.given)
-            return None if points is None else moved_away(points, self.camera, self.config.surface_offset)
+            return moved_away(next(self.given), self.camera, self.config.surface_offset)
 
     def once(sample, rate, follow_gain):  # type: ignore[no-untyped-def]
         if (rate, follow_gain) not in trained:

@@ -35,6 +35,8 @@ BORDER = 1
 """px: new corners keep away from the edge of their region by so much, as the ground shows through there."""
 SAMPLE = 1
 """px: a feature's disparity is the median in a square of 2 SAMPLE + 1 px."""
+FAINT = 4.0
+"""A disparity below so many standard deviations of its error is not used: the error of its depth is not normal."""
 CENTRE = np.float32(0.5)
 """px: OpenCV counts places from the centre of the first pixel, the camera from its corner."""
 
@@ -44,7 +46,9 @@ class SpacePoints:
     """M measured points in space.
 
     id (M,): the same number in each frame in which a point is measured. pos (M, 3): world x, y, z, m; cov (M, 3, 3):
-    covariance of a measured position. vel (M, 3): m/s; vel_cov (M, 3, 3): covariance of a measured velocity.
+    covariance of a measured position. vel (M, 3): m/s; vel_cov (M, 3, 3): covariance of a measured velocity. lag (M,):
+    s from the mean time of the places that a velocity is the slope of to now; position and velocity have the
+    covariance lag vel_cov. It is 0 if the velocity is not measured.
     """
 
     id: Ints
@@ -52,28 +56,31 @@ class SpacePoints:
     cov: Array
     vel: Array
     vel_cov: Array
+    lag: Array
 
     def __len__(self) -> int:
         return len(self.pos)
 
     def at(self, rows: Ints | Bools) -> SpacePoints:
         """Return the points of some rows: indices, or flags (M,)."""
-        return SpacePoints(self.id[rows], self.pos[rows], self.cov[rows], self.vel[rows], self.vel_cov[rows])
+        return SpacePoints(
+            self.id[rows], self.pos[rows], self.cov[rows], self.vel[rows], self.vel_cov[rows], self.lag[rows]
+        )
 
     @classmethod
     def none(cls) -> SpacePoints:
         """Return M = 0 points."""
         two, three = np.zeros((0, 3)), np.zeros((0, 3, 3))
-        return cls(no_ids(), two, three, two, three)
+        return cls(no_ids(), two, three, two, three, np.zeros(0))
 
 
 @dataclass(frozen=True)
 class FeatureRules:
     """How features are found and measured.
 
-    window_time: s that a feature must have lived; spacing: least distance of two features, px; back: largest distance
-    from its place after following it forwards and backwards, px; deviations (3,): standard deviations of u, v and d,
-    px; most: largest number of features.
+    window_time: s that a feature must have lived; spacing: least distance of a new feature from others, px; back:
+    largest error in u or v after following it forwards and backwards, px; deviations (3,): standard deviations of u, v
+    and d, px; most: largest number of features.
     """
 
     window_time: float
@@ -101,7 +108,7 @@ class Features:
         """Follow the features into the next picture, find new ones, and return those that lived through the window.
 
         grey (H, W) uint8: left picture. mask (H, W): where features may be, the foreground of people. disparity (H, W):
-        px, nan where unknown. A point without disparity in this frame is not returned.
+        px, nan where unknown. A feature without disparity in this frame, or in half of the window, is not returned.
         """
         self._resize(max(round(rules.window_time * self.fps), 1) + 1)
         if self.grey is not None and len(self.uv):
@@ -110,6 +117,7 @@ class Features:
         self._find(grey, mask, rules)
         self.grey, self.age = grey, self.age + 1
         d = sampled(disparity, self.uv, SAMPLE)
+        d[d < FAINT * rules.deviations[2]] = np.nan
         here = back_project(self.camera, np.column_stack([self.uv, d]))
         self.world = np.concatenate([self.world[:, 1:], here[:, None]], 1)
         return self._measured(rules)
@@ -178,25 +186,27 @@ class Features:
         self.age = np.concatenate([self.age, np.zeros(len(new), np.int64)])
 
     def _measured(self, rules: FeatureRules) -> SpacePoints:
-        """Returns the points of the features that have lived through the time window and have a disparity now."""
+        """Returns the points of the features that have lived through the time window, and have a disparity now and in
+        more than half of it."""
         frames = self.world.shape[1]
         known = np.isfinite(self.world[..., 0])
         old = (self.age >= frames) & known[:, -1] & (known.sum(1) > frames / 2)
         world, known = self.world[old], known[old]
         pos = world[:, -1]
         cov = point_covariances(self.camera, pos, np.square(rules.deviations))
-        vel, spread = slopes(world, known, np.arange(frames) / self.fps)
-        return SpacePoints(self.id[old], pos, cov, vel, cov / spread[:, None, None])
+        vel, spread, lag = slopes(world, known, np.arange(frames) / self.fps)
+        return SpacePoints(self.id[old], pos, cov, vel, cov / spread[:, None, None], lag)
 
 
-def slopes(points: Array, known: Bools, times: Array) -> tuple[Array, Array]:
-    """Return the velocities (M, 3) of least squares of M points over K frames, and sum (t - mean t)^2 (M,), s^2.
+def slopes(points: Array, known: Bools, times: Array) -> tuple[Array, Array, Array]:
+    """Return the velocities (M, 3) of least squares of M points over K frames, sum (t - mean t)^2 (M,), s^2, and the
+    last time less mean t (M,), s.
 
     points (M, K, 3): nan where not `known` (M, K); times (K,): s. The covariance of a slope is that of one point over
     the sum. Each row needs two known points at least.
     """
-    count = np.maximum(known.sum(1), 1)
-    t = np.where(known, times - (known @ times / count)[:, None], 0.0)
+    mean = known @ times / np.maximum(known.sum(1), 1)
+    t = np.where(known, times - mean[:, None], 0.0)
     spread = np.square(t).sum(1)
     slope = np.einsum("mk,mkd->md", t, np.where(known[..., None], points, 0.0)) / spread[:, None]
-    return slope, spread
+    return slope, spread, times[-1] - mean

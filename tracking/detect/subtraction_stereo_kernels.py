@@ -99,7 +99,7 @@ def best(sad: Sads, unique: int) -> tuple[float, int]:
     """Returns the disparity, px, with the least of the SADs (D,), and that SAD; nan if there is no disparity.
 
     The largest of equal ones counts. There is none if another disparity more than 1 px away has a SAD at most `unique`
-    % larger, or if the best is 0.
+    % larger. It may be a little below 0.
     """
     D = len(sad)
     least = sad[0]
@@ -124,7 +124,7 @@ def best(sad: Sads, unique: int) -> tuple[float, int]:
         part = abs(more - less) * 256 // bend
         part = part if more > less else -part
     found = ((D - 1 - k) * 256 + part + 15) >> 4
-    return (found / STEPS if found > 0 else np.nan), int(least)
+    return found / STEPS, int(least)
 
 
 @njit(cache=True)
@@ -173,7 +173,7 @@ def left_right(runs: Runs, found: Floats, cost: Costs) -> None:
     """Sets `found` (H, W) to nan where another pixel of the runs (R, 3) matches the same place better, by `cost`.
 
     It is OpenCV's check: a disparity d at column x stays if the best match of column x - d, rounded down or up, has a
-    disparity at most 1 px from d, or if there is none.
+    disparity at most 1 px from d, or if there is none. Disparities up to 0 take part, and become nan.
     """
     wide = found.shape[1]
     price, match = np.empty(wide, np.int32), np.empty(wide, np.float32)
@@ -195,5 +195,5 @@ def left_right(runs: Runs, found: Floats, cost: Costs) -> None:
                 if np.isnan(d):
                     continue
                 low, high = x - int(np.floor(d)), x - int(np.ceil(d))
-                if abs(match[low] - d) > 1 and abs(match[high] - d) > 1:
+                if d <= 0 or (abs(match[low] - d) > 1 and abs(match[high] - d) > 1):
                     found[row, x] = np.nan

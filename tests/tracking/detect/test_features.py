@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from sim.scene.camera import project
 from sim.scene.stereo import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import FeatureRules, Features, slopes
@@ -89,7 +90,7 @@ def test_slopes_are_those_of_numpy_with_gaps() -> None:
     r, times = np.random.default_rng(0), np.arange(6) / 10
     points, known = r.standard_normal((4, 6, 3)), r.uniform(size=(4, 6)) < 0.7
     known[:, [0, -1]] = True
-    found, spread = slopes(np.where(known[..., None], points, np.nan), known, times)
+    found, spread, _ = slopes(np.where(known[..., None], points, np.nan), known, times)
     for k in range(4):
         t = times[known[k]]
         assert found[k] == pytest.approx(np.polyfit(t, points[k, known[k]], 1)[0])
@@ -105,7 +106,7 @@ def test_the_stated_covariance_of_a_velocity_is_that_of_its_errors() -> None:
     uvd = np.repeat(project_pair(camera, X)[None], n * 10, 0).reshape(n, 10, 3).copy()
     uvd[..., 2] += 0.25 * r.standard_normal((n, 10))
     world = back_project(camera, uvd.reshape(-1, 3)).reshape(n, 10, 3)
-    vel, spread = slopes(world, np.ones((n, 10), bool), np.arange(10) / FPS)
+    vel, spread, _ = slopes(world, np.ones((n, 10), bool), np.arange(10) / FPS)
     measured = np.median(np.abs(vel @ camera.rotation[2])) * 1.4826
     cov = point_covariances(camera, X, np.square([1e-9, 1e-9, 0.25]))[0]
     stated = np.sqrt(camera.rotation[2] @ cov @ camera.rotation[2] / spread[0])
@@ -125,3 +126,17 @@ def test_a_feature_lies_in_space_where_the_camera_sees_it() -> None:
         found = features.step(image, mask, np.full((240, 320), D, np.float32), RULES)
     nearest = np.linalg.norm(project_pair(camera, found.pos) - spot, axis=1).min()
     assert nearest < 0.1
+
+
+def test_a_disparity_that_is_mostly_noise_is_not_used() -> None:
+    camera = rig(0.0, baseline=0.5)
+    features, mask = Features(camera, FPS), np.zeros((240, 320), bool)
+    mask[60:180, 60:160] = True
+    sd = RULES.deviations[2]
+    disparity = np.full((240, 320), 3.9 * sd, np.float32)
+    disparity[:, :110] = 4.1 * sd
+    for _ in range(10):
+        found = features.step(picture(0.0), mask, disparity, RULES)
+    assert len(found) > 10
+    uv, _ = project(camera, found.pos)
+    assert uv[:, 0].max() < 112

@@ -10,15 +10,16 @@ from sim.types import Ints
 from tracking.detect.features import SpacePoints
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.stereo.config import StereoConfig
+from tracking.papers.stereo.measurement import Measurement
 from tracking.papers.stereo.space_group import Motion3D, SpaceGroup, newborn
 
 
-def born(points: SpacePoints, group: Ints, motion: Motion3D, t: float) -> list[SpaceGroup]:
+def born(points: SpacePoints, group: Ints, measurement: Measurement, motion: Motion3D, t: float) -> list[SpaceGroup]:
     """Return the tentative groups that free points form (sec. 3.4).
 
     group (M,): number of each point's group by eq. 12, -1 for none. t: s.
     """
-    return [newborn(points.at(group == k), motion, t) for k in range(int(group.max(initial=-1)) + 1)]
+    return [newborn(points.at(group == k), measurement, motion, t) for k in range(int(group.max(initial=-1)) + 1)]
 
 
 def confirm(groups: list[SpaceGroup], config: StereoConfig, t: float, ids: GroupIds) -> list[WholeGroupEvent]:

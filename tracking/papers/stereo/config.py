@@ -21,7 +21,8 @@ class StereoConfig(BackgroundSettings):
     tracker: ClassVar[str] = "stereo"
 
     nearest: float = param(
-        2.5, (0.5, 20.0), "m", "from pixels: depth of the nearest people; sets the largest disparity", "log",
+        2.5, (0.5, 20.0), "m",
+        "from pixels: depth of the nearest people; sets the largest disparity, rounded up to 15, 31, 47 … px", "log",
         sees="pixels",
     )  # fmt: skip
     block: float = param(
@@ -31,7 +32,7 @@ class StereoConfig(BackgroundSettings):
         0.5, (0.0, 1.5), "m", "from pixels: a lower foreground region is no person (sec. 2)", sees="pixels"
     )
     most_height: float = param(
-        3.0, (1.0, 10.0), "m", "from pixels: a higher foreground region is no person (sec. 2)", sees="pixels"
+        3.0, (1.6, 10.0), "m", "from pixels: a higher foreground region is no person (sec. 2)", sees="pixels"
     )
     least_width: float = param(
         0.1, (0.0, 1.0), "m", "from pixels: a narrower foreground region is no person (sec. 2)", sees="pixels"
@@ -43,11 +44,12 @@ class StereoConfig(BackgroundSettings):
         "time window: features that lived shorter are not used; their velocity is the slope in it",
     )
     feature_spacing: float = param(
-        0.09, (0.03, 0.5), "m", "from pixels: least distance of two features in the image", "log", sees="pixels"
-    )
+        0.09, (0.03, 0.5), "m", "from pixels: least distance of a new feature from the others in the image", "log",
+        sees="pixels",
+    )  # fmt: skip
     back_check: float = param(
         0.7, (0.05, 5.0), "px",
-        "from pixels: a feature ends if it is farther from its place after following it forwards and backwards (ours)",
+        "from pixels: a feature ends if u or v is so far off after following it forwards and backwards (ours)",
         "log", sees="pixels",
     )  # fmt: skip
     most_features: int = param(
@@ -61,7 +63,8 @@ class StereoConfig(BackgroundSettings):
     )
     surface_offset: float = param(
         0.12, (0.0, 0.4), "m",
-        "from pixels: people's middle lies so far behind their visible surface; all points are moved by it (ours)",
+        "from pixels: people's middle lies so far behind their visible surface; all points are moved by it, "
+        "horizontally (ours)",
         sees="pixels",
     )  # fmt: skip
     point_noise: float = param(
@@ -77,7 +80,8 @@ class StereoConfig(BackgroundSettings):
     )
     point_covariance: bool = param(
         True, (True, False), "",
-        "points have covariances of their own, which count in regions and probabilities and not in the spread (ours)",
+        "points have covariances of their own; they and P count in regions and probabilities, hulls go round expected "
+        "places, and they are no part of the spread (ours)",
         "categorical",
     )  # fmt: skip
     person_spread: float = param(
@@ -89,8 +93,9 @@ class StereoConfig(BackgroundSettings):
     spread_weight: float = param(10.0, (0.1, 200.0), "points", "weight of both, in points (ours)", "log")
     spread_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the spread, alpha_s of eq. 7", "log")
     accel_noise: float = param(
-        0.5, (0.05, 5.0), "m/s^1.5", "process noise: white acceleration per root second (eq. 2)", "log"
-    )
+        0.5, (0.05, 5.0), "m/s^1.5",
+        "process noise: square root of the spectral density of a white acceleration (eq. 2)", "log",
+    )  # fmt: skip
     centroid_noise: float = param(
         0.1, (0.005, 1.0), "m",
         "v of eq. 5: measurement noise of a group's mean beside that of its points, as points come and go", "log",
@@ -98,7 +103,7 @@ class StereoConfig(BackgroundSettings):
     density_width: float = param(
         0.15, (0.05, 20.0), "m",
         "from pixels: a feature counts in the mean by the inverse of the features' density on the ground, with a "
-        "kernel of this standard deviation; the largest: all features alike (ours)",
+        "kernel of this standard deviation; the largest: all features nearly alike (ours)",
         "log", before=20.0, sees="pixels",
     )  # fmt: skip
 
@@ -114,7 +119,7 @@ class StereoConfig(BackgroundSettings):
         5, (1, 50), "", "from pixels: least number of linked features that form a group", "int", sees="pixels"
     )
     least_features: int = param(
-        3, (1, 20), "", "from pixels: least number of features that update a group (sec. 4)", "int", sees="pixels"
+        3, (1, 20), "", "from pixels: least number of features that update a group (sec. 3.3)", "int", sees="pixels"
     )
     merge_gate: float = param(
         9.0, (0.5, 30.0), "", "squared Mahalanobis radius of the six-dimensional regions of merging (eq. 13)"
@@ -123,12 +128,18 @@ class StereoConfig(BackgroundSettings):
     split_time: float = param(
         0.5, (0.0, 3.0), "s", "time for which a group's points must be unlinked parts before it splits (ours)"
     )
-    confirm_time: float = param(0.3, (0.0, 3.0), "s", "a new group is confirmed after so long with measurements (ours)")
-    coast_time: float = param(1.5, (0.0, 10.0), "s", "a group is deleted after so long without measurements (ours)")
+    confirm_time: float = param(
+        0.3, (0.0, 3.0), "s",
+        "a new group is confirmed after so long with measurements, and deleted after so long without (ours)",
+    )  # fmt: skip
+    coast_time: float = param(
+        1.5, (0.0, 10.0), "s", "a confirmed group is deleted after so long without measurements (ours)"
+    )
     report_coast: float = param(
         0.5, (0.0, 5.0), "s", "time after the last measurement for which a group is reported (ours)"
     )
     most_foreground: float = param(
-        0.6, (0.05, 1.0), "share", "from pixels: a frame with a larger share of foreground is ignored (ours)",
+        0.6, (0.05, 1.0), "share",
+        "from pixels: no group is measured in a frame with a larger share of foreground (ours)",
         sees="pixels",
     )  # fmt: skip

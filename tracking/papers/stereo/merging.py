@@ -1,12 +1,13 @@
 """Merging of `stereo`'s groups: regions of the full state that overlap (eqs 13 to 15, sec. 3.5).
 
-    x_i R x_j  if MR_i and MR_j overlap                                              (13)
+    x_i R x_j  if MR_i and MR_j overlap; I_n: the connected components of R          (13)
     X = sum of n_i X_i,   Sigma = sum of n_i {Sigma_i + (X_i - X)(X_i - X)'}         (14), (15)
 MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
 Two ellipsoids are tested exactly (tracking.filters.ellipsoid_overlap).
 
 Tentative groups merge, too: without an event, as nobody knows of them. The paper does not say what P of a merged group
-is: here it is that of a weighted mean, sum of n_i^2 P_i. The confirmed group with most points keeps its id (ours).
+is: here it is that of a weighted mean, sum of n_i^2 P_i. The group with most points keeps its id, of those that have
+been there for SETTLED if there are any, else of the confirmed ones (ours).
 """
 
 from __future__ import annotations
@@ -19,21 +20,20 @@ from scipy.sparse.csgraph import connected_components
 
 from sim.types import Array
 from tracking.filters.ellipsoid_overlap import separation
-from tracking.grouping.whole_groups import WholeGroupEvent
+from tracking.grouping.whole_groups import NO_ID, WholeGroupEvent
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.space_group import SpaceGroup
 
 SETTLED = 1.0
-"""s: a group that was there for a shorter time enters with the other one; that is no merge (ours)."""
+"""s: a group that came less long ago, and did not split from another one, enters with the other one; that is no merge
+(ours)."""
 
 
 def merge(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
     """Merge groups of the list, in place, at time t (s), and return the events of unions of two or more confirmed
-    groups: merge, or enter if at most one of these has been there for 1 s.
+    groups: merge, or enter if at most one of these has been there for 1 s or split from another one.
     """
-    gate = config.merge_gate
-    near = [(i, j) for i, j in _close_pairs(groups, gate) if overlap(groups[i], groups[j], gate)]
-    events = [_merge(groups, parts, t) for parts in (_connected(groups, near) if near else ())]
+    events = [_merge(groups, parts, t) for parts in connected(groups, config.merge_gate)]
     return [event for event in events if event is not None]
 
 
@@ -73,8 +73,11 @@ def covariance_of_mean(n: Array, P: Array) -> Array:
     return np.asarray(np.einsum("k,kij->ij", n**2, P))
 
 
-def _connected(groups: Sequence[SpaceGroup], pairs: list[tuple[int, int]]) -> list[list[SpaceGroup]]:
-    """Returns the sets of two or more groups that are connected by pairs of indices."""
+def connected(groups: Sequence[SpaceGroup], gate: float) -> list[list[SpaceGroup]]:
+    """Return the sets I_n of two or more groups whose regions overlap directly or through others (eq. 13)."""
+    pairs = [(i, j) for i, j in _close_pairs(groups, gate) if overlap(groups[i], groups[j], gate)]
+    if not pairs:
+        return []
     i, j = np.array(pairs, np.int64).T
     label = connected_components(coo_array((np.ones(len(i)), (i, j)), (len(groups), len(groups))), directed=False)[1]
     return [[groups[k] for k in np.flatnonzero(label == c).tolist()] for c in np.unique(label[i]).tolist()]
@@ -83,22 +86,28 @@ def _connected(groups: Sequence[SpaceGroup], pairs: list[tuple[int, int]]) -> li
 def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> WholeGroupEvent | None:
     """Replaces the parts by their union in the list, and returns the event, None if at most one part is confirmed.
 
-    The confirmed part with most points survives; without one, the part with most points.
+    Children of parts become children of the union; a tentative union is a child if a part is.
     """
     known = [g for g in parts if g.confirmed]
-    kept = max(known or parts, key=lambda g: (g.count, -g.id))
+    settled = [g for g in known if g.first_seen <= t - SETTLED or g.parent != NO_ID]
+    kept = max(settled or known or parts, key=lambda g: (g.count, -g.id))
     counts = np.array([g.count for g in parts])
     n, old = counts / counts.sum(), [g.pos for g in parts]
     X, kept.spread = pooled(np.stack([g.ekf.x[:, 0] for g in parts]), np.stack([g.spread for g in parts]), counts)
     kept.ekf.x, kept.ekf.P = X[:, None], covariance_of_mean(n, np.stack([g.ekf.P for g in parts]))
     kept.members = np.concatenate([g.members + p for g, p in zip(parts, old, strict=True)]) - kept.pos
-    kept.count, settled = float(counts.sum()), [g for g in known if g.first_seen <= t - SETTLED]
+    kept.count = float(counts.sum())
     kept.first_seen, kept.last_seen = min(g.first_seen for g in parts), max(g.last_seen for g in parts)
-    kept.measured_time, kept.apart_since = max(g.measured_time for g in parts), float("nan")
+    kept.measured_time = max(g.measured_time for g in parts)
     groups[:] = [g for g in groups if g is kept or g not in parts]
-    x, y = kept.pos[:2].tolist()
+    if not known:
+        kept.parent = max(g.parent for g in parts)
+        return None
+    before = tuple(sorted(g.id for g in known))
+    for g in groups:
+        g.parent = kept.id if g.parent in before else g.parent
     if len(known) < 2:
         return None
-    if len(settled) < 2:
-        return WholeGroupEvent("enter", t, (), (kept.id,), (x, y))
-    return WholeGroupEvent("merge", t, tuple(sorted(g.id for g in known)), (kept.id,), (x, y))
+    kept.apart_since = float("nan")
+    x, y = kept.pos[:2].tolist()
+    return WholeGroupEvent("merge" if len(settled) > 1 else "enter", t, before, (kept.id,), (x, y))

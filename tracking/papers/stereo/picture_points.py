@@ -40,8 +40,8 @@ class PicturePoints:
         block = odd(config.block * self.foreground.scale, 5)
         self.stereo = SubtractionStereo(largest, block)
 
-    def points(self, image: Image, right: Image) -> SpacePoints | None:
-        """Return the features of people as points in space; None if more is foreground than `most_foreground`.
+    def points(self, image: Image, right: Image) -> SpacePoints:
+        """Return the features of people as points in space, none if more is foreground than `most_foreground`.
 
         image, right (H, W, 3) BGR uint8. The background model learns from the left picture except where people are, and
         from all of it if there is too much foreground. Points are moved by `surface_offset` away from the camera,
@@ -55,7 +55,7 @@ class PicturePoints:
         if not seen.plausible:
             self.foreground.adapt(seen, np.zeros(self.foreground.shape, bool))
             self.features.forget()
-            return None
+            return SpacePoints.none()
         c, left = self.config, grey(image)
         blobs = self.foreground.person_blobs(seen.mask)
         disparity = self.stereo.match(left, grey(right), blobs.label > 0).disparity

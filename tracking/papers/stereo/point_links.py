@@ -52,6 +52,10 @@ class PointLinks:
         self.id, self.world = id, world
         return self._points(config)
 
+    def forget(self) -> None:
+        """End all links, after a frame without detections; returns nothing."""
+        self.id, self.world = no_ids(), np.zeros((0, 2, 3))
+
     def _past(self, frames: int) -> Array:
         """Returns the places (N, frames, 3) of the last frames; frames that are not kept are nan."""
         kept = self.world[:, -frames:]
@@ -70,10 +74,10 @@ class PointLinks:
         M, unit = len(self.id), np.eye(3)
         known = np.isfinite(self.world[..., 0])
         moving = known.sum(1) > 1
-        vel, vel_cov = np.zeros((M, 3)), np.repeat(SPEED**2 * unit[None], M, 0)
+        vel, vel_cov, lag = np.zeros((M, 3)), np.repeat(SPEED**2 * unit[None], M, 0), np.zeros(M)
         if moving.any():
             times = np.arange(self.world.shape[1]) / self.fps
-            vel[moving], spread = slopes(self.world[moving], known[moving], times)
+            vel[moving], spread, lag[moving] = slopes(self.world[moving], known[moving], times)
             vel_cov[moving] = config.point_noise**2 / spread[:, None, None] * unit
         cov = np.repeat(config.point_noise**2 * unit[None], M, 0)
-        return SpacePoints(self.id, self.world[:, -1].copy(), cov, vel, vel_cov)
+        return SpacePoints(self.id, self.world[:, -1].copy(), cov, vel, vel_cov, lag)

@@ -1,8 +1,6 @@
 """What `stereo` reports in a frame: the confirmed groups with their hulls, and the events.
 
-Hulls go round the points of a group, seen from above. From pixels a point's depth is uncertain by more than a person is
-wide. Each point is therefore moved towards the centroid: to its expected place, Sigma (Sigma + C_i)^-1 (y_i - xi),
-given the spread Sigma of the group and its own covariance C_i (ours).
+Hulls go round the expected places of a group's points (space_group.expected_places), seen from above.
 """
 
 from __future__ import annotations
@@ -62,11 +60,3 @@ def space_tracks(
         shown.index, shown.t, shown.plane, "group", id, id.copy(), pos.copy(), vel.copy(), s**2 * P,
         None, np.ones(len(rows)), found, tuple(reported_event(e, shown.index, shown.t, shown.fps, s) for e in events),
     )  # fmt: skip
-
-
-def expected_places(offset: Array, cov: Array, spread: Array) -> Array:
-    """Return the expected offsets (M, 3), m, of a group's points from its centroid, given measured offsets (M, 3).
-
-    cov (M, 3, 3): covariances of the measured places; spread (3, 3): covariance of the members' places.
-    """
-    return np.asarray((spread @ np.linalg.solve(spread + cov, offset[..., None]))[..., 0])

@@ -4,8 +4,9 @@
     Z = f(X_k) + noise                                       (u, v, d) of the mean of the group's points (eqs 4 to 6)
     Sigma <- alpha_s Sigma + (1 - alpha_s) C_y               covariance of its points' positions and velocities (eq. 7)
 
-The filter is filterpy's. The paper's Phi has a step of 1 frame; here times are seconds. Departures: C_y is without the
-points' own covariances and is shrunk to a prior, as few points have no covariance in six dimensions.
+The filter is filterpy's. The paper's Phi has a step of 1 frame; here times are seconds. The paper has one covariance of
+a group; here P is that of the centroid, by the filter, and Sigma that of the members. Departures: C_y is without the
+points' own covariances and is shrunk to a prior, as the covariance of few points in six dimensions is singular.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ class SpaceGroup:
     ekf: filter with the state x (6, 1), order x, x', y, y', z, z', and its covariance P. spread (6, 6): Sigma, in
     the same order. count: N, number of its points in its last measured frame. id: NO_ID while tentative.
     first_seen, last_seen: s; measured_time: s. parent: id of the group that it split from, or NO_ID. members (K,
-    3): its points relative to its position, m, when it was measured last. apart_since: s since when its points have
-    been unlinked parts, nan if they are not.
+    3): expected places of its points relative to its position, m, when it was measured last. apart_since: s since when
+    its points have been unlinked parts, nan if they are not or it was not measured.
     """
 
     ekf: ExtendedKalmanFilter
@@ -87,54 +88,61 @@ def predict(group: SpaceGroup, motion: Motion3D) -> None:
     group.ekf.predict()
 
 
-def newborn(points: SpacePoints, motion: Motion3D, t: float) -> SpaceGroup:
+def newborn(points: SpacePoints, measurement: Measurement, motion: Motion3D, t: float) -> SpaceGroup:
     """Return a tentative group of M points, M at least 1, with their mean position, velocity and covariance (sec. 3.4).
 
-    t: time of the frame, s.
+    measurement: gives the weights of the mean position; t: time of the frame, s.
     """
     from filterpy.kalman import ExtendedKalmanFilter
 
     config, n = motion.config, len(points)
     ekf = ExtendedKalmanFilter(dim_x=6, dim_z=3)
     ekf.P = np.zeros((6, 6))
-    ekf.x[POS, 0], ekf.x[VEL, 0] = points.pos.mean(0), points.vel.mean(0)
-    ekf.P[np.ix_(POS, POS)] = mean_covariance(points, config)
+    mean, weights = mean_position(points, measurement, config)
+    ekf.x[POS, 0], ekf.x[VEL, 0] = mean, points.vel.mean(0)
+    ekf.P[np.ix_(POS, POS)] = mean_covariance(points, weights, config)
     ekf.P[np.ix_(VEL, VEL)] = points.vel_cov.mean(0) / n + config.velocity_spread**2 / n * np.eye(3)
     group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt)
-    group.members = points.pos - group.pos
+    _place_members(group, points, config)
     return group
 
 
-def mean_position(points: SpacePoints, measurement: Measurement, config: StereoConfig) -> Array:
-    """Return the mean position (3,), m, of M points, with the weights of `measurement` (ours).
+def mean_position(points: SpacePoints, measurement: Measurement, config: StereoConfig) -> tuple[Array, Array]:
+    """Return the mean position (3,), m, of M points and their weights (M,) in it, with sum 1, by `measurement` (ours).
 
     People who are near, or textured, show more features than others. The mean of all features would lie near them.
     """
     weights = measurement.weights(points, config.density_width)
-    return np.asarray(np.average(points.pos, axis=0, weights=weights))
+    weights = weights / weights.sum()
+    return weights @ points.pos, weights
 
 
-def mean_covariance(points: SpacePoints, config: StereoConfig) -> Array:
+def mean_covariance(points: SpacePoints, weights: Array, config: StereoConfig) -> Array:
     """Return the covariance (3, 3), m^2, of the mean of M points as a measurement of their group's position.
 
-    It is that of the mean of the points' errors, and centroid_noise^2 in each coordinate.
+    It is that of the mean of the points' errors with weights (M,), sum 1, and centroid_noise^2 in each coordinate.
     """
-    return np.asarray(points.cov.mean(0) / len(points) + config.centroid_noise**2 * np.eye(3))
+    errors = np.einsum("m,mij->ij", weights**2, points.cov)
+    return np.asarray(errors + config.centroid_noise**2 * np.eye(3))
 
 
 def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
     """Return C_y (6, 6): covariance of the positions and velocities of M points, order x, x', y, y', z, z' (eq. 7).
 
-    Ours: with `point_covariance` the mean of the points' own covariances is subtracted; negative eigenvalues become 0.
-    The result is shrunk to a diagonal prior worth `spread_weight` points.
+    Ours: with `point_covariance` the mean of the points' own covariances is subtracted, those of positions with
+    velocities, too; negative eigenvalues become 0. The result is shrunk to a diagonal prior worth `spread_weight`
+    points.
     """
     n = len(points)
-    both = np.zeros((n, 6))
-    both[:, POS], both[:, VEL] = points.pos, points.vel
-    C = np.cov(both.T, bias=True) if n > 1 else np.zeros((6, 6))
+    y = np.zeros((n, 6))
+    y[:, POS], y[:, VEL] = points.pos, points.vel
+    C = np.cov(y.T, bias=True) if n > 1 else np.zeros((6, 6))
     if config.point_covariance:
         C[np.ix_(POS, POS)] -= points.cov.mean(0)
         C[np.ix_(VEL, VEL)] -= points.vel_cov.mean(0)
+        both = (points.lag[:, None, None] * points.vel_cov).mean(0)
+        C[np.ix_(POS, VEL)] -= both
+        C[np.ix_(VEL, POS)] -= both.T
         values, U = np.linalg.eigh(C)
         C = (U * np.maximum(values, 0.0)) @ U.T
     w = config.spread_weight
@@ -148,9 +156,10 @@ def measure(group: SpaceGroup, points: SpacePoints, measurement: Measurement, mo
     Z is the measurement of the mean position; its covariance is that of the mean, by the Jacobian at
     the mean.
     """
-    config, mean = motion.config, mean_position(points, measurement, motion.config)
+    config = motion.config
+    mean, weights = mean_position(points, measurement, config)
     J = measurement.jacobian(mean)
-    R = J @ mean_covariance(points, config) @ J.T
+    R = J @ mean_covariance(points, weights, config) @ J.T
     group.ekf.update(
         measurement.z(mean), state_jacobian, measured_state, R, args=(measurement,), hx_args=(measurement,)
     )
@@ -159,4 +168,21 @@ def measure(group: SpaceGroup, points: SpacePoints, measurement: Measurement, mo
     group.spread = keep * group.spread + (1 - keep) * spread_of(points, config)
     group.count, group.last_seen = float(len(points)), t
     group.measured_time += motion.dt
-    group.members = points.pos - group.pos
+    _place_members(group, points, config)
+
+
+def _place_members(group: SpaceGroup, points: SpacePoints, config: StereoConfig) -> None:
+    """Sets the members of a group from its M points of the frame: with `point_covariance` their expected places."""
+    offset = points.pos - group.pos
+    spread = group.spread[np.ix_(POS, POS)]
+    group.members = expected_places(offset, points.cov, spread) if config.point_covariance else offset
+
+
+def expected_places(offset: Array, cov: Array, spread: Array) -> Array:
+    """Return the expected offsets (M, 3), m, of a group's points from its centroid: Sigma (Sigma + C_i)^-1 (y_i - xi)
+    (ours). From pixels a point's depth is uncertain by more than a person is wide.
+
+    offset (M, 3): measured offsets; cov (M, 3, 3): C_i, covariances of the measured places; spread (3, 3): Sigma of
+    positions.
+    """
+    return np.asarray((spread @ np.linalg.solve(spread + cov, offset[..., None]))[..., 0])

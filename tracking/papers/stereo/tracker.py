@@ -33,11 +33,11 @@ from tracking.papers.stereo.association import associated
 from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
-from tracking.papers.stereo.measurement import POS, Measurement, PairMeasurement, PlaceMeasurement
+from tracking.papers.stereo.measurement import Measurement, PairMeasurement, PlaceMeasurement
 from tracking.papers.stereo.merging import merge
 from tracking.papers.stereo.picture_points import PicturePoints
 from tracking.papers.stereo.point_links import PointLinks
-from tracking.papers.stereo.report import ShownFrame, expected_places, space_tracks
+from tracking.papers.stereo.report import ShownFrame, space_tracks
 from tracking.papers.stereo.space_group import SpaceGroup, measure, motion_model, predict
 from tracking.papers.stereo.splitting import split
 
@@ -49,8 +49,8 @@ class Stereo:
     """The tracker `stereo`: groups of people in space, from pairs of pictures or from points.
 
     State: config, which may be replaced between two frames; groups, a list; ids; pictures: from pictures to points,
-    None from points; links: from detections to points; motion: the model of a step; plane; context. All but config
-    exist after `reset` only.
+    None from points; links: from detections to points; motion: the model of a step; measurement: of a position; plane;
+    scale: units of the plane per m; context. All but config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("stereo", "points")
@@ -83,8 +83,9 @@ class Stereo:
         """Return the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
         From pictures `frame.image` and `frame.right` are used and the plane is "space"; from points `detections.pos`,
-        whose plane is kept. A frame without them, and from pictures one with too much foreground, is predicted only. A
-        config that has replaced `config` since the last frame holds from this frame on; the groups stay.
+        whose plane is kept. Without them, and from pictures with too much foreground, no group is measured; groups are
+        predicted, merge and end all the same. A config that has replaced `config` since the last frame holds from this
+        frame on; the groups stay.
 
         Raises InputError if points are in the image and the context has no scale above 0, or if a picture's size or
         dtype is wrong.
@@ -96,8 +97,7 @@ class Stereo:
         points, t = self._points(frame, detections), frame.t
         for group in self.groups:
             predict(group, self.motion)
-        if points is not None:
-            self._measure(points, t)
+        self._measure(points, t)
         events = merge(self.groups, self.config, t)
         events += confirm(self.groups, self.config, t, self.ids)
         events += remove_lost(self.groups, self.config, t)
@@ -105,15 +105,16 @@ class Stereo:
         shown = ShownFrame(frame.index, t, self.context.fps, self.plane, self.scale, outline, self.pictures is None)
         return space_tracks(self.groups, events, self.config.report_coast, shown)
 
-    def _points(self, frame: Frame, detections: Detections | None) -> SpacePoints | None:
-        """Returns the points of the frame in m; None without information. Sets the plane, from points."""
+    def _points(self, frame: Frame, detections: Detections | None) -> SpacePoints:
+        """Returns the points of the frame in m, none without information. Sets the plane, from points."""
         if self.pictures is not None:
             if frame.image is None or frame.right is None:
                 self.pictures.features.forget()
-                return None
+                return SpacePoints.none()
             return self.pictures.points(frame.image, frame.right)
         if detections is None:
-            return None
+            self.links.forget()
+            return SpacePoints.none()
         self.plane = detections.plane
         self.scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
         xyz = np.zeros((len(detections.pos), 3))
@@ -121,7 +122,10 @@ class Stereo:
         return self.links.step(xyz, self.config)
 
     def _measure(self, points: SpacePoints, t: float) -> None:
-        """Associate the points (sec. 3.3), update and split the groups, and add new ones (sec. 3.4)."""
+        """Associate the points (sec. 3.3), update and split the groups, and add new ones (sec. 3.4).
+
+        A group with fewer points than `least_features` is predicted only (end of sec. 3.3); these points are not used.
+        """
         c, motion = self.config, self.motion
         radius, least, update = (
             (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.least_group, c.least_features)
@@ -131,12 +135,10 @@ class Stereo:
         for k, group in enumerate(self.groups):
             mine = points.at(owner == k)
             if len(mine) < update:
+                group.apart_since = float("nan")
                 continue
             measure(group, mine, self.measurement, motion, t)
-            if c.point_covariance:
-                flat = group.spread[np.ix_(POS, POS)]
-                group.members = expected_places(group.members, mine.cov, flat)
-            if c.split:
-                children += split(group, mine, sphere_groups(mine.pos, radius, least), motion, t)
+            children += split(group, mine, sphere_groups(mine.pos, radius, least), self.measurement, motion, t)
         loose = points.at(owner < 0)
-        self.groups += children + born(loose, sphere_groups(loose.pos, radius, least), motion, t)
+        alone = sphere_groups(loose.pos, radius, least)
+        self.groups += children + born(loose, alone, self.measurement, motion, t)

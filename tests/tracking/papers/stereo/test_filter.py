@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
 from sim.scene.stereo import back_project, point_covariances, project_pair
 from tests.sim.scene.test_stereo import rig
-from tracking.detect.features import SpacePoints
+from tracking.detect.features import SpacePoints, slopes
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.measurement import (
     POS,
@@ -18,7 +20,15 @@ from tracking.papers.stereo.measurement import (
     measured_state,
     state_jacobian,
 )
-from tracking.papers.stereo.space_group import mean_position, measure, motion_model, newborn, predict, spread_of
+from tracking.papers.stereo.space_group import (
+    mean_covariance,
+    mean_position,
+    measure,
+    motion_model,
+    newborn,
+    predict,
+    spread_of,
+)
 
 DT = 1 / 30
 FIT = {"tilt": 20.0, "focal": 1000.0, "baseline": 0.5, "height": 3.0}
@@ -28,7 +38,7 @@ FIT = {"tilt": 20.0, "focal": 1000.0, "baseline": 0.5, "height": 3.0}
 def at_places(pos: np.ndarray, cov: np.ndarray, vel: np.ndarray | None = None, vel_cov: float = 0.01) -> SpacePoints:
     n = len(pos)
     vel = np.zeros((n, 3)) if vel is None else vel
-    return SpacePoints(np.arange(1, n + 1), pos, cov, vel, np.repeat(vel_cov * np.eye(3)[None], n, 0))
+    return SpacePoints(np.arange(1, n + 1), pos, cov, vel, np.repeat(vel_cov * np.eye(3)[None], n, 0), np.zeros(n))
 
 
 def cloud(seed: int, count: int, centre, sd: float = 0.3) -> np.ndarray:
@@ -49,7 +59,7 @@ def test_a_linear_measurement_makes_it_a_kalman_filter() -> None:
     config = StereoConfig()
     motion, r = motion_model(config, DT), np.random.default_rng(0)
     points = at_places(cloud(1, 8, [1, 2, 1]), np.repeat(0.01 * np.eye(3)[None], 8, 0))
-    group = newborn(points, motion, 0.0)
+    group = newborn(points, PlaceMeasurement(), motion, 0.0)
     kf = KalmanFilter(dim_x=6, dim_z=3)
     kf.x, kf.P, kf.F, kf.Q = group.ekf.x.copy(), group.ekf.P.copy(), motion.Phi, motion.Q
     kf.H = np.eye(6)[POS]
@@ -86,7 +96,7 @@ def test_errors_have_the_stated_covariance(depth: float) -> None:
             pos = back_project(camera, uvd)
             points = at_places(pos, point_covariances(camera, pos, deviations**2))
             if group is None:
-                group = newborn(points, motion, 0.0)
+                group = newborn(points, measurement, motion, 0.0)
                 group.ekf.x[VEL, 0] = x[VEL] + 0.2 * r.standard_normal(3)
                 group.ekf.P[np.ix_(VEL, VEL)] = 0.04 * np.eye(3)
             else:
@@ -110,7 +120,7 @@ def test_depth_has_no_bias_where_members_stand_at_many_depths() -> None:
     config, measurement = StereoConfig(density_width=20.0), PairMeasurement(camera)
     motion = motion_model(config, DT)
     points = at_places(pos, point_covariances(camera, pos, np.square([0.3, 0.3, 0.15])))
-    group = newborn(points, motion, 0.0)
+    group = newborn(points, measurement, motion, 0.0)
     for k in range(1, 30):
         predict(group, motion)
         measure(group, points, measurement, motion, k * DT)
@@ -125,14 +135,42 @@ def test_members_with_more_features_do_not_draw_the_mean_to_them() -> None:
         z = np.repeat([z for z, _ in places], [n for _, n in places])
         pos = camera.position + z[:, None] * camera.rotation[2]
         points = at_places(pos, np.repeat(0.04 * np.eye(3)[None], len(z), 0))
-        mean = mean_position(points, PairMeasurement(camera), StereoConfig(density_width=width))
-        plain = mean_position(points, PlaceMeasurement(), StereoConfig(density_width=width))
+        mean, _ = mean_position(points, PairMeasurement(camera), StereoConfig(density_width=width))
+        plain, _ = mean_position(points, PlaceMeasurement(), StereoConfig(density_width=width))
         assert plain == pytest.approx(pos.mean(0))
         return float((mean - camera.position) @ camera.rotation[2])
 
     two = (7.0, 60), (9.0, 20)
     assert depth(0.15, *two) == pytest.approx(8.0, abs=0.02)
     assert depth(20.0, *two) == pytest.approx(7.5, abs=0.02)
+
+
+def test_the_covariance_of_a_mean_is_that_of_its_weights() -> None:
+    """One lone member has nearly half of the weight."""
+    camera, config, r = rig(0.0, focal=246.0), StereoConfig(centroid_noise=0.005), np.random.default_rng(0)
+    z = np.repeat([7.0, 11.0], [60, 1])
+    true = camera.position + z[:, None] * camera.rotation[2]
+    means = []
+    for _ in range(300):
+        points = at_places(true + 0.03 * r.standard_normal(true.shape), np.repeat(9e-4 * np.eye(3)[None], len(z), 0))
+        mean, weights = mean_position(points, PairMeasurement(camera), config)
+        means.append(mean)
+    assert weights[-1] > 0.3
+    stated = np.sqrt(np.diag(mean_covariance(points, weights, config)))
+    assert np.std(means, axis=0) == pytest.approx(stated, rel=0.25)
+
+
+def test_errors_of_places_and_of_their_slopes_are_no_spread() -> None:
+    """A velocity is the slope of the last places, so that its error goes with that of the last place."""
+    r, n, frames = np.random.default_rng(0), 40000, 11
+    times = np.arange(frames) * DT
+    places = 0.2 * r.standard_normal((n, frames, 3))
+    vel, spread, lag = slopes(places, np.ones((n, frames), bool), times)
+    cov = np.repeat(0.04 * np.eye(3)[None], n, 0)
+    points = SpacePoints(np.arange(n), places[:, -1], cov, vel, cov / spread[:, None, None], lag)
+    C = spread_of(points, StereoConfig(spread_weight=0.1))
+    assert np.abs(C).max() < 0.005
+    assert np.abs(spread_of(replace(points, lag=np.zeros(n)), StereoConfig(spread_weight=0.1))).max() > 0.02
 
 
 def test_the_spread_is_that_of_the_members_without_their_errors() -> None:

@@ -23,6 +23,7 @@ def test_a_picture_that_stays_bright_becomes_background() -> None:
     context = Context(FPS, 30.0, camera=camera, background=np.stack([picture(80) for _ in range(20)]))
     config = StereoConfig(gain="none", background_time=1.0, foreground_time=1.0)
     source = PicturePoints(config, context)
-    found = [source.points(picture(180), picture(180)) for _ in range(80)]
-    assert found[0] is None
-    assert found[-1] is not None
+    assert not source.foreground.segment(picture(180)).plausible
+    for _ in range(80):
+        assert not len(source.points(picture(180), picture(180)))
+    assert source.foreground.segment(picture(180)).plausible

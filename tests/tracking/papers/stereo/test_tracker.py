@@ -16,15 +16,16 @@ from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo.association import associated
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.initial_grouping import sphere_groups
-from tracking.papers.stereo.measurement import POS, VEL, PairMeasurement
+from tracking.papers.stereo.measurement import POS, VEL, PairMeasurement, PlaceMeasurement
 from tracking.papers.stereo.merging import merge, overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera
-from tracking.papers.stereo.space_group import motion_model, newborn
+from tracking.papers.stereo.space_group import SpaceGroup, motion_model, newborn
 from tracking.papers.stereo.splitting import split
 from tracking.papers.stereo.tracker import Stereo
 
 FPS = 30.0
 PICTURE = np.zeros((4, 4, 3), np.uint8)
+PLACE = PlaceMeasurement()
 
 
 def scripted(steps, config: StereoConfig | None = None, camera=None):
@@ -61,7 +62,7 @@ def together(*groups) -> list[SpacePoints]:
     for parts in zip(*groups, strict=True):
         pos, vel, id = (np.concatenate([p[a] for p in parts]) for a in range(3))
         cov = np.repeat(4e-4 * np.eye(3)[None], len(pos), 0)
-        made.append(SpacePoints(id, pos, cov, vel, 25 * cov))
+        made.append(SpacePoints(id, pos, cov, vel, 25 * cov, np.zeros(len(pos))))
     return made
 
 
@@ -113,9 +114,11 @@ def test_a_point_in_no_region_belongs_to_nobody(away: float, owner: int) -> None
     """Its sphere overlaps those of the group's points, and its velocity is the group's (eq. 8)."""
     (step,) = together(walkers(0, 12, [1, 5, 1], [1, 0, 0], 1))
     config = StereoConfig()
-    group = newborn(step, motion_model(config, 1 / FPS), 0.0)
+    group = newborn(step, PLACE, motion_model(config, 1 / FPS), 0.0)
     cov = 4e-4 * np.eye(3)[None]
-    point = SpacePoints(np.array([99]), group.pos[None] + [away, 0, 0], cov, group.ekf.x[None, VEL, 0], 25 * cov)
+    point = SpacePoints(
+        np.array([99]), group.pos[None] + [away, 0, 0], cov, group.ekf.x[None, VEL, 0], 25 * cov, np.zeros(1)
+    )
     assert sphere_groups(np.concatenate([step.pos, point.pos]), config.radius, 1).tolist() == [0] * 13
     assert associated([group], point, config).tolist() == [owner]
 
@@ -154,28 +157,45 @@ def test_groups_of_one_velocity_merge_and_opposite_ones_never() -> None:
         assert "merge" not in kinds(scripted(together(a, b))[1])
 
 
+def people(*groups: tuple[int, int, float, float]) -> list[SpaceGroup]:
+    """Groups that walk alike: id, number of points, place, first time."""
+    model, made = motion_model(StereoConfig(), 1 / FPS), []
+    for id, count, start, first_seen in groups:
+        (step,) = together(walkers(count, count, [start, 5, 1], [1, 0, 0], 1))
+        made.append(newborn(step, PLACE, model, first_seen))
+        made[-1].id = id
+    return made
+
+
 @pytest.mark.parametrize(("before", "event"), [(1.1, "merge"), (0.7, "enter")])
 def test_a_group_that_has_just_come_enters_with_the_other_one(before: float, event: str) -> None:
-    """before: s for which the second group was there when the two merge."""
-    config, t = StereoConfig(), 5.0
-    model, groups = motion_model(config, 1 / FPS), []
-    for id, first_seen in ((1, 0.0), (2, t - before)):
-        (step,) = together(walkers(id, 12, [1, 5, 1], [1, 0, 0], 1))
-        groups.append(newborn(step, model, first_seen))
-        groups[-1].id = id
-    assert [e.kind for e in merge(groups, config, t)] == [event]
-    assert [g.id for g in groups] == [1]
+    """before: s for which the second group was there when the two merge. The older one keeps its id."""
+    groups = people((1, 12, 1.0, 0.0), (2, 30, 1.0, 5.0 - before))
+    (found,) = merge(groups, StereoConfig(), 5.0)
+    assert (found.kind, found.before) == (event, (1, 2))
+    assert [g.id for g in groups] == [2 if event == "merge" else 1]
+
+
+def test_a_group_that_split_merges_again() -> None:
+    groups = people((1, 12, 1.0, 0.0), (2, 30, 1.0, 4.9))
+    groups[1].parent = 1
+    (found,) = merge(groups, StereoConfig(), 5.0)
+    assert found.kind == "merge"
+
+
+def test_children_of_merged_groups_are_children_of_the_union() -> None:
+    """A tentative child of group 1 here, whose parent merges into group 2, and one that merges with a newborn group."""
+    tentative = (NO_ID, 8, 9.0, 4.0), (NO_ID, 8, 17.0, 4.0), (NO_ID, 20, 17.0, 5.0)
+    groups = people((1, 12, 1.0, 0.0), (2, 30, 1.0, 0.0), *tentative)
+    groups[2].parent = groups[3].parent = 1
+    merge(groups, StereoConfig(), 5.0)
+    assert [(g.id, g.parent) for g in groups] == [(2, NO_ID), (NO_ID, 2), (NO_ID, 2)]
 
 
 def test_tentative_groups_merge_without_an_event() -> None:
     """One joins a confirmed group with fewer points, whose id stays; two become one."""
-    config, t = StereoConfig(), 5.0
-    model, groups = motion_model(config, 1 / FPS), []
-    for id, count, start in ((7, 10, 1.0), (NO_ID, 30, 1.0), (NO_ID, 10, 9.0), (NO_ID, 20, 9.0)):
-        (step,) = together(walkers(count, count, [start, 5, 1], [1, 0, 0], 1))
-        groups.append(newborn(step, model, t))
-        groups[-1].id = id
-    assert merge(groups, config, t) == []
+    groups = people((7, 10, 1.0, 5.0), (NO_ID, 30, 1.0, 5.0), (NO_ID, 10, 9.0, 5.0), (NO_ID, 20, 9.0, 5.0))
+    assert merge(groups, StereoConfig(), 5.0) == []
     assert [(g.id, g.count) for g in groups] == [(7, 40), (NO_ID, 30)]
 
 
@@ -190,7 +210,7 @@ def test_regions_of_opposite_groups_overlap_at_no_distance(distance: float, dire
         pos = np.array([at, 5.0, 1.0]) + 0.25 * r.standard_normal((15, 3))
         vel = speed * along + 0.1 * r.standard_normal((15, 3))
         cov = np.repeat(4e-4 * np.eye(3)[None], 15, 0)
-        return newborn(SpacePoints(np.arange(15), pos, cov, vel, 25 * cov), motion, 0.0)
+        return newborn(SpacePoints(np.arange(15), pos, cov, vel, 25 * cov, np.zeros(15)), PLACE, motion, 0.0)
 
     assert not overlap(group(0.0, 0.9), group(distance, -0.9), config.merge_gate)
     assert overlap(group(0.0, 0.9), group(distance, 0.9), config.merge_gate) == (distance < 1.5)
@@ -232,14 +252,42 @@ def test_a_group_whose_points_part_splits() -> None:
     assert "split" not in kinds(scripted(together(walkers(0, 20, [0, 5, 1], [0.8, 0, 0], 150)))[1])
 
 
+def beside(gap: float, frames: int) -> list[SpacePoints]:
+    """Two points of one velocity that are `gap` m apart after 1 s beside each other."""
+    near = walkers(0, 1, [0, 5, 0], [0, 1, 0], frames, sd=0.0), walkers(1, 1, [0.5, 5, 0], [0, 1, 0], frames, 100, 0.0)
+    made = together(*near)
+    for points in made[round(FPS) :]:
+        points.pos[1, 0] += gap - 0.5
+    return made
+
+
+@pytest.mark.parametrize(("gap", "parts"), [(1.6, 1), (1.9, 2)])
+def test_parts_that_would_merge_at_once_do_not_split(gap: float, parts: int) -> None:
+    """Points are linked up to 1.5 m, and the regions of two points of one velocity overlap up to 1.7 m."""
+    tracker, _ = scripted(beside(gap, 90), StereoConfig(radius=0.75, least_group=1, least_features=1))
+    assert len(tracker.groups) == parts
+    assert tracker.groups[0].first_seen == 0.0
+    if parts == 1:
+        assert tracker.groups[0].apart_since == pytest.approx(1.0, abs=0.1), "the clock runs on"
+
+
+def test_the_clock_of_a_split_stops_while_a_group_is_not_measured() -> None:
+    steps = beside(1.8, 90)
+    config = StereoConfig(radius=0.75, least_group=1, least_features=1)
+    lost = [None if FPS + 2 < k < FPS + 15 else points for k, points in enumerate(steps[: round(FPS) + 16])]
+    seen, after = scripted(steps[: round(FPS) + 18], config)[0], scripted(lost, config)[0]
+    assert [g.parent for g in seen.groups] == [NO_ID, 1]
+    assert [g.parent for g in after.groups] == [NO_ID]
+
+
 def test_a_child_has_the_velocity_of_its_parent_and_its_covariance() -> None:
     (step,) = together(walkers(0, 12, [0, 5, 1], [1, 0, 0], 1), walkers(1, 8, [4, 5, 1], [0, 1, 0], 1, first=100))
     config = StereoConfig()
     motion = motion_model(config, 1 / FPS)
-    group = newborn(step, motion, 0.0)
+    group = newborn(step, PLACE, motion, 0.0)
     group.apart_since = 0.0
     before = group.ekf
-    (child,) = split(group, step, sphere_groups(step.pos, config.radius, 1), motion, config.split_time)
+    (child,) = split(group, step, sphere_groups(step.pos, config.radius, 1), PLACE, motion, config.split_time)
     assert child.count == 8
     assert np.array_equal(child.ekf.x[VEL], before.x[VEL])
     assert np.array_equal(child.ekf.P[np.ix_(VEL, VEL)], before.P[np.ix_(VEL, VEL)])
