@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.types import Context, Frame
+from sim.types import Context, Detections, Frame
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.filters.ellipsoid_overlap import separation
@@ -274,8 +274,9 @@ def test_parts_that_would_merge_at_once_do_not_split(gap: float, parts: int) -> 
 def test_the_clock_of_a_split_stops_while_a_group_is_not_measured() -> None:
     steps = beside(1.8, 90)
     config = StereoConfig(radius=0.75, least_group=1, least_features=1)
-    lost = [None if FPS + 2 < k < FPS + 15 else points for k, points in enumerate(steps[: round(FPS) + 16])]
-    seen, after = scripted(steps[: round(FPS) + 18], config)[0], scripted(lost, config)[0]
+    steps = steps[: round(FPS) + 18]
+    lost = [None if FPS + 2 < k < FPS + 17 else points for k, points in enumerate(steps)]
+    seen, after = scripted(steps, config)[0], scripted(lost, config)[0]
     assert [g.parent for g in seen.groups] == [NO_ID, 1]
     assert [g.parent for g in after.groups] == [NO_ID]
 
@@ -299,6 +300,17 @@ def test_points_that_appear_far_from_their_group_enter() -> None:
     far = together(walkers(0, 10, [0, 5, 1], [0, 0, 0], 30), walkers(1, 10, [5, 5, 1], [0, 0, 0], 30, first=11))
     _, tracks = scripted([*seen, *far])
     assert kinds(tracks) == ["enter", "enter"]
+
+
+def test_a_frame_without_detections_ends_the_links_of_points() -> None:
+    """Their places would else be one frame apart, and their velocities too high."""
+    tracker = Stereo()
+    tracker.reset(Context(FPS, 30.0), 0)
+    for k in range(30):
+        found = Detections(k + 1, k / FPS, "ground", np.array([[1.3 * k / FPS, 5.0]]))
+        tracker.step(Frame(k + 1, k / FPS, None, None), found if k < 28 else None)
+    points = tracker.links.step(np.array([[1.3 * 30 / FPS, 5.0, 0.0]]), tracker.config)
+    assert not points.vel.any()
 
 
 def test_a_group_that_is_gone_is_deleted() -> None:
