@@ -143,7 +143,8 @@ class JointConfig(BackgroundSettings):
         4.0,
         (0.0, 100.0),
         "1/s",
-        "of validity bayesian: weight of log p(Z, X), per second; it takes the place of validity_rate (ours)",
+        "of validity bayesian: weight of log p(Z, X) in p(Z | X), per second; splits and new people keep the "
+        "Davies-Bouldin index with validity_rate (ours)",
         before=4.0,
     )
     belief_rate: float = param(
@@ -161,7 +162,7 @@ class JointConfig(BackgroundSettings):
         "energy",
         ("energy", "sampled"),
         "",
-        "energy: eq. 4 as printed; sampled: p(Z | X) sums to 1 over the partitions of a particle (ours)",
+        "energy: eq. 4 as printed; sampled: p(Z | X) has the mean 1 over the partitions of a particle (ours)",
         "categorical",
     )
     scatter: float = param(
@@ -194,7 +195,12 @@ class JointConfig(BackgroundSettings):
         before=1.0,
     )  # fmt: skip
 
-    lag: float = param(0.4, (0.05, 3.0), "s", "between the two times of the features of events (ours)", online=False)
+    lag: float = param(
+        0.4, (0.05, 3.0), "s",
+        "between the two times of the features of events; the classifier is fitted at 0.4 s, for another lag it must "
+        "be fitted anew (ours)",
+        online=False,
+    )  # fmt: skip
     event_rate: float = param(1.0, (0.05, 20.0), "", "factor of the rate of merges and splits (ours)", "log")
     newcomers: str = param(
         "validity",
@@ -224,7 +230,11 @@ class JointConfig(BackgroundSettings):
 
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity (ours)", "log")
     gate: float = param(0.999, (0.9, 0.99999), "probability", "that a detection of a person is in the gate (ours)")
-    confirm_time: float = param(0.3, (0.0, 3.0), "s", "for which a new person must be seen to be tracked (ours)")
+    confirm_time: float = param(
+        0.3, (0.0, 3.0), "s",
+        "since its first measurement after which a new person is tracked, from the next frame on; it is given up after "
+        "so long without one (ours)",
+    )  # fmt: skip
     coast_time: float = param(
         1.0,
         (0.1, 10.0),
@@ -268,13 +278,11 @@ class JointConfig(BackgroundSettings):
         """The Dirichlet process mixture (4,), as mixture_of has it."""
         return mixture_of({name: getattr(self, name) for name in MIXTURE})
 
-    @property
-    def sharpness(self) -> float:
-        """Weight of the validity where the parts of a split, or the group of a new person, are drawn: lambda_cl over
-        the lag, the time in which an event happens."""
-        return self.validity_rate * self.lag
-
     def rules(self, dt: float, lag: float) -> Array:
-        """Return the rules (6,) of events in a step of dt s, as group_events_kernels has them; lag: s."""
+        """Return the rules (6,) of events in a step of dt s, as group_events_kernels has them.
+
+        lag: s, in which an event happens, a whole number of frames. The validity has the weight lambda_cl lag where the
+        parts of a split are drawn.
+        """
         every = self.size_prior == "all"
-        return np.array([dt / lag, self.sharpness, self.event_rate, every, self.size_mean, self.size_std])
+        return np.array([dt / lag, self.validity_rate * lag, self.event_rate, every, self.size_mean, self.size_std])

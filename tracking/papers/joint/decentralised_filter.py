@@ -96,6 +96,7 @@ def joint_indices(nested: Nested, uniform: float) -> Ints:
 def component_indices(nested: Nested, uniforms: Array) -> tuple[Ints, Ints]:
     """Return the indices of step 2 in two stages (ours): (N_x, K) of each component alone, then (N_x,) of the rest.
 
+    The rest is that of X as it was before its components were resampled: it selects partitions, and hardly places.
     uniforms (K + 1,).
     """
     single = systematic_resample_rows(nested.component_weights().T, uniforms[:-1]).T

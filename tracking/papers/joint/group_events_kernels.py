@@ -19,8 +19,10 @@ from tracking.papers.joint.partition_kernels import clusters, same_row
 SIZE, X, Y, VX, VY, XX, XY, YY, SPREAD = range(9)
 """Columns of moments (G, 9): number of people, mean place and velocity, covariance of the places shrunk to PRIOR, mean
 squared distance to the mean place."""
-PRIOR, PRIOR_WEIGHT = 0.35, 1.0
-"""Standard deviation per axis, m, to which covariances of places are shrunk, and the people that it counts for."""
+PRIOR = 0.35
+"""Standard deviation per axis, m, to which covariances of places are shrunk."""
+PRIOR_WEIGHT = 1.0
+"""Number of people that PRIOR counts for."""
 LOG_KL_MOST = 8.0
 """Largest log(1 + d_KL); also its value without another group."""
 FEATURES = 6

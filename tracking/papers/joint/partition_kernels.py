@@ -74,7 +74,7 @@ def clusters(label: Ints, cluster: Ints, head: Ints) -> int:
 
 @njit(cache=True)
 def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre: Array, scatter: Array) -> float:
-    """Return d_cl(Z, X) of one partition: the Davies-Bouldin index with a floor of the scatter (ours).
+    """Return d_cl(Z, X) of one partition: the Davies-Bouldin index with a prior scatter (ours).
 
     points (K, D): the data that are clustered; the tracker gives the paper's X: states x, y, m, and vx, vy, m/s.
     cluster (K,): number of each person's cluster, below `count`; scales: as SCATTER, APART. centre (K, D), scatter
@@ -231,19 +231,8 @@ def binder_moves(gain: Array, label: Ints) -> float:
             for g in range(1, n + 1):
                 if worth[g] > best + 1e-12:
                     best, at = worth[g], g
-            if at == label[k] or best < 0:
-                empty = 0
-                if best < -1e-12:
-                    for g in range(1, n + 1):
-                        used = False
-                        for other in range(n):
-                            used = used or (other != k and label[other] == g)
-                        if not used:
-                            empty = g
-                            break
-                if empty == 0 or empty == label[k]:
-                    continue
-                at = empty
+            if at == label[k]:
+                continue
             label[k] = at
             moved = True
     total = 0.0

@@ -2,7 +2,7 @@
 
 The paper does not say how individuals start, end or get their detections. One association serves all particles: that
 of least total cost with the means over particles. A new person is followed by a Kalman filter until confirmed, and then
-drawn into the particles from its posterior, alone in all partitions.
+drawn into the particles from its posterior.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class People:
         """Return for how long each person has been missed, s, (K,); in a group of whom nobody was measured, the sum
         over its members.
 
-        group (K,): of each person, -1 for alone. Members are missed independently, so that their evidence adds up.
+        group (K,): of each person, -1 for alone. The evidence of members adds up, as if they were missed independently.
         """
         same = ((group[:, None] == group) & (group >= 0)) | np.eye(len(group), dtype=bool)
         measured = (same & (self.missed == 0)).any(axis=1)
@@ -67,8 +67,8 @@ class People:
 class Newcomers:
     """People who are not confirmed yet, a Kalman filter for each.
 
-    bank (5, M, 2): filters of x, y, m. age (M,): s since the first measurement. missed (M,): s since the last one. size
-    (M, 2): width, height of the last box, px, nan if unknown.
+    bank (5, M, 2): filters of x, y, m. age (M,): s since the first measurement. missed (M,): s since the last one,
+    without frames that have no detector. size (M, 2): width, height of the last box, px, nan if unknown.
     """
 
     bank: Array = field(default_factory=lambda: np.zeros((5, 0, 2)))
@@ -77,10 +77,9 @@ class Newcomers:
     size: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     def predict(self, dt: float) -> None:
-        """Go on for dt s without a measurement."""
+        """Predict to dt s later."""
         kalman.predict(self.bank, dt, kalman.white_acceleration(dt, np.full(2, NEWCOMER_NOISE)))
         self.age += dt
-        self.missed += dt
 
     def measure(self, points: Array, sizes: Array | None, noise: float, gate: float) -> Bools:
         """Update by the points (M, 2), m, that they are associated with; return flags of the points left over."""

@@ -11,10 +11,11 @@ from tracking.papers.joint.distributions import newest
 from tracking.papers.joint.division_kernels import place_newcomer
 
 
-def place(nested: Nested, new: int, config: JointConfig, draws: np.random.Generator) -> None:
+def place(nested: Nested, new: int, config: JointConfig, lag: float, draws: np.random.Generator) -> None:
     """Draw in all partitions whether each of the `new` last people, alone so far, joins a group or person; in place.
 
-    It is the nearest one, joined with the probability of the validity; with the Dirichlet process any one.
+    It is the nearest one, joined with the probability of the validity; with the Dirichlet process any one. lag: s, in
+    which an event happens.
     """
     n, c, people = nested, config, nested.x.shape[1]
     if c.partition_dynamics == "dirichlet":
@@ -24,4 +25,4 @@ def place(nested: Nested, new: int, config: JointConfig, draws: np.random.Genera
         return
     state = newest(n.x)
     for person in range(people - new, people):
-        place_newcomer(state, n.z, person, draws.random(n.log_q.shape), c.sharpness, c.scales)
+        place_newcomer(state, n.z, person, draws.random(n.log_q.shape), c.validity_rate * lag, c.scales)

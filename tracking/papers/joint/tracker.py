@@ -4,7 +4,7 @@ Bazzani, Cristani, Murino, "Decentralized particle filter for joint individual-g
 state is (X, Z): X places and velocities of K individuals, Z the partition of them into groups; y the detections. N_x
 particles of X, N_z partitions under each. The steps of a frame, with the numbers of Algorithm 1:
 
-    4  X' ~ pi(X' | X, y)              composite proposal                     sec. 4, eq. 3  individuals
+    4  X' ~ pi(X' | X, y)              composite proposal                     before eq. 3   individuals
     5  q = qbar p(X' | X, Z)           groups move individuals                eq. 5          individuals_kernels
     6  resample Z by q                                                                       decentralised_filter
     7  Z' ~ pi(Z' | X', X, Z)          Merge, Split, None of each group       eqs 6, 7       group_events_kernels
@@ -23,7 +23,9 @@ Departures, all ours:
   confirmation and losses.
 - The proposal is a mixture for each person, not of products. Its second part is p(x' | x, y), the product of dynamics
   and likelihood. Sigma is made of two noises per root second.
-- Each person is resampled by the own part of the weight, and the particles by the rest.
+- Each person is resampled by the own part of the weight, and the partitions by the rest: eq. 5 and the validity. A
+  person then comes from another particle than the partitions, so that the rest hardly selects places. Reported moments
+  have the own part only. A new person joins a group by the validity.
 - The Davies-Bouldin index has a prior scatter and a virtual other cluster, and acts per second.
 - People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
   features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
@@ -110,9 +112,9 @@ class Joint:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Return the people of the frame and their groups as Tracks; updates all particles.
 
-        From points `detections.pos` is used (x, y), from pixels `frame.image`. In a frame without them (None), and from
-        pixels in one with too much foreground, nobody counts as missed. Raises InputError if points are in the image
-        and the context has no scale above 0, or if the picture's size or dtype is not the background sample's.
+        From points `detections.pos` is used (x, y, finite), from pixels `frame.image`. In a frame without them (None),
+        and from pixels in one with too much foreground, nobody counts as missed. Raises InputError if points are in the
+        image and the context has no scale above 0, or if the picture's size or dtype is not the background sample's.
         """
         if self.pixels is not None:
             if self.pixels.settings is not self.config:
@@ -125,6 +127,7 @@ class Joint:
         self._filter(z)
         tracks = self._report(frame, np.isfinite(z[:, 0]))
         self._resample()
+        self.newcomers.predict(self.dt)
         if detections is not None:
             free = np.ones(len(points), bool)
             free[columns] = False
@@ -222,9 +225,10 @@ class Joint:
         self.health.keep(rows)
 
     def _newcomers(self, points: Array, sizes: Array | None) -> None:
-        """Follow people who are not confirmed, with the points (M, 2) of nobody; add those who are confirmed."""
+        """Follow people who are not confirmed, predicted to this frame, with the points (M, 2) of nobody; add those who
+        are confirmed."""
         c, new = self.config, self.newcomers
-        new.predict(self.dt)
+        new.missed += self.dt
         free = new.measure(points, sizes, self.noise, c.largest_distance)
         new.start(points[free], None if sizes is None else sizes[free], self.noise, c.speed_prior)
         sure = (new.age >= c.confirm_time - 1e-9) & (new.missed == 0)
@@ -233,7 +237,8 @@ class Joint:
         new.keep(~sure & (new.missed <= c.confirm_time + 1e-9))
 
     def _add(self, rows: Bools) -> None:
-        """Draw the newcomers `rows` into the particles, alone in all partitions; their earlier states are straight."""
+        """Draw the newcomers `rows` into the particles, with straight earlier states: alone in all partitions, or by
+        the validity."""
         n, c = self.nested, self.config
         normals = self.draws[BIRTHS].standard_normal((c.particles, int(rows.sum()), STATE))
         if c.individuals == "measured":
@@ -249,7 +254,7 @@ class Joint:
         self.belief.add(self.nested.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
         self.health.add(past.shape[1])
         if c.newcomers == "validity":
-            place(self.nested, past.shape[1], c, self.draws[PLACING])
+            place(self.nested, past.shape[1], c, self.frames * self.dt, self.draws[PLACING])
 
     def _report(self, frame: Frame, seen: Bools) -> Tracks:
         """Returns the Tracks of the frame, on the ground in m, in the image in px; seen (K,): who was measured."""

@@ -240,3 +240,11 @@ def test_people_have_arrived_when_they_were_first_seen():
     stepped(tracker, frames)
     assert len(tracker.people.id) == 3
     assert tracker.belief.first.tolist() == [0, 0, 20 / tracker.belief.size]
+
+
+def test_a_new_person_goes_on_in_frames_without_a_detector():
+    """The velocity is that of the walk, and the time of the first sight is kept."""
+    tracker, frames = Joint(JointConfig(**QUIET)), walk([[0, 0]], [1.3, 0], 12)
+    shown = stepped(tracker, [*frames[:2], None, None, None, *frames[5:8]])
+    assert [len(t.id) for t in shown] == [0] * 6 + [1, 1]
+    assert shown[-1].vel[0, 0] == pytest.approx(1.3, abs=0.35)
