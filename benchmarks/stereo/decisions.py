@@ -3,8 +3,9 @@
 `ABLATIONS` are decisions that have a parameter. `RULES` have none, so that code of the tracker is replaced: `mean in
 space` measures the mean of the points' (u, v, d); `expected places` puts hulls round the measured places of points;
 `settled` counts merges of groups that were there for less than 1 s; `P of a mean` gives a merged group the P of its
-largest part; `half a footprint` gives a feature a whole one. `LIGHT` is for the scene light and run by --options only.
-With --store, rows of earlier runs count, too, so that decisions may have different numbers of sequences.
+largest part; `least density` takes densities of features as they are; `half a footprint` gives a feature a whole one.
+`LIGHT` is for the scene light and run by --options only. With --store, rows of earlier runs count, too, so that
+decisions may have different numbers of sequences.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from benchmarks.support.tables import signed, table
 from sim.scene.stereo import back_project, project_pair
 from sim.types import Array
 from tracking.detect.features import SpacePoints
-from tracking.papers.stereo import merging, space_group, tracker
+from tracking.papers.stereo import measurement, merging, space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.measurement import PairMeasurement
 from tracking.stats import mean_interval
@@ -69,6 +70,7 @@ RULES: Mapping[str, tuple[object, str, object]] = {
     "expected places": (space_group, "expected_places", _measured_places),
     "settled": (merging, "SETTLED", 0.0),
     "P of a mean": (merging, "covariance_of_mean", _largest_part),
+    "least density": (measurement, "LEAST_DENSITY", 0.0),
     "half a footprint": (tracker, "FEATURE_OUTLINE", 1.0),
 }
 """Owner, name and replacement by the name of the row."""
