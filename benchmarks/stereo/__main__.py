@@ -70,14 +70,14 @@ def main() -> None:
     parser.add_argument(
         "--options", help="decisions: names of decisions, separated by commas; scenes: stereo, preset paper"
     )
-    parser.add_argument(
-        "--chart", type=Path, default=Path("stereo.svg"), help="trajectories, density, cost: the SVG to write"
-    )
+    parser.add_argument("--chart", type=Path, help="trajectories (needed), density, cost: the SVG to write")
     parser.add_argument(
         "--store", type=Path, help="scenes, causes, decisions, density: JSON of rows; measured ones are kept"
     )
     parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")
     args = parser.parse_args()
+    if args.mode == "trajectories" and args.chart is None:
+        parser.error("trajectories needs --chart FILE")
     one_thread()
     found = MODES[args.mode](args)
     if args.json is not None:

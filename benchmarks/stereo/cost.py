@@ -61,7 +61,8 @@ def cost(args: argparse.Namespace) -> dict[str, list[list[float]]]:
     chart = {"time": [float(c[2]) for c in rows.values()], "touched": [float(c[1]) for c in rows.values()]}
     chart["target"] = [float(c[3]) for c in rows.values()]
     share = [float(c[0]) for c in rows.values()]
-    lines([Panel("Subtraction stereo over dense matching", share, chart, "share of foreground")], args.chart, 1)
+    if args.chart is not None:
+        lines([Panel("Subtraction stereo over dense matching", share, chart, "share of foreground")], args.chart, 1)
     table("Cost of matching", "foreground", ("mean", "touched", "time", "target", "frames"), rows)
     table("Frames per second", "scene", ("frames/s",), {k: [f"{np.mean(v):.0f}"] for k, v in speed.items()})
     return made

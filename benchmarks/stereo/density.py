@@ -152,4 +152,5 @@ def _chart(args: argparse.Namespace, people: list[float], curves: Curves) -> Non
         )
         for title, by in curves.items()
     ]
-    lines(panels, args.chart, 2)
+    if args.chart is not None:
+        lines(panels, args.chart, 2)
