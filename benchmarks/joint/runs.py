@@ -78,7 +78,8 @@ def pooled(rows: Sequence[Row], end: str) -> list[str]:
     there = total("TP") + total("FN")
     found = [(r[f"group_TP{end}"], r[f"group_FN{end}"], r[f"group_GDSR{end}"], r[f"group_MOTP{end}"]) for r in rows]
     success = sum((tp + fn) * gdsr for tp, fn, gdsr, _ in found if tp + fn)
-    place = sum(tp * motp for tp, _, _, motp in found if tp) / max(total("TP"), 1)
+    placed = [(tp, motp) for tp, _, _, motp in found if np.isfinite(motp)]
+    place = sum(tp * motp for tp, motp in placed) / max(sum(tp for tp, _ in placed), 1)
     wrong = total("FP") + total("FN") + total("IDSW")
     shares = 1 - total("FP") / there, total("TP") / there, success / there, 1 - wrong / there
     return [*(f"{100 * x:.1f}" for x in shares), f"{PX_PER_M * place:.1f}"]
