@@ -40,7 +40,7 @@ def main() -> None:
     add_seeds(parser, "20000:20001")
     parser.add_argument("--filter-seeds", type=seed_range, default="0:5", metavar="A:B", help="seeds of the filters")
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of joint")
-    parser.add_argument("--suite", default="standard", help="of mode events")
+    parser.add_argument("--suite", help="of the modes events (standard) and ablation (friends-meet)")
     parser.add_argument("--recordings", action="store_true", help="mode classifier: labelled recordings (--data)")
     parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="mode particles: draw it")
     parser.add_argument(

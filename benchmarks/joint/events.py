@@ -6,7 +6,16 @@ import argparse
 
 import numpy as np
 
-from benchmarks.joint.runs import Row, Variant, difference, mean_row, measured, median_latency, sequences
+from benchmarks.joint.runs import (
+    Row,
+    Variant,
+    difference,
+    mean_row,
+    measured,
+    median_latency,
+    sequences,
+    with_false_events,
+)
 from benchmarks.support import tables
 from benchmarks.support.options import seeds_text
 
@@ -18,10 +27,10 @@ def events(given: argparse.Namespace) -> None:
     compared += [Variant(f"{name} + default grouping", name, seeds=name != "blob") for name in ("particle", "blob")]
     compared = [v for v in compared if not given.only or v.name in given.only.split(",")]
     rows: dict[str, list[Row]] = {v.name: [] for v in compared}
-    for sequence in sequences(given.seeds, given.suite):
+    suite = given.suite or "standard"
+    for sequence in sequences(given.seeds, suite):
         for v in compared:
-            mean = mean_row(measured(sequence, v, given.filter_seeds, given.set))
-            rows[v.name].append({**mean, "false": mean["merge_FP"] + mean["split_FP"]})
+            rows[v.name].append(with_false_events(mean_row(measured(sequence, v, given.filter_seeds, given.set))))
     cells = {}
     for name, found in rows.items():
         counts = [
@@ -31,7 +40,7 @@ def events(given: argparse.Namespace) -> None:
         means = [float(np.nanmean([row[key] for row in found])) for key in ("event_F1", "group_F1", "pairwise_F1")]
         cells[name] = [*map(tables.number, means), *counts, median_latency(found)]
     columns = ["event F1", "group F1", "pairwise F1", "merges: hits / false / missed", "splits", "latency, s (median)"]
-    title = f"{given.suite}, {len(rows[compared[0].name])} sequences, seeds {seeds_text(given.seeds)}, "
+    title = f"{suite}, {len(rows[compared[0].name])} sequences, seeds {seeds_text(given.seeds)}, "
     tables.table(title + f"filter seeds {seeds_text(given.filter_seeds)}", "tracker", columns, cells)
     first, *rest = (v.name for v in compared)
     keys = {"event F1": "event_F1", "group F1": "group_F1", "pairwise F1": "pairwise_F1", "false events": "false"}

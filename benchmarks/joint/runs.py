@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
+from unittest import mock
 
 import numpy as np
 
@@ -29,13 +31,17 @@ OTHERS = (
 
 @dataclass(frozen=True)
 class Variant:
-    """A tracker, its parameters and its detections; seeds: False if its seed has no effect."""
+    """A tracker, its parameters and its detections; seeds: False if its seed has no effect.
+
+    replaced: attributes of the tracker's code that are replaced while it runs: owner, name, value.
+    """
 
     name: str
     tracker: str = "joint"
     params: Mapping[str, object] = field(default_factory=dict)
     detections: DetectionMode = "file"
     seeds: bool = True
+    replaced: tuple[tuple[object, str, object], ...] = ()
 
 
 def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settings: Sequence[str] = ()) -> list[Row]:
@@ -45,7 +51,10 @@ def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settin
         params = JointConfig.from_dict(dict(variant.params)).with_set(*settings)
     rows = []
     for seed in list(seeds)[: None if variant.seeds else 1]:
-        run = track(variant.tracker, sequence, params=params, detections=variant.detections, seed=seed)
+        with ExitStack() as replaced:
+            for owner, name, value in variant.replaced:
+                replaced.enter_context(mock.patch.object(owner, name, value))
+            run = track(variant.tracker, sequence, params=params, detections=variant.detections, seed=seed)
         own = {k: v for k, v in run.info.get("diagnostics", {}).items() if v is not None}
         rows.append({**evaluate(sequence.truth, run), **own, "speed": run.info["frames_per_second"]})
     return rows
@@ -54,6 +63,11 @@ def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settin
 def mean_row(rows: Sequence[Row]) -> Row:
     """Returns the mean of each score over filter seeds; nan where a seed has none."""
     return {key: float(np.mean([row.get(key, np.nan) for row in rows])) for key in rows[0]}
+
+
+def with_false_events(row: Row) -> Row:
+    """Returns the row with `false`, the number of false merges and splits."""
+    return {**row, "false": row["merge_FP"] + row["split_FP"]}
 
 
 def sequences(seeds: Iterable[int], suite: str = "friends-meet") -> Iterable[Recording]:
