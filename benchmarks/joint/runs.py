@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field
-from unittest import mock
 
 import numpy as np
 
 from benchmarks.support import tables
+from benchmarks.support.replaced_code import Replacement, replaced_code
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import resolve
 from sim.sequence import simulate
@@ -41,7 +40,7 @@ class Variant:
     params: Mapping[str, object] = field(default_factory=dict)
     detections: DetectionMode = "file"
     seeds: bool = True
-    replaced: tuple[tuple[object, str, object], ...] = ()
+    replaced: tuple[Replacement, ...] = ()
 
 
 def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settings: Sequence[str] = ()) -> list[Row]:
@@ -51,9 +50,7 @@ def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settin
         params = JointConfig.from_dict(dict(variant.params)).with_set(*settings)
     rows = []
     for seed in list(seeds)[: None if variant.seeds else 1]:
-        with ExitStack() as replaced:
-            for owner, name, value in variant.replaced:
-                replaced.enter_context(mock.patch.object(owner, name, value))
+        with replaced_code(variant.replaced):
             run = track(variant.tracker, sequence, params=params, detections=variant.detections, seed=seed)
         own = {k: v for k, v in run.info.get("diagnostics", {}).items() if v is not None}
         rows.append({**evaluate(sequence.truth, run), **own, "speed": run.info["frames_per_second"]})

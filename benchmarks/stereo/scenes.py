@@ -14,9 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass, field
-from unittest import mock
 
 import numpy as np
 
@@ -24,6 +22,7 @@ from benchmarks.stereo.further_scenes import further_entries
 from benchmarks.stereo.kept_points import shared_points
 from benchmarks.stereo.stored_rows import Row, Stored
 from benchmarks.support.in_memory import in_memory
+from benchmarks.support.replaced_code import Replacement, replaced_code
 from benchmarks.support.tables import interval, number, table
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry, resolve
@@ -54,7 +53,7 @@ class Variant:
 
     name: str
     params: Mapping[str, object] = field(default_factory=dict)
-    replaced: tuple[tuple[object, str, object], ...] = ()
+    replaced: tuple[Replacement, ...] = ()
 
 
 def entries(only: str | None) -> dict[str, Entry]:
@@ -82,9 +81,7 @@ def recordings(entry: Entry, seeds: Iterable[int]) -> Iterator[tuple[int, Record
 
 def tracked(sequence: Recording, variant: Variant, detections: DetectionMode) -> TrackingRun:
     """Returns the tracks of one sequence by a variant."""
-    with ExitStack() as replaced:
-        for owner, name, value in variant.replaced:
-            replaced.enter_context(mock.patch.object(owner, name, value))
+    with replaced_code(variant.replaced):
         return track("stereo", sequence, params=variant.params or None, detections=detections)
 
 
