@@ -72,5 +72,9 @@ class WorkError(FlockscopeError):
     """
 
 
+class OrderError(WorkError):
+    """An order of a scenario's script did not come true with one seed; the scenario may work with others."""
+
+
 def _rebuild(kind: type[FlockscopeError], parts: dict[str, str]) -> FlockscopeError:
     return kind(**parts)

@@ -1,11 +1,21 @@
 """Keyed random streams: each combination of seed, role and keys (such as a person's number) has a generator of its own.
 
-An additional draw from one stream therefore changes no other stream.
+An additional draw from one stream therefore changes no other stream. What is drawn for motion, truth and detections
+goes through the functions below: numpy's own normal, exponential and Poisson draws call the C library, whose last bits
+depend on the processor.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
+
+from sim.elementary import log, normal_quantile
+from sim.types import Array, Ints
+
+if TYPE_CHECKING:
+    from scenarios.schema.values import Distribution, Value
 
 # Every stored hash depends on these numbers: add at the end, never change one.
 ROLE = {
@@ -41,3 +51,76 @@ def rng(seed: int, role: str, *keys: int, repeat: int = 0) -> np.random.Generato
     """
     spawn_key = (ROLE[role], *keys) if repeat == 0 else (ROLE[role], *keys, 1_000_000 + repeat)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))
+
+
+def uniforms(r: np.random.Generator, shape: int | tuple[int, ...]) -> Array:
+    """Returns uniforms above 0 and at most 1 (a value may round to 1) of this shape."""
+    return np.asarray(r.random(shape) + 2.0**-54)
+
+
+def normals(u: Array) -> Array:
+    """Returns the standard normal quantiles at u, any shape, 0 < u <= 1; always finite, as u = 1 is lowered a little.
+
+    nan stays nan.
+    """
+    return np.asarray(normal_quantile(np.minimum(u, 1.0 - 2.0**-53)))
+
+
+def autoregression(e: Array, keep: Any) -> Array:
+    """Returns x (K, D) with x_0 = e_0 and x_k = keep x_(k-1) + sqrt(1 - keep²) e_k down the rows of e (K, D).
+
+    keep: correlation of successive rows, 0 to 1; a number or (D,). If e is standard normal, so is x. The sums are made
+    in steps of 1, 2, 4, … rows; a row does not depend on later ones.
+    """
+    x = e.copy()
+    x[1:] *= np.sqrt(1.0 - keep * keep)
+    step = 1
+    while step < len(x):
+        x[step:] = x[step:] + keep * x[:-step]
+        keep, step = keep * keep, 2 * step
+    return x
+
+
+def poisson_quantiles(mean: float, u: Array) -> Ints:
+    """Returns the quantiles (N,) of a Poisson distribution at u (N,), 0 < u <= 1: zeros if the mean is 0.
+
+    A quantile is the smallest number whose cumulative probability is at least u; it is at most mean + 12 sqrt(mean) +
+    20. For a fixed u below 1 it never falls when the mean rises. Raises ValueError for a negative or nan mean.
+    """
+    if not mean >= 0:
+        raise ValueError(f"a Poisson distribution of mean {mean}")
+    k = np.arange(1, int(mean + 12 * np.sqrt(mean) + 20))
+    mode = int(mean)  # probabilities relative to that of the mode, so that none of the large ones underflows
+    up = np.cumprod(mean / k[mode:])
+    down = np.cumprod(k[:mode][::-1] / mean)[::-1] if mode else up[:0]
+    share = np.cumsum(np.concatenate([down, [1.0], up]))
+    return np.searchsorted(share / share[-1], u).astype(np.int64)
+
+
+def draw(value: Value, r: np.random.Generator) -> float:
+    """Returns the number itself as float, or one draw of the distribution; draws outside its `clip` are drawn again.
+
+    A clip that keeps less than 1 % of the draws was refused when the distribution was made, so this ends.
+    """
+    if isinstance(value, (int, float)):
+        return float(value)
+    while True:
+        drawn = _draw_once(value, r)
+        if value.clip is None or value.clip[0] <= drawn <= value.clip[1]:
+            return drawn
+
+
+def _draw_once(value: Distribution, r: np.random.Generator) -> float:
+    if value.choice is not None:
+        return value.choice[int(r.integers(len(value.choice)))]
+    u = uniforms(r, 1)
+    if value.normal is not None:
+        mean, sd = value.normal
+        return float(mean + sd * normals(u)[0])
+    if value.uniform is not None:
+        low, high = value.uniform
+        return float(low + (high - low) * u[0])
+    if value.exponential is not None:
+        return float(-value.exponential * log(u[0]))
+    assert value.poisson is not None
+    return float(poisson_quantiles(value.poisson, u)[0])

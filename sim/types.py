@@ -191,13 +191,31 @@ class Context(Frozen):
 class Order:
     """One order of a scenario's script, as recorded in gt/script.json; measured events never depend on it. kind:
     "merge", "split" or "queue". fired: frame (from 1) in which it took effect, None if it never did. before, after:
-    person ids of each group concerned, as the script plans them before and after the order."""
+    person ids of each group concerned, as the script plans them before and after the order. time: of firing, s. event:
+    index among the truth's events of the one that fulfilled it. None: unknown, or none."""
 
     id: str
     kind: str
     fired: int | None
     before: tuple[tuple[int, ...], ...]
     after: tuple[tuple[int, ...], ...]
+    time: float | None = None
+    event: int | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class States(Frozen):
+    """The states of a crowd from which groups and events are measured: C ticks at `rate` per s from t = 0, P people.
+
+    The other fields are those of Motion, with ticks in place of frames. A simulated crowd has the ticks of its script,
+    whatever the frame rate of the camera."""
+
+    rate: float
+    pos: Array
+    vel: Array
+    heading: Array
+    present: Bools
+    intent: Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,7 +224,8 @@ class Motion(Frozen):
     repeat: number of the suite entry's copy, or 0. fps: frames/s. pos (T, P, 2): x, y in m; vel (T, P, 2): m/s; heading
     (T, P): rad; nan while absent. present (T, P): True while in the scene. intent (T, P): number of the group that the
     script assigns the person to (a number of its own for a person alone, -1 while absent). height, width, depth (P,):
-    of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script."""
+    of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script. measured: states from which the
+    truth is measured; None: the frames themselves."""
 
     name: str
     seed: int
@@ -223,6 +242,13 @@ class Motion(Frozen):
     free_speed: Array
     scene: Scene
     orders: tuple[Order, ...] = ()
+    measured: States | None = None
+
+    def states(self) -> States:
+        """Return the states from which the truth is measured."""
+        if self.measured is not None:
+            return self.measured
+        return States(self.fps, self.pos, self.vel, self.heading, self.present, self.intent)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,7 +3,7 @@
 A value is a number, such as `1.2`, or a distribution: `{ normal = [1.34, 0.26], clip = [0.5, 2.2] }` (mean, standard
 deviation), `{ uniform = [0, 5] }` (bounds), `{ exponential = 3.0 }` (mean), `{ poisson = 1.1, clip = [1, 6] }` (mean)
 or `{ choice = [-1, 1] }` (each entry with equal probability). `clip` draws again until the value lies between its
-bounds, both included.
+bounds, both included. `sim.rng.draw` draws.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from typing import Annotated, Self
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from scenarios.limits import PICTURE_SIDE
@@ -107,29 +106,6 @@ class Distribution(BaseModel):
         above = 1.0 if math.isinf(high) else self._below(high)
         return max(0.0, above - (0.0 if math.isinf(low) else self._below(low, strictly=True)))
 
-    def _draw(self, rng: np.random.Generator) -> float:
-        """Returns one draw from rng, ignoring `clip`; poisson gives a whole number as float."""
-        if self.normal is not None:
-            return float(rng.normal(*self.normal))
-        if self.uniform is not None:
-            return float(rng.uniform(*self.uniform))
-        if self.exponential is not None:
-            return float(rng.exponential(self.exponential))
-        if self.poisson is not None:
-            return float(rng.poisson(self.poisson))
-        assert self.choice is not None
-        return self.choice[int(rng.integers(len(self.choice)))]
-
-    def draw(self, rng: np.random.Generator) -> float:
-        """Returns one value of this distribution from rng. With `clip`, values outside its bounds are drawn again.
-
-        A clip that keeps less than 1 % of the draws was refused when the distribution was made, so this ends.
-        """
-        while True:
-            value = self._draw(rng)
-            if self.clip is None or self.clip[0] <= value <= self.clip[1]:
-                return value
-
 
 Value = float | Distribution
 Point = tuple[Value, Value]
@@ -145,11 +121,6 @@ def poisson_share(mean: float, k: int) -> float:
 def share_within(value: Value, low: float, high: float) -> float:
     """Returns the probability that a value lies between low and high, both included; 0 or 1 for a number."""
     return value.share_within(low, high) if isinstance(value, Distribution) else float(low <= value <= high)
-
-
-def draw(value: Value, rng: np.random.Generator) -> float:
-    """Returns the number itself as float, or one draw of the distribution from rng."""
-    return value.draw(rng) if isinstance(value, Distribution) else float(value)
 
 
 def bounds(value: Value) -> tuple[float, float]:

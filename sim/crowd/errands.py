@@ -15,6 +15,7 @@ from sim.crowd.formation import standing, to_world, walking
 from sim.crowd.group_state import GroupState
 from sim.crowd.population import EnteringGroup, is_free
 from sim.crowd.stops import PlannedStop
+from sim.elementary import length, unit
 from sim.types import Array, Scene
 
 LOOK_AHEAD = 3.0  # m from the stop: the group looks for a free place
@@ -85,7 +86,7 @@ class Errands:
     def _advance(self, g: int, errand: _Errand, columns: list[int], t: float, state: Array) -> bool:
         stop, pos = errand.stops[0], state[columns, :2]
         middle = pos.mean(axis=0)
-        far = float(np.linalg.norm(middle - stop.at))
+        far = float(length(middle - stop.at))
         if errand.leaves is not None:
             if t < errand.leaves:
                 return False
@@ -136,11 +137,10 @@ class Errands:
         """
         others = np.ones(len(state), np.bool_)
         others[columns] = False
-        slow = others & (np.hypot(state[:, 2], state[:, 3]) < STANDING)
+        slow = others & (length(state[:, 2:]) < STANDING)
         taken = [state[slow, :2], *(e.places for other, e in self.errands.items() if other != g)]
         taken = [places for places in taken if len(places)]
-        turn = 2 * np.pi * np.arange(ANGLES) / ANGLES
-        ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        ring = unit(2 * np.pi * np.arange(ANGLES) / ANGLES)
         rings = [at + k * RING * ring for k in range(1, RINGS + 1)]
         for middle in np.concatenate([at[None], *rings]):
             if is_free(self._circle(g, middle), self.scene, taken):

@@ -6,11 +6,12 @@ there are more than BRUTE (48) people. Only pairs that may act on each other go 
 
 from __future__ import annotations
 
-from math import exp, sqrt
+from math import sqrt
 
 import numpy as np
 
 from sim.compiler import njit
+from sim.elementary_kernels import exp
 
 # isort: off
 # fmt: off
@@ -218,7 +219,8 @@ def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
     n = len(state)
     order, start, nx = _cells(state, rules[PERSON_RANGE])
     reach, radius = rules[PERSON_RANGE] * rules[PERSON_RANGE], 2.0 * rules[PERSON_RADIUS]
-    touch = max(rules[SEPARATION_RANGE], QUEUE_SEPARATION_RANGE, radius) ** 2
+    touch = max(rules[SEPARATION_RANGE], QUEUE_SEPARATION_RANGE, radius)
+    touch *= touch
     rows = np.empty((4, n))
     for s in range(n):
         for k in range(4):
@@ -289,7 +291,7 @@ def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore
         if tag[i, MODE] == IN_GROUP:
             out[i, X] += push[tag[i, GROUP], 0]
             out[i, Y] += push[tag[i, GROUP], 1]
-        size = sqrt(out[i, X] ** 2 + out[i, Y] ** 2)
+        size = sqrt(out[i, X] * out[i, X] + out[i, Y] * out[i, Y])
         if size > cap:
             out[i, X] *= cap / size
             out[i, Y] *= cap / size

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numpy as np
-
 from sim.compiler import njit
+from sim.elementary_kernels import atan2, cos, sin
 
 # isort: off
 # fmt: off
@@ -33,6 +32,11 @@ ARRIVED = 0.25  # m from the end
 DOOR_DISTANCE = 0.45  # m from the middle of a door: the person is through
 DOOR_PACE = 0.6  # share of the speed of those who are through and wait for the others
 LOOSE = 2.2  # m: a group with a larger radius is not avoided as a whole
+
+
+@njit(cache=True)
+def _length(x, y):  # type: ignore[no-untyped-def]
+    return sqrt(x * x + y * y)
 
 
 @njit(cache=True)
@@ -145,7 +149,7 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
             _turn(groups.heading, g, dx / d, dy / d, dt / turn_time)
         if groups.arrived[g] and groups.finish[g] == STAND:
             status[g, WANTED_VX], status[g, WANTED_VY] = dx / slow_time, dy / slow_time
-            size = sqrt(status[g, WANTED_VX] ** 2 + status[g, WANTED_VY] ** 2)
+            size = _length(status[g, WANTED_VX], status[g, WANTED_VY])
             if size > STANDING_SPEED:
                 status[g, WANTED_VX] *= STANDING_SPEED / size
                 status[g, WANTED_VY] *= STANDING_SPEED / size
@@ -160,8 +164,8 @@ def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
     It turns by `share` of the angle between them, at most the whole angle. Returns nothing.
     """
     hx, hy = heading[g, 0], heading[g, 1]
-    angle = np.arctan2(hx * ey - hy * ex, hx * ex + hy * ey) * min(share, 1.0)
-    c, s = np.cos(angle), np.sin(angle)
+    angle = atan2(hx * ey - hy * ex, hx * ex + hy * ey) * min(share, 1.0)
+    c, s = cos(angle), sin(angle)
     hx, hy = c * hx - s * hy, s * hx + c * hy
     size = sqrt(hx * hx + hy * hy)
     heading[g, 0], heading[g, 1] = hx / size, hy / size
@@ -196,7 +200,7 @@ def _seek(people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
             hx, hy = groups.heading[g, 0], groups.heading[g, 1]
             ahead, left = people.place[i, 0], people.place[i, 1]
             if kind != GATHER:
-                loose = min(1.0, sqrt(status[g, WANTED_VX] ** 2 + status[g, WANTED_VY] ** 2) / STANDING_SPEED)
+                loose = min(1.0, _length(status[g, WANTED_VX], status[g, WANTED_VY]) / STANDING_SPEED)
                 ahead += loose * (noise[i, STRAY_AHEAD] - status[g, MEAN_AHEAD])
                 left += loose * (noise[i, STRAY_LEFT] - status[g, MEAN_LEFT])
             ox = ahead * hx - left * hy

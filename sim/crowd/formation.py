@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.elementary import dot, length, sin, turned, unit
 from sim.types import Array, Ints
 
 V_DEPTH = 0.3  # how far the middle of a triad falls behind, in neighbour distances
@@ -41,7 +42,7 @@ def walking(n: int, spacing: float) -> Array:
         ahead = np.full(size, -k * ROW_GAP * spacing)
         if size == 3:
             ahead[1] -= V_DEPTH * spacing
-            left *= np.sqrt(1 - V_DEPTH**2)
+            left *= np.sqrt(1 - V_DEPTH * V_DEPTH)
         rows.append(np.stack([ahead, left], axis=1))
     places = np.concatenate(rows)
     return np.asarray(places - places.mean(axis=0))
@@ -56,8 +57,7 @@ def standing(n: int, spacing: float) -> Array:
     if n == 1:
         return np.zeros((1, 2))
     angle = 2 * np.pi * (np.arange(n) + 0.5) / n
-    radius = spacing / (2 * np.sin(np.pi / n))
-    return np.asarray(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    return np.asarray(spacing / (2 * sin(np.pi / n)) * unit(angle))
 
 
 def to_world(places: Array, middle: Array, heading: Array) -> Array:
@@ -77,8 +77,8 @@ def assign(pos: Array, points: Array) -> Ints:
     """
     from scipy.optimize import linear_sum_assignment
 
-    cost = np.sum((pos[:, None] - points[None]) ** 2, axis=2)
-    return np.asarray(linear_sum_assignment(cost)[1], dtype=np.int64)
+    apart = pos[:, None] - points[None]
+    return np.asarray(linear_sum_assignment(dot(apart, apart))[1], dtype=np.int64)
 
 
 def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
@@ -90,11 +90,11 @@ def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
     and the goal.
     """
     weights = (1 / speeds) / np.sum(1 / speeds)
-    centre = np.asarray(weights @ middles)
+    centre = dot(weights, middles.T)
     if goal is None:
         return centre
     ahead = goal - centre
-    far = float(np.linalg.norm(ahead))
+    far = float(length(ahead))
     if far < 1e-6:
         return centre
     apart = middles - centre
@@ -128,8 +128,8 @@ def divide(offsets: Array, ways: Array, sizes: list[int]) -> Ints:
     from scipy.optimize import linear_sum_assignment
 
     seats = np.repeat(np.arange(len(sizes)), sizes)
-    unit = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
-    rows, chosen = linear_sum_assignment(-(offsets @ unit.T)[:, seats])
+    along = ways / np.maximum(length(ways)[:, None], 1e-9)
+    rows, chosen = linear_sum_assignment(-turned(along, offsets)[:, seats])
     out = np.full(len(offsets), len(sizes) - 1)
     out[rows] = seats[chosen]
     return np.asarray(out, dtype=np.int64)

@@ -28,6 +28,7 @@ from sim.crowd.forces import (
 from sim.crowd.formation import assign, standing, to_world, walking
 from sim.crowd.navigation import Navigator
 from sim.crowd.population import EnteringGroup, walking_speed
+from sim.elementary import length
 from sim.types import Array, Ints
 
 WAY = 32  # waypoints of a group for which there is room from the start
@@ -135,7 +136,7 @@ class GroupState:
             here = target
         if finish == "walk":
             along = goal - (way[-2][0] if len(way) > 1 else start)
-            way[-1] = (goal + WALK_ON * along / max(float(np.linalg.norm(along)), 1e-9), END)
+            way[-1] = (goal + WALK_ON * along / max(float(length(along)), 1e-9), END)
         way[-1] = (way[-1][0], END)
         self.write_way(g, way, finish, speed, start)
 
@@ -156,7 +157,7 @@ class GroupState:
         arrays.arrived[g] = False
         first = way[0][0] if way[0][1] != GATHER or len(way) == 1 else way[1][0]
         ahead = first - (way[0][0] if way[0][1] == GATHER else start)
-        size = float(np.linalg.norm(ahead))
+        size = float(length(ahead))
         if size > 1e-6:
             arrays.heading[g] = ahead / size
         self.waypoint[self.members[g]] = 0

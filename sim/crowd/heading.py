@@ -1,5 +1,4 @@
-"""The direction in which each person faces, in radians counter-clockwise from +x, for a whole motion of T frames and P
-people.
+"""The direction in which each person faces, for a whole motion of C ticks and P people.
 
 It is computed from positions, velocities, presence and groups. People who walk (0.25 m/s or faster) turn towards their
 velocity; people who stand turn towards the middle of their group. A person who stands alone keeps the direction.
@@ -9,39 +8,44 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.elementary import atan2, length
 from sim.types import Array, Bools, Ints
 
 WALKING_SPEED = 0.25  # m/s: slower people turn to their group
 TURN_TIME = 0.3  # s
 
 
-def headings(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> Array:
-    """Returns the direction in which each person faces in each frame, shape (T, P), radians counter-clockwise from +x,
-    nan while absent.
+def facings(pos: Array, vel: Array, present: Bools, intent: Ints, rate: float) -> Array:
+    """Returns the vector in which each person faces at each tick, shape (C, P, 2), nan while absent.
 
-    pos, vel (T, P, 2): x, y in m and m/s. present (T, P): flags. intent (T, P): group index, -1 while absent. fps:
-    frames per s. A person at WALKING_SPEED (0.25 m/s) or faster turns to the velocity, a slower one to the middle of
-    the group. A slow person who is alone, or exactly in the middle, keeps the heading. In each frame the facing vector
-    moves by the share 1 / (fps TURN_TIME), at most 1, towards the wanted unit vector. TURN_TIME is 0.3 s; the heading
-    is the vector's angle. A person who enters for the first time faces the wanted direction at once, +x if there is
-    none. A person who returns goes on from the last heading.
+    pos, vel (C, P, 2): x, y in m and m/s. present (C, P): flags. intent (C, P): group index, -1 while absent. rate:
+    ticks per s. A person at WALKING_SPEED (0.25 m/s) or faster turns to the velocity, a slower one to the middle of the
+    group. A slow person who is alone, or exactly in the middle, keeps the direction. In each tick the vector moves by
+    the share 1 / (rate TURN_TIME), at most 1, towards the wanted unit vector; TURN_TIME is 0.3 s. A person who enters
+    for the first time faces the wanted direction at once, +x if there is none. A person who returns goes on from the
+    last direction.
     """
-    out = np.full(present.shape, np.nan)
+    out = np.full((*present.shape, 2), np.nan)
     facing = np.zeros((present.shape[1], 2))
-    share = min(1.0, 1 / (fps * TURN_TIME))
+    share = min(1.0, 1 / (rate * TURN_TIME))
     for t in range(len(present)):
         here = present[t]
         wanted = np.where(here[:, None], vel[t], 0.0)
-        slow = here & (np.hypot(wanted[:, 0], wanted[:, 1]) < WALKING_SPEED)
+        slow = here & (length(wanted) < WALKING_SPEED)
         if slow.any():
             wanted[slow] = _towards_group(pos[t], intent[t], slow, facing)
-        size = np.linalg.norm(wanted, axis=1, keepdims=True)
+        size = length(wanted)[:, None]
         wanted = np.divide(wanted, size, out=np.zeros_like(wanted), where=size > 1e-9)
         fresh = here & ~facing.any(axis=1)
         facing[fresh] = np.where(wanted[fresh].any(axis=1, keepdims=True), wanted[fresh], [1.0, 0.0])
         facing = np.where(here[:, None], facing + share * (wanted - facing) * wanted.any(axis=1, keepdims=True), facing)
-        out[t, here] = np.arctan2(facing[here, 1], facing[here, 0])
+        out[t, here] = facing[here]
     return out
+
+
+def headings(facing: Array) -> Array:
+    """Returns the directions (...) of vectors (..., 2), radians counter-clockwise from +x; nan stays nan."""
+    return np.asarray(atan2(facing[..., 1], facing[..., 0]))
 
 
 def _towards_group(pos: Array, intent: Ints, slow: Bools, facing: Array) -> Array:

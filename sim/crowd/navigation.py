@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.schema.world import WorldSpec
+from sim.elementary import dot, length
 from sim.types import Array, Bools, Scene, Stairs
 
 BEHIND = 0.7  # m behind a door, where nobody touches the wall any more
@@ -29,15 +30,13 @@ def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Ar
     for at, width in doors:
         k = int(np.argmin([_distance(at, w) for w in pieces]))
         wall = pieces.pop(k)
-        length = float(np.linalg.norm(wall[1] - wall[0]))
-        along = (wall[1] - wall[0]) / length
-        s = float(along @ (at - wall[0]))
-        low, high = max(0.0, s - width / 2), min(length, s + width / 2)
+        far = float(length(wall[1] - wall[0]))
+        along = (wall[1] - wall[0]) / far
+        s = float(dot(along, at - wall[0]))
+        low, high = max(0.0, s - width / 2), min(far, s + width / 2)
         openings.append(np.stack([wall[0] + low * along, wall[0] + high * along]))
         pieces += [
-            np.stack([wall[0] + a * along, wall[0] + b * along])
-            for a, b in ((0.0, low), (high, length))
-            if b - a > 1e-9
+            np.stack([wall[0] + a * along, wall[0] + b * along]) for a, b in ((0.0, low), (high, far)) if b - a > 1e-9
         ]
     return np.array(pieces).reshape(-1, 2, 2), np.array(openings).reshape(-1, 2, 2)
 
@@ -69,8 +68,8 @@ def scene_of(world: WorldSpec) -> Scene:
 def _distance(point: Array, wall: Array) -> float:
     """Returns the distance in m of a point (2,) from the nearest point of a wall (2, 2), two ends x, y in m."""
     along = wall[1] - wall[0]
-    s = np.clip((point - wall[0]) @ along / max(along @ along, 1e-12), 0, 1)
-    return float(np.linalg.norm(point - wall[0] - s * along))
+    s = np.clip(dot(point - wall[0], along) / max(float(dot(along, along)), 1e-12), 0, 1)
+    return float(length(point - wall[0] - s * along))
 
 
 def blocked(a: Array, b: Array, walls: Array) -> Bools:
@@ -120,7 +119,7 @@ class Navigator:
         Points outside the world, and points within 0.54 m of a wall or door, are left out.
         """
         along = self.walls[:, 1] - self.walls[:, 0]
-        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        along = along / length(along)[:, None]
         ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
         free = [min(_distance(e, w) for w in self.closed) > 0.9 * CLEARANCE for e in ends]
         inside = ((ends >= 0) & (ends <= self.size)).all(axis=1)
@@ -130,7 +129,7 @@ class Navigator:
         """Returns the distances (A, B) in m from points a (A, 2) to points b (B, 2); inf where a wall or door lies
         between.
         """
-        d = np.linalg.norm(a[:, None] - b[None], axis=2)
+        d = length(a[:, None] - b[None])
         hidden = blocked(np.repeat(a[:, None], len(b), 1), np.repeat(b[None], len(a), 0), self.closed)
         return np.asarray(np.where(hidden, np.inf, d))
 
@@ -170,8 +169,8 @@ class Navigator:
         For a way along the door it points to the right of the direction from the door's first to its second end.
         """
         along = self.doors[door, 1] - self.doors[door, 0]
-        across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
-        return np.asarray(BEHIND * across * (1.0 if across @ way > 0 else -1.0))
+        across = np.array([-along[1], along[0]]) / length(along)
+        return np.asarray(BEHIND * across * (1.0 if dot(across, way) > 0 else -1.0))
 
 
 def _dijkstra(lengths: Array, start: int, goal: int) -> list[int] | None:

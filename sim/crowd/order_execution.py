@@ -9,14 +9,15 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder
-from scenarios.schema.values import draw
+from sim.clock import SCRIPT_RATE, FrameTimes
 from sim.crowd.forces import GATHER
 from sim.crowd.formation import divide, meeting_point, part_sizes, standing, walking
 from sim.crowd.group_state import GroupState
 from sim.crowd.population import ScriptPlacement, draw_point
 from sim.crowd.queue_service import ServiceQueue
 from sim.crowd.triggers import PendingOrder, concerned, rule_holds
-from sim.rng import rng
+from sim.elementary import unit
+from sim.rng import draw, rng
 from sim.types import Array, Order
 
 
@@ -34,7 +35,7 @@ class OrderExecution:
     - groups: the groups whose members, ways and places the orders change. placement: turn and mirror of the script.
     - pending: all orders, in the order of the file, fired or not. come_true: ids of orders whose rule has held long
       enough (people are together, apart or in line, as ordered).
-    - queues: the opened queues, by index (from 0) of their order in the file. fps: frames per s.
+    - queues: the opened queues, by index (from 0) of their order in the file.
     - seed, repeat (the suite entry's copy, 0 for none): keys of the random draws of times, goals and service times.
 
     Construction takes scenario, groups, placement, seed and repeat, and draws each order's delay and time.
@@ -44,7 +45,6 @@ class OrderExecution:
         self, scenario: Scenario, groups: GroupState, placement: ScriptPlacement, seed: int, repeat: int
     ) -> None:
         self.groups, self.placement, self.seed, self.repeat = groups, placement, seed, repeat
-        self.fps = scenario.camera.fps
         self.queues: dict[int, ServiceQueue] = {}
         self.come_true: set[str] = set()
         self.pending = [self._pending(order, k) for k, order in enumerate(scenario.event)]
@@ -63,29 +63,29 @@ class OrderExecution:
         at = None if when.reach is None or when.reach.at is None else self.placement.point(np.array(when.reach.at))
         return PendingOrder(order, k, draw(when.delay, self._rng("event", k, 0)), time, at)
 
-    def advance(self, frame: int, t: float, state: Array) -> bool:
+    def advance(self, tick: int, t: float, state: Array) -> bool:
         """Fires orders that are due at time t (s), serves queues, and lets groups that have arrived stand in a circle.
 
-        frame: recorded frame from 0, at t = frame / fps; in the warm-up nothing fires. state (P, 4): x, y, vx, vy by
-        column, m, m/s, nan while absent. Orders are taken in the order of the file. From the frame after firing, an
+        tick: of the script, from 0; in the warm-up nothing fires. state (P, 4): x, y, vx, vy by
+        column, m, m/s, nan while absent. Orders are taken in the order of the file. From the tick after firing, an
         order's rule is examined until it has held long enough; then its id joins come_true. Returns False only if
         nothing has changed that `GroupState.fill` writes. It is always True once a queue has opened.
         """
         changed = bool(self.queues)
         for pending in self.pending:
             if pending.fired is None and pending.is_due(t, state, self.groups, self.come_true):
-                self._fire(pending, frame, state)
+                self._fire(pending, tick, state)
                 changed = True
             elif pending.fired is not None and pending.true_at is None:
-                pending.watch(t, self.fps, rule_holds(pending, state, self.groups.targets))
+                pending.watch(t, rule_holds(pending, state, self.groups.targets))
                 if pending.true_at is not None:
                     self.come_true.add(pending.order.id)
         for k, queue in self.queues.items():
             self._serve(k, queue, t, state)
         return self.groups.settle_arrived(state) or changed
 
-    def _fire(self, pending: PendingOrder, frame: int, state: Array) -> None:
-        pending.fired = frame + 1
+    def _fire(self, pending: PendingOrder, tick: int, state: Array) -> None:
+        pending.fired = tick
         order = pending.order
         if isinstance(order, MergeOrder):
             self._merge(pending, order, state)
@@ -179,8 +179,7 @@ class OrderExecution:
                 queue.remove(g)
         r = self._rng("service", pending.index)
         service = {g: draw(order.service, r) for g in queuing}
-        a = np.deg2rad(order.direction_deg)
-        along = self.placement.vector(np.array([np.cos(a), np.sin(a)]))
+        along = self.placement.vector(unit(order.direction_deg / 180 * np.pi))
         head = self.placement.point(np.array(order.at))
         self.queues[pending.index] = ServiceQueue(head, along, order.spacing, service, coming=list(queuing))
         columns = [c for g in queuing for c in groups.members[g]]
@@ -214,14 +213,19 @@ class OrderExecution:
             groups.settled.discard(g)
             groups.places[columns] = walking(len(columns), groups.spacing[g])
 
-    def record(self) -> tuple[Order, ...]:
+    def record(self, frames: FrameTimes) -> tuple[Order, ...]:
         """Returns all orders of the script, in the order of the file, with the person ids (column + 1) of each group
         before and after.
 
-        `fired` is the 1-based frame. Of an order that never fired it is None, and before and after are empty.
+        `fired` is the nearest of the frames, from 1. Of an order that never fired `fired` and `time` are None, and
+        before and after are empty.
         """
 
         def ids(parts: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
             return tuple(tuple(c + 1 for c in part) for part in parts)
 
-        return tuple(Order(p.order.id, p.order.type, p.fired, ids(p.before), ids(p.after)) for p in self.pending)
+        def order(p: PendingOrder) -> Order:
+            fired, time = (None, None) if p.fired is None else (frames.frame_of(p.fired), p.fired / SCRIPT_RATE)
+            return Order(p.order.id, p.order.type, fired, ids(p.before), ids(p.after), time)
+
+        return tuple(order(p) for p in self.pending)

@@ -13,10 +13,11 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, group_names
-from scenarios.schema.values import Distribution, Point, Value, draw
+from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
 from sim.crowd.stops import PlannedStop, draw_stops
-from sim.rng import rng
+from sim.elementary import dot, exp, length, unit
+from sim.rng import autoregression, draw, normals, rng, uniforms
 from sim.types import Array, Scene
 
 BODY_RADIUS = 0.20  # m, in the physics
@@ -56,7 +57,7 @@ class ScriptPlacement:
         """
         if flip:
             d = d * np.array([self.flip, 1.0])
-        c, s = np.cos(self.turn), np.sin(self.turn)
+        c, s = unit(self.turn)
         return np.array([c * d[0] - s * d[1], s * d[0] + c * d[1]])
 
 
@@ -106,7 +107,7 @@ class EnteringGroup:
     @property
     def walks(self) -> bool:
         """True if the first stop, without stops the goal, is more than STANDING_DISTANCE (0.3 m) from the start."""
-        return bool(np.linalg.norm(self.leg(self.stops)[1] - self.start) > STANDING_DISTANCE)
+        return bool(length(self.leg(self.stops)[1] - self.start) > STANDING_DISTANCE)
 
     def leg(self, stops: Sequence[PlannedStop]) -> tuple[list[Array], Array, str]:
         """Returns points to pass (each (2,), m), end (2,), m, and finish of the way to the first of the stops that are
@@ -122,7 +123,7 @@ def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacem
     negative.
     """
     r = rng(seed, "layout", repeat=repeat)
-    turn = np.deg2rad(draw(scenario.turn_deg, r))
+    turn = draw(scenario.turn_deg, r) / 180 * np.pi
     flip = -1.0 if scenario.mirror and r.random() < 0.5 else 1.0
     return ScriptPlacement(np.array(scenario.world.size) / 2, float(turn), flip, draw(scenario.lead, r))
 
@@ -192,7 +193,7 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
     members = []
     for m in range(size):
         p = draws.rng("person", *key, m)
-        own_draws = (draw(crowd.free_speed, p), draw(crowd.height, p), draw(crowd.sway, p), p.uniform(0, 2 * np.pi))
+        own_draws = (draw(crowd.free_speed, p), draw(crowd.height, p), draw(crowd.sway, p), 2 * np.pi * p.random())
         members.append(Person(column + m, (*key, m), *own_draws))
     speed = own if own is not None else walking_speed([m.free_speed for m in members], crowd.slowdown_per_member)
     q = draws.rng("group", *key, 2)
@@ -227,10 +228,10 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
         via, end, _ = group.leg(group.stops)
         first = via[0] if via else end
         way = first - group.start
-        length = float(np.linalg.norm(way))
-        heading = way / length if length > 1e-6 else placement.vector(np.array([1.0, 0.0]))
-        lead = min(placement.lead * group.speed, length / 2)
-        group.start = group.start + lead * heading * (length > STANDING_DISTANCE)
+        far = float(length(way))
+        heading = way / far if far > 1e-6 else placement.vector(np.array([1.0, 0.0]))
+        lead = min(placement.lead * group.speed, far / 2)
+        group.start = group.start + lead * heading * (far > STANDING_DISTANCE)
         group.pos = to_world(walking(len(group.members), group.spacing), group.start, heading)
         if spec.scatter != 0.0:
             group.pos += scattered(len(group.members), spec.scatter, r)
@@ -248,13 +249,13 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
 
 def scattered(n: int, scatter: Value, r: np.random.Generator) -> Array:
     """Returns how far n people start from their places, (n, 2): x, y in m; lengths drawn, directions uniform."""
-    length, angle = np.array([draw(scatter, r) for _ in range(n)]), r.uniform(0, 2 * np.pi, n)
-    return np.asarray(length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    far = np.array([draw(scatter, r) for _ in range(n)])
+    return np.asarray(far[:, None] * unit(2 * np.pi * r.random(n)))
 
 
 def _apart(pos: Array) -> bool:
     """Returns True if no two of the places pos (n, 2), m, are nearer than two body radii."""
-    gap = np.linalg.norm(pos[:, None] - pos[None], axis=2) + 10 * np.eye(len(pos))
+    gap = length(pos[:, None] - pos[None]) + 10 * np.eye(len(pos))
     return bool((gap >= 2 * BODY_RADIUS).all())
 
 
@@ -267,14 +268,14 @@ def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
     """
     if taken:
         others = np.concatenate(taken)
-        if np.min(np.sum((pos[:, None] - others[None]) ** 2, axis=2)) < START_GAP**2:
+        if np.min(length(pos[:, None] - others[None])) < START_GAP:
             return False
     for wall in scene.walls:
         u = wall[1] - wall[0]
-        s = np.clip((pos - wall[0]) @ u / (u @ u), 0, 1)
-        if np.min(np.linalg.norm(pos - wall[0] - s[:, None] * u, axis=1)) < BODY_RADIUS:
+        s = np.clip(dot(pos - wall[0], u) / dot(u, u), 0, 1)
+        if np.min(length(pos - wall[0] - s[:, None] * u)) < BODY_RADIUS:
             return False
-    d = np.linalg.norm(pos[:, None] - scene.pillars[None, :, :2], axis=2) - scene.pillars[None, :, 2]
+    d = length(pos[:, None] - scene.pillars[None, :, :2]) - scene.pillars[None, :, 2]
     return bool((d >= BODY_RADIUS).all())
 
 
@@ -287,12 +288,9 @@ def fluctuations(crowd: CrowdSpec, people: Sequence[Person], frames: int, fps: f
     correlation time T is WANDER_TIME (1 s) for velocities, PLACE_TIME (10 s) for places. Raises ValueError if the seed
     is negative.
     """
-    keep = np.exp(-1 / (fps * np.array([WANDER_TIME, WANDER_TIME, PLACE_TIME, PLACE_TIME])))
+    keep = exp(-1 / (fps * np.array([WANDER_TIME, WANDER_TIME, PLACE_TIME, PLACE_TIME])))
     out = np.empty((frames, len(people), 4))
     for p, person in enumerate(people):
-        out[:, p] = rng(seed, "gait", *person.key, repeat=repeat).normal(size=(frames, 4))
-    out[1:] *= np.sqrt(1 - keep**2)
-    out *= [*crowd.velocity_noise, *crowd.place_noise]
-    for k in range(1, frames):
-        out[k] += keep * out[k - 1]
-    return out
+        out[:, p] = normals(uniforms(rng(seed, "gait", *person.key, repeat=repeat), (frames, 4)))
+    scale = np.array([*crowd.velocity_noise, *crowd.place_noise])
+    return scale * autoregression(out, keep)

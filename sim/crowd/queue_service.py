@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sim.elementary import length
 from sim.types import Array
 
 JOIN_RADIUS = 0.5  # m from the first free place: a group has joined
@@ -63,7 +64,7 @@ class ServiceQueue:
         """
         done = self._serve(t, members, pos)
         tail = sum(len(members[g]) for g in self.joined)
-        self.coming.sort(key=lambda g: (float(np.min(np.linalg.norm(pos[members[g]] - self.slot(tail), axis=1))), g))
+        self.coming.sort(key=lambda g: (float(np.min(length(pos[members[g]] - self.slot(tail)))), g))
         slots: dict[int, Array] = {}
         k = 0
         for g in self.joined:
@@ -72,7 +73,7 @@ class ServiceQueue:
             self.joined.append(self.coming.pop(0))
             k = self._give_slots(self.joined[-1], k, members, slots)
         for g in self.coming:
-            members[g].sort(key=lambda c: (float(np.linalg.norm(pos[c] - self.head)), c))
+            members[g].sort(key=lambda c: (float(length(pos[c] - self.head)), c))
             k = self._give_slots(g, k, members, slots)
         return slots, done
 
@@ -88,7 +89,7 @@ class ServiceQueue:
         return k
 
     def _has_reached(self, g: int, k: int, members: dict[int, list[int]], pos: Array) -> bool:
-        return bool(np.min(np.linalg.norm(pos[members[g]] - self.slot(k), axis=1)) < JOIN_RADIUS)
+        return bool(np.min(length(pos[members[g]] - self.slot(k))) < JOIN_RADIUS)
 
     def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
         """Returns the group whose service ends by time t (s), as a list of one, and removes it from `joined`; else [].
@@ -102,7 +103,7 @@ class ServiceQueue:
             return []
         first = self.joined[0]
         if self.busy_until is None:
-            if np.linalg.norm(pos[members[first][0]] - self.head) < SERVED_RADIUS:
+            if length(pos[members[first][0]] - self.head) < SERVED_RADIUS:
                 self.busy_until = t + self.service[first]
             return []
         if t < self.busy_until:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenarios.schema.scenario import Stop
-from scenarios.schema.values import Point, draw
+from scenarios.schema.values import Point
+from sim.rng import draw
 from sim.types import Array
 
 

@@ -25,11 +25,11 @@ def sway(wanted, gait, dt, out):  # type: ignore[no-untyped-def]
     after dt.
     """
     for i in range(len(gait)):
-        pace = sqrt(wanted[i, X] ** 2 + wanted[i, Y] ** 2)
+        pace = sqrt(wanted[i, X] * wanted[i, X] + wanted[i, Y] * wanted[i, Y])
         size = gait[i, AMPLITUDE] * max(0.0, (SWAYLESS - pace) / (SWAYLESS - USUAL_SPEED)) * min(1.0, pace / SLOW)
         rate = 2.0 * PI * STRIDES * sqrt(pace)
         half = 0.5 * rate * dt
-        half += half**3 / 3.0  # the tangent of half the angle by which the phase grows
+        half += half * half * half / 3.0  # the tangent of half the angle by which the phase grows
         c, s, share = gait[i, COS], gait[i, SIN], 2.0 * half / (1.0 + half * half)
         gait[i, COS], gait[i, SIN] = c - share * (s + half * c), s + share * (c - half * s)
         per_speed = size * rate / max(pace, 1e-9)

@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenarios.schema.scenario import MergeOrder, QueueOrder, SplitOrder, expand
+from sim.clock import SCRIPT_RATE
 from sim.crowd.group_state import GroupState
+from sim.elementary import length
 from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY
 from sim.truth.order_fulfilment import RULE_TIME
 from sim.truth.queue_detection import QUEUE_PEOPLE
@@ -26,8 +28,8 @@ class PendingOrder:
 
     - order; index: in the file, from 0; delay: s between trigger and firing; time: of a `time` trigger, s, else inf.
     - reach_at (2,): place of a `reach` trigger in the world, m; None: the group's goal, or no such trigger.
-    - fired: 1-based frame in which it fired, None: not yet. met_at: time at which the trigger (the order's condition
-      for firing) was first met, s; None: not yet.
+    - fired: tick of the script, from 0, at which it fired, None: not yet. met_at: time at which the trigger (the
+      order's condition for firing) was first met, s; None: not yet.
     - held_for: s for which the order's rule (people are together, apart or in line, as ordered) has held without a
       break. true_at: time at which it had held long enough, s; None: not yet.
     - before, after: columns (person id - 1) of the people of each group before and after the order; empty until it
@@ -89,15 +91,14 @@ class PendingOrder:
             return False
         at = groups.goals[g][0] if self.reach_at is None else self.reach_at
         middle = state[groups.members[g], :2].mean(axis=0)
-        return bool(np.linalg.norm(middle - at) < when.reach.radius)
+        return bool(length(middle - at) < when.reach.radius)
 
-    def watch(self, t: float, fps: float, holds: bool) -> None:
-        """Adds one frame (1 / fps s) to held_for if the order's rule `holds` in this frame, else sets it to 0. Returns
-        nothing.
+    def watch(self, t: float, holds: bool) -> None:
+        """Adds one tick to held_for if the order's rule `holds` at this tick, else sets it to 0. Returns nothing.
 
         Sets true_at = t (s) once the rule has held for its time: 2 s for merge and split, 3 s for queue.
         """
-        self.held_for = self.held_for + 1 / fps if holds else 0.0
+        self.held_for = self.held_for + 1 / SCRIPT_RATE if holds else 0.0
         if self.held_for >= RULE_TIME[self.order.type] - EPS:
             self.true_at = t
 
@@ -131,7 +132,7 @@ def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
     order = pending.order
     if isinstance(order, QueueOrder):
         columns = list(pending.after[0])
-        off = np.linalg.norm(state[columns, :2] - targets[columns], axis=1)
+        off = length(state[columns, :2] - targets[columns])
         return bool(np.sum(off < IN_PLACE) >= min(QUEUE_PEOPLE, len(columns)))
     parts = [list(p) for p in (pending.before if isinstance(order, MergeOrder) else pending.after)]
     if not all(np.isfinite(state[p]).all() for p in parts):
@@ -150,7 +151,7 @@ def _nearest(state: Array, a: list[int], b: list[int]) -> float:
 
     state (P, 4): x, y, vx, vy, m, m/s, nan while absent. Raises ValueError if a or b is empty.
     """
-    return float(np.linalg.norm(state[a, None, :2] - state[None, b, :2], axis=2).min())
+    return float(length(state[a, None, :2] - state[None, b, :2]).min())
 
 
 def _velocity_difference(state: Array, a: list[int], b: list[int]) -> float:
@@ -159,4 +160,4 @@ def _velocity_difference(state: Array, a: list[int], b: list[int]) -> float:
 
     state (P, 4): x, y, vx, vy, m, m/s, nan while absent.
     """
-    return float(np.linalg.norm(state[a, 2:].mean(axis=0) - state[b, 2:].mean(axis=0)))
+    return float(length(state[a, 2:].mean(axis=0) - state[b, 2:].mean(axis=0)))

@@ -2,14 +2,19 @@
 
 People are discs of radius 0.2 m and mass 1 kg, so a force is an acceleration. The space resolves contacts. States are
 read and forces written in batches; `World.columns` says which row of a batch is which person. Only forces move a person
-who has entered. A frame is the state after the step that ends at its time.
+who has entered.
+
+Three clocks run side by side. The physics makes PHYSICS_RATE steps per s. SCRIPT_RATE times per s people come and go,
+orders and errands are looked at, and the fluctuations of the walk change; from the states at these ticks the truth is
+measured. The camera takes its frames at any rate: a frame is the state at its time, on the straight line between two
+steps, which is how the physics moves people. So another frame rate shows the same world.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import pymunk
@@ -17,17 +22,21 @@ import pymunk.batch
 
 from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
+from sim.clock import PHYSICS_RATE, SCRIPT_RATE, STEPS, FrameTimes
 from sim.crowd.errands import Errands
 from sim.crowd.forces import WAYPOINT, GroupArrays, Obstacles, PeopleArrays, Steering
 from sim.crowd.group_state import GroupState
-from sim.crowd.heading import headings
+from sim.crowd.heading import facings, headings
 from sim.crowd.navigation import Navigator, blocked, scene_of
 from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
+from sim.elementary import cos, length, sin
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
-from sim.types import Array, Ints, Motion, Scene
+from sim.types import Array, Ints, Motion, Scene, States
 
-MAX_STEP = 0.02  # s
+STEP_TIME = 1 / PHYSICS_RATE  # s
+OVERLAP_LEFT = 0.0012600931512018426  # 0.875^50: share of an overlap of bodies that is left after 1 s, 0.875 a step.
+# The C library's pow gives 0.875 exactly on every machine, because the true value lies 1e-18 from it.
 ENTRY_GAP = 2.2  # body radii between a person who enters and all others
 READ = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.VELOCITY
 WRITE = pymunk.batch.BodyFields.FORCE
@@ -40,11 +49,6 @@ def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | Non
     finite."""
     world = World(scenario, seed, repeat, steering or Steering())
     return world.run()
-
-
-def steps_per_frame(fps: float) -> int:
-    """Returns the least number (≥ 1) of physics steps per frame whose steps are at most MAX_STEP; fps above 0."""
-    return max(1, math.ceil(1 / (fps * MAX_STEP) - 1e-9))
 
 
 def accelerate(
@@ -69,13 +73,13 @@ def accelerate(
 class World:
     """The running simulation of one scenario and seed; it can be run once. Column = person id - 1.
 
-    - scenario, seed, repeat; scene; fps; substeps: physics steps per frame, of dt s; rules: steering parameters;
-      obstacles; push: scratch; members: all people by column; entering: all groups; waiting: those not entered yet;
-      groups, orders, errands: the script.
+    - scenario, seed, repeat; scene; rules: steering parameters; obstacles; push: scratch; members: all people by
+      column; entering: all groups; waiting: those not entered yet; groups, orders, errands: the script.
     - `space`, `bodies` (by column): of the physics. state (N, 4): x, y, vx, vy, m, m/s, and `people`: of the N people
       present, whose columns are `columns`. gait (P, 5): as in PeopleArrays, by column. force: x, y, m/s², of the N
-      people, then zeros for static bodies. states (P, 4), group_of (P,): frame being recorded, by column, nan and -1
-      while absent.
+      people, then zeros for static bodies. states (P, 4), group_of (P,): at the present tick, by column, nan and -1
+      while absent. between (STEPS + 1, P, 4): states from the present tick to the next one, step by step, before people
+      come and go there; None if all frames lie on ticks.
 
     Construction raises InputError if a group finds no room.
     """
@@ -86,9 +90,6 @@ class World:
         self.entering: list[EnteringGroup] = draw_population(scenario, self.scene, seed, repeat)
         self.waiting = list(self.entering)
         self.members = [m for group in self.entering for m in group.members]
-        self.fps = scenario.camera.fps
-        self.substeps = steps_per_frame(self.fps)
-        self.dt = 1 / (self.fps * self.substeps)
         self.rules = steering.array()
         slowdown = scenario.crowd.slowdown_per_member
         self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
@@ -99,9 +100,13 @@ class World:
         self.space = _space(self.scene)
         self.bodies: dict[int, pymunk.Body] = {}
         self.columns = np.zeros(0, np.int64)
-        self.gait = np.array([(math.cos(m.phase), math.sin(m.phase), 0.0, 0.0, m.sway) for m in self.members])
+        phase = np.array([m.phase for m in self.members])
+        still = np.zeros_like(phase)
+        self.gait = np.stack([cos(phase), sin(phase), still, still, [m.sway for m in self.members]], axis=1)
         self.states = np.full((len(self.members), 4), np.nan)
         self.group_of = np.full(len(self.members), -1, np.int64)
+        on_ticks = scenario.camera.fps == SCRIPT_RATE
+        self.between = None if on_ticks else np.full((STEPS + 1, len(self.members), 4), np.nan)
         self.people = PeopleArrays.empty(0)
         self.state = np.zeros((0, 4))
         self.force = np.zeros((0, 2))
@@ -110,51 +115,67 @@ class World:
     def run(self) -> Motion:
         """Returns the Motion of duration × fps frames (rounded, at least 1) after the warm-up. Raises WorkError if a
         position or velocity is not finite."""
-        frames = max(1, round(self.scenario.duration * self.fps))
-        record = np.empty((frames, len(self.members), 4))
-        intent = np.empty((frames, len(self.members)), np.int64)
-        for f, (state, group) in enumerate(self.frames(frames)):
-            record[f], intent[f] = state, group
-        return self._motion(record, intent)
+        fps, duration = self.scenario.camera.fps, self.scenario.duration
+        count = max(1, math.ceil(duration * SCRIPT_RATE - 1e-9))
+        frames = FrameTimes.of(max(1, round(duration * fps)), fps)
+        ticks = _Record.empty(count, len(self.members))
+        if self.between is None:
+            for tick, (state, group) in enumerate(self.ticks(count)):
+                ticks.state[tick], ticks.intent[tick] = state, group
+            return self._motion(ticks, ticks, frames)
+        shown = _Record.empty(len(frames.tick), len(self.members))
+        shown.intent[:] = -1
+        for tick, (state, group) in enumerate(self.ticks(max(count, int(frames.tick[-1]) + 2))):
+            if tick:  # what lies between two ticks is known at the second one
+                shown.state[frames.tick == tick - 1] = frames.states(tick - 1, self.between)
+            shown.intent[frames.tick == tick] = group
+            if tick < count:
+                ticks.state[tick], ticks.intent[tick] = state, group
+        return self._motion(ticks, shown, frames)
 
-    def frames(self, length: int) -> Iterator[tuple[Array, Ints]]:
-        """Yields `length` frames after the warm-up, the first at time 0: states (P, 4): x, y, vx, vy in m, m/s; group
-        indices (P,). By column; nan and -1 while absent. The next frame overwrites both. While iterating it
-        raises WorkError if a state is not finite."""
-        warm = round(self.scenario.warmup * self.fps)
-        noise = fluctuations(self.scenario.crowd, self.members, warm + length, self.fps, self.seed, self.repeat)
-        for f in range(-warm, length):
-            if f > -warm:
-                self._advance(noise[f + warm])
-            t = f / self.fps
-            self._come_and_go(t, f == -warm)
+    def ticks(self, length: int) -> Iterator[tuple[Array, Ints]]:
+        """Yields the states at `length` ticks of the script after the warm-up, the first at time 0: states (P, 4): x,
+        y, vx, vy in m, m/s; group indices (P,). By column; nan and -1 while absent. The next tick overwrites both.
+        While iterating it raises WorkError if a state is not finite."""
+        warm = round(self.scenario.warmup * SCRIPT_RATE)
+        noise = fluctuations(self.scenario.crowd, self.members, warm + length, SCRIPT_RATE, self.seed, self.repeat)
+        for tick in range(-warm, length):
+            if tick > -warm:
+                self._advance(noise[tick + warm])
+            t = tick / SCRIPT_RATE
+            self._come_and_go(t, tick == -warm)
             self.states[self.columns] = self.state
             changed = self.errands.advance(t, self.states)
-            if f >= 0:
+            if tick >= 0:
                 self.group_of[self.columns] = self.groups.group_of[self.columns]
-                changed |= self.orders.advance(f, t, self.states)
+                changed |= self.orders.advance(tick, t, self.states)
             if changed:
                 self._fill_people()
-            if f >= 0:
+            if tick >= 0:
                 yield self.states, self.group_of
 
     def _advance(self, noise: Array) -> None:
-        """Simulates one frame; noise (P, 4): as in PeopleArrays, by column. Does nothing while nobody is present.
-        Raises WorkError if a state is not finite."""
+        """Simulates the time to the next tick; noise (P, 4): as in PeopleArrays, by column. Does nothing while nobody
+        is present. Raises WorkError if a state is not finite."""
         n = len(self.columns)
+        if self.between is not None:
+            self.between[:] = np.nan
+            self.between[0] = self.states
         if n == 0:
             return
         noise.take(self.columns, axis=0, out=self.people.noise, mode="clip")
         out = self.force[:n]
-        for _ in range(self.substeps):
+        for step in range(1, STEPS + 1):
             if not accelerate(
-                self.state, self.people, self.groups.arrays, self.obstacles, self.dt, self.rules, self.push, out
+                self.state, self.people, self.groups.arrays, self.obstacles, STEP_TIME, self.rules, self.push, out
             ):
                 raise self._blown_up()
             pymunk.batch.set_space_bodies(self.space, WRITE, self._write_buffer)
-            self.space.step(self.dt)
+            self.space.step(STEP_TIME)
             self._read_buffer.clear()
             pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
+            if self.between is not None:
+                self.between[step, self.columns] = self.state
         self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
         self.gait[self.columns] = self.people.gait
 
@@ -212,7 +233,7 @@ class World:
         """True if everyone present is more than 0.44 m (centre to centre) from every place where the group enters."""
         if not len(self.state):
             return True
-        d = np.linalg.norm(group.pos[:, None] - self.state[None, :, :2], axis=2)
+        d = length(group.pos[:, None] - self.state[None, :, :2])
         return bool(d.min() > ENTRY_GAP * BODY_RADIUS)
 
     def _body(self, pos: Array, velocity: Array) -> pymunk.Body:
@@ -248,29 +269,50 @@ class World:
         self.groups.fill(self.people, self.columns)
         self.people.gait[:] = self.gait[self.columns]
 
-    def _motion(self, record: Array, intent: Any) -> Motion:
-        """Returns the Motion of T recorded frames and P people, with headings, body sizes and the script's orders.
-        record (T, P, 4): x, y, vx, vy, m, m/s, nan while absent. intent (T, P): group indices, -1 while absent."""
+    def _motion(self, ticks: _Record, shown: _Record, frames: FrameTimes) -> Motion:
+        """Returns the Motion of the recorded frames, with headings, body sizes and the script's orders."""
         height = np.array([m.height for m in self.members])
-        pos, vel = record[:, :, :2], record[:, :, 2:]
-        present = np.isfinite(pos[:, :, 0])
+        pos, vel = ticks.state[..., :2], ticks.state[..., 2:]
+        present = np.isfinite(pos[..., 0])
+        facing = facings(pos, vel, present, ticks.intent, SCRIPT_RATE)
+        measured = States(SCRIPT_RATE, pos, vel, headings(facing), present, ticks.intent)
+        count = len(frames.tick)  # fewer than ticks where the duration is no whole number of them
+        state, intent = shown.state[:count], shown.intent[:count]
+        there = np.isfinite(state[..., 0])
+        if self.between is None:
+            heading = measured.heading[:count]
+        else:
+            heading = np.where(there, headings(frames.between_ticks(facing, present)), np.nan)
         return Motion(
             name=self.scenario.name,
             seed=self.seed,
             repeat=self.repeat,
-            fps=self.fps,
-            pos=pos,
-            vel=vel,
-            heading=headings(pos, vel, present, intent, self.fps),
-            present=present,
+            fps=self.scenario.camera.fps,
+            pos=state[..., :2],
+            vel=state[..., 2:],
+            heading=heading,
+            present=there,
             intent=intent,
             height=height,
             width=SHOULDER_SHARE * height,
             depth=DEPTH_SHARE * height,
             free_speed=np.array([m.free_speed for m in self.members]),
             scene=self.scene,
-            orders=self.orders.record(),
+            orders=self.orders.record(frames),
+            measured=measured,
         )
+
+
+@dataclass(frozen=True)
+class _Record:
+    """State (K, P, 4): x, y, vx, vy in m, m/s, and group index (K, P) of the people at K times; nan, -1: absent."""
+
+    state: Array
+    intent: Ints
+
+    @classmethod
+    def empty(cls, times: int, people: int) -> _Record:
+        return cls(np.empty((times, people, 4)), np.empty((times, people), np.int64))
 
 
 def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
@@ -280,8 +322,8 @@ def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
     stairs = np.zeros((len(scene.stairs), 7))
     for row, s, spec in zip(stairs, scene.stairs, scenario.world.stairs, strict=True):
         along = s.head - s.foot
-        length = float(np.linalg.norm(along))
-        row[:] = (*s.foot, *(along / length), length, s.width, spec.slowdown)
+        far = float(length(along))
+        row[:] = (*s.foot, *(along / far), far, s.width, spec.slowdown)
     return Obstacles(np.array(scene.walls).reshape(-1, 4), np.array(scene.pillars), stairs)
 
 
@@ -289,6 +331,7 @@ def _space(scene: Scene) -> pymunk.Space:
     """Returns a new physics space that holds the walls (0.02 m half width) and pillars of a scene, without friction."""
     space = pymunk.Space()
     space.collision_slop = 0.005
+    space.collision_bias = OVERLAP_LEFT
     for wall in scene.walls:
         segment = pymunk.Segment(space.static_body, tuple(wall[0]), tuple(wall[1]), 0.02)
         segment.friction = 0.0

@@ -18,11 +18,11 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load_observation
 from scenarios.schema.observation import ObservationSpec, ReplayOrigin, ReplaySpec
-from sim.crowd.heading import headings
+from sim.crowd.heading import facings, headings
 from sim.dataset.splits import is_real
 from sim.dataset.trajectories import Trajectories, nearest_row, resample
 from sim.hashing import canonical_hash
-from sim.rng import rng
+from sim.rng import draw, rng
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.sequence import observe
 from sim.types import Array, Camera, Ints, Motion, Scene, Sequence, Truth
@@ -227,7 +227,7 @@ def _motion(moving: Trajectories, truth: Truth, name: str, fps: float, cut: Cut,
         fps=fps,
         pos=pos,
         vel=moving.vel,
-        heading=headings(pos, moving.vel, moving.present, intent, fps),
+        heading=headings(facings(pos, moving.vel, moving.present, intent, fps)),
         present=moving.present,
         intent=intent,
         height=height,
@@ -259,7 +259,6 @@ def _heights(people: Ints, truth: Truth, seed: int) -> Array:
     is drawn as in simulated crowds, from seed and id. Raises ValueError for a negative seed or id.
     """
     from scenarios.schema.scenario import CrowdSpec
-    from scenarios.schema.values import draw
 
     drawn = [draw(CrowdSpec().height, rng(seed, "person", int(one))) for one in people]
     if truth.height is None:

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.detector.draws import false_scores, poisson_counts, uniforms
+from sim.detector.draws import false_scores
 from sim.detector.persistent_clutter import persistent_false_alarms
 from sim.detector.readings import Readings
 from sim.detector.visible_ground import clip_boxes, furthest_row
-from sim.rng import rng
+from sim.rng import poisson_quantiles, rng, uniforms
 from sim.scene.body import SHOULDER_SHARE, person_boxes
 from sim.scene.camera import to_ground
 from sim.types import Array, Camera, Ints, Truth
@@ -53,7 +53,10 @@ def false_alarms(
         return persistent_false_alarms(truth, sensor, seed, camera, known, repeat)
     count = false_alarm_counts(sensor.clutter_rate, truth.length, seed, repeat)
     streams = [
-        (np.flatnonzero(count > k) + 1, uniforms(rng(seed, "clutter", 1 + k, repeat=repeat), 1, truth.length, DRAWS))
+        (
+            np.flatnonzero(count > k) + 1,
+            uniforms(rng(seed, "clutter", 1 + k, repeat=repeat), (truth.length, DRAWS)),
+        )
         for k in range(int(count.max(initial=0)))
     ]
     frame = np.concatenate([f for f, _ in streams]) if streams else np.zeros(0, np.int64)
@@ -75,7 +78,7 @@ def false_alarm_counts(rate: float, length: int, seed: int, repeat: int = 0) -> 
     seed, repeat (number of the suite entry's copy, 0 without copies): name the random stream; for fixed ones a higher
     rate never lowers a number. All are 0 if the rate is 0. Raises ValueError for a negative seed or rate.
     """
-    return poisson_counts(rate, uniforms(rng(seed, "clutter", 0, repeat=repeat), 1, length, 1)[:, 0])
+    return poisson_quantiles(rate, uniforms(rng(seed, "clutter", 0, repeat=repeat), length))
 
 
 def _placed_by_camera(camera: Camera, u: Array) -> tuple[Array, Array]:

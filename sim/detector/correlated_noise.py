@@ -1,10 +1,10 @@
 """Normal draws that stay correlated over time: sums of stationary AR(1) processes and of white noise.
 
-A part has a share s of the variance and a time constant tau in s. It adds sqrt(s) x_t in frame t, where x_t = rho
-x_(t-1) + sqrt(1 - rho²) e_t, e_t is a new standard normal, and rho = exp(-1 / (fps tau)) at fps frames/s. The sum of
-all parts is N(0, 1); its autocorrelation at a lag in s is the sum of s exp(-lag / tau). The rest of the variance is
-white, that is independent in each frame. Every process begins in frame 1, so that the draws of a frame do not depend on
-when a person enters.
+A part has a share s of the variance and a time constant tau in s. It is a process in time, not in frames: it runs on a
+clock of CLOCK ticks per s, and a frame takes the nearest tick. At tick k it adds sqrt(s) x_k, where x_k = rho x_(k-1) +
+sqrt(1 - rho²) e_k, e_k is a new standard normal, and rho = exp(-1 / (CLOCK tau)). The sum of all parts is N(0, 1); its
+autocorrelation at a lag in s is the sum of s exp(-lag / tau). The rest of the variance is white, that is independent in
+each frame. Every process begins in frame 1, so that the draws of a frame do not depend on when a person enters.
 """
 
 from __future__ import annotations
@@ -14,11 +14,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.rng import rng
-from sim.types import Array
+from sim.elementary import exp
+from sim.rng import autoregression, normals, rng, uniforms
+from sim.types import Array, Ints
 
 if TYPE_CHECKING:
     from scenarios.schema.sensor import Memory
+
+CLOCK = 50.0  # Hz, of what lasts in the simulated detector: errors, misses, false alarms
 
 
 def correlated_normals(
@@ -38,22 +41,13 @@ def correlated_normals(
         return fresh
     white = max(0.0, 1.0 - sum(part.share for part in memory))
     out = np.sqrt(white) * fresh
-    last = first + len(fresh) - 1
+    tick = ticks(np.arange(first, first + len(fresh)), fps)
     for k, part in enumerate(memory):
-        rho = float(np.exp(-1.0 / (fps * part.time)))
-        e = rng(seed, "detect", *keys, k, repeat=repeat).standard_normal((last, fresh.shape[1]))
-        out += np.sqrt(part.share) * _autoregression(e, rho)[first - 1 :]
+        e = normals(uniforms(rng(seed, "detect", *keys, k, repeat=repeat), (int(tick[-1]) + 1, fresh.shape[1])))
+        out += np.sqrt(part.share) * autoregression(e, exp(-1.0 / (CLOCK * part.time)))[tick]
     return np.asarray(out)
 
 
-def _autoregression(e: Array, rho: float) -> Array:
-    """Return x (F, D) with x_1 = e_1 and x_t = rho x_(t-1) + sqrt(1 - rho²) e_t down the rows of e (F, D), t being the
-    row.
-
-    rho: correlation of successive rows, 0 to 1. If e is standard normal, so is x. It changes e: rows 2 on are scaled by
-    sqrt(1 - rho²).
-    """
-    from scipy.signal import lfilter
-
-    e[1:] *= np.sqrt(1.0 - rho**2)
-    return np.asarray(lfilter([1.0], [1.0, -rho], e, axis=0))
+def ticks(frame: Ints, fps: float) -> Ints:
+    """Return the ticks (F,) of the detector's clock, from 0 on, that are nearest to the times of frames (F,)."""
+    return np.asarray(np.floor((frame - 1) / fps * CLOCK + 0.5), np.int64)

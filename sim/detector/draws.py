@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.types import Array, Ints
+from sim.rng import uniforms
+from sim.types import Array
 
 if TYPE_CHECKING:
     from scenarios.schema.sensor import Sensor
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 HIGHEST_FALSE_SCORE = 0.7  # of a false alarm whose detector has no measured scores; the mean is a third of it
 
 
-def uniforms(generator: np.random.Generator, first: int, frames: int, per_frame: int) -> Array:
+def frame_uniforms(generator: np.random.Generator, first: int, frames: int, per_frame: int) -> Array:
     """Return uniforms, (frames, per_frame), for frames `first` to `first` + frames - 1 (frames from 1 on).
 
     They are above 0 and at most 1; a value may round to 1. The generator must be new, and is advanced: past the numbers
@@ -27,34 +28,7 @@ def uniforms(generator: np.random.Generator, first: int, frames: int, per_frame:
     default can.
     """
     generator.bit_generator.advance((first - 1) * per_frame)  # type: ignore[attr-defined]
-    return np.asarray(generator.random((frames, per_frame)) + 2.0**-54)
-
-
-def normals(u: Array) -> Array:
-    """Return the standard normal quantiles at u, any shape, with 0 < u <= 1: always finite, as u = 1 is lowered a
-    little.
-
-    u = 0 gives -inf, nan or a negative u gives nan, u above 1 counts as 1.
-    """
-    from scipy.special import ndtri
-
-    return np.asarray(ndtri(np.minimum(u, 1.0 - 2.0**-53)))
-
-
-def poisson_counts(rate: float, u: Array) -> Ints:
-    """Return the quantiles (N,) int64 of a Poisson distribution of mean `rate` at uniforms u (N,); zeros if the rate is
-    0.
-
-    A quantile is the smallest number whose cumulative probability is at least u; it is at most rate + 12 √rate + 20,
-    also at u = 1. For a fixed u below 1 it never falls when the rate rises. Raises ValueError for a negative or nan
-    rate.
-    """
-    if not rate:
-        return np.zeros(len(u), np.int64)
-    from scipy.special import pdtr
-
-    k = np.arange(int(rate + 12 * np.sqrt(rate) + 20))
-    return np.searchsorted(pdtr(k, rate), u).astype(np.int64)
+    return uniforms(generator, (frames, per_frame))
 
 
 def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
@@ -64,7 +38,12 @@ def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
     curve: the quantiles from u = 0 to u = 1, at least one number, in ascending order; a single one is the result for
     every u. u outside 0 to 1 gives the first or last of them. Raises ValueError for an empty curve.
     """
-    return np.interp(u, np.linspace(0.0, 1.0, len(curve)), curve)
+    values = np.array(curve)
+    if len(values) == 1:
+        return np.full(len(u), values[0])
+    place = np.clip(u, 0.0, 1.0) * (len(values) - 1)
+    k = np.minimum(place.astype(np.int64), len(values) - 2)
+    return np.asarray(values[k] + (place - k) * (values[k + 1] - values[k]))
 
 
 def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:
@@ -88,4 +67,4 @@ def false_scores(u: Array, sensor: Sensor) -> Array:
     They are the quantiles of `sensor.false_scores` at u if given, else 0.7 u², with a mean of 0.23.
     """
     curve = sensor.false_scores
-    return HIGHEST_FALSE_SCORE * u**2 if curve is None else interpolated_quantiles(curve, u)
+    return HIGHEST_FALSE_SCORE * u * u if curve is None else interpolated_quantiles(curve, u)

@@ -1,11 +1,12 @@
 """False alarms that persist over frames (`sensor.false_alarms`): at people (body parts, doubles) or on their own.
 
-Alarms are born as a Poisson process and live for a geometric number of frames: each survives to the next frame with
-probability q = exp(-1 / (fps life)), where fps is frames/s and life the mean life in s. A living alarm is reported in a
-frame with probability `seen`. On average, rate / seen alarms live in a frame, from the first on, where rate is
-`sensor.clutter_rate`. The number reported in a frame is therefore Poisson with mean `clutter_rate`, whatever the life;
-it is lower where alarms at people end early because the people leave. The k-th alarm born in a frame has a random
-stream of its own: a higher rate adds alarms and keeps the earlier ones.
+Alarms are born as a Poisson process in time and live for an exponential time, on the detector's clock of CLOCK ticks
+per s: each survives to the next tick with probability q = exp(-1 / (CLOCK life)), where life is the mean life in s. A
+living alarm is reported in a frame with probability `seen`. On average, rate / seen alarms live at any time, from the
+first on, where rate is `sensor.clutter_rate`. The number reported in a frame is therefore Poisson with mean
+`clutter_rate`, whatever the life and the frame rate; it is lower where alarms at people end early because the people
+leave. Alarms of life 0 are reported in one frame. The k-th alarm born at a tick has a random stream of its own: a
+higher rate adds alarms and keeps the earlier ones.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.detector.box_noise import move_edges, standing_share
-from sim.detector.draws import false_scores, normals, poisson_counts, uniforms
+from sim.detector.correlated_noise import CLOCK, ticks
+from sim.detector.draws import false_scores
 from sim.detector.readings import Readings
 from sim.detector.visible_ground import VisibleGround, clip_boxes
-from sim.rng import rng
+from sim.elementary import exp, log
+from sim.rng import normals, poisson_quantiles, rng, uniforms
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Ints, Truth
 
@@ -34,9 +37,11 @@ AlarmRows = tuple[Ints, Array, Array]
 
 @dataclass(frozen=True)
 class Births:
-    """All B false alarms of a sequence, sorted by frame of birth.
+    """All B false alarms of a sequence that live in at least one frame, sorted by time of birth.
 
-    frame (B,)        frame of birth, from 1 on
+    frame (B,)        first frame in which the alarm lives, from 1 on
+    age (B,)          time from its birth to that frame, s
+    name (B, 2)       tick of birth and number among the alarms born at this tick, from 0: names its random streams
     at_birth (B, 9)   uniforms in (0, 1] that draw: LIFE (number of frames), AT_PERSON (whether it goes with a person),
                       SITE (which of the given sites), X, Y (place), TALL (height), ASPECT (width over height), VX, VY
                       (velocity)
@@ -46,6 +51,8 @@ class Births:
     """
 
     frame: Ints
+    age: Array
+    name: Ints
     at_birth: Array
     in_frames: list[Array]
 
@@ -87,24 +94,38 @@ def persistent_false_alarms(
 def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int) -> Births:
     """Return all alarms of a sequence, with the uniforms that draw them, as Births.
 
-    Frame 1 starts with the stationary number of living alarms, as if some had begun earlier. truth: gives the frame
-    rate and the number of frames. rate: mean number of alarms reported per frame. An alarm's life is geometric with
-    mean about `model.life` (s), and is cut at the last frame; 0 means one frame. seed, repeat (number of the suite
-    entry's copy): name the random streams. Raises ValueError for a negative seed or rate.
+    The first tick starts with the stationary number of living alarms, as if some had begun earlier. truth: gives the
+    frame rate and the number of frames. rate: mean number of alarms reported per frame. An alarm's life has the mean
+    `model.life` (s); 0 means one frame. seed, repeat (number of the suite entry's copy): name the random streams.
+    Raises ValueError for a negative seed or rate.
     """
-    q = np.exp(-1.0 / (truth.fps * model.life)) if model.life else 0.0
+    frames = np.arange(1, truth.length + 1)
+    # the steps at which alarms may be born, and the step of each frame; without a life every frame is a step
+    step, per_s, q = frames - 1, truth.fps, 0.0
+    if model.life:
+        step, per_s, q = ticks(frames, truth.fps), CLOCK, float(exp(-1.0 / (CLOCK * model.life)))
     alive = rate / model.seen
-    u = uniforms(rng(seed, "clutter", 0, 1, repeat=repeat), 1, truth.length, 1)[:, 0]
-    number = poisson_counts(alive * (1.0 - q), u)
-    number[:1] = poisson_counts(alive, u[:1])
-    frame = np.repeat(np.arange(1, truth.length + 1), number)
-    at_birth, in_frames = np.empty((len(frame), BIRTH_DRAWS)), []
-    for row, (f, nth) in enumerate((f, n) for f, many in enumerate(number, 1) for n in range(many)):
-        stream = rng(seed, "clutter", 1, f, nth, repeat=repeat)
-        at_birth[row] = stream.random(BIRTH_DRAWS) + 2.0**-54
-        lives = 1 + int(np.log(at_birth[row, LIFE]) / np.log(q)) if q else 1
-        in_frames.append(stream.random((min(lives, truth.length + 1 - f), FRAME_DRAWS)) + 2.0**-54)
-    return Births(frame, at_birth, in_frames)
+    u = uniforms(rng(seed, "clutter", 0, 1, repeat=repeat), int(step[-1]) + 1 if len(step) else 0)
+    number = poisson_quantiles(alive * (1.0 - q), u)
+    number[:1] = poisson_quantiles(alive, u[:1])
+    born = []
+    for start in np.flatnonzero(number):
+        for nth in range(number[start]):
+            stream = rng(seed, "clutter", 1, int(start), nth, repeat=repeat)
+            at_birth = uniforms(stream, BIRTH_DRAWS)
+            life = 1 + int(log(at_birth[LIFE]) / log(q)) if q else 1
+            first, end = np.searchsorted(step, (start, start + life))
+            if first < end:
+                in_frames = uniforms(stream, (int(end - first), FRAME_DRAWS))
+                name = int(start), nth
+                born.append((int(first) + 1, (step[first] - start) / per_s, name, at_birth, in_frames))
+    return Births(
+        np.array([b[0] for b in born], np.int64),
+        np.array([b[1] for b in born]),
+        np.array([b[2] for b in born], np.int64).reshape(-1, 2),
+        np.array([b[3] for b in born]).reshape(-1, BIRTH_DRAWS),
+        [b[4] for b in born],
+    )
 
 
 def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, seed: int, repeat: int) -> AlarmRows:
@@ -121,26 +142,27 @@ def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, 
     n = normals(at_birth)
     here = ground.truth.rows(start)
     if at_birth[AT_PERSON] < model.near and here.stop > here.start:
-        nth = int(k - np.searchsorted(born.frame, start))
-        id = _draw_person(ground.truth.id[here], seed, start, nth, repeat)
+        id = _draw_person(ground.truth.id[here], seed, born.name[k], repeat)
         row, present = _rows_of_person(ground.truth, id, frame)
         frame, in_frames = frame[present], in_frames[present]
         box, pos = _boxes_at_person(model, ground, row, n)
     else:
-        box, pos = _boxes_alone(model, ground, len(in_frames), at_birth, n)
+        age = born.age[k] + np.arange(len(in_frames)) / ground.truth.fps
+        box, pos = _boxes_alone(model, ground, age, at_birth, n)
     if model.jitter:
         box = move_edges(box, model.jitter * box[:, 3:] * normals(in_frames[:, EDGES]))
     return frame, np.concatenate([box, pos], axis=1), in_frames
 
 
-def _draw_person(ids: Ints, seed: int, frame: int, nth: int, repeat: int) -> int:
+def _draw_person(ids: Ints, seed: int, name: Ints, repeat: int) -> int:
     """Return the id of the person with whom an alarm goes: the one of `ids` with the highest random draw.
 
-    frame, nth: frame of birth (from 1) and number of the alarm in it (from 0). Each draw has a random stream of its
-    own, named by seed, repeat (number of the suite entry's copy), frame, nth and the person's id. One person more
-    therefore changes few alarms. Raises ValueError if `ids` is empty, or for a negative seed or id.
+    name (2,): of the alarm, as in Births. Each draw has a random stream of its own, named by seed, repeat (number of
+    the suite entry's copy), the alarm and the person's id. One person more therefore changes few alarms. Raises
+    ValueError if `ids` is empty, or for a negative seed or id.
     """
-    draws = [rng(seed, "clutter", 2, frame, nth, int(id), repeat=repeat).random() for id in ids]
+    tick, nth = name.tolist()
+    draws = [rng(seed, "clutter", 2, tick, nth, int(id), repeat=repeat).random() for id in ids]
     return int(ids[int(np.argmax(draws))])
 
 
@@ -175,37 +197,37 @@ def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Ar
     if truth.box is None:
         return np.zeros((len(row), 4)), pos
     left, top, w, h = truth.box[row].T
-    tall = h * np.exp(model.near_height[0] + model.near_height[1] * n[TALL])
+    tall = h * exp(model.near_height[0] + model.near_height[1] * n[TALL])
     box = _boxes_on_feet(left + w / 2 + h * across, top + h * (1.0 + down), tall, model, n)
     share = standing_share(ground.camera)
     return box, ground.ground_points(box[:, 0] + box[:, 2] / 2, box[:, 1] + share * box[:, 3], pos)
 
 
 def _boxes_alone(
-    model: FalseAlarms, ground: VisibleGround, frames: int, at_birth: Array, n: Array
+    model: FalseAlarms, ground: VisibleGround, age: Array, at_birth: Array, n: Array
 ) -> tuple[Array, Array]:
     """Return boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that stands or drifts
     alone.
 
-    frames: L, the frames it lives. at_birth (9,): its uniforms, columns as `at_birth` of Births; n (9,): the same as
-    standard normals. It starts near one of the sites `model.at` (shares of width and height of the ground part of the
-    image), with a standard deviation of 0.03 and inside that part; without sites, anywhere on it. It moves with
-    constant velocity, drawn with standard deviation `model.drift` (box heights per s) per axis. `model.height`: mean
-    and standard deviation of the logarithm of its height over a person's. Points are those under the feet, for a camera
-    of kind "top" under the middle of the box, if there is a camera and ground is seen there; else one fixed point of
-    the labelled area (0, 0 without one), which does not drift.
+    age (L,): time since its birth in each frame, s. at_birth (9,): its uniforms, columns as `at_birth` of Births; n
+    (9,): the same as standard normals. It starts near one of the sites `model.at` (shares of width and height of
+    the ground part of the image), with a standard deviation of 0.03 and inside that part; without sites, anywhere
+    on it. It moves with constant velocity, drawn with standard deviation `model.drift` (box heights per s) per
+    axis. `model.height`: mean and standard deviation of the logarithm of its height over a person's. Points are
+    those under the feet, for a camera of kind "top" under the middle of the box, if there is a camera and ground is
+    seen there; else one fixed point of the labelled area (0, 0 without one), which does not drift.
     """
     x, y = at_birth[X], at_birth[Y]
     if model.at:
         x, y = model.at[min(int(at_birth[SITE] * len(model.at)), len(model.at) - 1)]
         x, y = x + SITE_SPREAD * n[X], y + SITE_SPREAD * n[Y]
     u, v = ground.image_point(float(np.clip(x, 0.0, 1.0)), float(np.clip(y, 0.0, 1.0)))
-    tall = ground.usual_height(u, v) * np.exp(model.height[0] + model.height[1] * n[TALL])
-    away = model.drift * tall / ground.truth.fps * np.arange(frames)
+    tall = ground.usual_height(u, v) * exp(model.height[0] + model.height[1] * n[TALL])
+    away = model.drift * tall * age
     u, v = u + away * n[VX], v + away * n[VY]
-    box = _boxes_on_feet(u, v, np.full(frames, tall), model, n)
+    box = _boxes_on_feet(u, v, np.full(len(age), tall), model, n)
     foot = v - (1.0 - standing_share(ground.camera)) * tall
-    return box, ground.ground_points(u, foot, np.tile(ground.labelled_point(x, y), (frames, 1)))
+    return box, ground.ground_points(u, foot, np.tile(ground.labelled_point(x, y), (len(age), 1)))
 
 
 def _boxes_on_feet(middle: Array, foot: Array, tall: Array, model: FalseAlarms, n: Array) -> Array:
@@ -215,5 +237,5 @@ def _boxes_on_feet(middle: Array, foot: Array, tall: Array, model: FalseAlarms, 
     are in px. The width is the same share of the height in all rows: its logarithm has the mean and standard deviation
     `model.aspect`, and is drawn by the standard normal in column ASPECT of n (9,).
     """
-    wide = tall * np.exp(model.aspect[0] + model.aspect[1] * n[ASPECT])
+    wide = tall * exp(model.aspect[0] + model.aspect[1] * n[ASPECT])
     return np.stack([middle - wide / 2, foot - tall, wide, tall], axis=1)

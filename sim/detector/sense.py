@@ -21,17 +21,20 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.detector.box_noise import foot_points, move_edges, perturb_boxes, seen_shift
 from sim.detector.clutter import false_alarms
-from sim.detector.correlated_noise import correlated_normals
-from sim.detector.draws import normals, true_scores, uniforms
+from sim.detector.correlated_noise import CLOCK, correlated_normals, ticks
+from sim.detector.draws import frame_uniforms, interpolated_quantiles, true_scores
 from sim.detector.readings import Readings, detections_by_frame
-from sim.rng import rng
+from sim.elementary import normal_quantile, power
+from sim.rng import normals, rng, uniforms
 from sim.scene.body import SHOULDER_SHARE
 from sim.types import Array, Bools, Camera, Detections, Ints, Truth
 
 if TYPE_CHECKING:
     from scenarios.schema.sensor import Sensor
 
-KEEP, DETECT, EDGES, POINT, SCORE, ORDER, DRAWS = 0, 1, slice(2, 6), slice(6, 8), 8, 9, 10  # a person's draws per frame
+DETECT, EDGES, POINT, NORMALS = 0, slice(1, 5), slice(5, 7), 7  # a person's standard normals in a frame
+SCORE, ORDER, UNIFORMS = 0, 1, 2  # and uniforms
+PERSISTENCE_STEP = 0.1  # s: lag of which `sensor.persistence` is the correlation
 
 
 def sense(
@@ -73,16 +76,18 @@ def sense(
 def _true_detections(
     truth: Truth, sensor: Sensor, seed: int, repeat: int, people: Mapping[str, tuple[int, ...]], camera: Camera | None
 ) -> Readings:
-    u = person_draws(truth, seed, repeat, sensor)
+    n, u = person_draws(truth, seed, repeat, sensor)
     hidden = _artificially_hidden(truth, sensor, people)
-    seen = (u[:, DETECT] < detection_probability(truth, sensor, camera)) & ~hidden
+    p = detection_probability(truth, sensor, camera)
+    within = normal_quantile(np.where((p > 0.0) & (p < 1.0), p, 0.5))
+    seen = np.where((p > 0.0) & (p < 1.0), n[:, DETECT] < within, p >= 1.0) & ~hidden
     base = _sensed_boxes(truth, sensor)
     if base is not None:
         seen &= np.isfinite(base).all(axis=1)
-    u = u[seen]
-    box = None if base is None else _with_box_noise(base[seen], truth.visibility[seen], sensor, u[:, EDGES])
+    n, u = n[seen], u[seen]
+    box = None if base is None else _with_box_noise(base[seen], truth.visibility[seen], sensor, n[:, EDGES])
     if truth.pos is not None:
-        pos = truth.pos[seen] + sensor.noise_m * normals(u[:, POINT]) if sensor.noise_m else truth.pos[seen]
+        pos = truth.pos[seen] + sensor.noise_m * n[:, POINT] if sensor.noise_m else truth.pos[seen]
         if base is not None and box is not None and camera is not None:
             pos = _displaced(pos, base[seen], box, truth, seen, sensor, camera)
     else:
@@ -111,56 +116,49 @@ def _displaced(
     return np.where(np.isfinite(at), at, pos)
 
 
-def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> Array:
-    """Return the uniforms in (0, 1] of each of the R rows of the truth, (R, 10), keyed by the person and the frame.
+def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> tuple[Array, Array]:
+    """Return the random numbers of each of the R rows of the truth, keyed by the person and the frame.
 
-    Columns: KEEP (whether DETECT is kept), DETECT (misses), four box edges, two point coordinates, SCORE, ORDER (place
-    in the frame's list). With `sensor.persistence` ρ, DETECT is that of the previous frame with probability ρ. It stays
-    uniform, and misses of neighbouring frames have correlation ρ if the detection probability is constant.
-    `sensor.miss_memory` and `box_noise.memory` make DETECT and the edges correlated over time (their normal quantiles
-    are AR(1) sums). Frames in which a person is absent are drawn, too. repeat: number of the suite entry's copy, 0
-    without copies. A truth without rows gives shape (0, 10).
+    Standard normals (R, 7): DETECT (a person is missed from the quantile of the detection probability on), four box
+    edges, two point coordinates. Uniforms (R, 2) in (0, 1]: SCORE, ORDER (place in the frame's list).
+
+    What lasts is a process in time, whatever the frame rate. With `sensor.persistence` ρ, DETECT is kept for a random
+    time, so that the misses of one person 0.1 s apart have correlation ρ if the detection probability is constant.
+    `sensor.miss_memory` and `box_noise.memory` make DETECT and the edges sums of AR(1) processes. Frames in which a
+    person is absent are drawn, too. repeat: number of the suite entry's copy, 0 without copies.
 
     Raises ValueError for a negative seed or id.
     """
-    u = np.empty((len(truth.id), DRAWS))
+    n, u = np.empty((len(truth.id), NORMALS)), np.empty((len(truth.id), UNIFORMS))
     by_person = np.argsort(truth.id, kind="stable")
     cuts = np.flatnonzero(np.diff(truth.id[by_person])) + 1
     for rows in np.split(by_person, cuts):
         if len(rows):
-            u[rows] = _one_person(int(truth.id[rows[0]]), truth.frame[rows], seed, repeat, sensor, truth.fps)
-    return u
+            n[rows], u[rows] = _one_person(int(truth.id[rows[0]]), truth.frame[rows], seed, repeat, sensor, truth.fps)
+    return n, u
 
 
-def _one_person(id: int, frame: Ints, seed: int, repeat: int, sensor: Sensor, fps: float) -> Array:
-    first = int(frame[0])
-    u = uniforms(rng(seed, "detect", id, repeat=repeat), first, int(frame[-1]) - first + 1, DRAWS)
-    _correlate(u, first, sensor, fps, seed, id, repeat)
-    if sensor.persistence:
-        fresh = u[:, KEEP] >= sensor.persistence
-        fresh[0] = True
-        source = np.maximum.accumulate(np.where(fresh, np.arange(len(u)), 0))
-        u[:, DETECT] = u[source, DETECT]
-    return u[frame - first]
-
-
-def _correlate(u: Array, first: int, sensor: Sensor, fps: float, seed: int, id: int, repeat: int) -> None:
-    """Replace columns DETECT and EDGES of u by correlated uniforms where the sensor has a memory for them. It changes
-    u.
-
-    u (F, 10): uniforms of person `id` in frames `first` to `first` + F - 1, from 1 on, at `fps` frames/s.
-    `sensor.miss_memory` is for DETECT (misses), `sensor.box_noise.memory` for the four columns EDGES (box errors);
-    without memory nothing changes. seed, id and repeat (number of the suite entry's copy) name the random streams.
-    Returns nothing. Raises ValueError for a negative seed or id.
-    """
+def _one_person(id: int, frame: Ints, seed: int, repeat: int, sensor: Sensor, fps: float) -> tuple[Array, Array]:
+    first, count = int(frame[0]), int(frame[-1] - frame[0]) + 1
+    drawn = frame_uniforms(rng(seed, "detect", id, repeat=repeat), first, count, NORMALS + UNIFORMS)
+    n, u = normals(drawn[:, :NORMALS]), drawn[:, NORMALS:]
     of_boxes = None if sensor.box_noise is None else sensor.box_noise.memory
     parts = ((0, slice(DETECT, DETECT + 1), sensor.miss_memory), (1, EDGES, of_boxes))
     for key, columns, memory in parts:
-        if memory:
-            from scipy.special import ndtr
+        n[:, columns] = correlated_normals(n[:, columns], memory or (), first, fps, seed, id, key, repeat=repeat)
+    if sensor.persistence:
+        tick = ticks(np.arange(first, first + count), fps)
+        n[:, DETECT] = _kept(sensor.persistence, int(tick[-1]) + 1, rng(seed, "detect", id, 2, repeat=repeat))[tick]
+    return n[frame - first], u[frame - first]
 
-            n = correlated_normals(normals(u[:, columns]), memory, first, fps, seed, id, key, repeat=repeat)
-            u[:, columns] = ndtr(n)
+
+def _kept(persistence: float, count: int, r: np.random.Generator) -> Array:
+    """Return standard normals (count,) at ticks of the detector's clock; each is that of the tick before with a
+    probability that leaves the share `persistence` after PERSISTENCE_STEP."""
+    drawn = uniforms(r, (count, 2))
+    fresh = drawn[:, 0] >= power(persistence, 1.0 / (CLOCK * PERSISTENCE_STEP))
+    fresh[0] = True
+    return normals(drawn[:, 1])[np.maximum.accumulate(np.where(fresh, np.arange(count), 0))]
 
 
 def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = None) -> Array:
@@ -189,8 +187,8 @@ def _visibility_factor(visible: Array, sensor: Sensor) -> Array:
     spaced visibilities from 0 to 1, linear between them.
     """
     if sensor.by_visibility is None:
-        return np.asarray(visible**sensor.occlusion_power)
-    return np.interp(visible, np.linspace(0.0, 1.0, len(sensor.by_visibility)), sensor.by_visibility)
+        return np.asarray(power(visible, sensor.occlusion_power))
+    return interpolated_quantiles(sensor.by_visibility, visible)
 
 
 def _artificially_hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]]) -> Bools:
@@ -225,14 +223,14 @@ def _sensed_boxes(truth: Truth, sensor: Sensor) -> Array | None:
     return np.where(np.isfinite(truth.visible_box), truth.visible_box, truth.box)
 
 
-def _with_box_noise(box: Array, visibility: Array, sensor: Sensor, u: Array) -> Array:
+def _with_box_noise(box: Array, visibility: Array, sensor: Sensor, n: Array) -> Array:
     """Return boxes (N, 4), left, top, width, height in px, with the errors of `sensor.box_noise`, else of
     `sensor.noise_px`.
 
-    u (N, 4): uniforms in (0, 1] that draw the errors. `box_noise`: errors in proportion to the box height. `noise_px`:
+    n (N, 4): standard normals that draw the errors. `box_noise`: errors in proportion to the box height. `noise_px`:
     standard deviation in px by which each edge is moved. visibility (N,): visible share, 0 to 1, which only `box_noise`
     uses. `box` itself is returned if `box_noise` is None and `noise_px` 0.
     """
     if sensor.box_noise is not None:
-        return perturb_boxes(box, visibility, sensor.box_noise, normals(u))
-    return move_edges(box, sensor.noise_px * normals(u)) if sensor.noise_px else box
+        return perturb_boxes(box, visibility, sensor.box_noise, n)
+    return move_edges(box, sensor.noise_px * n) if sensor.noise_px else box

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.elementary import length
 from sim.scene.body import PERSON_HEIGHT, person_boxes
 from sim.scene.camera import project, to_ground
 from sim.types import Array, Camera, Truth
@@ -64,7 +65,7 @@ class VisibleGround:
         without boxes.
         """
         if self.camera is None:
-            return float(np.clip(self.line @ [1.0, v], *self.limits))
+            return float(np.clip(self.line[0] + self.line[1] * v, *self.limits))
         pos = to_ground(self.camera, np.array([[u, v]]))
         height = np.full(1, PERSON_HEIGHT)
         tall = person_boxes(self.camera, np.column_stack([pos, [0.0]]), np.zeros(1), height)[0, 3]
@@ -110,7 +111,7 @@ def furthest_row(camera: Camera) -> float:
     ground = to_ground(camera, np.column_stack([np.full_like(v, camera.centre_px[0]), v]))
     foot = np.column_stack([ground, np.zeros(len(v))])
     head = foot + np.array([0.0, 0.0, PERSON_HEIGHT])
-    size = np.linalg.norm(project(camera, head)[0] - project(camera, foot)[0], axis=1)
+    size = length(project(camera, head)[0] - project(camera, foot)[0])
     at_middle = size[len(v) // 2] if np.isfinite(size[len(v) // 2]) else np.nanmax(size, initial=0.0)
     enough = np.flatnonzero(np.nan_to_num(size) >= SMALLEST * at_middle)
     return float(v[enough[0]]) if len(enough) else 0.0
@@ -134,7 +135,8 @@ def height_line(foot: Array, height: Array) -> Array:
     warning.
     """
     spread = foot - foot.mean()
-    b = float(spread @ height / (spread @ spread)) if spread @ spread > 1e-9 * len(foot) else 0.0
+    square = float(np.sum(spread * spread))
+    b = float(np.sum(spread * height)) / square if square > 1e-9 * len(foot) else 0.0
     return np.array([height.mean() - b * foot.mean(), b])
 
 

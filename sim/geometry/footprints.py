@@ -13,14 +13,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from sim.elementary import atan2, dot, unit
 from sim.types import Array, Ints
 
 FOOTPRINT_RADIUS = 0.25  # m
 FOOTPRINT_SIDES = 16
 STEP = 2 * np.pi / FOOTPRINT_SIDES  # rad: width of the normal cone of each footprint vertex
-FOOTPRINT = FOOTPRINT_RADIUS * np.stack(
-    [np.cos(STEP * np.arange(FOOTPRINT_SIDES)), np.sin(STEP * np.arange(FOOTPRINT_SIDES))], axis=1
-)  # (16, 2) m, counter-clockwise, round the origin
+FOOTPRINT = FOOTPRINT_RADIUS * unit(STEP * np.arange(FOOTPRINT_SIDES))  # (16, 2) m, counter-clockwise
 CONES = STEP * (np.arange(FOOTPRINT_SIDES) - 0.5)  # rad: the angle at which each vertex's normal cone begins
 CHUNK = 512  # groups per pass
 FLAT = 1e-9  # rad: a narrower cone is a rounding error, and its vertex lies on an edge
@@ -90,18 +89,18 @@ def _gift_wrap(pos: Array) -> tuple[Array, Array, Array]:
     vertex.
     """
     rows, n = np.arange(len(pos)), pos.shape[1]
-    now = (pos @ np.array([np.cos(CONES[0]), np.sin(CONES[0])])).argmax(axis=1)
+    now = dot(pos, unit(CONES[0])).argmax(axis=1)
     facing = np.full(len(pos), CONES[0] + np.pi / 2)  # direction of the edge that arrives at `now`
     turned = np.zeros(len(pos))
     vertex, start, width = [], [], []
     for _ in range(n + 1):  # the first vertex comes again as the last one, with the rest of its cone
         arm = pos - pos[rows, now][:, None]
         elsewhere = (arm != 0).any(axis=2)
-        turn = np.arctan2(arm[..., 1], arm[..., 0]) - facing[:, None]
+        turn = atan2(arm[..., 1], arm[..., 0]) - facing[:, None]
         turn = (turn + np.pi / 2) % (2 * np.pi) - np.pi / 2  # a rounding error to the right is straight on
         turn = np.where(elsewhere, np.maximum(turn, 0.0), np.inf)
         least = turn.min(axis=1)
-        furthest = np.where(turn <= least[:, None] + FLAT, (arm**2).sum(axis=2), -1.0).argmax(axis=1)
+        furthest = np.where(turn <= least[:, None] + FLAT, dot(arm, arm), -1.0).argmax(axis=1)
         # The last vertex is where the turn is complete; a single position turns all the way.
         done = turned + least > 2 * np.pi - FLAT
         cone = np.where(done, 2 * np.pi - turned, least)
@@ -130,7 +129,7 @@ def _minkowski_sums(p: Array, start: Array, width: Array) -> list[Array]:
     turned = (start - start[:, :1])[..., None]
     key = np.where(shared > FLAT, turned + np.where(begins_inside, after, 0.0), np.inf).reshape(len(p), -1)
     corner = (p[:, :, None] + FOOTPRINT).reshape(len(p), -1, 2)
-    order = np.argsort(key, axis=1)
+    order = np.argsort(key, axis=1, kind="stable")
     used = np.arange(key.shape[1]) < np.isfinite(key).sum(axis=1)[:, None]
     group, _ = np.nonzero(used)
     flat = corner[group, order[used]]

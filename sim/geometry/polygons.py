@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.elementary import atan2
 from sim.types import Array, Bools, Ints
 
 EDGE_TOLERANCE = 1e-9  # a point closer to an edge than this share of the polygons' size is on the edge
@@ -130,7 +131,7 @@ def _common_area(a: Array, b: Array) -> Array:
     origin = a[:, :1]
     a, b = a - origin, b - origin
     size = np.abs(np.concatenate([a, b], axis=1)).max(axis=(1, 2))
-    slack = EDGE_TOLERANCE * size[:, None, None] ** 2
+    slack = EDGE_TOLERANCE * (size * size)[:, None, None]
     enter, leave = _clip(a, b, slack)
     edge = np.roll(a, -1, axis=1) - a
     inside = (_left_of_edges(b, a) >= -slack).all(axis=1)
@@ -179,8 +180,8 @@ def _area_by_angle(points: Array, valid: Bools) -> Array:
     middle = np.where(valid[..., None], points, 0.0).sum(axis=1) / np.maximum(n, 1)[:, None]
     arm = points - middle[:, None]
     # Invalid points are moved onto the last vertex, where they add no area.
-    angle = np.where(valid, np.arctan2(arm[..., 1], arm[..., 0]), np.inf)
-    order = np.argsort(angle, axis=1)
+    angle = np.where(valid, atan2(arm[..., 1], arm[..., 0]), np.inf)
+    order = np.argsort(angle, axis=1, kind="stable")
     order = np.where(
         np.arange(order.shape[1]) < n[:, None], order, order[np.arange(len(n)), np.maximum(n - 1, 0)][:, None]
     )

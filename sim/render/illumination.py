@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.values import draw
 from sim.render.random_fields import PlaneWaves, moving_pattern, uniform_drift
-from sim.rng import rng
+from sim.rng import draw, rng
 from sim.types import Array
 
 if TYPE_CHECKING:

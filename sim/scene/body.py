@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.elementary import cos, length, product, sin, turned, unit
 from sim.scene.terrain import height_at
 from sim.types import Array, Camera, Ints, Motion
 
@@ -110,8 +111,8 @@ def ellipsoids(
     width None stands for 0.27 of the height, depth None for 0.16 of it. A nan in pos3 or heading gives nan.
     """
     half = half_axes(height, width, depth)
-    c, s = np.cos(heading), np.sin(heading)
-    a = half**2
+    c, s = cos(heading), sin(heading)
+    a = half * half
     shape = np.zeros((len(height), 2, 3, 3))
     shape[..., 0, 0] = a[..., 0] * (s * s)[:, None] + a[..., 1] * (c * c)[:, None]
     shape[..., 1, 1] = a[..., 0] * (c * c)[:, None] + a[..., 1] * (s * s)[:, None]
@@ -153,11 +154,11 @@ def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
     ignored. Kind "top": ellipses do not depend on the depth. Ellipses are not clipped to the image.
     """
     R = camera.rotation
-    c = (people.centre - camera.position) @ R.T
-    S = R @ people.shape @ R.T
+    c = turned(R, people.centre - camera.position)
+    S = product(product(R, people.shape), R.T)
     if camera.kind == "top":
         scale = camera.px_per_m
-        return Outlines(c[..., :2] * scale + camera.centre_px, S[..., :2, :2] * scale**2)
+        return Outlines(c[..., :2] * scale + camera.centre_px, S[..., :2, :2] * (scale * scale))
     Q = S - c[..., :, None] * c[..., None, :]
     in_front = (Q[..., 2, 2] < 0) & (c[..., 2] > 0)
     q = np.where(in_front, Q[..., 2, 2], np.nan)
@@ -207,11 +208,11 @@ def contour(ellipses: Outlines, points: int = 16) -> Array:
     the body.
     """
     angle = 2 * np.pi * np.arange(points) / points
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    circle = unit(angle)
     a, b, d = ellipses.shape[..., 0, 0], ellipses.shape[..., 0, 1], ellipses.shape[..., 1, 1]
     l00 = np.sqrt(a)
     l10 = b / l00
-    l11 = np.sqrt(np.maximum(d - l10**2, 0.0))
+    l11 = np.sqrt(np.maximum(d - l10 * l10, 0.0))
     u = ellipses.centre[..., :1] + l00[..., None] * circle[:, 0]
     v = ellipses.centre[..., 1:] + l10[..., None] * circle[:, 0] + l11[..., None] * circle[:, 1]
     return np.stack([u, v], axis=-1).reshape(len(a), 2 * points, 2)
@@ -228,4 +229,4 @@ def occlusion_distance(camera: Camera, pos3: Array, height: Array) -> Array:
     """
     if camera.kind == "top":
         return np.asarray(camera.position[2] - pos3[:, 2] - height)
-    return np.asarray(np.hypot(pos3[:, 0] - camera.position[0], pos3[:, 1] - camera.position[1]))
+    return length(pos3[:, :2] - camera.position[:2])

@@ -57,7 +57,7 @@ def inscribed_outlines(box: Array) -> Outlines:
     centre, shape = np.empty((len(box), 2, 2)), np.zeros((len(box), 2, 2, 2))
     for k, part, half_width in ((BODY_PART, BODY, 0.5), (HEAD_PART, HEAD, HEAD.across / SHOULDER_SHARE)):
         centre[:, k] = np.stack([middle, top + (1.0 - part.centre) * height], axis=1)
-        shape[:, k, 0, 0], shape[:, k, 1, 1] = (half_width * width) ** 2, (part.up * height) ** 2
+        shape[:, k, 0, 0], shape[:, k, 1, 1] = np.square(half_width * width), np.square(part.up * height)
     return Outlines(centre, shape)
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.elementary import PI, length, product, sin, turned, unit
 from sim.scene import lens
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera
@@ -26,7 +27,7 @@ def camera_rotation(tilt: float, yaw: float) -> Array:
     tilt: angle in rad by which the camera looks down; negative looks up. yaw: rad; 0 looks along world +y, positive
     turns left. x_camera = rotation (X - position).
     """
-    ct, st, cy, sy = np.cos(tilt), np.sin(tilt), np.cos(yaw), np.sin(yaw)
+    (ct, st), (cy, sy) = unit(tilt), unit(yaw)
     return np.array([[cy, sy, 0.0], [st * sy, -st * cy, -ct], [-sy * ct, cy * ct, -st]])
 
 
@@ -38,7 +39,7 @@ def project(camera: Camera, xyz: Array) -> tuple[Array, Array]:
     most NEAREST_DEPTH (0.05 m), and where a lens with radial < 0 does not show the point. Points outside the image are
     not clipped. A nan in a row of xyz makes that row's point and depth nan.
     """
-    x = (np.asarray(xyz, dtype=float) - camera.position) @ camera.rotation.T
+    x = turned(camera.rotation, np.asarray(xyz, dtype=float) - camera.position)
     depth = x[:, 2]
     if camera.kind == "top":
         return x[:, :2] * camera.px_per_m + camera.centre_px, depth
@@ -57,11 +58,11 @@ def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
     uv = np.asarray(uv, dtype=float)
     if camera.kind == "top":
         across = (uv - camera.centre_px) / camera.px_per_m
-        origin = camera.position + across @ camera.rotation[:2]
+        origin = camera.position + turned(camera.rotation[:2].T, across)
         return origin, np.broadcast_to(camera.rotation[2], origin.shape)
     x = np.ones((len(uv), 3))
     x[:, :2] = lens.undistort((uv - camera.centre_px) / camera.focal_px, camera.radial)
-    return np.broadcast_to(camera.position, x.shape), x @ camera.rotation
+    return np.broadcast_to(camera.position, x.shape), turned(camera.rotation.T, x)
 
 
 def to_ground(camera: Camera, uv: Array, z: float = 0.0) -> Array:
@@ -94,7 +95,7 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     bend = np.eye(2)[None]
     if camera.radial:
         bend = lens.undistort_jacobian((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
-    step = np.swapaxes(bend / focal, 1, 2) @ camera.rotation[:2]  # dD/du, dD/dv as rows
+    step = product(np.swapaxes(bend / focal, 1, 2), camera.rotation[:2])  # dD/du, dD/dv as rows
     s = (z - origin[:, 2]) / direction[:, 2]
     slope = direction[:, :2] / direction[:, 2:]
     dx = step[:, :, :2] - step[:, :, 2:] * slope[:, None]
@@ -112,8 +113,11 @@ def right_camera(camera: Camera) -> Camera:
 def misaligned(camera: Camera, roll: float, down: float) -> Camera:
     """Return a copy of a pinhole camera whose image is turned clockwise by `roll` (rad) about its centre, then moved
     down by `down` px."""
-    turn = np.array([[np.cos(roll), -np.sin(roll), 0.0], [np.sin(roll), np.cos(roll), 0.0], [0.0, 0.0, 1.0]])
-    return camera.replace(rotation=turn @ camera.rotation, centre_px=(camera.centre_px[0], camera.centre_px[1] + down))
+    c, s = unit(roll)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return camera.replace(
+        rotation=product(turn, camera.rotation), centre_px=(camera.centre_px[0], camera.centre_px[1] + down)
+    )
 
 
 def disparity(camera: Camera, depth: Array) -> Array:
@@ -144,15 +148,15 @@ def px_per_m_at_centre(camera: Camera) -> float:
         foot = _low_ground(camera)
     base = np.array([*foot, 0.0])
     uv, depth = project(camera, np.stack([base, base + np.array([0.0, 0.0, PERSON_HEIGHT])]))
-    if -camera.rotation[2, 2] > np.sin(np.deg2rad(STEEP_DEG)):
+    if -camera.rotation[2, 2] > float(sin(STEEP_DEG / 180.0 * PI)):
         return float(camera.focal_px[1] / depth[0])
-    return float(np.linalg.norm(uv[1] - uv[0]) / PERSON_HEIGHT)
+    return float(length(uv[1] - uv[0]) / PERSON_HEIGHT)
 
 
 def shows_ground(camera: Camera, ground: Array) -> Bools:
     """Return flags (...,), True for the points on the ground (..., 2), m, that are within 10 km of the camera; nan is
     not."""
-    return np.asarray(np.linalg.norm(ground - camera.position[:2], axis=-1) < FARTHEST)
+    return np.asarray(length(ground - camera.position[:2]) < FARTHEST)
 
 
 def _low_ground(camera: Camera) -> Array:
@@ -166,6 +170,6 @@ def _low_ground(camera: Camera) -> Array:
     ground = to_ground(camera, np.column_stack([np.full_like(v, u), v]))
     seen = np.flatnonzero(shows_ground(camera, ground))
     if not len(seen):
-        ahead = camera.rotation[2, :2] / max(float(np.linalg.norm(camera.rotation[2, :2])), 1e-12)
+        ahead = camera.rotation[2, :2] / max(float(length(camera.rotation[2, :2])), 1e-12)
         return np.asarray(camera.position[:2] + 10.0 * ahead)
     return np.asarray(ground[(seen[0] + len(v) - 1) // 2])

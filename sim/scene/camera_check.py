@@ -9,6 +9,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, PICTURE_SIZES, SCALES, fits_picture, is_number
+from sim.elementary import dot, product
 from sim.scene.camera import px_per_m_at_centre, shows_ground, to_ground
 from sim.types import Camera
 
@@ -65,7 +66,7 @@ def _lens(camera: Camera) -> tuple[str, bool, str, str]:
         return "focal_px", False, got, f"two like focal lengths from {low:g} to {high:g} px"
     if not ((centre >= -CENTRE * size) & (centre <= (1 + CENTRE) * size)).all():
         return "centre_px", False, got, "an image centre near the image"
-    corner = (np.maximum(np.abs(centre), np.abs(size - centre)) / focal) ** 2
+    corner = np.square(np.maximum(np.abs(centre), np.abs(size - centre)) / focal)
     bend = camera.radial * float(corner.sum())
     expected = f"from {FOLD:.2f} to {BULGE:g} at the corner"
     return "radial", FOLD < bend <= BULGE, f"a lens with radial r² = {bend:.3g} at the image's corner", expected
@@ -74,8 +75,8 @@ def _lens(camera: Camera) -> tuple[str, bool, str, str]:
 def _rotation(camera: Camera) -> tuple[str, bool, str, str]:
     r = camera.rotation
     with np.errstate(over="ignore", invalid="ignore"):
-        off = float(np.abs(r @ r.T - np.eye(3)).max())
-        turn = float(np.linalg.det(r)) if off <= ROTATION_TOLERANCE else np.nan
+        off = float(np.abs(product(r, r.T) - np.eye(3)).max())
+        turn = float(dot(r[0], np.cross(r[1], r[2]))) if off <= ROTATION_TOLERANCE else np.nan
     if not off <= ROTATION_TOLERANCE:
         got = f"rows that are no unit vectors at right angles (off by {off:.2g})"
         return "rotation", False, got, "a rotation matrix, world to camera"

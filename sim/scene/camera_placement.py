@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.elementary import dot, product, turned
 from sim.scene.body import PERSON_HEIGHT, Ellipsoids, RecordedBodies, ellipsoids, recorded_bodies
 from sim.scene.camera import camera_rotation
 from sim.scene.camera_check import require_camera
@@ -79,8 +80,8 @@ def _reach(bodies: RecordedBodies, normals: Array) -> Array:
 
     normals (K, 3). For an ellipsoid (centre c, shape S) it is n·c - sqrt(nᵀ S n); the smaller of body and head counts.
     """
-    centre = bodies.shapes.centre @ normals.T
-    spread = np.sqrt(np.einsum("ki,bpij,kj->bpk", normals, bodies.shapes.shape, normals))
+    centre = turned(normals, bodies.shapes.centre)
+    spread = np.sqrt(dot(turned(normals, bodies.shapes.shape).swapaxes(-1, -2), normals))
     return np.asarray((centre - spread).min(axis=1))
 
 
@@ -100,7 +101,7 @@ def _edges(rotation: Array, slopes: tuple[float, float]) -> Array:
     normals are not unit vectors.
     """
     k, m = slopes
-    return np.array([[1, 0, k], [-1, 0, k], [0, 1, m], [0, -1, m]]) @ rotation
+    return product(np.array([[1, 0, k], [-1, 0, k], [0, 1, m], [0, -1, m]]), rotation)
 
 
 def _pinhole(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
@@ -110,7 +111,7 @@ def _pinhole(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
     image's shorter side is kept free. A solved height is at least 0.3 m. If the given values leave no such place,
     bodies may be out of view; nothing is raised. There must be at least one body.
     """
-    rotation = camera_rotation(float(np.deg2rad(spec.tilt_deg)), float(np.deg2rad(spec.yaw_deg)))
+    rotation = camera_rotation(spec.tilt_deg / 180 * np.pi, spec.yaw_deg / 180 * np.pi)
     slopes = _slopes(spec, MARGIN * min(spec.image))
     normals = _edges(rotation, slopes)
     b = _reach(bodies, normals).min(axis=0)
@@ -140,7 +141,7 @@ def _closest(rotation: Array, slopes: tuple[float, float], b: Array) -> Array:
     limits; the other pair is centred.
     """
     forward = min((b[0] + b[1]) / (2 * slopes[0]), (b[2] + b[3]) / (2 * slopes[1]))
-    return np.asarray(np.array([(b[0] - b[1]) / 2, (b[2] - b[3]) / 2, forward]) @ rotation)
+    return turned(rotation.T, np.array([(b[0] - b[1]) / 2, (b[2] - b[3]) / 2, forward]))
 
 
 def _at_height(height: float, rotation: Array, slopes: tuple[float, float], b: Array) -> Array:
@@ -156,9 +157,9 @@ def _at_height(height: float, rotation: Array, slopes: tuple[float, float], b: A
     base = np.array([0.0, 0.0, height])
     down, forward = rotation[1], rotation[2]
     limits = [
-        (forward @ ahead * k, (b[0] + b[1]) / 2 - k * (forward @ base)),
-        ((down + m * forward) @ ahead, b[2] - (down + m * forward) @ base),
-        ((m * forward - down) @ ahead, b[3] - (m * forward - down) @ base),
+        (float(dot(forward, ahead)) * k, (b[0] + b[1]) / 2 - k * float(dot(forward, base))),
+        (float(dot(down + m * forward, ahead)), b[2] - float(dot(down + m * forward, base))),
+        (float(dot(m * forward - down, ahead)), b[3] - float(dot(m * forward - down, base))),
     ]
     straight_down = limits[0][0] < TOLERANCE  # going ahead brings nothing nearer: take the middle of both limits
     g = _largest(limits) if not straight_down else (_largest(limits) - _largest([(-a, c) for a, c in limits])) / 2
@@ -188,7 +189,7 @@ def _height_at_position(spec: CameraSpec, normals: Array, b: Array) -> float:
     if spec.height is not None:
         return spec.height
     position = np.array(spec.position, dtype=float)
-    limits = [(-n[2], float(c - n[:2] @ position)) for n, c in zip(normals, b, strict=True)]
+    limits = [(-n[2], float(c - dot(n[:2], position))) for n, c in zip(normals, b, strict=True)]
     return max(LOWEST, -_largest(limits))
 
 
@@ -199,15 +200,15 @@ def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
     settings; a given position (x, y in the world, m), px_per_m or height is used as it is. yaw turns the picture; tilt
     and baseline are ignored. A height that is not given is 20 m. There must be at least one body.
     """
-    rotation = camera_rotation(np.pi / 2, float(np.deg2rad(spec.yaw_deg)))
+    rotation = camera_rotation(np.pi / 2, spec.yaw_deg / 180 * np.pi)
     sides = np.concatenate([rotation[:2], -rotation[:2]])
     low_x, low_y, minus_high_x, minus_high_y = _reach(bodies, sides).min(axis=0)
     low, high = np.array([low_x, low_y]), -np.array([minus_high_x, minus_high_y])
-    middle = (low + high) / 2 if spec.position is None else rotation[:2, :2] @ np.array(spec.position)
+    middle = (low + high) / 2 if spec.position is None else turned(rotation[:2, :2], np.array(spec.position))
     half = np.maximum(np.maximum(high - middle, middle - low), 0.1)
     room = np.array(spec.image) / 2 - MARGIN * min(spec.image)
     scale = spec.px_per_m if spec.px_per_m is not None else float((room / half).min())
-    xy = middle @ rotation[:2, :2]
+    xy = turned(rotation[:2, :2].T, middle)
     return _camera(spec, np.array([*xy, spec.height or TOP_HEIGHT]), rotation, scale=scale)
 
 
@@ -221,10 +222,10 @@ def _check_all_in_view(camera: Camera, spec: CameraSpec, bodies: RecordedBodies,
     if camera.kind == "top":
         sides = np.concatenate([camera.rotation[:2], -camera.rotation[:2]])
         half = np.array(camera.image) / (2 * camera.px_per_m)
-        slack = _reach(bodies, sides) - sides @ camera.position + np.concatenate([half, half])
+        slack = _reach(bodies, sides) - turned(sides, camera.position) + np.concatenate([half, half])
     else:
         normals = _edges(camera.rotation, _slopes(spec, 0.0))
-        slack = _reach(bodies, normals) - normals @ camera.position
+        slack = _reach(bodies, normals) - turned(normals, camera.position)
     out = np.flatnonzero((slack < -TOLERANCE).any(axis=1))
     if not len(out):
         return

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.elementary import atan2, dot, exp, length, log, sin
 from sim.types import Array
 
 
@@ -21,7 +22,7 @@ def undistort(x: Array, k: float) -> Array:
     """
     if k == 0.0:
         return x
-    return np.asarray(x * (1.0 + k * (x**2).sum(axis=1, keepdims=True)))
+    return np.asarray(x * (1.0 + k * dot(x, x)[:, None]))
 
 
 def distort(y: Array, k: float) -> Array:
@@ -33,10 +34,16 @@ def distort(y: Array, k: float) -> Array:
     if k == 0.0:
         return y
     root = np.sqrt(3.0 * abs(k))
-    q = np.linalg.norm(y, axis=1, keepdims=True)
+    q = length(y)[:, None]
+    known = np.isfinite(q)
+    x = np.where(known, 1.5 * q * root, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        r = (np.sinh(np.arcsinh(1.5 * q * root) / 3) if k > 0 else np.sin(np.arcsin(1.5 * q * root) / 3)) * 2 / root
-        return np.asarray(y * np.where(q > 0, r / q, 1.0))
+        if k > 0:
+            e = exp(log(x + np.sqrt(x * x + 1.0)) / 3)  # asinh and sinh
+            third = (e - 1.0 / e) / 2
+        else:
+            third = sin(atan2(x, np.sqrt(1.0 - x * x)) / 3)
+        return np.asarray(y * np.where(known, np.where(q > 0, third * 2 / root / q, 1.0), np.nan))
 
 
 def undistort_jacobian(x: Array, k: float) -> Array:
@@ -45,5 +52,5 @@ def undistort_jacobian(x: Array, k: float) -> Array:
     Rows are the ideal point's coordinates, columns those of x. Points are in units of the focal length, from the image
     centre. k: the lens's radial coefficient.
     """
-    r2 = (x**2).sum(axis=1)
+    r2 = dot(x, x)
     return np.asarray((1.0 + k * r2)[:, None, None] * np.eye(2) + 2.0 * k * x[:, :, None] * x[:, None, :])

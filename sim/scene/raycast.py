@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.elementary import dot, product
 from sim.scene.terrain import flight_rows
 from sim.types import Array, Camera, Scene
 
@@ -74,7 +75,7 @@ def unprojection(camera: Camera) -> Array:
     """
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     inverse = np.array([[1 / fx, 0, -cx / fx], [0, 1 / fy, -cy / fy], [0, 0, 1]])
-    return np.asarray(camera.rotation.T @ inverse)
+    return product(camera.rotation.T, inverse)
 
 
 def pixel_rays(camera: Camera) -> PixelRays:
@@ -89,7 +90,7 @@ def pixel_rays(camera: Camera) -> PixelRays:
         return PixelRays(origin, np.ascontiguousarray(unprojection(camera)))
     right, down, forward = camera.rotation
     origin[:, 0], origin[:, 1] = right / camera.px_per_m, down / camera.px_per_m
-    origin[:, 2] -= origin[:, :2] @ np.array(camera.centre_px)
+    origin[:, 2] -= dot(origin[:, :2], np.array(camera.centre_px))
     direction[:, 2] = forward
     return PixelRays(origin, direction)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
+from sim.elementary_kernels import atan2
 from sim.scene.raycast import (
     CENTRE_X,
     CENTRE_Y,
@@ -72,7 +73,7 @@ def _hit_wall(o, d, wall, height, hit, best, index):  # type: ignore[no-untyped-
     s = (ax * d[1] - ay * d[0]) / cross
     z = o[2] + t * d[2]
     if TINY < t < best and 0 <= s <= 1 and 0 <= z <= height:
-        length = np.hypot(ex, ey)
+        length = np.sqrt(ex * ex + ey * ey)
         side = 1.0 if d[0] * ey - d[1] * ex < 0 else -1.0
         _set_hit(hit, WALL, side * ey / length, -side * ex / length, 0.0, index, s * length)
         return t
@@ -102,7 +103,7 @@ def _hit_pillar(o, d, pillar, height, hit, best, index):  # type: ignore[no-unty
         z = o[2] + t * d[2]
         if TINY < t < best and 0 <= z <= height:
             nx, ny = (px + t * d[0]) / r, (py + t * d[1]) / r
-            _set_hit(hit, PILLAR, nx, ny, 0.0, index, np.arctan2(ny, nx) * r)
+            _set_hit(hit, PILLAR, nx, ny, 0.0, index, atan2(ny, nx) * r)
             return t
     return best
 

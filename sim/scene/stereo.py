@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.elementary import inverse_3x3, product, turned
 from sim.types import Array, Camera
 
 
@@ -20,7 +21,7 @@ def project_pair(camera: Camera, xyz: Array) -> Array:
     camera: a pinhole camera with a baseline, without lens distortion. Points at depth 0 or behind the camera have no
     meaning; a depth of 0 gives inf or nan, with a numpy warning.
     """
-    x = (xyz - camera.position) @ camera.rotation.T
+    x = turned(camera.rotation, xyz - camera.position)
     (fx, fy), (u0, v0) = camera.focal_px, camera.centre_px
     z = x[:, 2]
     return np.column_stack([u0 + fx * x[:, 0] / z, v0 + fy * x[:, 1] / z, camera.baseline * fx / z])
@@ -34,7 +35,7 @@ def back_project(camera: Camera, uvd: Array) -> Array:
     (fx, fy), (u0, v0) = camera.focal_px, camera.centre_px
     z = camera.baseline * fx / uvd[:, 2]
     x = np.column_stack([(uvd[:, 0] - u0) / fx * z, (uvd[:, 1] - v0) / fy * z, z])
-    return np.asarray(x @ camera.rotation + camera.position)
+    return np.asarray(turned(camera.rotation.T, x) + camera.position)
 
 
 def pair_jacobian(camera: Camera, xyz: Array) -> Array:
@@ -42,13 +43,13 @@ def pair_jacobian(camera: Camera, xyz: Array) -> Array:
 
     Rows are u, v, d, columns world x, y, z. The determinant is -b fx^2 fy / z_c^4 for every pose of the camera.
     """
-    x = (xyz - camera.position) @ camera.rotation.T
+    x = turned(camera.rotation, xyz - camera.position)
     (fx, fy), z = camera.focal_px, x[:, 2]
     J = np.zeros((len(x), 3, 3))
-    J[:, 0, 0], J[:, 0, 2] = fx / z, -fx * x[:, 0] / z**2
-    J[:, 1, 1], J[:, 1, 2] = fy / z, -fy * x[:, 1] / z**2
-    J[:, 2, 2] = -camera.baseline * fx / z**2
-    return J @ camera.rotation
+    J[:, 0, 0], J[:, 0, 2] = fx / z, -fx * x[:, 0] / (z * z)
+    J[:, 1, 1], J[:, 1, 2] = fy / z, -fy * x[:, 1] / (z * z)
+    J[:, 2, 2] = -camera.baseline * fx / (z * z)
+    return product(J, camera.rotation)
 
 
 def point_covariances(camera: Camera, xyz: Array, variances: Array) -> Array:
@@ -57,5 +58,5 @@ def point_covariances(camera: Camera, xyz: Array, variances: Array) -> Array:
     variances (3,): of u, v and d, px^2, the diagonal of R; J: the Jacobian of the pair at each point. The standard
     deviation along the line of sight grows with the squared depth.
     """
-    inverse = np.linalg.inv(pair_jacobian(camera, xyz))
-    return np.asarray((inverse * variances) @ np.swapaxes(inverse, 1, 2))
+    inverse = inverse_3x3(pair_jacobian(camera, xyz))
+    return product(inverse * variances, np.swapaxes(inverse, 1, 2))

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.elementary import dot, sin
+from sim.elementary import length as length_of
 from sim.types import Array, Scene, Stairs
 
 FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, HALF_WIDTH, RISE, STEPS, LANDING = range(9)  # columns of `flight_rows`
@@ -37,15 +39,15 @@ def _flight_height(stairs: Stairs, xy: Array) -> Array:
     length 0 gives 0.
     """
     axis = stairs.head - stairs.foot
-    length = float(np.hypot(axis[0], axis[1]))
+    length = float(length_of(axis))
     if length == 0.0:
         return np.zeros(xy.shape[:-1])
     d = xy - stairs.foot
-    along = d @ (axis / length)
+    along = dot(d, axis / length)
     across = np.abs(d[..., 1] * axis[0] - d[..., 0] * axis[1]) / length
     n = stairs.steps
     k = np.clip(along / length, 0.0, 1.0) * n
-    h = stairs.rise / n * (k - np.sin(2 * np.pi * k) / (2 * np.pi))
+    h = stairs.rise / n * (k - sin(2 * np.pi * k) / (2 * np.pi))
     inside = (along > 0) & (along <= length + stairs.landing) & (across <= stairs.width / 2)
     return np.where(inside, h, 0.0)
 
@@ -59,6 +61,6 @@ def flight_rows(scene: Scene) -> Array:
     rows = np.zeros((len(scene.stairs), 9))
     for row, stairs in zip(rows, scene.stairs, strict=True):
         axis = stairs.head - stairs.foot
-        length = float(np.hypot(*axis))
+        length = float(length_of(axis))
         row[:] = [*stairs.foot, *(axis / length), length, stairs.width / 2, stairs.rise, stairs.steps, stairs.landing]
     return rows

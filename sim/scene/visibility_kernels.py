@@ -83,7 +83,7 @@ def _pillars_before(x, y, eye, pillars, found):  # type: ignore[no-untyped-def]
     dx, dy = x - eye[0], y - eye[1]
     for p in range(len(pillars)):
         px, py = pillars[p, CENTRE_X] - eye[0], pillars[p, CENTRE_Y] - eye[1]
-        if dx * dx + dy * dy > px * px + py * py - pillars[p, RADIUS] ** 2 and px * dx + py * dy > 0:
+        if dx * dx + dy * dy > px * px + py * py - pillars[p, RADIUS] * pillars[p, RADIUS] and px * dx + py * dy > 0:
             found[n] = p
             n += 1
     return n
@@ -115,7 +115,7 @@ def _meets_pillar(d, eye, pillar, height):  # type: ignore[no-untyped-def]
     px, py = pillar[CENTRE_X] - eye[0], pillar[CENTRE_Y] - eye[1]
     a = d[0] * d[0] + d[1] * d[1]
     b = px * d[0] + py * d[1]
-    root = b * b - a * (px * px + py * py - pillar[RADIUS] ** 2)
+    root = b * b - a * (px * px + py * py - pillar[RADIUS] * pillar[RADIUS])
     if root <= 0 or a == 0.0 or b <= 0:
         return False
     enter = eye[2] + max(0.0, (b - np.sqrt(root)) / a) * d[2]

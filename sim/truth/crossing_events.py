@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sim.elementary import length
 from sim.truth.encounters import (
     Encounters,
     GroupPath,
@@ -111,7 +112,7 @@ def _relative_speed(a: GroupPath, b: GroupPath, k: Ints, during: Bools, count: i
     known = during & np.isfinite(relative).all(axis=1)
     total = [np.bincount(k[known], relative[known, axis], minlength=count) for axis in (0, 1)]
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.hypot(*total) / np.bincount(k[known], minlength=count))
+        return np.asarray(length(np.stack(total, axis=-1)) / np.bincount(k[known], minlength=count))
 
 
 def _closest(apart: Array, k: Ints, during: Bools) -> Ints:
@@ -122,6 +123,6 @@ def _closest(apart: Array, k: Ints, during: Bools) -> Ints:
     vector between the two groups' middles, m, nan if unknown. k (R,): encounter of each row, ascending. during (R,):
     rows outside the encounter are False and are chosen only if no row of it is known.
     """
-    distance = np.where(during & np.isfinite(apart).all(axis=1), np.hypot(*apart.T), np.inf)
+    distance = np.where(during & np.isfinite(apart).all(axis=1), length(apart), np.inf)
     order = np.lexsort((distance, k))
     return order[np.flatnonzero(np.diff(k, prepend=-1))]

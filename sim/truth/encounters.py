@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from sim.elementary import atan2, cos, dot, length
 from sim.geometry.footprints import FOOTPRINT_RADIUS, FOOTPRINT_SIDES, footprint_hulls, position_hulls
 from sim.geometry.polygons import edge_distance_pairs, gap_pairs, pack
 from sim.truth.merge_split_rules import frames_of
@@ -126,16 +127,16 @@ def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
     """
     start = np.cumsum(count) - count
     middle = np.add.reduceat(places, start) / count[:, None]
-    radius = np.maximum.reduceat(np.hypot(*(places - np.repeat(middle, count, axis=0)).T), start) + FOOTPRINT_RADIUS
+    radius = np.maximum.reduceat(length(places - np.repeat(middle, count, axis=0)), start) + FOOTPRINT_RADIUS
     i, j = close_pairs(t, middle, CROSS_GAP + 2 * float(radius.max()))
-    near = np.hypot(*(middle[i] - middle[j]).T) <= CROSS_GAP + radius[i] + radius[j]
+    near = length(middle[i] - middle[j]) <= CROSS_GAP + radius[i] + radius[j]
     near &= (count[i] > 1) & (count[j] > 1)
     i, j = i[near], j[near]
     # A footprint lies between its circumscribed and its inscribed disc. In most cases these two decide; only the cases
     # between them need the hulls of the footprints.
     bare = pack(position_hulls(places, count))
     between = edge_distance_pairs(bare, bare, i, j)
-    close = between <= CROSS_GAP + 2 * FOOTPRINT_RADIUS * np.cos(np.pi / FOOTPRINT_SIDES)
+    close = between <= CROSS_GAP + 2 * FOOTPRINT_RADIUS * float(cos(np.pi / FOOTPRINT_SIDES))
     overlap = (bare.box[i, :2] <= bare.box[j, 2:]).all(axis=1) & (bare.box[j, :2] <= bare.box[i, 2:]).all(axis=1)
     doubt = np.flatnonzero(~close & ((between <= CROSS_GAP + 2 * FOOTPRINT_RADIUS) | overlap))
     group, place = np.unique(np.concatenate([i[doubt], j[doubt]]), return_inverse=True)
@@ -236,6 +237,6 @@ def _turns(path: Array, other: Array, encounter: Ints, count: int) -> Array:
         from_[encounter[end]] = other[end]  # of several rows the last one stays: reversed, that is the first
         arm = point - from_[own]
         a, b = arm[:-1], arm[1:]
-        angle = np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1))
+        angle = atan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], dot(a, b))
         total += sign * np.bincount(own[1:], np.where(own[1:] == own[:-1], angle, 0.0), minlength=count)
     return total

@@ -7,14 +7,18 @@ group). The times of orders are not used; sim.truth.order_fulfilment checks afte
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
+from sim.clock import FrameTicks
 from sim.scene.body import RecordedBodies, recorded_bodies
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.visibility import measure_visibility
 from sim.truth.image_group_hulls import image_groups
-from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Truth
+from sim.truth.merge_split_events import GroupsAndEvents
+from sim.truth.order_fulfilment import fulfilment
+from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Near, Order, States, Truth
 
 
 def bodies(motion: Motion, camera: Camera | None) -> Truth:
@@ -72,31 +76,73 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
 
     people = recorded_bodies(motion)
     truth = _bodies(motion, camera, people)
-    found = groups_and_events(motion.pos, motion.vel, motion.present, motion.intent, motion.fps)
-    truth = truth.replace(group=found.group[people.frame - 1, people.id - 1])
+    s = motion.states()
+    found = groups_and_events(s.pos, s.vel, s.present, s.intent, s.rate)
+    shown = FrameTicks.of(truth.length, motion.fps, s.rate, s.present)
+    truth = truth.replace(group=found.group[shown.tick[people.frame - 1], people.id - 1])
     ground = tuple(_ground_groups(truth))
+    events, orders = _events_in_frames(_events(s, found), motion, found.group, shown)
     return truth.replace(
         groups=ground,
         groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
         labelled=np.ones(truth.length, dtype=np.bool_),
-        events=_events(motion, found.group, found.events),
-        near=found.near,
+        events=events,
+        near=_near_in_frames(found.near, shown),
+        orders=orders,
     )
 
 
-def _events(motion: Motion, group: Ints, changes: tuple[GroupEvent, ...]) -> tuple[GroupEvent, ...]:
-    """Returns all events of a motion, sorted by start frame, end frame, kind, members and groups after.
-
-    changes: its merge, split, form, dissolve, enter and leave events; crossings and queues are measured here. group (T,
-    P): group id of each person, -1 = alone or absent.
-    """
+def _events(s: States, found: GroupsAndEvents) -> list[GroupEvent]:
+    """Returns all events of a crowd at the ticks of its states, in no order; crossings and queues are measured here."""
     from sim.truth.crossing_events import crossings
     from sim.truth.queue_detection import queues
 
-    crossed = crossings(motion.pos, motion.vel, motion.present, group, motion.fps)
-    queued = queues(motion.pos, motion.vel, motion.present, group, motion.fps)
-    every = [*changes, *crossed, *queued]
-    return tuple(sorted(every, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
+    crossed = crossings(s.pos, s.vel, s.present, found.group, s.rate)
+    queued = queues(s.pos, s.vel, s.present, found.group, s.rate)
+    return [*found.events, *crossed, *queued]
+
+
+def _events_in_frames(
+    events: list[GroupEvent], motion: Motion, group: Ints, shown: FrameTicks
+) -> tuple[tuple[GroupEvent, ...], tuple[Order, ...]]:
+    """Returns the events with frames in place of ticks, sorted, and the orders with the events that fulfil them.
+
+    group (C, P): group id of each person at each tick. Groups that enter or leave between two frames of which none
+    shows it have no such event.
+    """
+    ticks = sorted(events, key=_sorting)
+    converted = [_in_frames(event, shown) for event in ticks]
+    every = sorted((e for e in converted if e is not None), key=_sorting)
+    place = {id(e): k for k, e in enumerate(every)}
+    index = [None if e is None else place[id(e)] for e in converted]
+    fulfilled = [fulfilment(order, ticks, group, motion.states()) for order in motion.orders]
+    orders = (
+        replace(order, event=None if k is None else index[k]) for order, k in zip(motion.orders, fulfilled, strict=True)
+    )
+    return tuple(every), tuple(orders)
+
+
+def _sorting(e: GroupEvent) -> tuple[int, int, str, tuple[int, ...], tuple[int, ...]]:
+    return e.start, e.end, e.kind, e.members, e.after
+
+
+def _in_frames(event: GroupEvent, shown: FrameTicks) -> GroupEvent | None:
+    """Returns the event with frames in place of ticks, both from 1; None if its people enter or leave unseen."""
+    last = len(shown.tick) - 1
+    if event.kind in ("enter", "leave"):  # a leave is in the last frame before the change
+        start = shown.first(event.start - 1) if event.kind == "enter" else shown.first(event.start) - 1
+        seen = 0 <= start <= last and not (event.kind == "leave" and start == last)
+        return replace(event, start=start + 1, end=start + 1) if seen else None
+    start = min(shown.first(event.start - 1), last)
+    return replace(event, start=start + 1, end=max(shown.last(event.end - 1), start) + 1)
+
+
+def _near_in_frames(near: Near, shown: FrameTicks) -> Near:
+    """Returns the stretches with frames in place of ticks, without those that no frame shows."""
+    start = np.searchsorted(shown.tick, near.start - 1) + 1
+    end = np.searchsorted(shown.tick, near.end - 1, side="right")
+    kept = start <= end
+    return Near(start[kept], end[kept], near.a[kept], near.b[kept])
 
 
 def _ground_groups(truth: Truth) -> Iterator[Groups]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.elementary import dot, length
 from sim.types import Array, Bools, Ints
 
 MERGE_DISTANCE = 1.5  # m between the nearest members: parts may merge below it
@@ -77,9 +78,10 @@ def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
 
     pos, vel (T, P, 2): m, m/s, nan while absent. Absent members are left out; both values are inf if a part has nobody.
     """
-    gap2 = ((pos[:, a, None] - pos[:, None, b]) ** 2).sum(axis=-1).reshape(len(pos), -1)
+    gap = pos[:, a, None] - pos[:, None, b]
+    gap2 = dot(gap, gap).reshape(len(pos), -1)
     gap2 = np.where(np.isnan(gap2), np.inf, gap2).min(axis=1, initial=np.inf)
-    difference = np.hypot(*(mean_of_present(vel[:, a]) - mean_of_present(vel[:, b])).T)
+    difference = length(mean_of_present(vel[:, a]) - mean_of_present(vel[:, b]))
     return Separation(np.sqrt(gap2), np.where(np.isnan(difference), np.inf, difference))
 
 

@@ -7,13 +7,16 @@ s) of the firing. Orders are carried out by sim.crowd.order_execution.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from scenarios.errors import WorkError
+from scenarios.errors import OrderError
+from sim.elementary import length
 from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY
 from sim.truth.queue_detection import QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, detect_queues
 from sim.truth.queue_shapes import MAX_SPACING, MIN_SPACING
-from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, Truth
+from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, States, Truth
 
 PATIENCE = 10.0  # s from the firing of an order until its rule has come true
 # s for which the rule of each kind of order must hold
@@ -34,67 +37,64 @@ def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
     """Returns for each order id the index in `truth.events` of the event that fulfils the order; two orders may share
     one.
 
-    motion: with its orders. truth: measured from that motion. Raises WorkError for the first order, in the script's
+    motion: with its orders. truth: measured from that motion. Raises OrderError for the first order, in the script's
     order, that no event fulfils (an order that never fired included); the error says how close the motion came to the
-    rule. Raises WorkError for a queue whose people did not all leave from the same end. A motion without orders gives
+    rule. Raises OrderError for a queue whose people did not all leave from the same end. A motion without orders gives
     {}.
     """
-    group = dense_groups(truth, motion.present.shape)
     fulfilled = {}
-    for order in motion.orders:
-        index = fulfilment(order, truth, group)
-        if index is None:
-            raise _unfulfilled(order, motion, truth.length)
-        fulfilled[order.id] = index
+    for order in truth.orders:
+        if order.event is None:
+            raise _unfulfilled(order, motion)
+        fulfilled[order.id] = order.event
         if order.kind == "queue":
-            _check_fifo(order, motion, (truth.events or ())[index])
+            _check_fifo(order, motion)
     return fulfilled
 
 
-def _check_fifo(order: Order, motion: Motion, event: GroupEvent) -> None:
-    """Raises WorkError if the people of the queue that is `event` did not all leave it from the same end.
+def _check_fifo(order: Order, motion: Motion) -> None:
+    """Raises OrderError if the people of the queue that fulfils the order did not all leave it from the same end.
 
-    order: gives its id for the message. Queues are detected in the motion anew. Does nothing if none of them has the
-    event's frames and members.
+    Queues are detected in the motion anew; those that hold enough of the order's people after it fired count.
     """
-    for queue in detect_queues(motion.pos, motion.vel, motion.present, motion.fps):
-        people = {p + 1 for p in queue.order}
-        if (queue.first + 1, queue.last + 1) == (event.start, event.end) and people == set(event.members):
-            if not queue.fifo:
-                raise WorkError(
-                    file=f"scenario {motion.name}", place=f"event {order.id} (seed {motion.seed})",
-                    got=f"a queue left by people {', '.join(str(p + 1) for p in queue.left)} in this order",
-                    expected=f"first in, first out: {', '.join(str(p + 1) for p in queue.order)} or from the other end",
-                    remedy="give the line more room, or let people come from behind it",
-                )  # fmt: skip
+    s = motion.states()
+    people = {p for part in order.before for p in part}
+    fired = _fired(order, s)
+    for queue in detect_queues(s.pos, s.vel, s.present, s.rate):
+        members = {p + 1 for p in queue.order}
+        ordered = len(people & members) >= min(QUEUE_PEOPLE, len(people)) and queue.first >= fired
+        if ordered and not queue.fifo:
+            raise OrderError(
+                file=f"scenario {motion.name}", place=f"event {order.id} (seed {motion.seed})",
+                got=f"a queue left by people {', '.join(str(p + 1) for p in queue.left)} in this order",
+                expected=f"first in, first out: {', '.join(str(p + 1) for p in queue.order)} or from the other end",
+                remedy="give the line more room, or let people come from behind it",
+            )  # fmt: skip
+        if ordered:
             return
 
 
-def dense_groups(truth: Truth, shape: tuple[int, ...]) -> Ints:
-    """Returns the group id of each person in each frame, shape (T, P): -1 = alone, -2 = absent.
+def _fired(order: Order, s: States) -> int:
+    """Returns the tick, from 0, at which an order that has fired did so."""
+    assert order.time is not None
+    return round(order.time * s.rate)
 
-    truth: frames from 1, person ids from 1, one row per person and frame. shape: (T, P); raises IndexError if the truth
-    has a frame or id beyond it.
+
+def fulfilment(order: Order, events: Sequence[GroupEvent], group: Ints, s: States) -> int | None:
+    """Returns the index in `events` of the first event that fulfils an order, None if no event does.
+
+    events: at the ticks of the states s, from 1. group (C, P): group ids, -1 = alone or absent. The event has the right
+    kind (merge or form, split or dissolve, queue) and one of the order's people. They are together (parted) at its
+    first tick and not at the tick before; a queue holds 3 of them. It starts no earlier than the order fired, and early
+    enough that its rule (2 s; queues 3 s) has held within PATIENCE (10 s) of the firing. An order that never fired is
+    not fulfilled.
     """
-    group = np.full(shape, -2, np.int64)
-    group[truth.frame - 1, truth.id - 1] = truth.group
-    return group
-
-
-def fulfilment(order: Order, truth: Truth, group: Ints) -> int | None:
-    """Returns the index in `truth.events` of the first event that fulfils an order, None if no event does.
-
-    group (T, P): group ids, -1 = alone, -2 = absent. The event has the right kind (merge or form, split or dissolve,
-    queue) and one of the order's people. They are together (parted) in its first frame and not in the frame before; a
-    queue holds 3 of them. It starts no earlier than the order fired, and early enough that its rule (2 s; queues 3 s)
-    has held within PATIENCE (10 s) of the firing. An order that never fired is not fulfilled; nor is any order if the
-    truth has no events.
-    """
-    if order.fired is None:
+    if order.time is None:
         return None
-    last = order.fired + (PATIENCE - RULE_TIME[order.kind]) * truth.fps
-    for k, event in enumerate(truth.events or ()):
-        if event.kind in KINDS[order.kind] and order.fired <= event.start <= last and _concerns(event, order, group):
+    first = _fired(order, s) + 1
+    last = first + (PATIENCE - RULE_TIME[order.kind]) * s.rate
+    for k, event in enumerate(events):
+        if event.kind in KINDS[order.kind] and first <= event.start <= last and _concerns(event, order, group):
             return k
     return None
 
@@ -108,7 +108,7 @@ def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
     - Split: one of the order's people is a member. In the event's first frame, but not in the frame before, no group
       has people of two of the planned parts.
 
-    An event in frame 1 fulfils no merge or split. group (T, P): group ids, -1 = alone, -2 = absent.
+    An event in frame 1 fulfils no merge or split. group (C, P): group ids, -1 = alone or absent.
     """
     if order.kind == "queue":
         people = {p for part in order.before for p in part}
@@ -138,47 +138,46 @@ def _apart(wanted: list[Ints], group: Ints) -> bool:
     return sum(map(len, ids)) == len(set().union(*ids))
 
 
-def _unfulfilled(order: Order, motion: Motion, length: int) -> WorkError:
-    """Returns, without raising it, the WorkError for an order that no event fulfils.
+def _unfulfilled(order: Order, motion: Motion) -> OrderError:
+    """Returns, without raising it, the OrderError for an order that no event fulfils.
 
     It says that the order never fired, or how close the motion came to its rule within 10 s (PATIENCE) of the firing.
-    length: frames of the recording.
     """
-    place = f"event {order.id} (seed {motion.seed})"
-    if order.fired is None:
-        return WorkError(
+    s = motion.states()
+    place, length = f"event {order.id} (seed {motion.seed})", len(s.present)
+    if order.time is None:
+        return OrderError(
             file=f"scenario {motion.name}", place=place, got=f"a {order.kind} that never fired",
-            expected=f"its trigger within the {length / motion.fps:g} s recorded",
+            expected=f"its trigger within the {length / s.rate:g} s recorded",
             remedy="loosen its `when`, or let the groups come closer",
         )  # fmt: skip
-    end = min(length, order.fired + round(PATIENCE * motion.fps))
-    window = slice(max(order.fired, 1) - 1, end)
-    short = (end - order.fired) / motion.fps
+    fired = _fired(order, s)
+    end = min(length, fired + 1 + round(PATIENCE * s.rate))
+    short = (end - fired - 1) / s.rate
     limit = f"{PATIENCE:g} s" if short >= PATIENCE - 1e-9 else f"the {max(short, 0):.1f} s until the recording ends"
-    return WorkError(
+    return OrderError(
         file=f"scenario {motion.name}", place=place,
-        got=f"no such {order.kind} within {limit} of its firing: {closest(order, motion, window)}",
+        got=f"no such {order.kind} within {limit} of its firing: {closest(order, s, slice(fired, end))}",
         expected=WORDS[order.kind], remedy="move starts and goals, fire it earlier, or record for longer",
     )  # fmt: skip
 
 
-def closest(order: Order, motion: Motion, window: slice) -> str:
-    """Returns in words how close the motion came to an order's rule within a window (slice) of frames that count from
-    0.
+def closest(order: Order, s: States, window: slice) -> str:
+    """Returns in words how close the people came to an order's rule within a window (slice) of ticks that count from 0.
 
     - Queue: the greatest number of its people slower than 0.4 m/s at once, and the longest stretch in s with 3 of them.
-    - Merge: in each frame the part furthest from the others counts; the least such distance, m. Split: the part nearest
+    - Merge: at each tick the part furthest from the others counts; the least such distance, m. Split: the part nearest
       to the others counts; the greatest such distance. Both with the velocity difference at that time, m/s.
 
     If the window is empty, or the parts were never there together, it says that.
     """
-    pos, vel, present = motion.pos[window], motion.vel[window], motion.present[window]
+    pos, vel, present = s.pos[window], s.vel[window], s.present[window]
     if not len(pos):
         return "the recording had ended"
     if order.kind == "queue":
         people = [p - 1 for part in order.before for p in part]
-        slow = present[:, people] & (np.linalg.norm(np.nan_to_num(vel[:, people]), axis=2) < WAITING_SPEED)
-        most, stretch = slow.sum(axis=1).max(initial=0), _longest(slow.sum(axis=1) >= QUEUE_PEOPLE) / motion.fps
+        slow = present[:, people] & (length(np.nan_to_num(vel[:, people])) < WAITING_SPEED)
+        most, stretch = slow.sum(axis=1).max(initial=0), _longest(slow.sum(axis=1) >= QUEUE_PEOPLE) / s.rate
         return (
             f"at most {most} of {len(people)} people slower than {WAITING_SPEED:g} m/s at once, "
             f"{QUEUE_PEOPLE} of them for {stretch:.1f} s at a stretch"
@@ -210,9 +209,9 @@ def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: b
     gaps, differences = [], []
     for i, a in enumerate(columns):
         rest = np.concatenate([c for j, c in enumerate(columns) if j != i]) if len(columns) > 1 else a[:0]
-        d = np.linalg.norm(pos[:, a, None] - pos[:, None, rest], axis=3)
+        d = length(pos[:, a, None] - pos[:, None, rest])
         gaps.append(np.where(np.isnan(d), np.inf, d).reshape(len(pos), -1).min(axis=1, initial=np.inf))
-        differences.append(np.linalg.norm(_mean_velocity(vel, present, a) - _mean_velocity(vel, present, rest), axis=1))
+        differences.append(length(_mean_velocity(vel, present, a) - _mean_velocity(vel, present, rest)))
     gap, difference = np.array(gaps), np.array(differences)
     gap[np.isinf(gap)] = -np.inf if widest else np.inf
     worst = gap.argmax(axis=0) if widest else gap.argmin(axis=0), np.arange(len(pos))

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sim.elementary import dot, length
 from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, frames_of
 from sim.types import Array, Bools, Ints, Near
 
@@ -61,7 +62,8 @@ def _pairs_of(frame: Ints, pos: Array, low: int, high: int, reach: float) -> tup
     i1, j1 = runs(here + 1, np.searchsorted(key, key + 1, side="right"))
     i2, j2 = runs(np.searchsorted(key, key + rows - 1), np.searchsorted(key, key + rows + 1, side="right"))
     i, j = order[np.concatenate([i1, i2])], order[np.concatenate([j1, j2])]
-    close = ((p[i] - p[j]) ** 2).sum(axis=1) < reach**2
+    apart = p[i] - p[j]
+    close = dot(apart, apart) < reach * reach
     i, j = i[close] + low, j[close] + low
     return np.minimum(i, j), np.maximum(i, j)
 
@@ -105,7 +107,7 @@ def strangers(pos: Array, vel: Array, present: Bools, intent: Ints, group: Ints,
     t, p = np.nonzero(present)
     i, j = close_pairs(t, pos[t, p], MERGE_DISTANCE)
     t, a, b = t[i], p[i], p[j]
-    differ = np.hypot(*(vel[t, a] - vel[t, b]).T)
+    differ = length(vel[t, a] - vel[t, b])
     same_group = (group[t, a] >= 0) & (group[t, a] == group[t, b])
     kept = (differ < MERGE_VELOCITY) & (intent[t, a] != intent[t, b]) & ~same_group
     t, a, b = t[kept], a[kept], b[kept]

@@ -13,6 +13,7 @@ from itertools import groupby
 
 import numpy as np
 
+from sim.elementary import length
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.proximity import close_pairs, stretches
 from sim.truth.queue_shapes import MAX_SPACING, QueueShapes, queue_shapes
@@ -158,7 +159,7 @@ def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
     s.
     """
     with np.errstate(invalid="ignore"):
-        slow = there & (np.hypot(vel[..., 0], vel[..., 1]) < WAITING_SPEED)
+        slow = there & (length(vel) < WAITING_SPEED)
     p, t = np.nonzero(slow.T)
     out = np.zeros((len(slow) + 1, slow.shape[1]), np.int64)
     person, first, last = stretches(p, t, 1, frames_of(ADVANCE_TIME, fps))

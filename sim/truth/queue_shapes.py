@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.elementary import atan2, length, unit
 from sim.types import Array, Bools, Ints
 
 MIN_SPACING, MAX_SPACING = 0.4, 1.5  # m along the line
@@ -51,7 +52,7 @@ def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
     table may be empty. Nothing is yielded without pairs.
     """
     for crowd in _crowds(len(pos), i, j):
-        portion = max(1, MAX_CELLS // crowd.shape[1] ** 3)
+        portion = max(1, MAX_CELLS // (crowd.shape[1] * crowd.shape[1] * crowd.shape[1]))
         for low in range(0, len(crowd), portion):
             some = crowd[low : low + portion]
             order, count = _best(pos[some])
@@ -112,11 +113,10 @@ def _axes(p: Array, count: Ints) -> tuple[Array, Array, Array]:
     middle = np.where(within[..., None], p, 0.0).sum(axis=1) / count[:, None]
     arm = np.where(within[..., None], p - middle[:, None], 0.0)
     xx, yy, xy = ((arm[..., a] * arm[..., b]).sum(axis=1) for a, b in ((0, 0), (1, 1), (0, 1)))
-    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
-    u = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    u = unit(0.5 * atan2(2 * xy, xx - yy))
     whole = p[np.arange(len(p)), count - 1] - p[:, 0]
     u = np.where(((u * whole).sum(axis=1) >= 0)[:, None], u, -u)
-    least = (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)
+    least = (xx + yy) / 2 - length(np.stack([(xx - yy) / 2, xy], axis=-1))
     return u, middle, np.sqrt(np.maximum(least, 0.0))
 
 
@@ -147,8 +147,8 @@ def _steps_fit(along: Array) -> Bools:
 def _turns_fit(p: Array) -> Bools:
     """Returns whether the direction turns by at most 60° at each inner position, shape (M, n - 2); p (M, n, 2): m."""
     step = np.diff(p, axis=1)
-    length = np.hypot(step[..., 0], step[..., 1])
-    return np.asarray((step[:, :-1] * step[:, 1:]).sum(axis=2) >= MIN_TURN_COSINE * length[:, :-1] * length[:, 1:])
+    size = length(step)
+    return np.asarray((step[:, :-1] * step[:, 1:]).sum(axis=2) >= MIN_TURN_COSINE * size[:, :-1] * size[:, 1:])
 
 
 def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
@@ -164,7 +164,7 @@ def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]
     i, j, places = i[seed], j[seed], p[crowd]
     rows = np.arange(len(crowd))
     u = places[rows, j] - places[rows, i]
-    u /= np.hypot(*u.T)[:, None]
+    u /= length(u)[:, None]
     arm = places - (places[rows, i] + places[rows, j])[:, None] / 2
     off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
     along = np.where(off <= MAX_OFFSET, (arm * u[:, None]).sum(axis=2), OFF_LINE)
@@ -181,8 +181,7 @@ def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]
 
 def _lengths(p: Array, i: Ints, j: Ints) -> Array:
     """Returns the distances (C, K), m, between positions i and j (K,) of each crowd p (C, n, 2)."""
-    step = p[:, j] - p[:, i]
-    return np.hypot(step[..., 0], step[..., 1])
+    return length(p[:, j] - p[:, i])
 
 
 def _longest(links: Bools) -> tuple[Ints, Ints]:

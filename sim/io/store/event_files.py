@@ -19,6 +19,7 @@ from sim.io.files.tables import json_list, nan_to_none, read_document
 from sim.types import EVENT_KINDS, GroupEvent, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
+ORDER_KEYS = ("id", "kind", "fired", "time", "before", "after", "event")
 
 
 def event_dict(event: GroupEvent) -> dict[str, Any]:
@@ -148,26 +149,21 @@ def _near_row(path: Path, number: int, line: str) -> tuple[int, int, int, int]:
     return start, end, a, b
 
 
-def script_bytes(orders: Iterable[Order], fulfilled: Iterable[int | None]) -> bytes:
+def script_bytes(orders: Iterable[Order]) -> bytes:
     """Return script.json as bytes, with one order of the script per line; no orders give an empty list.
 
-    orders: the script's orders. fulfilled: for each order the index (from 0) in events.json of the event that fulfilled
-    it, or None; stored as the key "event". The other keys are id, kind, fired (frame from 1, or null), before, after
-    (lists of person ids of each group). Raises ValueError if the two differ in length.
+    The keys are id, kind, fired (frame from 1, or null), time (of firing, s, or null), before, after (lists of person
+    ids of each group), event (index from 0 in events.json of the event that fulfilled it, or null).
     """
-    rows = (
-        {"id": o.id, "kind": o.kind, "fired": o.fired, "before": o.before, "after": o.after, "event": event}
-        for o, event in zip(orders, fulfilled, strict=True)
-    )
-    return json_list("orders", rows)
+    return json_list("orders", ({key: getattr(o, key) for key in ORDER_KEYS} for o in orders))
 
 
 def read_script(path: Path) -> tuple[Order, ...]:
-    """Read the orders of a script.json, in the order of the file; the key "event" is ignored, a missing list gives ().
+    """Read the orders of a script.json, in the order of the file; a missing list gives (). time and event may miss.
 
     Raises InputError if the file is unreadable, no JSON object or of another format number, or if "orders" is no list.
     Also if an order lacks a key, or has a person id that is no whole number from 0 on, or a frame "fired" that is
-    neither null nor a whole number from 1 on.
+    neither null nor a whole number from 1 on, or a time or event that is no number.
     """
     found = read_document(path).get("orders", [])
     if not isinstance(found, list):
@@ -178,7 +174,11 @@ def read_script(path: Path) -> tuple[Order, ...]:
 def _order(path: Path, k: int, o: Any) -> Order:
     try:
         fired = None if o["fired"] is None else _number_from(1, o["fired"])
-        return Order(str(o["id"]), str(o["kind"]), fired, _people(o["before"]), _people(o["after"]))
+        time, event = o.get("time"), o.get("event")
+        if time is not None and not is_number(time, 0, COORDINATE):
+            raise ValueError(f"time {time!r}, which is no time in s")
+        event = None if event is None else _number_from(0, event)
+        return Order(str(o["id"]), str(o["kind"]), fired, _people(o["before"]), _people(o["after"]), time, event)
     except (KeyError, TypeError, ValueError) as error:
         got = f"no key {error}" if isinstance(error, KeyError) else str(error)
         expected = "an order with id, kind, fired, before and after"

@@ -33,7 +33,7 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
     groups.parquet where it has groups on the ground, groups_px.parquet where it has groups in the image, groups.csv
     with either. Where it has them, events.json and near.csv (pairs of strangers who came near each other).
     """
-    files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders, _fulfilled(truth))}
+    files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders)}
     if truth.box is not None:
         files["gt/gt.txt"] = _mot_text(truth, truth.box)
     if truth.groups is not None:
@@ -47,21 +47,6 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
     if truth.near is not None:
         files["gt/near.csv"] = near_bytes(truth.near)
     return files
-
-
-def _fulfilled(truth: Truth) -> list[int | None]:
-    """Return for each order of the script the index (from 0) in `truth.events` of the event that fulfilled it, None
-    without one.
-
-    A truth without orders gives [].
-    """
-    if not truth.orders:
-        return []
-    from sim.truth.order_fulfilment import dense_groups, fulfilment
-
-    people = max([int(truth.id.max(initial=0)), *(p for o in truth.orders for part in o.after for p in part)])
-    group = dense_groups(truth, (truth.length, people))
-    return [fulfilment(order, truth, group) for order in truth.orders]
 
 
 def _table(truth: Truth) -> bytes:

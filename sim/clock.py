@@ -1,0 +1,94 @@
+"""The clocks of a simulated world, and the frames of a camera between their ticks.
+
+Physics and script have clocks of their own; the frame rate is a property of the camera alone. A frame is the state at
+its time, on the straight line between two steps of the physics. Groups and events are measured at the ticks of the
+script; an onset belongs to the frame nearest to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+
+PHYSICS_RATE = 50.0  # Hz
+SCRIPT_RATE = 10.0  # Hz: people come and go, orders and errands are looked at, fluctuations change
+STEPS = 5  # of the physics per tick of the script
+EXACT = 1e-6  # of a step: a frame as near to a step is on it
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """Where the T frames of a camera lie on the clocks: frame f (from 0) at time f / fps.
+
+    tick (T,): last tick of the script at or before the frame, from 0. step (T,): physics steps from there to the last
+    one at or before the frame. share (T,): share of the next step that has passed, 0 to 1.
+    """
+
+    fps: float
+    tick: Ints
+    step: Ints
+    share: Array
+
+    @classmethod
+    def of(cls, length: int, fps: float) -> FrameTimes:
+        """Returns the times of `length` frames at fps frames/s."""
+        at = np.arange(length) / fps * PHYSICS_RATE
+        whole = np.floor(at + EXACT)
+        share = np.maximum(at - whole, 0.0)
+        steps = whole.astype(np.int64)
+        return cls(fps, steps // STEPS, steps % STEPS, np.where(share < EXACT, 0.0, share))
+
+    def frame_of(self, tick: int) -> int:
+        """Returns the number (from 1) of the frame nearest to a tick; the later one of two."""
+        return min(int(np.floor(tick * self.fps / SCRIPT_RATE + 0.5)) + 1, len(self.tick))
+
+    def states(self, tick: int, steps: Array) -> Array:
+        """Returns the states (K, ...) in the K frames from a tick to the next one, given those of its steps (STEPS + 1,
+        ...)."""
+        first, last = np.searchsorted(self.tick, (tick, tick + 1))
+        k, share = self.step[first:last], self.share[first:last].reshape(-1, *[1] * (steps.ndim - 1))
+        low, high = steps[k], steps[k + 1]
+        return np.where(share == 0.0, low, (1.0 - share) * low + share * high)
+
+    def between_ticks(self, values: Array, present: Bools) -> Array:
+        """Returns values (C, P, D) of the ticks at the frames, (T, P, D), linear between two ticks.
+
+        Where a person is absent at the next tick, present (C, P), the value of the last one stays.
+        """
+        k = np.minimum(self.tick, len(values) - 1)
+        after = np.minimum(k + 1, len(values) - 1)
+        share = ((self.step + self.share) / STEPS)[:, None, None]
+        return np.asarray(
+            np.where(present[after][..., None], values[k] + share * (values[after] - values[k]), values[k])
+        )
+
+
+@dataclass(frozen=True)
+class FrameTicks:
+    """Which tick's groups each of T frames shows: the last tick whose nearest frame it is, or before, with the same
+    people present. Converts ticks to frames, both from 0. tick (T,), ascending."""
+
+    tick: Ints
+
+    @classmethod
+    def of(cls, length: int, fps: float, rate: float, present: Bools) -> FrameTicks:
+        """Returns it for `length` frames at fps frames/s and C ticks at `rate` per s with people present (C, P)."""
+        frame, ticks = np.arange(length), np.arange(len(present))
+        if fps == rate:
+            return cls(np.minimum(frame, len(ticks) - 1))
+        nearest = np.floor(ticks * (fps / rate) + 0.5)
+        shown = np.searchsorted(nearest, frame, side="right") - 1
+        before = np.minimum(np.floor(frame * (rate / fps) + EXACT).astype(np.int64), len(ticks) - 1)
+        turns = np.append(np.flatnonzero((present[1:] != present[:-1]).any(axis=1)) + 1, len(ticks))
+        return cls(np.minimum(shown, turns[np.searchsorted(turns, before, side="right")] - 1))
+
+    def first(self, tick: int) -> int:
+        """Returns the first frame that shows this tick or a later one; T if there is none."""
+        return int(np.searchsorted(self.tick, tick))
+
+    def last(self, tick: int) -> int:
+        """Returns the last frame that shows this tick or an earlier one; -1 if there is none."""
+        return int(np.searchsorted(self.tick, tick, side="right")) - 1

@@ -1,0 +1,14 @@
+"""The functions of `sim.elementary` compiled for scalars, to be called by other kernels.
+
+numba's cache does not notice changes in another file: delete the caches after a change there (CONTRIBUTING.md).
+"""
+
+from __future__ import annotations
+
+from sim import elementary
+from sim.compiler import njit
+
+exp = njit(cache=True)(elementary.exp)
+sin = njit(cache=True)(elementary.sin)
+cos = njit(cache=True)(elementary.cos)
+atan2 = njit(cache=True)(elementary.atan2)
