@@ -26,8 +26,9 @@ import pymunk.batch
 from benchmarks.support.options import new_parser
 from benchmarks.support.tables import head, row
 from scenarios.schema.scenario import Scenario
+from sim.clock import SCRIPT_RATE, STEPS
 from sim.crowd.forces import Steering
-from sim.crowd.world import WRITE, World
+from sim.crowd.world import STEP_TIME, WRITE, World
 
 RUNNER = Path(__file__).parent / "peers" / "run_jupedsim.py"
 DENSITY = 0.2  # people per m²
@@ -72,7 +73,7 @@ def episodes(people: int) -> int:
 def populated_world(people: int) -> tuple[World, Iterator]:
     """Returns a world after its first frame, in which everybody is present, and its further frames."""
     world = World(scenario(people), 0, 0, Steering())
-    frames = world.frames(round(SECONDS * world.fps))
+    frames = world.ticks(round(SECONDS * SCRIPT_RATE))
     next(frames)
     return world, frames
 
@@ -81,11 +82,11 @@ def our_rate(people: int) -> float:
     """Returns the steps per CPU second of our simulator."""
     steps, seconds = 0, 0.0
     for _ in range(episodes(people)):
-        world, frames = populated_world(people)
+        _, frames = populated_world(people)
         begin = time.process_time()
         count = sum(len(state) == people for state, _ in frames)
         seconds += time.process_time() - begin
-        steps += count * world.substeps
+        steps += count * STEPS
     return steps / seconds
 
 
@@ -106,7 +107,7 @@ def physics_rate(people: int) -> float:
             again.force[:] = force
             pymunk.batch.set_space_bodies(again.space, WRITE, again._write_buffer)
             if stepping:
-                again.space.step(again.dt)
+                again.space.step(STEP_TIME)
         seconds[stepping] += time.process_time() - begin
     return episodes(people) * len(world.space.forces) / (seconds[True] - seconds[False])
 
@@ -121,8 +122,8 @@ def peer_input(people: int) -> str:
             scene["goal"].append((np.array(pos) - group.start + group.goal).tolist())
             scene["speed"].append(member.free_speed)
     size = float(world.scene.size[0])
-    steps = round(SECONDS / world.dt)
-    more = {"size": size, "margin": MARGIN, "dt": world.dt, "steps": steps, "episodes": episodes(people)}
+    steps = round(SECONDS / STEP_TIME)
+    more = {"size": size, "margin": MARGIN, "dt": STEP_TIME, "steps": steps, "episodes": episodes(people)}
     return json.dumps({**scene, **more})
 
 

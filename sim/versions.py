@@ -1,11 +1,12 @@
-"""What the bytes of a result depend on besides its inputs: versions of Python and libraries, a hash of our own source
-files, and the vector instructions of the CPU.
+"""What the bytes of a result depend on besides its inputs: versions of Python and libraries, and our own source files.
+
+Motion, truth and simulated detections do not depend on the processor (`sim.elementary`). The last bits of pictures and
+of trackers may.
 """
 
 from __future__ import annotations
 
 import hashlib
-import importlib
 import platform
 from functools import cache, lru_cache
 from importlib import metadata
@@ -37,11 +38,10 @@ def runtime() -> dict[str, str]:
     """Return everything that two machines must share to produce the same bytes, as name to value.
 
     The names are those of `versions(drawn=True)` ("python", "numpy", …), whose values are version numbers, "sources"
-    (hash of our source files, 12 hex digits) and "cpu" (vector instructions, as "x86-64-v3"). Computed once and cached:
-    do not modify the dict.
+    (hash of our source files, 12 hex digits). Computed once and cached: do not modify the dict.
     """
     root = Path(__file__).resolve().parents[1]
-    return {**versions(drawn=True), "sources": source_hash(root), "cpu": cpu_level()}
+    return {**versions(drawn=True), "sources": source_hash(root)}
 
 
 def packages() -> tuple[str, ...]:
@@ -68,18 +68,3 @@ def source_hash(root: Path) -> str:
             if path.suffix in (".py", ".toml"):
                 h.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes() + b"\0")
     return h.hexdigest()[:12]
-
-
-def cpu_level() -> str:
-    """Return the vector instructions that numpy may use here; the last bits of numpy's results depend on them.
-
-    On x86-64 this is the level, "x86-64-v2" to "x86-64-v4"; elsewhere the machine's name and its features, as
-    "arm64+ASIMD". Features disabled by NPY_DISABLE_CPU_FEATURES do not count.
-    """
-    has = importlib.import_module("numpy._core._multiarray_umath").__cpu_features__
-    machine = platform.machine().lower()
-    if machine in ("x86_64", "amd64"):
-        third = has.get("X86_V3", has.get("AVX2") and has.get("FMA3"))  # older numpy lists the single features
-        level = 4 if has.get("X86_V4", has.get("AVX512_SKX")) else 3 if third else 2
-        return f"x86-64-v{level}"
-    return "+".join([machine, *sorted(name for name in ("ASIMD", "SVE", "VSX", "VX") if has.get(name))])

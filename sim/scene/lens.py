@@ -43,7 +43,10 @@ def distort(y: Array, k: float) -> Array:
             third = (e - 1.0 / e) / 2
         else:
             third = sin(atan2(x, np.sqrt(1.0 - x * x)) / 3)
-        return np.asarray(y * np.where(known, np.where(q > 0, third * 2 / root / q, 1.0), np.nan))
+        r = np.where(x < 0.02, q, third * 2 / root)
+        for _ in range(3):  # Newton's steps, where the closed form would lose digits
+            r = np.where(x < 0.5, r - (r + k * r * r * r - q) / (1.0 + 3.0 * k * r * r), r)
+        return np.asarray(y * np.where(known, np.where(q > 0, r / q, 1.0), np.nan))
 
 
 def undistort_jacobian(x: Array, k: float) -> Array:

@@ -1,7 +1,7 @@
 """Runs a function over items on the workers of a dask.distributed cluster.
 
 The scheduler is given bytes only, so it needs none of our code. A worker refuses an item unless it has the same
-versions, sources and CPU instructions as this process, because its results could differ in their bytes otherwise
+versions and sources as this process, because its results could differ in their bytes otherwise
 (sim.versions.runtime). If a worker dies, the scheduler gives its item to another worker.
 """
 
@@ -30,6 +30,7 @@ from sim.workers.process import WorkResult, run_pickled
 from sim.workers.protocol import THREAD_VARIABLES, R, RunItems, T, worker_loss
 
 ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):\d+/?"
+SAME = "install the same on all (pip install -c constraints.txt) and restart the workers"
 CONNECT_TIMEOUT = 10.0  # s to reach a scheduler
 COUNT_INTERVAL = 1.0  # s between two counts of the cluster's workers
 NO_WORKERS_WARNING = 20.0  # s without any worker before a warning
@@ -52,7 +53,7 @@ def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
 
     Entering the block raises InputError if the address is malformed or dask.distributed is not installed, and WorkError
     if no scheduler answers within CONNECT_TIMEOUT (10 s). Reading results raises the exception of the function, and
-    WorkError if the connection is lost, or if a worker has other versions, sources or CPU instructions than this
+    WorkError if the connection is lost, or if a worker has other versions or sources than this
     process, has several threads, or cannot import flockscope. An item that killed too many workers raises WorkError
     unless `on_loss` is given; then on_loss(item, error) is its result. A cluster without workers causes a warning after
     20 s.
@@ -207,7 +208,7 @@ def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
         wanted = dict(required)
         raise WorkError(
             file=worker.address, got="a worker with " + ", ".join(f"{k} {here.get(k)}" for k in different),
-            expected=", ".join(f"{k} {wanted[k]}" for k in different) + " as here", remedy=_remedy(different),
+            expected=", ".join(f"{k} {wanted[k]}" for k in different) + " as here", remedy=SAME,
         )  # fmt: skip
     return run_pickled(call)
 
@@ -223,12 +224,6 @@ def _stop_profiler(worker: Any) -> None:
         stopped = threading.Event()
         worker.loop.add_callback(stopped.set)
         stopped.wait(CONNECT_TIMEOUT)
-
-
-def _remedy(different: list[str]) -> str:
-    if different == ["cpu"]:
-        return "use machines of one kind, or give all the same NPY_DISABLE_CPU_FEATURES"
-    return "install the same on all (pip install -c constraints.txt) and restart the workers"
 
 
 def _drain(finished: queue.SimpleQueue[str]) -> Iterator[str]:
@@ -268,7 +263,7 @@ def _result(fetch: Callable[[], bytes], item: T, address: str, on_loss: Callable
     except (ImportError, AttributeError) as error:
         raise WorkError(
             place="--cluster", got=f"a worker that cannot import flockscope ({error})",
-            expected="flockscope as it is installed here", remedy=_remedy([]),
+            expected="flockscope as it is installed here", remedy=SAME,
         ) from None  # fmt: skip
     result: R = outcome.result()
     return result

@@ -1,4 +1,4 @@
-"""The same scenario, seed and environment give the truth they gave before, to the last bit (benchmarks/golden.py)."""
+"""Truth and detections are what they were, to the last bit, whatever the processor (benchmarks/golden.py)."""
 
 from __future__ import annotations
 
@@ -8,27 +8,38 @@ from benchmarks import golden
 from scenarios.loading.resolve import names
 from sim.hashing import ENGINE
 
+KEPT = golden.golden_file()
+SOME = ("merge", "queue", "crowd", "stairs")
 
-@pytest.fixture(scope="module")
-def kept() -> dict[str, dict[str, str]]:
-    """The golden hashes of this environment."""
-    file, here = golden.golden_file(), golden.environment()
-    if not golden.FILE.is_file():
-        pytest.skip(f"no golden hashes are kept; {golden.WRITE}")
-    assert file["engine"] == ENGINE, f"golden hashes are of engine {file['engine']}; {golden.WRITE}"
-    if here not in file["environments"]:
-        pytest.skip(f"no golden hashes for {here}; on an unchanged checkout, {golden.WRITE}")
-    return file["environments"][here]
+
+def test_the_file_is_of_this_engine() -> None:
+    assert KEPT["engine"] == ENGINE, f"golden hashes are of engine {KEPT['engine']}; {golden.WRITE}"
+    assert sorted(KEPT["scenarios"]) == sorted(names())
 
 
 @pytest.mark.parametrize("name", names())
-def test_truth_is_as_it_was(name: str, kept: dict[str, dict[str, str]]) -> None:
-    assert golden.difference(name, kept.get(name), golden.present_hashes(name)) == ""
+def test_truth_and_detections_are_as_they_were(name: str) -> None:
+    assert golden.difference(name, KEPT["scenarios"].get(name), golden.present_hashes(name)) == ""
+
+
+def test_nothing_depends_on_the_processor() -> None:
+    assert golden.under(golden.SETTINGS["all of these"], "scenarios", *names()) == KEPT["scenarios"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("label", golden.SETTINGS)
+def test_no_scenario_depends_on_a_setting(label: str) -> None:
+    assert golden.under(golden.SETTINGS[label], "scenarios", *names()) == KEPT["scenarios"]
+
+
+@pytest.mark.slow
+def test_kernels_compiled_for_the_oldest_processor_give_the_same() -> None:
+    assert golden.under(golden.KERNELS, "scenarios", *SOME) == {name: KEPT["scenarios"][name] for name in SOME}
 
 
 def test_what_has_changed_is_told_apart() -> None:
-    one = {"scenario": "a", "truth": "b"}
+    one = {"scenario": "a", "truth": "b", "detections": "c"}
     assert golden.difference("x", one, dict(one)) == ""
     assert "no golden hash" in golden.difference("x", None, one)
-    assert "scenario has changed" in golden.difference("x", one, {"scenario": "c", "truth": "d"})
-    assert "raise sim.hashing.ENGINE" in golden.difference("x", one, {"scenario": "a", "truth": "d"})
+    assert "scenario has changed" in golden.difference("x", one, {**one, "scenario": "d"})
+    assert "raise ENGINE" in golden.difference("x", one, {**one, "detections": "d"})

@@ -150,7 +150,7 @@ class SearchPlan:
         return {
             "tracker": self.tracker_name,
             "code": self.tracker.code,
-            "versions": _digest(version for name, version in runtime().items() if name != "cpu"),
+            "versions": _digest(runtime().values()),
             "suite": self.suite_name,
             "seeds": seeds_text(self.seeds.training),
             "motions": _digest(source.key for source in self.training),

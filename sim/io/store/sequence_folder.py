@@ -28,7 +28,7 @@ from sim.io.store.manifest import MANIFEST, REDO, damaged_files, identity, is_ow
 from sim.io.store.manifest_check import check_manifest
 from sim.io.store.streams import check_streams, file_name
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
-from sim.versions import cpu_level, versions
+from sim.versions import versions
 
 
 def write_sequence(
@@ -141,7 +141,6 @@ def _manifest(
             "image_size": None if sequence.image_size is None else list(sequence.image_size),
             "px_per_m": tables.nan_to_none(sequence.px_per_m),
         },
-        "cpu": cpu_level(),
         "versions": versions(bool(pictures.streams)),
     }
 

@@ -66,13 +66,13 @@ def test_a_group_that_merges_leaves_its_queue(tmp_path):
 
 
 def test_a_merge_as_a_parent_arrives_keeps_the_places_of_the_new_group(tmp_path):
-    """Whatever the frame in which it fires, also the one in which the old group begins to stand in a circle."""
+    """Whatever the tick at which it fires, also the one in which the old group begins to stand in a circle."""
     merge = '{{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", when = {{ time = {} }} }}'
     first = World(scenario(tmp_path), 0, 0, Steering())
-    arrival = next(f for f, _ in enumerate(first.frames(120)) if first.groups.arrays.arrived[0]) / 5
-    for t in arrival + np.arange(-2, 3) / 5:
+    arrival = next(k for k, _ in enumerate(first.ticks(240)) if first.groups.arrays.arrived[0]) / 10
+    for t in arrival + np.arange(-2, 3) / 10:
         world = World(scenario(tmp_path, merge.format(t)), 0, 0, Steering())
-        assert len(list(world.frames(120))) == 120
+        assert len(list(world.ticks(240))) == 240
         g = world.groups.alive["ab"]
         kept = world.groups.places[world.groups.members[g]]
         assert sorted(kept.tolist()) == sorted(standing(4, world.groups.spacing[g]).tolist()), t

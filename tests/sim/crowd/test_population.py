@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from scenarios.schema.scenario import CrowdSpec
 from sim.crowd.population import PLACE_TIME, WANDER_TIME, Person, fluctuations
-from sim.rng import rng
+from sim.rng import normals, rng, uniforms
 
 FPS = 10.0
 CROWD = CrowdSpec(velocity_noise=(0.1, 0.2), place_noise=(0.3, 0.05))
@@ -30,7 +30,7 @@ def test_it_is_the_recursive_filter_of_each_persons_own_noise() -> None:
     u = fluctuations(CROWD, people(keys), 50, FPS, 7, 2)
     keep = np.exp(-1 / (FPS * TIME))
     for p, key in enumerate(keys):
-        noise = rng(7, "gait", *key, repeat=2).normal(size=(50, 4))
+        noise = normals(uniforms(rng(7, "gait", *key, repeat=2), (50, 4)))
         noise[1:] *= np.sqrt(1 - keep**2)
         for k in range(4):
             filtered = lfilter([SD[k]], [1.0, -keep[k]], noise[:, k])

@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.loading.resolve import load, names
 from sim.crowd.forces import Steering
-from sim.crowd.world import WRITE, World, run, steps_per_frame
+from sim.crowd.world import WRITE, World, run
 
 
 @pytest.mark.parametrize("name", names())
@@ -53,10 +53,3 @@ def test_batches_read_what_the_loop_reads() -> None:
     world.force[: len(by_loop)] = np.arange(2 * len(by_loop)).reshape(-1, 2)
     pymunk.batch.set_space_bodies(world.space, WRITE, world._write_buffer)
     assert [tuple(world.bodies[c].force) for c in world.columns] == [tuple(f) for f in world.force[: len(by_loop)]]
-
-
-def test_steps_stay_below_the_limit() -> None:
-    for fps in (1, 2.5, 7, 10, 25, 30, 50, 60):
-        k = steps_per_frame(fps)
-        assert 1 / (fps * k) <= 0.02 + 1e-9
-        assert k == 1 or 1 / (fps * (k - 1)) > 0.02

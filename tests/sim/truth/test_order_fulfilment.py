@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from scenarios.errors import WorkError
-from sim.truth.order_fulfilment import check_orders
+from sim.truth.order_fulfilment import check_orders, fulfilment
 from sim.truth.queue_detection import queues
 from sim.types import GroupEvent, Motion, Order, Truth
 from tests.reference_sense import walkers
@@ -10,9 +12,24 @@ from tests.reference_sense import walkers
 FRAMES = 150
 
 
+def order_of(id: str, kind: str, fired: int | None, before: tuple, after: tuple) -> Order:
+    """An order that fired in a frame of 0.1 s."""
+    return Order(id, kind, fired, before, after, None if fired is None else (fired - 1) / 10)
+
+
+def check(motion: Motion, truth: Truth) -> dict[str, int]:
+    """Checks the orders of a motion against the events and groups of a truth of the same frames."""
+    group = np.full(motion.present.shape, -1)
+    column = truth.id <= group.shape[1]
+    group[truth.frame[column] - 1, truth.id[column] - 1] = truth.group[column]
+    found = [fulfilment(o, truth.events or (), group, motion.states()) for o in motion.orders]
+    orders = tuple(replace(o, event=k) for o, k in zip(motion.orders, found, strict=True))
+    return check_orders(motion, truth.replace(orders=orders))
+
+
 def merging(fired: int | None = 20, kind: str = "merge") -> Motion:
     """Persons 1 and 2 in one group, 3 in another, one order that the three belong together."""
-    order = Order("m1", kind, fired, ((1, 2), (3,)), ((1, 2, 3),))
+    order = order_of("m1", kind, fired, ((1, 2), (3,)), ((1, 2, 3),))
     start = [[2, 2], [2.8, 2], [12, 2]]
     return walkers(start, [[0.5, 0], [0.5, 0], [-0.2, 0]], frames=FRAMES, orders=(order,))
 
@@ -31,14 +48,14 @@ def truth_of(motion: Motion, changes: int, kind: str = "merge", to: tuple[int, .
 @pytest.mark.parametrize("onset", [20, 57, 100])
 def test_fulfilled_from_the_firing_to_ten_seconds_less_the_rule(onset: int) -> None:
     motion = merging()
-    assert check_orders(motion, truth_of(motion, onset)) == {"m1": 0}
+    assert check(motion, truth_of(motion, onset)) == {"m1": 0}
 
 
 @pytest.mark.parametrize("onset", [19, 101])
 def test_too_early_and_too_late(onset: int) -> None:
     motion = merging()
     with pytest.raises(WorkError) as caught:
-        check_orders(motion, truth_of(motion, onset))
+        check(motion, truth_of(motion, onset))
     assert caught.value.file == "scenario made-up"
     assert "m1" in caught.value.place
     assert "seed 7" in caught.value.place
@@ -52,16 +69,16 @@ def test_closest_values_are_the_closest() -> None:
     last = 120 - 1  # 10 s after the firing
     gap = (12 - 0.2 * last / 10) - (2.8 + 0.5 * last / 10)
     with pytest.raises(WorkError, match=rf"nearest {gap:.2f} m, velocities then differing by 0\.70 m/s"):
-        check_orders(motion, truth_of(motion, 140))
+        check(motion, truth_of(motion, 140))
 
 
 def test_the_wrong_kind_or_the_wrong_people_do_not_count() -> None:
     motion = merging()
     with pytest.raises(WorkError):
-        check_orders(motion, truth_of(motion, 50, kind="cross"))
+        check(motion, truth_of(motion, 50, kind="cross"))
     with pytest.raises(WorkError):
-        check_orders(motion, truth_of(motion, 50, to=(1, 1, -1)))
-    assert check_orders(motion, truth_of(motion, 50, kind="form")) == {"m1": 0}
+        check(motion, truth_of(motion, 50, to=(1, 1, -1)))
+    assert check(motion, truth_of(motion, 50, kind="form")) == {"m1": 0}
 
 
 def test_an_event_after_all_was_done_does_not_count() -> None:
@@ -69,51 +86,51 @@ def test_an_event_after_all_was_done_does_not_count() -> None:
     assert truth.events is not None
     again = GroupEvent("merge", 60, 60, None, (1, -1), (1,), (1, 2, 3), (0.0, 0.0))
     with pytest.raises(WorkError):
-        check_orders(motion, truth.replace(events=(again,)))
-    assert check_orders(motion, truth.replace(events=(again, *truth.events))) == {"m1": 1}
+        check(motion, truth.replace(events=(again,)))
+    assert check(motion, truth.replace(events=(again, *truth.events))) == {"m1": 1}
 
 
 def test_an_order_that_never_fired() -> None:
     with pytest.raises(WorkError, match="never fired"):
-        check_orders(merging(None), truth_of(merging(None), 50))
+        check(merging(None), truth_of(merging(None), 50))
 
 
 def test_the_recording_may_end_first() -> None:
     motion = merging(140)
     with pytest.raises(WorkError, match="until the recording ends"):
-        check_orders(motion, truth_of(motion, 30))
+        check(motion, truth_of(motion, 30))
 
 
 def test_splits() -> None:
-    order = Order("s1", "split", 20, ((1, 2),), ((1,), (2,)))
+    order = order_of("s1", "split", 20, ((1, 2),), ((1,), (2,)))
     motion = merging().replace(orders=(order,))
-    assert check_orders(motion, truth_of(motion, 50, "split", (-1, -1, -1))) == {"s1": 0}
-    assert check_orders(motion, truth_of(motion, 50, "dissolve", (-1, -1, -1))) == {"s1": 0}
+    assert check(motion, truth_of(motion, 50, "split", (-1, -1, -1))) == {"s1": 0}
+    assert check(motion, truth_of(motion, 50, "dissolve", (-1, -1, -1))) == {"s1": 0}
     with pytest.raises(WorkError, match=r"furthest 0\.80 m"):
-        check_orders(motion, truth_of(motion, 50, "split", (1, 1, -1)))
+        check(motion, truth_of(motion, 50, "split", (1, 1, -1)))
 
 
 def test_queues_want_three_of_their_people() -> None:
-    order = Order("q1", "queue", 20, ((1, 2), (3,)), ())
+    order = order_of("q1", "queue", 20, ((1, 2), (3,)), ())
     motion = merging().replace(orders=(order,))
     truth = truth_of(motion, 50, "queue")
-    assert check_orders(motion, truth) == {"q1": 0}
+    assert check(motion, truth) == {"q1": 0}
     assert truth.events is not None
     fewer = truth.replace(events=(GroupEvent("queue", 50, 90, None, (), (), (1, 2, 9), (0, 0)),))
     with pytest.raises(WorkError, match="at most 1 of 3 people slower"):
-        check_orders(motion, fewer)
+        check(motion, fewer)
     pause = motion.vel.copy()
     pause[30:47] = 0
     with pytest.raises(WorkError, match=r"at most 3 of 3 .* 3 of them for 1\.7 s at a stretch"):
-        check_orders(motion.replace(vel=pause), fewer)
+        check(motion.replace(vel=pause), fewer)
     late = truth_of(motion, 91, "queue")  # 3 s of the rule would end later than 10 s after the firing
     with pytest.raises(WorkError):
-        check_orders(motion, late)
+        check(motion, late)
 
 
 def test_no_orders() -> None:
     motion = merging().replace(orders=())
-    assert check_orders(motion, truth_of(motion, 50)) == {}
+    assert check(motion, truth_of(motion, 50)) == {}
 
 
 @pytest.mark.parametrize("leaving", [(1, 2, 3, 4), (2, 1, 3, 4)])
@@ -124,14 +141,14 @@ def test_queues_are_first_in_first_out(leaving: tuple[int, ...]) -> None:
     for turn, person in enumerate(leaving):
         pos[:, person - 1] = np.stack([0 * t + 5 + 0.6 * person, np.maximum(t - 5 - 2 * turn, 0) * 1.3], axis=1)
     base = walkers([[0, 0]] * 4, [[0, 0]] * 4, frames=FRAMES)
-    order = Order("q1", "queue", 1, ((1,), (2,), (3,), (4,)), ((1, 2, 3, 4),))
+    order = order_of("q1", "queue", 1, ((1,), (2,), (3,), (4,)), ((1, 2, 3, 4),))
     motion = base.replace(pos=pos, vel=np.gradient(pos, 0.1, axis=0), orders=(order,))
     alone = np.full((FRAMES, 4), -1)
     truth = truth_of(merging(), 50).replace(
         events=tuple(queues(motion.pos, motion.vel, motion.present, alone, motion.fps))
     )
     if leaving[0] == 1:
-        assert check_orders(motion, truth) == {"q1": 0}
+        assert check(motion, truth) == {"q1": 0}
     else:
         with pytest.raises(WorkError, match=r"left by people 2, 1.* first in, first out"):
-            check_orders(motion, truth)
+            check(motion, truth)

@@ -206,10 +206,7 @@ def test_a_study_is_of_one_version(tmp_path, monkeypatch, what):
     made = toy_plan(tmp_path)
     with open_study(made, tmp_path / "j", "x") as study:
         study.tell(study.ask(), [0.1])
-    other = {**runtime(), "cpu": "another"}
+    other = {**runtime(), what: "another"}
     monkeypatch.setattr("tracking.tuning.search_plan.runtime", lambda: other)
-    with open_study(made, tmp_path / "j", "x") as study:
-        assert len(study.finished()) == 1, "what workers of a cluster may not differ in, going on may"
-    other[what] = "another"
     with pytest.raises(InputError, match="another search: versions differ"), open_study(made, tmp_path / "j", "x"):
         pass
