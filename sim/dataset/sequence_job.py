@@ -17,6 +17,7 @@ from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading.resolve import Entry
 from sim.dataset.setting_differences import setting_differences
 from sim.io.files.output_paths import output_path, output_paths
+from sim.io.files.side_files import is_side_file
 from sim.io.store import sequence_folder
 from sim.io.store.manifest import damaged_files, identity, is_own_sequence, read_manifest
 
@@ -80,7 +81,8 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
 
     if not job.folder.exists():
         return None
-    if not job.folder.is_dir() or (any(job.folder.iterdir()) and not is_own_sequence(job.folder)):
+    inside = job.folder.is_dir() and any(not is_side_file(path.name) for path in job.folder.iterdir())
+    if not job.folder.is_dir() or (inside and not is_own_sequence(job.folder)):
         raise InputError(
             file=job.folder, got="something that flockscope did not write", expected="a stored sequence, or nothing",
             remedy="choose another --out, or move it away",

@@ -84,3 +84,27 @@ def test_a_folder_with_right_pictures_is_a_stereo_recording(tmp_path) -> None:
     assert np.array_equal(right[7], made["img1_right"][7])
     with pytest.warns(UserWarning, match="frame 7"), pytest.warns(UserWarning, match="background sample"):
         assert len(track("stereo", sequence, detections="image")) == 12
+
+
+def test_right_pictures_are_numbered_like_the_left_ones(tmp_path) -> None:
+    """Also if the first right picture is lost: 000000.png of the left is frame 1, so 000002.png of the right is 3."""
+    for name, numbers in (("img1", range(4)), ("img1_right", (2, 3))):
+        (tmp_path / name).mkdir()
+        for k in numbers:
+            cv2.imwrite(str(tmp_path / name / f"{k:06d}.png"), np.full((*SIZE, 3), 10 * k, np.uint8))
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\n")
+    (sequence,) = open_source(tmp_path)
+    with pytest.warns(UserWarning, match="right: frame 1 has no readable picture"):
+        frames = list(sequence)
+    assert [f.image[0, 0, 0] for f in frames] == [0, 10, 20, 30]
+    assert [None if f.right is None else f.right[0, 0, 0] for f in frames] == [None, None, 20, 30]
+
+
+def test_right_pictures_without_numbers_are_as_many_as_the_left_ones(tmp_path) -> None:
+    for name, files in (("img1", "abc"), ("img1_right", "bc")):
+        (tmp_path / name).mkdir()
+        for file in files:
+            cv2.imwrite(str(tmp_path / name / f"{file}.png"), np.zeros((*SIZE, 3), np.uint8))
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\n")
+    with pytest.raises(InputError, match="2 pictures without numbers; expected 3, as in img1"):
+        open_source(tmp_path)
