@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -35,19 +36,22 @@ def read_calibration(path: Path) -> Camera:
     return read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
 
 
-def scaled_to_image(camera: Camera, image: tuple[int, int] | None, path: Path) -> Camera:
+def scaled_to_image(
+    camera: Camera, image: tuple[int, int] | None, path: Path, aspect: Fraction = Fraction(1)
+) -> Camera:
     """Return the camera for pictures of `image` = (width, height) px, if it was calibrated at another size.
 
     Focal lengths and image centre are scaled per axis, px_per_m by the geometric mean of both factors; position,
     rotation and distortion stay. With `image` None or equal to the camera's size, the camera is returned unchanged.
-    path: the recording, for the error.
+    path: the recording, for the error. aspect: width / height of the recording's stored pixels, which `image` shows as
+    squares; the camera may be calibrated with stored or square pixels.
 
     Raises InputError if the aspect ratios differ by more than SHAPE_TOLERANCE (1 %).
     """
     if image is None or image == camera.image:
         return camera
     x, y = image[0] / camera.image[0], image[1] / camera.image[1]
-    if abs(x / y - 1) > SHAPE_TOLERANCE:
+    if all(abs(x / y / ratio - 1) > SHAPE_TOLERANCE for ratio in (1.0, float(aspect))):
         raise InputError(
             file=path, place="--camera", got="a calibration for {}×{} px".format(*camera.image),
             expected="one for {}×{} px, or of that shape".format(*image), remedy="give this recording's calibration",
