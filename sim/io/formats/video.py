@@ -153,7 +153,7 @@ def is_steady(times: Array) -> bool:
     if len(times) < 3:
         return True
     off = times - np.linspace(times[0], times[-1], len(times))
-    return float(np.abs(off).max()) <= (times[-1] - times[0]) / (len(times) - 1) / 2
+    return bool(np.abs(off).max() <= (times[-1] - times[0]) / (len(times) - 1) / 2)
 
 
 def stamped_rate(index: video_decoding.PacketIndex) -> float:
