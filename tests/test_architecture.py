@@ -12,8 +12,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("scenarios", "sim", "tracking")
 LINES = 500
-LONGER = {"sim.types": 420}
-"""One definition of all types."""
 
 SCORING = (
     "tracking.scoring",
@@ -258,7 +256,7 @@ def test_pymunk_is_met_in_one_module():
 
 @pytest.mark.parametrize("name", modules())
 def test_modules_are_short(name):
-    assert len(modules()[name].read_text(encoding="utf-8").splitlines()) <= LONGER.get(name, LINES)
+    assert len(modules()[name].read_text(encoding="utf-8").splitlines()) <= LINES
 
 
 @pytest.mark.parametrize("name", modules())

@@ -2,7 +2,8 @@
 
 The format states neither frame rate nor picture size. CAVIAR's own recordings have 25 fps and 384x288 px; for labels of
 others in this format the user gives the frame rate. A box is stored as centre and size. Most boxes are wider than tall
-although the people stand, so only their centres can be relied on. The image scale is the median of the longer sides / 1.7 m. Groups are labelled in each frame.
+although the people stand, so only their centres can be relied on. The image scale is the median of the longer sides /
+1.7 m. Groups are labelled in each frame.
 """
 
 from __future__ import annotations
@@ -60,9 +61,9 @@ def read_xml(path: Path) -> CaviarRecording:
 
     A list of fewer than two members is no group. A person in two groups of a frame stays in the first, with a warning.
     A file without people gives no rows. Raises InputError if the file is unreadable, no CVML or without frames, and,
-    with the file's frame number, if an object has no box or a box without area, a number is missing or beyond 1e6, an id or frame is
-    no whole number from 0 on, or an id stands twice in a frame. Also raises it for more than 1,000,000 frames, or
-    20,000,000 frames times people.
+    with the file's frame number, if an object has no box or a box without area, a number is missing or beyond 1e6, an
+    id or frame is no whole number from 0 on, or an id stands twice in a frame. Also raises it for more than
+    1,000,000 frames, or 20,000,000 frames times people.
     """
     root = _root(path)
     rows: list[tuple[float, ...]] = []
@@ -222,9 +223,9 @@ def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = 
 
     The image size is 384 × 288 px for CAVIAR's own recordings, else unknown. fps: frames per second; None: 25 for
     CAVIAR's own recordings, with a warning. px_per_m: image scale; None: the median of the longer sides of the first
-    100 boxes / 1.7 m, nan without boxes. `source["px_per_m_frames"]` is then the last frame of these boxes. Raises InputError at
-    once if the file is unreadable, no CVML or invalid (see read_xml), or not CAVIAR's own without `fps`. The file is
-    read again when the truth is asked for.
+    100 boxes / 1.7 m, nan without boxes. `source["px_per_m_frames"]` is then the last frame of these boxes. Raises
+    InputError at once if the file is unreadable, no CVML or invalid (see read_xml), or not CAVIAR's own without `fps`.
+    The file is read again when the truth is asked for.
     """
     found = read_xml(path)
     rate = _frame_rate(path, found) if fps is None else fps

@@ -169,6 +169,7 @@ def open_folder(
         px_per_m=scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
+        picture_file=pictures.files.get if pictures.files else None,
         source={"kind": "mot", "path": str(path), **({} if choice is None else {"background": str(choice)})},
     )  # fmt: skip
 
