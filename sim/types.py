@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -378,9 +377,7 @@ class Sequence:
     image_size: (width, height) px, camera, scene: None if unknown. px_per_m: nan if unknown. Each load_ field is a
     function, or None if there is nothing to load: load_truth() gives the Truth; load_background() pictures (K, H, W, 3)
     of a scene to train a background model; load_people() the person ids of each group that the script names;
-    load_pixels(index) the PixelTruth of frame `index`. picture_file(index): path of the file with the left picture of
-    frame `index`, perhaps a video, or None; the field is None without picture files. source: where it comes from
-    ("kind", "path", "seed", …)."""
+    load_pixels(index) the PixelTruth of frame `index`. source: where it comes from ("kind", "path", "seed", …)."""
 
     name: str
     fps: float
@@ -399,7 +396,6 @@ class Sequence:
     source: dict[str, Any] = field(default_factory=dict)
     bare: Callable[[], Iterator[Frame]] | None = None
     load_pixels: Callable[[int], PixelTruth] | None = None
-    picture_file: Callable[[int], Path | None] | None = None
 
     def __iter__(self) -> Iterator[Frame]:
         return self.frames()

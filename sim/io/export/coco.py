@@ -8,6 +8,7 @@ where the stream ids is stored, else the part of the box inside the picture.
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,10 @@ from sim.dataset.splits import split_of
 from sim.io.files.atomic import write_file
 from sim.io.files.output_paths import output_paths
 from sim.io.files.tables import json_text
+from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
-from sim.io.store.manifest import read_manifest
+from sim.io.store.manifest_check import read_whole_manifest
+from sim.io.store.streams import file_name
 from sim.types import Array, Ints, Sequence, Truth
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
@@ -84,7 +87,7 @@ def _document(sequences: list[Sequence], root: Path, path: Path, min_visibility:
     info: dict[str, Any] = {"description": "flockscope", "version": "1"}
     if all(s.source.get("kind") == "generated" for s in sequences):
         folders = [Path(s.source["path"]) for s in sequences]
-        hashes = {split_and_name(folder): read_manifest(folder)["content_hash"] for folder in folders}
+        hashes = {split_and_name(folder): read_whole_manifest(folder)["content_hash"] for folder in folders}
         info["content_hash"] = hashing.dataset_hash(hashes)
     info["root"] = Path(os.path.relpath(root, path.parent)).as_posix()
     videos, images, annotations = [], list[str](), list[str]()
@@ -132,12 +135,25 @@ def _size(sequence: Sequence) -> dict[str, int]:
 
 def _images(sequence: Sequence, root: Path) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yields (frame, size and, where a picture is stored, file_name) of the frames that are images."""
-    size = _size(sequence)
+    size, files = _size(sequence), _picture_files(sequence)
     for index in range(1, (sequence.length or 0) + 1):
-        if sequence.picture_file is None:
+        if not files:
             yield index, size
-        elif (file := sequence.picture_file(index)) is not None:
-            yield index, {"file_name": Path(os.path.relpath(file, root)).as_posix(), **size}
+        elif index in files:
+            yield index, {"file_name": Path(os.path.relpath(files[index], root)).as_posix(), **size}
+
+
+def _picture_files(sequence: Sequence) -> dict[int, Path]:
+    """Returns the file with the picture of each frame, perhaps one video for all; empty without pictures."""
+    if not sequence.has_images:
+        return {}
+    folder = Path(sequence.source["path"])
+    if sequence.source["kind"] == "mot":
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # said when the sequence was opened
+            return left_pictures(folder).files
+    images = sequence.source["images"] or "jpg"
+    return {index: folder / file_name("left", images, index) for index in range(1, (sequence.length or 0) + 1)}
 
 
 def _annotations(sequence: Sequence, index: int, min_visibility: float) -> Iterator[dict[str, Any]]:

@@ -131,8 +131,7 @@ def open_folder(
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found = mot_text.read_detections(det, info.length) if is_present(det) else None
-    labelled = (lambda: _labelled_frames(found, gt)) if is_present(gt) or found is not None else None
-    pictures = find_pictures(path / info.image_dir, info.length, labelled)
+    pictures = _find_pictures(path, info, gt, found)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(found, gt).max(initial=0).item(), pictures.last)
     if not length:
@@ -169,9 +168,24 @@ def open_folder(
         px_per_m=scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        picture_file=pictures.files.get if pictures.files else None,
         source={"kind": "mot", "path": str(path), **({} if choice is None else {"background": str(choice)})},
     )  # fmt: skip
+
+
+def left_pictures(path: Path) -> PictureFolder:
+    """Return the picture files of the MOTChallenge folder `path`, of the left camera, by frame.
+
+    Raises InputError as `open_folder`.
+    """
+    ini = path / "seqinfo.ini"
+    info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
+    gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
+    return _find_pictures(path, info, gt, mot_text.read_detections(det, info.length) if is_present(det) else None)
+
+
+def _find_pictures(path: Path, info: SeqInfo, gt: Path, found: mot_text.DetectionTable | None) -> PictureFolder:
+    labelled = (lambda: _labelled_frames(found, gt)) if is_present(gt) or found is not None else None
+    return find_pictures(path / info.image_dir, info.length, labelled)
 
 
 def _refuse_beyond(path: Path, pictures: PictureFolder, length: int) -> None:

@@ -226,7 +226,6 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
             **words, **origin,
         },
         bare=bare if left or right else None,
-        picture_file=(lambda index: folder / file_name("left", pictures.images, index)) if left else None,
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
     )  # fmt: skip
 
