@@ -33,7 +33,7 @@ SPLITS = ("train", "training", "val", "valid", "validation", "test", "testing", 
 """Names of folders that divide recordings into splits."""
 
 
-def coco(source: str | Path, out: str | Path, *, min_visibility: float = 0.0) -> list[Path]:
+def coco(source: str | Path, out: str | Path, min_visibility: float = 0.0) -> list[Path]:
     """Write the sequences of a source that have labelled boxes as COCO files, and return their paths.
 
     source: path of a dataset or recording. out: the JSON file, replaced if it exists. If sequences belong to several
