@@ -96,7 +96,7 @@ def an_xml_file(folder: Path) -> tuple[str, Read]:
     count = (limits.XML_BYTES - 100) // (len(frame) + 5)
     path = folder / "c.xml"
     path.write_text('<dataset name="x">' + "".join(frame.format(k) for k in range(count)) + "</dataset>")
-    return f"{limits.XML_BYTES:,} bytes", lambda: open_source(path)
+    return f"{limits.XML_BYTES:,} bytes", lambda: open_source(path, fps=25)
 
 
 def a_toml_file(folder: Path) -> tuple[str, Read]:

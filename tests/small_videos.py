@@ -30,14 +30,17 @@ def disc(image: np.ndarray) -> float:
 def write_video(
     path: Path, pictures: Iterable[np.ndarray], rate: float = 10, codec: str = "libx264", pix_fmt: str = "yuv420p",
     audio: bool = False, rotation: int = 0, options: dict[str, str] | None = None, stamps: Iterable[int] | None = None,
+    aspect: Fraction | None = None,
 ) -> Path:  # fmt: skip
-    """A video; stamps: the frames' times in 1/1000 s instead of a steady rate."""
+    """A video; stamps: the frames' times in 1/1000 s instead of a steady rate. aspect: width / height of a pixel."""
     pictures = list(pictures)
     faststart = {"movflags": "faststart"} if path.suffix in (".mp4", ".mov") else {}
     with av.open(str(path), "w", options=faststart) as container:
         sound = container.add_stream("aac", rate=8000, layout="mono") if audio else None
         stream = container.add_stream(codec, rate=int(rate), options=options or {})
         stream.width, stream.height, stream.pix_fmt = pictures[0].shape[1], pictures[0].shape[0], pix_fmt
+        if aspect is not None:
+            stream.codec_context.sample_aspect_ratio = aspect
         if rotation:
             stream.set_display_rotation(rotation)
         if sound is not None:

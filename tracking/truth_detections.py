@@ -55,13 +55,15 @@ def perfect(truth: FrameTruth) -> Detections:
 
     They are in the plane "ground" at the labelled positions, m, with the labelled boxes if there are any. Without
     positions they are in the plane "image", at the centres of the boxes, px. Boxes are left, top, width, height in px,
-    amodal: as if nothing hid the person. Labels without both are an AssertionError.
+    amodal: as if nothing hid the person. A person whose box is unknown, as of people behind the camera, has no row.
+    Labels without both are an AssertionError.
     """
-    score = np.ones(len(truth.id))
+    seen = np.ones(len(truth.id), bool) if truth.box is None else np.isfinite(truth.box).all(axis=1)
+    box, score = None if truth.box is None else truth.box[seen], np.ones(int(seen.sum()))
     if truth.pos is not None:
-        return Detections(truth.index, truth.t, "ground", truth.pos, None, truth.box, score)
-    assert truth.box is not None, "labels have positions or boxes"
-    return Detections(truth.index, truth.t, "image", truth.box[:, :2] + truth.box[:, 2:] / 2, None, truth.box, score)
+        return Detections(truth.index, truth.t, "ground", truth.pos[seen], None, box, score)
+    assert box is not None, "labels have positions or boxes"
+    return Detections(truth.index, truth.t, "image", box[:, :2] + box[:, 2:] / 2, None, box, score)
 
 
 def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:

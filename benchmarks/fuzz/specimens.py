@@ -78,7 +78,8 @@ OBSERVATION = (
 PARAMS = 'tracker = "blob"\n\n[params]\ngate = 0.99\n'
 CAVIAR = """<?xml version="1.0" encoding="UTF-8"?>
 <dataset name="walk">
-<frame number="0"><objectlist><object id="0"><orientation>90</orientation><box h="40" w="20" xc="50" yc="60"/></object>
+<frame number="0"><objectlist><object id="0"><orientation>90</orientation><box h="40" w="20" xc="50" yc="60"/>
+<hypothesislist><hypothesis><movement>walking</movement></hypothesis></hypothesislist></object>
 <object id="1"><box h="41" w="21" xc="80" yc="61"/></object></objectlist>
 <grouplist><group id="2"><members>0,1</members></group></grouplist></frame>
 <frame number="1"><objectlist><object id="0"><box h="40" w="20" xc="51" yc="60"/></object>

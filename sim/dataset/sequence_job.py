@@ -17,8 +17,10 @@ from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading.resolve import Entry
 from sim.dataset.setting_differences import setting_differences
 from sim.io.files.output_paths import output_path, output_paths
+from sim.io.files.side_files import is_side_file
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import damaged_files, identity, is_own_sequence, read_manifest
+from sim.io.store.manifest import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
+from sim.io.store.manifest_check import check_manifest
 
 MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
 
@@ -69,26 +71,31 @@ def plan_jobs(entries: list[Entry], seeds: range, folder: Path) -> list[Sequence
 
 
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
-    """Return the manifest in the job's folder; None if the folder is missing or has no valid manifest of our format.
+    """Return the manifest in the job's folder; None if the folder or its manifest is missing.
 
-    The files are not compared with the manifest. Raises InputError if the folder holds another sequence, that is, if
-    the manifest differs in scenario, seed, repeat, schema, engine, streams or file type; the error names what differs.
-    Also raises InputError if the folder is a file or holds something else than a sequence, or a stream or the file type
-    of the job is unknown.
+    The files are not compared with the manifest. Raises InputError for an invalid manifest, which does not tell what
+    the folder holds, and if the folder holds another sequence, that is, if the manifest differs in scenario, seed,
+    repeat, schema, engine, streams or file type; the error names what differs. Also raises InputError if the folder is
+    a file or holds something else than a sequence, or a stream or the file type of the job is unknown.
     """
     from scenarios.loading.resolve import dump
 
     if not job.folder.exists():
         return None
-    if not job.folder.is_dir() or (any(job.folder.iterdir()) and not is_own_sequence(job.folder)):
+    inside = job.folder.is_dir() and any(not is_side_file(path.name) for path in job.folder.iterdir())
+    if not job.folder.is_dir() or (inside and not is_own_sequence(job.folder)):
         raise InputError(
             file=job.folder, got="something that flockscope did not write", expected="a stored sequence, or nothing",
             remedy="choose another --out, or move it away",
         )  # fmt: skip
-    try:
-        manifest = read_manifest(job.folder)
-    except InputError:
+    path = job.folder / MANIFEST
+    if not path.exists():
         return None
+    try:
+        manifest = check_manifest(path, read_manifest(job.folder))
+    except InputError as error:
+        remedy = "delete that folder, or choose another --out"
+        raise InputError(**{**error.as_dict(), "remedy": remedy}) from None
     scenario = dump(job.entry.scenario)
     wanted = identity(scenario, job.seed, job.entry.repeat, job.streams, job.images)
     different = {key: value for key, value in wanted.items() if manifest.get(key) != value}

@@ -13,6 +13,7 @@ from pathlib import Path
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.regular_file import is_present, require_regular
+from sim.io.files.side_files import is_hidden
 from sim.io.formats import biwi, caviar, mot_folder, video
 from sim.io.formats.calibration import read_calibration
 from sim.io.pictures.background_sample import BackgroundChoice, parse_choice
@@ -158,14 +159,14 @@ def _find(folder: Path, depth: int) -> list[Path]:
     """Return sequence folders, videos and CAVIAR files at or below a folder, down to `depth` levels, sorted in each
     folder.
 
-    A folder that is a sequence itself gives only itself. Subfolders come before files; names that begin with a dot are
+    A folder that is a sequence itself gives only itself. Subfolders come before files; hidden and side files are
     skipped.
     """
     if _kind(folder) is not None:
         return [folder]
     if depth == 0:
         return []
-    found = [p for p in sorted(folder.iterdir()) if not p.name.startswith(".")]
+    found = [p for p in sorted(folder.iterdir()) if not is_hidden(p)]
     deeper = [q for p in found if p.is_dir() for q in _find(p, depth - 1)]
     return deeper + [p for p in found if p.is_file() and _is_recording(p)]
 

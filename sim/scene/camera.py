@@ -86,7 +86,7 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     direction D; it meets the plane at s = (z - O_z)/D_z. Then dX = s dD + D ds and ds = -s dD_z/D_z. Kind "top": the
     same read-only matrix in every row, for any z.
 
-    Special cases: the matrix is inf or nan at the horizon, with a numpy warning. Above the horizon it has no meaning.
+    Special case: the matrix is nan where the line of sight does not meet the plane, at and above the horizon.
     """
     origin, direction = rays(camera, uv)
     if camera.kind == "top":
@@ -96,8 +96,11 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     if camera.radial:
         bend = lens.undistort_jacobian((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
     step = product(np.swapaxes(bend / focal, 1, 2), camera.rotation[:2])  # dD/du, dD/dv as rows
-    s = (z - origin[:, 2]) / direction[:, 2]
-    slope = direction[:, :2] / direction[:, 2:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = (z - origin[:, 2]) / direction[:, 2]
+    down = np.where(np.isfinite(s) & (s > 0), direction[:, 2], np.nan)
+    s = (z - origin[:, 2]) / down
+    slope = direction[:, :2] / down[:, None]
     dx = step[:, :, :2] - step[:, :, 2:] * slope[:, None]
     return np.asarray(np.swapaxes(s[:, None, None] * dx, 1, 2))
 

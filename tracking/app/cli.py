@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from tracking.app.command_options import (
+    CocoOptions,
     GenerateOptions,
     GroupOptions,
     OverlayOptions,
@@ -209,15 +210,12 @@ def validate(
 
 
 @export.command()
-def coco(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A sequence or dataset with labelled boxes.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.json", help="File to write.")],
-    json: Json = False,
-) -> CommandResult:
-    """Write one COCO file with track and group ids."""
+@options_from(CocoOptions)
+def coco(options: CocoOptions) -> CommandResult:
+    """Write COCO files, one per split, with track and group ids and masks."""
     from tracking.app.commands.datasets import export_coco
 
-    return export_coco(folder, out)
+    return export_coco(options)
 
 
 @export.command()

@@ -265,6 +265,27 @@ class OverlayOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CocoOptions:
+    """Options of the command `export coco`, which writes COCO files.
+
+    folder: a sequence or dataset with labelled boxes. out: JSON file; with several splits, each has its own.
+    min_visibility: people less visible are left out, 0 to 1.
+    """
+
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A sequence or dataset with labelled boxes.")]
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", metavar="FILE.json", help="File to write; for several splits FILE-train.json, FILE-val.json, …"
+        ),
+    ]
+    min_visibility: Annotated[
+        float,
+        typer.Option("--min-visibility", min=0.0, max=1.0, metavar="V", help="Leave out people who are less visible."),
+    ] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class WebdatasetOptions:
     """Options of the command `export webdataset`, which writes tar shards.
 

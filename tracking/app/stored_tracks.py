@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from sim.io.files.side_files import is_hidden
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
@@ -98,10 +99,10 @@ def _below(folder: Path, depth: int) -> list[StoredTracks]:
         return [StoredTracks(info.get("sequence", folder.name), folder, info)]
     if (folder / "tracks.txt").is_file():
         return [StoredTracks(folder.name, folder, {})]
-    texts = [StoredTracks(p.stem, p, {}) for p in sorted(folder.glob("*.txt"))]
+    texts = [StoredTracks(p.stem, p, {}) for p in sorted(folder.glob("*.txt")) if not is_hidden(p)]
     if depth == 0:
         return texts
-    inner = [p for p in sorted(folder.iterdir()) if p.is_dir() and not p.name.startswith(".")]
+    inner = [p for p in sorted(folder.iterdir()) if p.is_dir() and not is_hidden(p)]
     return [stored for p in inner for stored in _below(p, depth - 1)] + texts
 
 

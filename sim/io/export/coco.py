@@ -1,69 +1,123 @@
-"""Writes a dataset or recording as one COCO JSON file, with all sequences that have labelled boxes.
+"""Writes a dataset or recording as COCO JSON: one file per split, with all sequences that have labelled boxes.
 
-Each frame is an image and each sequence a video. Each box of a person is an annotation (left, top, width, height in px,
-unclipped), with the person's id, group id and visibility. Boxes that are unknown (nan) are left out.
+Each frame is an image and each sequence a video. Each person in the picture is an annotation: box (left, top, width,
+height in px, unclipped), person id, group id, visibility, and a segmentation. That is the mask of the visible pixels
+where the stream ids is stored, else the part of the box inside the picture.
 """
 
 from __future__ import annotations
 
+import os
+import warnings
 from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import is_number
+from sim import hashing
+from sim.dataset.splits import split_of
 from sim.io.files.atomic import write_file
 from sim.io.files.output_paths import output_paths
 from sim.io.files.tables import json_text
-from sim.io.source import open_source
+from sim.io.formats.mot_folder import left_pictures
+from sim.io.source import open_source, split_and_name
+from sim.io.store.manifest_check import read_whole_manifest
 from sim.io.store.streams import file_name
-from sim.io.store.validate import content_hash
-from sim.types import Sequence, Truth
+from sim.types import Array, Ints, Sequence, Truth
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
+SPLITS = ("train", "training", "val", "valid", "validation", "test", "testing", "fit", "demo")
+"""Names of folders that divide recordings into splits."""
 
 
-def coco(source: str | Path, out: str | Path) -> Path:
-    """Write a COCO file with every sequence of a source that has labelled boxes, and return its path.
+def coco(source: str | Path, out: str | Path, min_visibility: float = 0.0) -> list[Path]:
+    """Write the sequences of a source that have labelled boxes as COCO files, and return their paths.
 
-    source: path of a dataset or recording. out: the JSON file, replaced if it exists. Each frame is an image, each
-    sequence a video, both numbered from 1. Annotations have bbox [left, top, width, height] px (amodal, unclipped),
-    track_id (the person's id), group_id (-1 for alone, or where no groups are labelled) and visibility; rows with an
-    unknown box are left out. file_name is the frame's picture or video, also where none is stored, in a folder named
-    for the sequence. An unknown image size is replaced by the extent of the boxes. info has the content hash if all
-    exported sequences are generated. The same dataset gives the same bytes.
+    source: path of a dataset or recording. out: the JSON file, replaced if it exists. If sequences belong to several
+    splits, each has a file of its own: `coco-train.json`, `coco-val.json` for `coco.json`. The split of a generated
+    sequence follows its seed, that of a recording the folder it lies in (train, val, test, …). min_visibility: people
+    who are less visible, 0 to 1, are left out. So are people outside the picture, and rows with an unknown box.
+
+    Each frame is an image, each sequence a video, both numbered from 1. file_name is the path of the frame's picture or
+    video relative to the source (a folder, else the folder of the file); info.root is the way there from the JSON file.
+    A sequence without pictures has images without file_name; of others, frames without a picture are left out.
+    Annotations have bbox [left, top, width, height] px (amodal, unclipped), segmentation, area, track_id (the person's
+    id), group_id (-1 for alone, or where no groups are labelled) and visibility. An unknown image size is replaced by
+    the extent of the boxes. info has the content hash if all exported sequences are generated. The same dataset gives
+    the same bytes.
 
     Raises InputError if the source cannot be opened, a file of it is invalid, no sequence has labelled boxes, two
-    sequences would share a folder, or `out` cannot be written; WorkError if the disk is full.
+    sequences have one name, min_visibility is no share, or `out` cannot be written; WorkError if the disk is full.
     """
-    sequences = [s for s in open_source(source, images=False) if s.truth is not None and s.truth.box is not None]
+    if not is_number(min_visibility, 0, 1):
+        raise InputError(
+            place="--min-visibility", got=min_visibility, expected="a number from 0 to 1", remedy="correct it"
+        )
+    source, out = Path(source), Path(out)
+    sequences = [s for s in open_source(source) if s.truth is not None and s.truth.box is not None]
     if not sequences:
         raise InputError(
             file=source, got="no labelled boxes", expected="a dataset with boxes", remedy="give a generated dataset"
         )
-    starts = np.cumsum([0, *(s.length or 0 for s in sequences)]).tolist()
-    videos = [_video(k, s) for k, s in enumerate(sequences, 1)]
-    folders = output_paths("", [s.name for s in sequences], source=source)
-    images = chain.from_iterable(_images(k, s, folders[k - 1], starts[k - 1]) for k, s in enumerate(sequences, 1))
-    rows = chain.from_iterable(_annotations(k, s, starts[k - 1]) for k, s in enumerate(sequences, 1))
-    numbered = ({"id": k, **row} for k, row in enumerate(rows, 1))
-    ours = all(s.source.get("kind") == "generated" for s in sequences)
-    info = {"description": "flockscope", "version": "1"} | ({"content_hash": content_hash(source)} if ours else {})
+    root = source if source.is_dir() else source.parent
+    splits: dict[str, list[Sequence]] = {}
+    for sequence in sequences:
+        splits.setdefault(_split(sequence, root), []).append(sequence)
+    paths = [out if len(splits) == 1 else out.with_name(f"{out.stem}-{split}{out.suffix}") for split in splits]
+    for some in splits.values():
+        output_paths("", [s.name for s in some], source=source)
+    for path, some in zip(paths, splits.values(), strict=True):
+        write_file(path, _document(some, root, path, min_visibility).encode())
+    return paths
+
+
+def _split(sequence: Sequence, root: Path) -> str:
+    """Returns the name of the split that a sequence belongs to; "other" if none is known."""
+    if sequence.source.get("kind") == "generated":
+        seed = sequence.source["seed"]
+        return split_of(range(seed, seed + 1))
+    inside = Path(os.path.relpath(sequence.source.get("path", root), root)).parts
+    return next((part.lower() for part in reversed(inside) if part.lower() in SPLITS), "other")
+
+
+def _document(sequences: list[Sequence], root: Path, path: Path, min_visibility: float) -> str:
+    info: dict[str, Any] = {"description": "flockscope", "version": "1"}
+    if all(s.source.get("kind") == "generated" for s in sequences):
+        folders = [Path(s.source["path"]) for s in sequences]
+        hashes = {split_and_name(folder): read_whole_manifest(folder)["content_hash"] for folder in folders}
+        info["content_hash"] = hashing.dataset_hash(hashes)
+    info["root"] = Path(os.path.relpath(root, path.parent)).as_posix()
+    videos, images, annotations = [], list[str](), list[str]()
+    for k, sequence in enumerate(sequences, 1):
+        videos.append(json_text({"id": k, "name": sequence.name, **_numbers(sequence), **_size(sequence)}))
+        for index, row in _images(sequence, root):
+            images.append(json_text({"id": len(images) + 1, **row, "video_id": k, "frame": index}))
+            about = {"image_id": len(images), "video_id": k, "category_id": 1}
+            for found in _annotations(sequence, index, min_visibility):
+                annotations.append(json_text({"id": len(annotations) + 1, **about, **found}))
     blocks = (
         f'"info": {json_text(info)}, "licenses": []',
         f'"categories": [{json_text(PERSON)}]',
-        _block("videos", videos),
-        _block("images", images),
-        _block("annotations", numbered),
+        *(
+            f'"{name}": [\n' + ",\n".join(rows) + "\n]"
+            for name, rows in (("videos", videos), ("images", images), ("annotations", annotations))
+        ),
     )
-    write_file(Path(out), ("{" + ",\n".join(blocks) + "}\n").encode())
-    return Path(out)
+    return "{" + ",\n".join(blocks) + "}\n"
 
 
-def _block(name: str, rows: Any) -> str:
-    return f'"{name}": [\n' + ",\n".join(json_text(row) for row in rows) + "\n]"
+def _numbers(sequence: Sequence) -> dict[str, Any]:
+    return {"fps": sequence.fps, "length": sequence.length}
+
+
+def _truth(sequence: Sequence) -> tuple[Truth, Array]:
+    truth = sequence.truth
+    assert truth is not None
+    assert truth.box is not None
+    return truth, truth.box
 
 
 def _size(sequence: Sequence) -> dict[str, int]:
@@ -73,33 +127,74 @@ def _size(sequence: Sequence) -> dict[str, int]:
     """
     if sequence.image_size is not None:
         return {"width": sequence.image_size[0], "height": sequence.image_size[1]}
-    truth = sequence.truth
-    assert truth is not None
-    assert truth.box is not None
-    right, bottom = np.ceil((truth.box[:, :2] + truth.box[:, 2:]).max(axis=0, initial=1)).astype(int).tolist()
+    box = _truth(sequence)[1]
+    edges = box[:, :2] + box[:, 2:]
+    right, bottom = np.ceil(edges[np.isfinite(edges).all(axis=1)].max(axis=0, initial=1)).astype(int).tolist()
     return {"width": right, "height": bottom}
 
 
-def _video(k: int, sequence: Sequence) -> dict[str, Any]:
-    return {"id": k, "name": sequence.name, "fps": sequence.fps, "length": sequence.length, **_size(sequence)}
-
-
-def _images(k: int, sequence: Sequence, folder: Path, before: int) -> Iterator[dict[str, Any]]:
-    size = _size(sequence)
-    images = sequence.source.get("images") or "jpg"
+def _images(sequence: Sequence, root: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yields (frame, size and, where a picture is stored, file_name) of the frames that are images."""
+    size, files = _size(sequence), _picture_files(sequence)
     for index in range(1, (sequence.length or 0) + 1):
-        name = f"{folder.name}/{file_name('left', images, index)}"
-        yield {"id": before + index, "file_name": name, **size, "video_id": k, "frame": index}
+        if not files:
+            yield index, size
+        elif index in files:
+            yield index, {"file_name": Path(os.path.relpath(files[index], root)).as_posix(), **size}
 
 
-def _annotations(k: int, sequence: Sequence, before: int) -> Iterator[dict[str, Any]]:
-    truth: Truth | None = sequence.truth
-    assert truth is not None
-    assert truth.box is not None
-    for row in np.flatnonzero(np.isfinite(truth.box).all(axis=1)):
-        box = [round(v, 2) for v in truth.box[row].tolist()]
+def _picture_files(sequence: Sequence) -> dict[int, Path]:
+    """Returns the file with the picture of each frame, perhaps one video for all; empty without pictures."""
+    if not sequence.has_images:
+        return {}
+    folder = Path(sequence.source["path"])
+    if sequence.source["kind"] == "mot":
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # said when the sequence was opened
+            return left_pictures(folder).files
+    images = sequence.source["images"] or "jpg"
+    return {index: folder / file_name("left", images, index) for index in range(1, (sequence.length or 0) + 1)}
+
+
+def _annotations(sequence: Sequence, index: int, min_visibility: float) -> Iterator[dict[str, Any]]:
+    (truth, boxes), size = _truth(sequence), tuple(_size(sequence).values())
+    counts: dict[int, list[int]] | None = None
+    for row in range(*truth.rows(index).indices(len(boxes))):
+        box = [round(v, 2) for v in boxes[row].tolist()]
+        left, top, right, bottom = _inside(boxes[row], size)
+        if not (right > left and bottom > top and truth.visibility[row] >= min_visibility):  # also for nan
+            continue
+        person, area = int(truth.id[row]), round(box[2] * box[3], 2)
+        segmentation: Any = [[left, top, right, top, right, bottom, left, bottom]]
+        if sequence.load_pixels is not None:
+            counts = run_lengths(sequence.load_pixels(index).ids) if counts is None else counts
+            mask = counts.get(person, [size[0] * size[1]])
+            segmentation, area = {"size": [size[1], size[0]], "counts": mask}, sum(mask[1::2])
         yield {
-            "image_id": before + int(truth.frame[row]), "video_id": k, "category_id": 1, "bbox": box,
-            "area": round(box[2] * box[3], 2), "iscrowd": 0, "track_id": int(truth.id[row]),
+            "bbox": box, "segmentation": segmentation, "area": area, "iscrowd": 0, "track_id": person,
             "group_id": int(truth.group[row]), "visibility": round(float(truth.visibility[row]), 3),
         }  # fmt: skip
+
+
+def _inside(box: Array, size: tuple[int, ...]) -> tuple[float, ...]:
+    """Returns left, top, right, bottom of the part of a box inside the picture, px; nan for an unknown box."""
+    low, high = np.clip(box[:2], 0, size), np.clip(box[:2] + box[2:], 0, size)
+    return tuple(np.round([*low, *high], 2).tolist())
+
+
+def run_lengths(ids: Ints) -> dict[int, list[int]]:
+    """Return the mask of each person in an image of ids (H, W) as COCO's uncompressed run lengths, by id.
+
+    Pixels are counted down the columns, from left to right; numbers of pixels outside and inside the mask alternate,
+    the first is outside. Only ids above 0 are people.
+    """
+    flat = ids.ravel(order="F")
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(flat)) + 1]) if len(flat) else np.zeros(0, np.int64)
+    ends = np.append(starts[1:], len(flat))
+    found: dict[int, list[int]] = {}
+    reached: dict[int, int] = {}
+    for person, start, end in zip(flat[starts].tolist(), starts.tolist(), ends.tolist(), strict=True):
+        if person > 0:
+            found.setdefault(person, []).extend((start - reached.get(person, 0), end - start))
+            reached[person] = end
+    return {person: [*runs, len(flat) - reached[person]] for person, runs in found.items()}

@@ -1,9 +1,13 @@
-"""KITTI export: stereo pairs, true disparities and calibration of generated sequences, named as in KITTI's stereo data.
+"""KITTI export: stereo pairs, true disparities and calibration of generated sequences, named as in KITTI's data.
 
 OUT/<split>/<name>/ of a sequence holds image_2 (left) and image_3 (right), 8-bit PNG; disp_noc_0, 16-bit PNG of 256
-times the disparity in px, 0 where it is unknown or the right camera does not see the point; and calib.txt. Pictures are
-named for the frame, from 000001.png. calib.txt has three lines of 12 numbers, 3 x 4 matrices row by row: P2 and P3
-project points of the left camera's coordinates into the left and right picture; Tr maps world to left camera.
+times the disparity in px, 0 where it is unknown or the right camera does not see the point; times.txt, the time of each
+frame in s; and calib.txt. Pictures are named for the frame, from 000001.png.
+
+calib.txt has the matrices of KITTI's calibrations row by row, so that tools for its odometry and its object data read
+it. P0 to P3 (3 x 4) project points of the left camera's coordinates: there are no grey cameras, so P0 and P2 are the
+left picture, P1 and P3 the right one. The world takes the place of the laser scanner and of the IMU: Tr and
+Tr_velo_to_cam (3 x 4) map it to the left camera, Tr_imu_to_velo (3 x 4) and R0_rect (3 x 3) are identities.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ from sim.io.files.atomic import write_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
 from sim.io.store.camera_files import read_camera
-from sim.io.store.manifest import read_manifest
+from sim.io.store.manifest_check import read_whole_manifest
 from sim.types import Camera
 
 FOLDERS = {"left": "image_2", "right": "image_3", "disparity": "disp_noc_0"}
@@ -51,7 +55,9 @@ def calibration(camera: Camera) -> str:
     right = left.copy()
     right[0, 3] = -fx * camera.baseline
     pose = np.column_stack([camera.rotation, -camera.rotation @ camera.position])
-    return "".join(_line(name, matrix) for name, matrix in (("P2", left), ("P3", right), ("Tr", pose)))
+    lines = {"P0": left, "P1": right, "P2": left, "P3": right, "R0_rect": np.eye(3), "Tr_velo_to_cam": pose}
+    lines |= {"Tr_imu_to_velo": np.eye(3, 4), "Tr": pose}
+    return "".join(_line(name, matrix) for name, matrix in lines.items())
 
 
 def _line(name: str, matrix: NDArray[Any]) -> str:
@@ -59,7 +65,7 @@ def _line(name: str, matrix: NDArray[Any]) -> str:
 
 
 def _export(folder: Path, target: Path) -> None:
-    stored = StoredPictures(folder, read_manifest(folder))
+    stored = StoredPictures(folder, read_whole_manifest(folder))
     missing = [name for name in ("left", "right") if name not in stored.streams]
     if missing:
         raise InputError(
@@ -67,7 +73,10 @@ def _export(folder: Path, target: Path) -> None:
             remedy="generate it with --streams left,right,disparity",
         )  # fmt: skip
     write_file(target / "calib.txt", calibration(read_camera(folder / "camera.json")).encode())
+    about = stored.manifest["sequence"]
+    times = "".join(f"{k / about['fps']:.6e}\n" for k in range(about["length"]))
+    write_file(target / "times.txt", times.encode())
     for stream, name in FOLDERS.items():
         if stream in stored.streams:
-            for k, picture in enumerate(stored.all(stream, stored.manifest["sequence"]["length"]), 1):
+            for k, picture in enumerate(stored.all(stream, about["length"]), 1):
                 write_file(target / name / f"{k:06d}.png", cv2.imencode(".png", picture)[1].tobytes())

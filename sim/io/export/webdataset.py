@@ -19,7 +19,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim import hashing
-from sim.io.export.webdataset_samples import Member, SequenceItem, read_item, tar_members
+from sim.io.export.webdataset_samples import BLOCK, Member, SequenceItem, read_item, tar_members
 from sim.io.files import tables
 from sim.io.files.atomic import new_file, remove_partials, write_file
 from sim.io.files.lock import lock_folder
@@ -29,6 +29,7 @@ from sim.io.source import sequence_folders
 
 SAMPLES = ("sequence", "frame")
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
+RECORD = tarfile.RECORDSIZE
 INDEX = "index.json"
 INDEX_MARKS: Rules = {"content_hash": TEXT, "shards": list_of(TABLE)}
 SHARD_MARKS: Rules = {"manifests": TEXT, "sequences": TABLE}
@@ -96,7 +97,7 @@ def _items(source: Path, samples: str) -> list[SequenceItem]:
     generated dataset or holds no sequence, a manifest is invalid, two sequences share a name, or samples are "frame"
     and a sequence has videos.
     """
-    found = sorted(map(read_item, sequence_folders(source, "generated")), key=lambda item: item.name)
+    found = sorted((read_item(p, samples) for p in sequence_folders(source, "generated")), key=lambda item: item.name)
     twice = next((a.name for a, b in pairwise(found) if a.name == b.name), None)
     if twice is not None:
         raise InputError(file=source, got=f"two sequences {twice}", expected="unique names", remedy="export them apart")
@@ -110,14 +111,14 @@ def _items(source: Path, samples: str) -> list[SequenceItem]:
 
 
 def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]]:
-    """Yield the sequences of each shard: consecutive items, as many as fit into `size` bytes, at least one.
+    """Yield the sequences of each shard: consecutive items, as many as fit into a tar of `size` bytes, at least one.
 
     Without items one empty shard is yielded.
     """
     some: list[SequenceItem] = []
     full = 0
     for item in items:
-        if some and full + item.bytes > size:
+        if some and -(-(full + item.bytes + 2 * BLOCK) // RECORD) * RECORD > size:  # a tar ends with two empty blocks
             yield some
             some, full = [], 0
         some.append(item)
@@ -188,7 +189,7 @@ def _write_shard(root: Path, facts: dict[str, Any], items: list[SequenceItem]) -
 
 def _tar(path: Path, members: Iterable[Member]) -> None:
     with tarfile.open(path, "w", format=tarfile.GNU_FORMAT) as tar:
-        for name, read in members:
+        for name, _, read in members:
             body = read()
             info = tarfile.TarInfo(name)
             info.size = len(body)

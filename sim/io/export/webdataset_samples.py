@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import tarfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from sim.io.files import tables
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import split_and_name
 from sim.io.store.manifest import MANIFEST, read_manifest
+from sim.io.store.manifest_check import read_whole_manifest
 from sim.io.store.sequence_folder import open_sequence
 from sim.io.store.streams import file_name
 from sim.types import Array, Detections, FrameTruth, Groups
@@ -19,17 +21,17 @@ from sim.types import Array, Detections, FrameTruth, Groups
 FRAME_STREAMS = ("left", "right", "disparity", "ids")
 """Streams with one picture per frame; a frame's sample holds those of them that are stored."""
 
-TAR_HEADER = 1024  # bytes that one member adds to a tar beside its content, about
+BLOCK = 512  # bytes: a tar holds whole blocks
 
-Member = tuple[str, Callable[[], bytes]]
-"""Name of a file in the tar, and a call that reads its content."""
+Member = tuple[str, int, Callable[[], bytes]]
+"""Name of a file in the tar, its size in bytes, and a call that reads its content."""
 
 
 @dataclass(frozen=True)
 class SequenceItem:
     """A stored sequence to pack.
 
-    folder: where it is stored. bytes: its approximate size in a tar. content: its content hash, which names truth,
+    folder: where it is stored. bytes: what its members add to a tar. content: its content hash, which names truth,
     detections and pixels. manifest: the hash of its manifest. images: file type of its pictures ("jpg", "png" or
     "mp4"), None without pictures or with 16-bit streams only.
     """
@@ -53,18 +55,30 @@ class SequenceItem:
         return self.name.replace(".", "%2E")
 
 
-def read_item(folder: Path) -> SequenceItem:
+def read_item(folder: Path, samples: str) -> SequenceItem:
     """Return the item (size, hashes, file type) of a stored sequence's folder.
 
-    Raises InputError if its manifest is missing, altered or of another format. The other files are not read.
+    samples: "sequence" or "frame"; for frames, truth and detections are read. Raises InputError if its manifest is
+    missing, altered, of another format or not whole, or a file that is read is altered.
     """
-    manifest = read_manifest(folder)
-    size = sum(TAR_HEADER + facts["bytes"] for facts in manifest["files"].values())
-    return SequenceItem(folder, size, manifest["content_hash"], manifest["sha256"], manifest.get("images"))
+    manifest = read_whole_manifest(folder)
+    item = SequenceItem(folder, 0, manifest["content_hash"], manifest["sha256"], manifest.get("images"))
+    return replace(item, bytes=sum(_tar_bytes(name, size) for name, size, _ in tar_members(item, samples)))
+
+
+def _tar_bytes(name: str, size: int) -> int:
+    """Returns what a member adds to a tar: a header and its content; a name over 100 bytes is a member of its own."""
+    letters = len(name.encode())
+    longer = BLOCK + _whole(letters + 1) if letters > tarfile.LENGTH_NAME else 0
+    return longer + BLOCK + _whole(size)
+
+
+def _whole(size: int) -> int:
+    return -(-size // BLOCK) * BLOCK
 
 
 def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
-    """Yield the tar members of a stored sequence as (name, function that reads the content), in the order of packing.
+    """Yield the tar members of a stored sequence as (name, bytes, function that reads them), in the order of packing.
 
     item: the sequence; names begin with its key. samples "sequence": every file of the sequence, the manifest first.
     Otherwise, for each frame, its JSON labels and then its stored pictures (left, right, disparity, ids). Iterating
@@ -74,16 +88,18 @@ def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
     manifest = read_manifest(item.folder)
     stored = StoredPictures(item.folder, manifest)
     if samples == "sequence":
-        yield f"{item.key}.{MANIFEST}", (item.folder / MANIFEST).read_bytes
-        for name in manifest["files"]:
-            yield f"{item.key}.{name.replace('/', '.')}", partial(stored.body, name)
+        path = item.folder / MANIFEST
+        yield f"{item.key}.{MANIFEST}", path.stat().st_size, path.read_bytes
+        for name, facts in manifest["files"].items():
+            yield f"{item.key}.{name.replace('/', '.')}", facts["bytes"], partial(stored.body, name)
         return
     streams = [stream for stream in stored.streams if stream in FRAME_STREAMS]
     for index, body in enumerate(frame_labels(item.folder, manifest), 1):
-        yield f"{item.key}/{index:06d}.json", partial(bytes, body)
+        yield f"{item.key}/{index:06d}.json", len(body), partial(bytes, body)
         for stream in streams:
             name = file_name(stream, stored.images, index)
-            yield f"{item.key}/{index:06d}.{stream}{Path(name).suffix}", partial(stored.body, name)
+            size = manifest["files"][name]["bytes"]
+            yield f"{item.key}/{index:06d}.{stream}{Path(name).suffix}", size, partial(stored.body, name)
 
 
 def frame_labels(folder: Path, manifest: dict[str, Any]) -> Iterator[bytes]:

@@ -7,32 +7,44 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextvars import ContextVar
 from pathlib import Path
 
 from scenarios.errors import InputError
 from sim.io.files.atomic import write_error
+
+_held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
+"""Folders whose lock an enclosing block of this thread holds."""
 
 
 @contextmanager
 def lock_folder(root: Path) -> Iterator[None]:
     """Create the folder `root` and hold its lock for the length of the block; the block gets None.
 
-    Folders that it created are removed at the end if they are empty. Raises InputError at once, without waiting, if
-    another process, or another block of this one, holds the lock. An OSError inside the block is raised as WorkError if
-    the disk is full, else as InputError. Systems and file systems without such locks, as NFS, run unlocked.
+    Folders that it created are removed at the end if they are empty. `hold_lock` is the same for a writer that may run
+    inside such a block. Raises InputError at once, without waiting, if another process, or another block of this one,
+    holds the lock. An OSError inside the block is raised as WorkError if the disk is full, else as InputError. Systems
+    and file systems without such locks, as NFS, run unlocked.
     """
     made = [p for p in (root, *root.parents) if not p.exists()]
     try:
-        root.mkdir(parents=True, exist_ok=True)
         with _lock(root):
-            yield
+            token = _held.set(_held.get() | {root.resolve()})
+            try:
+                yield
+            finally:
+                _held.reset(token)
+                with suppress(OSError):  # only who holds the lock may remove what others would lock
+                    for folder in made:
+                        folder.rmdir()
     except OSError as error:
         raise write_error(root, error) from error
-    finally:
-        with suppress(OSError):
-            for folder in made:
-                folder.rmdir()
+
+
+def hold_lock(root: Path) -> AbstractContextManager[None]:
+    """Return `lock_folder(root)`, or a block without effect inside one of the same thread for the same folder."""
+    return nullcontext() if root.resolve() in _held.get() else lock_folder(root)
 
 
 @contextmanager
@@ -40,21 +52,37 @@ def _lock(root: Path) -> Iterator[None]:
     try:
         import fcntl
     except ImportError:
+        root.mkdir(parents=True, exist_ok=True)
         yield
         return
-    descriptor = os.open(root, os.O_RDONLY)
-    try:
+    while True:
+        root.mkdir(parents=True, exist_ok=True)
+        try:
+            descriptor = os.open(root, os.O_RDONLY)
+        except FileNotFoundError:  # removed by who held its lock
+            continue
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
+            os.close(descriptor)
             raise InputError(
-                file=root,
-                got="another run that writes here",
-                expected="one at a time",
+                file=root, got="another run that writes here", expected="one at a time",
                 remedy="wait, or choose another --out",
-            ) from None
+            ) from None  # fmt: skip
         except OSError:  # NFS cannot lock folders
-            pass
+            break
+        if _is_folder(descriptor, root):
+            break
+        os.close(descriptor)
+    try:
         yield
     finally:
         os.close(descriptor)
+
+
+def _is_folder(descriptor: int, root: Path) -> bool:
+    """Returns whether the open folder still stands at the path `root`, where another one may have been created."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), os.stat(root))
+    except FileNotFoundError:
+        return False

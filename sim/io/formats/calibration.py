@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from sim.io.formats.tsai import read_tsai
 from sim.io.store.camera_files import read_camera
 from sim.types import Camera
 
+PERSON, SMALLEST = 1.7, 2.0  # a person's height, m, and the least px that it must have in the picture
+WIDEST, WIDEST_SHARE = 2.0, 0.25  # m, and share of the height: a longer baseline is not in metres
 SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios of calibration and recording
 
 
@@ -21,7 +24,7 @@ def read_calibration(path: Path) -> Camera:
     rectified pair if it ends in .yml or .yaml, else our camera.json.
 
     Raises InputError if there is no such file, it is no XML, YAML or JSON object, a value is missing or of the wrong
-    kind or shape, or the camera cannot be used (sim.scene.camera_check).
+    kind or shape, the camera cannot be used (sim.scene.camera_check), or its lengths cannot be metres.
     """
     require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
     if path.suffix.lower() == ".toml":
@@ -31,23 +34,48 @@ def read_calibration(path: Path) -> Camera:
             remedy=remedy,
         )  # fmt: skip
     if path.suffix.lower() in (".yml", ".yaml"):
-        return read_opencv_yaml(path)
-    return read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
+        camera = read_opencv_yaml(path)
+    else:
+        camera = read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
+    return _require_metres(camera, path)
 
 
-def scaled_to_image(camera: Camera, image: tuple[int, int] | None, path: Path) -> Camera:
+def _require_metres(camera: Camera, path: Path) -> Camera:
+    """Return the camera unchanged; raise InputError if its lengths cannot be metres.
+
+    The height is no length in m if a person right below would be smaller than 2 px in any direction of view; the
+    baseline is none if it is longer than 2 m and than a quarter of the height.
+    """
+    height = float(camera.position[2])
+    person = camera.focal_px[1] * PERSON / height if camera.kind == "pinhole" else np.inf
+    if person < SMALLEST:
+        got = f"height {height:g} m, from where a person is {person:.2g} px tall"
+        raise InputError(file=path, place="position", got=got, expected="metres", remedy="give all lengths in metres")
+    if camera.baseline > max(WIDEST, height * WIDEST_SHARE):
+        raise InputError(
+            file=path, place="baseline", got=f"{camera.baseline:g} m, {height:g} m above the ground",
+            expected=f"metres, up to {max(WIDEST, height * WIDEST_SHARE):g} m",
+            remedy="give T, and P2 made from it, in metres: divide by 1000 if they are in mm",
+        )  # fmt: skip
+    return camera
+
+
+def scaled_to_image(
+    camera: Camera, image: tuple[int, int] | None, path: Path, aspect: Fraction = Fraction(1)
+) -> Camera:
     """Return the camera for pictures of `image` = (width, height) px, if it was calibrated at another size.
 
     Focal lengths and image centre are scaled per axis, px_per_m by the geometric mean of both factors; position,
     rotation and distortion stay. With `image` None or equal to the camera's size, the camera is returned unchanged.
-    path: the recording, for the error.
+    path: the recording, for the error. aspect: width / height of the recording's stored pixels, which `image` shows as
+    squares; the camera may be calibrated with stored or square pixels.
 
     Raises InputError if the aspect ratios differ by more than SHAPE_TOLERANCE (1 %).
     """
     if image is None or image == camera.image:
         return camera
     x, y = image[0] / camera.image[0], image[1] / camera.image[1]
-    if abs(x / y - 1) > SHAPE_TOLERANCE:
+    if all(abs(x / y / ratio - 1) > SHAPE_TOLERANCE for ratio in (1.0, float(aspect))):
         raise InputError(
             file=path, place="--camera", got="a calibration for {}×{} px".format(*camera.image),
             expected="one for {}×{} px, or of that shape".format(*image), remedy="give this recording's calibration",

@@ -1,7 +1,9 @@
-"""Reader for CAVIAR ground truth (CVML): an XML file of a recording with 25 fps and 384x288 px, frames from 0.
+"""Reader for CAVIAR ground truth (CVML): an XML file with the labels of a recording, frames from 0.
 
-A box is stored as centre and size. Most boxes are wider than tall although the people stand, so only their centres can
-be relied on. The image scale is the median of the longer sides / 1.7 m. Groups are labelled in each frame.
+The format states neither frame rate nor picture size. CAVIAR's own recordings have 25 fps and 384x288 px; for labels of
+others in this format the user gives the frame rate. A box is stored as centre and size. Most boxes are wider than tall
+although the people stand, so only their centres can be relied on. The image scale is the median of the longer sides /
+1.7 m. Groups are labelled in each frame.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ class CaviarRecording:
     name: that in the file, else the file's name without suffix. length: the last frame in the file, 0 without frames.
     frame (R,): from 1. id (R,): the person's id. label (R,): the id of the person's group, -1 for alone. centre (R, 2):
     x, y of the box's centre, px. size (R, 2): width, height, px. labelled: True if the file has a list of groups,
-    perhaps empty, in any frame.
+    perhaps empty, in any frame. caviar: True if it is one of CAVIAR's own recordings: people have hypotheses about what
+    they do, and all boxes lie in CAVIAR's pictures.
     """
 
     name: str
@@ -50,26 +53,32 @@ class CaviarRecording:
     centre: Array
     size: Array
     labelled: bool
+    caviar: bool
 
 
 def read_xml(path: Path) -> CaviarRecording:
     """Read the people and groups of the CAVIAR file (CVML) `path`. Our frame is the file's frame number + 1.
 
     A list of fewer than two members is no group. A person in two groups of a frame stays in the first, with a warning.
-    A file without people gives no rows. Raises InputError if the file is unreadable or no CVML, and, with the file's
-    frame number, if an object has no box or a box without area, a number is missing or beyond 1e6, an id or frame is
-    no whole number from 0 on, or an id stands twice in a frame. Also raises it for more than 1,000,000 frames, or
-    20,000,000 frames times people.
+    A file without people gives no rows. Raises InputError if the file is unreadable, no CVML or without frames, and,
+    with the file's frame number, if an object has no box or a box without area, a number is missing or beyond 1e6, an
+    id or frame is no whole number from 0 on, or an id stands twice in a frame. Also raises it for more than
+    1,000,000 frames, or 20,000,000 frames times people.
     """
     root = _root(path)
     rows: list[tuple[float, ...]] = []
-    last, labelled = 0, False
-    for element in root.iter("frame"):
+    last, labelled, hypotheses = 0, False, root.find("frame/objectlist/object/hypothesislist") is not None
+    for element in root.iterfind("frame"):
         index = _whole(path, "frame", element, "number", FRAMES - 1) + 1
         last, labelled = max(last, index), labelled or element.find("grouplist") is not None
         label = _labels(path, index, element)
         for person in element.iterfind("objectlist/object"):
             rows.append(_row(path, index, person, label))
+    if not last:
+        raise InputError(
+            file=path, got="no <frame> in <dataset>", expected="a CAVIAR file (CVML) with frames",
+            remedy="give another file",
+        )  # fmt: skip
     table = np.array(sorted(rows), np.float64).reshape(-1, 7)
     frame, id, label_ = (table[:, k].astype(np.int64) for k in range(3))
     again = repeated_ids(frame, id)
@@ -81,7 +90,9 @@ def read_xml(path: Path) -> CaviarRecording:
         )  # fmt: skip
     require_size(path, last, id)
     name = root.get("name", path.stem)
-    return CaviarRecording(name, last, frame, id, label_, table[:, 3:5], table[:, 5:7], labelled)
+    centre, size = table[:, 3:5], table[:, 5:7]
+    inside = bool(((centre >= 0) & (centre <= IMAGE_SIZE)).all())
+    return CaviarRecording(name, last, frame, id, label_, centre, size, labelled, hypotheses and inside)
 
 
 def _root(path: Path) -> ET.Element:
@@ -208,14 +219,16 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
 
 
 def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
-    """Return the CAVIAR file `path` as Sequence, without pictures and detections; image size 384 × 288 px.
+    """Return the CAVIAR file `path` as Sequence, without pictures and detections.
 
-    fps: frames per second; None: 25. px_per_m: image scale; None: the median of the longer sides of the first 100 boxes
-    / 1.7 m, nan without boxes. `source["px_per_m_frames"]` is then the last frame of these boxes. Raises InputError at
-    once if the file is unreadable, no CVML or invalid (see read_xml). The file is read again when the truth is asked
-    for.
+    The image size is 384 × 288 px for CAVIAR's own recordings, else unknown. fps: frames per second; None: 25 for
+    CAVIAR's own recordings, with a warning. px_per_m: image scale; None: the median of the longer sides of the first
+    100 boxes / 1.7 m, nan without boxes. `source["px_per_m_frames"]` is then the last frame of these boxes. Raises
+    InputError at once if the file is unreadable, no CVML or invalid (see read_xml), or not CAVIAR's own without `fps`.
+    The file is read again when the truth is asked for.
     """
-    rate, found = FPS if fps is None else fps, read_xml(path)
+    found = read_xml(path)
+    rate = _frame_rate(path, found) if fps is None else fps
     scale, learned = scale_of_first_boxes(found.frame, found.size.max(axis=1)) if px_per_m is None else (px_per_m, 0)
 
     def frames() -> Iterator[Frame]:
@@ -223,9 +236,22 @@ def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = 
 
     return Sequence(
         name=found.name, fps=rate, length=found.length, frames=frames,
-        load_truth=lambda: read_truth(path, rate, px_per_m), image_size=IMAGE_SIZE, px_per_m=scale,
+        load_truth=lambda: read_truth(path, rate, px_per_m), px_per_m=scale,
+        image_size=IMAGE_SIZE if found.caviar else None,
         source={"kind": "caviar", "path": str(path), **({"px_per_m_frames": learned} if learned else {})},
     )  # fmt: skip
+
+
+def _frame_rate(path: Path, found: CaviarRecording) -> float:
+    if not found.caviar:
+        raise InputError(
+            file=path, place="--fps", got="labels without frame rate, not of CAVIAR's recordings",
+            expected="the frames per second of the video", remedy="give --fps",
+        )  # fmt: skip
+    # The text names no path, so that a command over many recordings prints it once.
+    words = f"CAVIAR's recordings are taken at {FPS:g} fps, with pictures of {IMAGE_SIZE[0]}×{IMAGE_SIZE[1]} px"
+    warnings.warn(f"{words} (--fps says otherwise)", stacklevel=4)
+    return FPS
 
 
 def is_caviar(path: Path) -> bool:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
 
+import numpy as np
+
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, is_number
 from scenarios.limits import PICTURE_SIDE as SIDE
@@ -17,8 +19,8 @@ from sim.io.files.numeric_text import read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
-from sim.io.pictures.picture_folder import fill_gaps, find_pictures
-from sim.types import Camera, Frame, Image, Sequence
+from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
+from sim.types import Camera, Frame, Image, Ints, Sequence
 
 DEFAULT_FPS = 25.0
 
@@ -129,12 +131,13 @@ def open_folder(
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found = mot_text.read_detections(det, info.length) if is_present(det) else None
-    pictures = find_pictures(path / info.image_dir, info.length, is_present(gt) or found is not None)
-    right = find_pictures(path / f"{info.image_dir}_right", info.length, is_present(gt) or found is not None)
-    length = info.length or max(_labelled(found, gt), pictures.last)
+    pictures = _find_pictures(path, info, gt, found)
+    right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
+    length = info.length or max(_labelled_frames(found, gt).max(initial=0).item(), pictures.last)
     if not length:
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
         raise InputError(file=path, got="nothing that tells its length", expected=expected, remedy="complete it")
+    _refuse_beyond(path, pictures, length)
     seen = pictures.first_size() if images else None
     size = _picture_size(ini, info.image_size, seen)
     if background is not None and not pictures.files:
@@ -167,6 +170,34 @@ def open_folder(
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
         source={"kind": "mot", "path": str(path), **({} if choice is None else {"background": str(choice)})},
     )  # fmt: skip
+
+
+def left_pictures(path: Path) -> PictureFolder:
+    """Return the picture files of the MOTChallenge folder `path`, of the left camera, by frame.
+
+    Raises InputError as `open_folder`.
+    """
+    ini = path / "seqinfo.ini"
+    info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
+    gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
+    return _find_pictures(path, info, gt, mot_text.read_detections(det, info.length) if is_present(det) else None)
+
+
+def _find_pictures(path: Path, info: SeqInfo, gt: Path, found: mot_text.DetectionTable | None) -> PictureFolder:
+    labelled = (lambda: _labelled_frames(found, gt)) if is_present(gt) or found is not None else None
+    return find_pictures(path / info.image_dir, info.length, labelled)
+
+
+def _refuse_beyond(path: Path, pictures: PictureFolder, length: int) -> None:
+    """Warn about more pictures than frames; raise InputError if there are not more, but some have higher numbers."""
+    beyond = [file for frame, file in pictures.files.items() if frame > length]
+    if beyond and len(pictures.files) <= length:
+        raise InputError(
+            file=path, got=f"{beyond[0].name} among {len(pictures.files)} pictures", expected=f"frames 1 to {length}",
+            remedy="rename the pictures: each gets the number of its frame, or correct seqLength",
+        )  # fmt: skip
+    if beyond:
+        warnings.warn(f"{path}: {len(beyond)} pictures beyond frame {length} (seqLength) are not read", stacklevel=3)
 
 
 def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
@@ -216,11 +247,12 @@ def open_text(
     )  # fmt: skip
 
 
-def _labelled(found: mot_text.DetectionTable | None, gt: Path) -> int:
-    """Return the last frame (from 1) in det.txt, given as table `found`, and in the file `gt`; 0 if both are missing or
-    empty.
+def _labelled_frames(found: mot_text.DetectionTable | None, gt: Path) -> Ints:
+    """Return the frames (from 1) with a row in det.txt, given as table `found`, or in the file `gt`, ascending.
 
     Raises InputError if `gt` exists and is invalid.
     """
-    last = 0 if found is None else int(found.frame.max(initial=0))
-    return max(last, int(mot_text.read_table(gt).frame.max(initial=0))) if gt.is_file() else last
+    frames = [] if found is None else [found.frame]
+    if gt.is_file():
+        frames.append(mot_text.read_table(gt, boxless=True).frame)
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *frames]))

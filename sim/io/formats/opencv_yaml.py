@@ -23,7 +23,7 @@ from sim.types import Array, Camera
 
 SAME = 1e-6
 """Relative difference allowed between P1 and the left part of P2."""
-POSE = ("rotation", "position")
+KEYS = ("image_width", "image_height", "P1", "P2", "rotation", "position")
 KEY = re.compile(r"([A-Za-z_]\w*)\s*:\s*(.*)")
 NUMBER = re.compile(r"[-+]?(\d{1,30}\.?\d{0,30}|\.\d{1,30})([eE][-+]?\d{1,3})?")
 LIST = re.compile(r"\[([^\[\]]*)\]")
@@ -38,11 +38,17 @@ def read_opencv_yaml(path: Path) -> Camera:
     """Return the left Camera, with its baseline, of a rectified pair in OpenCV's YAML `path`.
 
     OpenCV's pixel coordinates begin at the centre of the first pixel, ours at its corner; 0.5 px is added. Raises
-    InputError if the file cannot be read as OpenCV's YAML, a key is missing or of a wrong shape, P1 and P2 are no
+    InputError if the file cannot be read as OpenCV's YAML, keys are missing or of a wrong shape, P1 and P2 are no
     rectified horizontal pair, or the camera cannot be used (sim.scene.camera_check).
     """
     blocks = _blocks(path, read_text(path))
-    values = {key: _value(blocks[key]) for key in ("image_width", "image_height", "P1", "P2", *POSE) if key in blocks}
+    missing = [key for key in KEYS if key not in blocks]
+    if missing:
+        raise InputError(
+            file=path, place=", ".join(missing), got="nothing", expected=f"the keys {', '.join(KEYS)}",
+            remedy="add them: see Calibration in docs/reference/formats.md",
+        )  # fmt: skip
+    values = {key: _value(blocks[key]) for key in KEYS}
     width, height = (float(_numbers(path, values, k, ())) for k in ("image_width", "image_height"))
     left, right = (_numbers(path, values, k, (3, 4)) for k in ("P1", "P2"))
     rotation, position = _numbers(path, values, "rotation", (3, 3)), _numbers(path, values, "position", (3,))

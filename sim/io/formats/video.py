@@ -1,7 +1,8 @@
 """Reader for video files, as Sequences: every frame has a number, also one that cannot be decoded.
 
 A frame that cannot be decoded has no picture. The container's frame rate is often wrong, so it is used only if the time
-stamps agree with it or tell no plausible rate. Sound is ignored.
+stamps agree with it or tell no plausible rate. Where the rate varies, each frame has the time that the file states.
+Pictures have square pixels. Sound is ignored.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from sim.io.formats.calibration import scaled_to_image
 from sim.io.pictures import video_decoding
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import fill_gaps, require_size, size_of
-from sim.types import Camera, Frame, Image, Sequence
+from sim.types import Array, Bools, Camera, Frame, Image, Sequence
 
 SUFFIXES = (
     ".mp4", ".m4v", ".mov", ".3gp", ".mkv", ".webm", ".avi", ".wmv", ".flv", ".ogv", ".mpg", ".mpeg",
@@ -41,12 +42,14 @@ def open_video(
     """Return the video file `path` as Sequence; its pictures are decoded while iterating, and it has no detections or
     truth.
 
-    fps: frames per second; None: found in the file (frame_rate). px_per_m: image scale, None if unknown. camera:
+    fps: frames per second; None: found in the file (frame_rate), and times of frames are those of the file if the rate
+    varies. px_per_m: image scale, None if unknown. camera:
     calibration, scaled to the picture size, None if unknown. background: sample of frames for background models,
     default 50 spread over the video, fewer if it is shorter. A frame that cannot be decoded has no picture, with a
     warning. The length is None for VP8 videos, whose packets are not all shown.
 
-    Warns if the video is shorter than its header says, has gaps in time, or states no credible frame rate. Raises
+    Warns if the video is shorter than its header says, has gaps in time, states no credible frame rate, or stores
+    pixels that are not square. Raises
     InputError if there is no file, it is no video or no picture can be decoded, the calibration has another aspect
     ratio, or more background frames are asked for than there are or fit into 2 GB. Iterating raises InputError for a
     picture of another size.
@@ -59,21 +62,28 @@ def open_video(
         raise InputError(file=path, got=got, expected="a video with pictures", remedy=video_decoding.REMEDY)
     for words in missing(index):
         warnings.warn(f"{path.name}: {words}", stacklevel=2)
+    if index.aspect != 1:
+        words = f"pixels of shape {index.aspect.numerator}:{index.aspect.denominator} are made square"
+        warnings.warn(f"{path.name}: {words}: pictures of {size_of(first)[0]}×{size_of(first)[1]} px", stacklevel=2)
     size, known = size_of(first), None if index.codec in video_decoding.HIDDEN else length
     rate, words = frame_rate(path.name, fps, index)
     choice = background.of(length, path, size)
+    times = None if fps is not None or index.ranks() is None or is_steady(index.times()) else index.times()
+
+    def bare(k: int) -> Frame:
+        return Frame(k, (k - 1) / rate if times is None else float(times[k - 1] - times[0]))
 
     def frames() -> Iterator[Frame]:
         for k, picture in enumerate(fill_gaps(_pictures(path, index, size), known, path.name), 1):
-            yield Frame(k, (k - 1) / rate, picture)
+            yield bare(k).replace(image=picture)
 
     return Sequence(
         name=path.stem, fps=rate, length=known, frames=frames,
-        image_size=size, camera=None if camera is None else scaled_to_image(camera, size, path),
+        image_size=size, camera=None if camera is None else scaled_to_image(camera, size, path, index.aspect),
         px_per_m=float("nan") if px_per_m is None else px_per_m, has_images=True,
         load_background=BackgroundSample(choice, length, path, lambda wanted: _pictures(path, index, size, wanted)),
         source={"kind": "video", "path": str(path), "fps": words, "background": str(choice)},
-        bare=None if known is None else lambda: (Frame(k, (k - 1) / rate) for k in range(1, known + 1)),
+        bare=None if known is None else lambda: map(bare, range(1, known + 1)),
     )  # fmt: skip
 
 
@@ -96,7 +106,7 @@ def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
         yield f"ends after {length} of the {index.promised} frames it promises"
     elif not index.promised and index.seconds - shown > max(GAP, GAPS * usual):
         yield f"ends after {shown:.1f} of the {index.seconds:.1f} s it promises"
-    gaps = np.flatnonzero(step > max(GAP, GAPS * usual)) + 1
+    gaps = np.flatnonzero(_is_gap(step)) + 1
     if len(gaps):
         more = f" ({len(gaps) - 1} more such)" if len(gaps) > 1 else ""
         yield f"nothing for {step[gaps[0] - 1]:.1f} s after frame {gaps[0]}{more}; frames are numbered without the gap"
@@ -105,17 +115,19 @@ def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
 def frame_rate(name: str, given: float | None, index: video_decoding.PacketIndex) -> tuple[float, str]:
     """Return (frames per second, text that says where they come from).
 
-    The first of these is taken: `given` by the user, unchecked; the container's rate, if it is from 0.1 to 300 and
-    within 2 % of the time stamps' rate or that one is implausible (outside 0.1 to 300); the rate of the time stamps, if
-    plausible; 25. The last two cause a warning. name: the video's name in the warning. index: the video's packets.
+    The first of these is taken: `given` by the user, unchecked; the container's rate, if it is from 0.1 to 300, and
+    either the frames come at a steady rate within 2 % of it, or their rate is implausible (outside 0.1 to 300); the
+    rate of the time stamps, if plausible; 25. The last two cause a warning. name: the video's name in the warning.
+    index: the video's packets.
     """
     if given is not None:
         return given, f"{given:g}, as given"
-    header, timed = index.rate, stamped_rate(index)
-    if _plausible(header) and (not _plausible(timed) or abs(header / timed - 1) <= AGREE):
+    header, timed, steady = index.rate, stamped_rate(index), is_steady(index.times())
+    if _plausible(header) and (not _plausible(timed) or (steady and abs(header / timed - 1) <= AGREE)):
         return header, f"{header:g}, as the container says"
     if _plausible(timed):
-        text = f"{timed:g} by its time stamps (the container says {header:g})"
+        varying = "" if steady else ", which vary"
+        text = f"{timed:g} by its time stamps{varying} (the container says {header:g})"
         rate = timed
     else:
         text = f"{DEFAULT_FPS:g} (the container says {header:g}, its time stamps {timed:g})"
@@ -128,17 +140,31 @@ def _plausible(rate: float) -> bool:
     return RATES[0] <= rate <= RATES[1]
 
 
+def _is_gap(step: Array) -> Bools:
+    """Return flags for steps between frames, s, that are longer than 1 s and than 5 usual steps (the median)."""
+    return np.asarray(step > max(GAP, GAPS * float(np.median(step)) if len(step) else 0.0))
+
+
+def is_steady(times: Array) -> bool:
+    """Return True if frames come at a steady rate: each within half a step of its time at the mean rate.
+
+    times: of the frames, s, ascending.
+    """
+    if len(times) < 3:
+        return True
+    off = times - np.linspace(times[0], times[-1], len(times))
+    return bool(np.abs(off).max() <= (times[-1] - times[0]) / (len(times) - 1) / 2)
+
+
 def stamped_rate(index: video_decoding.PacketIndex) -> float:
     """Return the frames per second by the time stamps of the packets, rounded to 0.001; 0 with fewer than two stamps.
 
-    index: the video's packets. It is 1 over the mean step between successive stamps in s. Only steps within half of the
-    median step of it count, so gaps are left out.
+    index: the video's packets. It is the number of steps between frames over the time from the first to the last. Gaps
+    that `missing` reports do not count.
     """
     step = np.diff(index.times())
-    if not len(step):
-        return 0.0
-    usual = np.abs(step - np.median(step)) <= np.median(step) / 2
-    return round(1.0 / float(step[usual].mean()), 3)
+    step = step[~_is_gap(step)]
+    return round(len(step) / float(step.sum()), 3) if len(step) else 0.0
 
 
 def _pictures(

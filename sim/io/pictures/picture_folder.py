@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os.path
-import re
 import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -14,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAMES
 from scenarios.regular_file import refuse_irregular
+from sim.io.files.side_files import is_hidden
 from sim.io.pictures.picture_header import is_bearable
+from sim.io.pictures.picture_numbers import Labelled, Numbering, frames_of, numbering_of
 from sim.types import Image
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff")
 Picture = TypeVar("Picture", bound=NDArray[Any])
-SPARSE = 100  # numbers in file names that use less than 1 of 100 values are time stamps, not frames
 
 
 def fill_gaps(pairs: Iterable[tuple[int, Image]], length: int | None, place: str) -> Iterator[Image | None]:
@@ -106,11 +105,13 @@ class PictureFolder:
     """The picture files of a recording.
 
     folder: their folder. files: path of the file of each frame, by frame number (from 1); a frame without a picture has
-    no entry. `last` is the highest number, so frames without a picture below it are gaps.
+    no entry. `last` is the highest number, so frames without a picture below it are gaps. numbering: how the numbers in
+    the names became frames, None for files in the order of their names.
     """
 
     folder: Path
     files: dict[int, Path]
+    numbering: Numbering | None
 
     @property
     def last(self) -> int:
@@ -142,46 +143,37 @@ class PictureFolder:
                 yield k, require_size(picture, size, self.files[k])
 
 
-def find_pictures(folder: Path, length: int | None, labelled: bool) -> PictureFolder:
+def find_pictures(folder: Path, length: int | None, labelled: Labelled | None) -> PictureFolder:
     """Return the picture files of a folder by frame (from 1); a missing folder gives no files.
 
-    length: number of frames, None if unknown. labelled: True if labels or detections define the frames. Files ending in
-    .jpg, .jpeg, .png, .bmp, .tif and .tiff count. The number at the end of a file's name is its frame. Numbers are
-    shifted so that the lowest becomes 1 if the lowest is 0, if the highest exceeds `length`, or if `length` is None and
-    `labelled` False. Files are numbered from 1 in the order of their names instead if one has no number, the rest of
-    their names differs, or the numbers use less than 1 of 100 values.
+    length: number of frames, None if unknown. labelled: returns the labelled frames, None without labels and
+    detections. Files ending in .jpg, .jpeg, .png, .bmp, .tif and .tiff count, except hidden and side files. Which frame
+    a file is, and what is refused: `picture_numbers`.
 
-    Raises InputError if two files are the same frame, as 1.jpg and 01.jpg, a frame is beyond 1,000,000, or one is a
-    FIFO, device, folder or other thing that is no regular file. A link to a missing file is a frame without picture.
+    Also raises InputError for a FIFO, device, folder or other thing that is no regular file. A link to a missing file
+    is a frame without picture.
     """
-    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES) if os.path.isdir(folder) else []
+    files = _picture_files(folder)
+    numbering = numbering_of(folder, files, length, labelled)
+    return PictureFolder(folder, frames_of(folder, files, numbering), numbering)
+
+
+def find_right_pictures(folder: Path, left: PictureFolder) -> PictureFolder:
+    """Return the picture files of the right camera by frame, numbered like those of the left one.
+
+    Raises InputError if the files have no number and are not as many as the left ones, and as `find_pictures`.
+    """
+    files = _picture_files(folder)
+    if files and left.numbering is None and len(files) != len(left.files):
+        got, expected = f"{len(files)} pictures without numbers", f"{len(left.files)}, as in {left.folder.name}"
+        raise InputError(file=folder, got=got, expected=expected, remedy="number the pictures of both cameras")
+    return PictureFolder(folder, frames_of(folder, files, left.numbering), left.numbering)
+
+
+def _picture_files(folder: Path) -> list[Path]:
+    if not os.path.isdir(folder):
+        return []
+    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and not is_hidden(p))
     for path in found:
         refuse_irregular(path)
-    numbers = [_number(path) for path in found]
-    if not found or None in numbers or len({str(p.with_suffix(""))[: -len(_digits(p))] for p in found}) > 1:
-        return PictureFolder(folder, dict(enumerate(found, 1)))
-    known = [n for n in numbers if n is not None]
-    low, high = min(known), max(known)
-    if high - low >= SPARSE * len(known):
-        return PictureFolder(folder, dict(enumerate(found, 1)))
-    beyond = length is not None and high > length
-    shift = 1 - low if low == 0 or beyond or (length is None and not labelled) else 0
-    files: dict[int, Path] = {}
-    for number, path in sorted(zip(known, found, strict=True)):
-        if number + shift in files:
-            got = f"{files[number + shift].name} and {path.name}"
-            raise InputError(file=folder, got=got, expected="one picture of each frame", remedy="remove one of the two")
-        files[number + shift] = path
-    if max(files) > FRAMES:
-        expected = f"frames up to {FRAMES}"
-        raise InputError(file=folder, got=files[max(files)].name, expected=expected, remedy="rename the pictures")
-    return PictureFolder(folder, files)
-
-
-def _digits(path: Path) -> str:
-    found = re.search(r"[0-9]+$", path.stem)
-    return found[0] if found else ""
-
-
-def _number(path: Path) -> int | None:
-    return int(_digits(path)) if _digits(path) else None
+    return found

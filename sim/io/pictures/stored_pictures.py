@@ -55,11 +55,14 @@ class StoredPictures:
         path, facts = self.folder / name, self.manifest["files"].get(name)
         wanted = "a file that manifest.json names" if facts is None else f"the {facts['bytes']} bytes of manifest.json"
         try:
-            body = path.read_bytes()
+            size = path.stat().st_size if path.is_file() else None  # a FIFO would block its reader
+            body = path.read_bytes() if size is not None and facts is not None and size == facts["bytes"] else b""
         except OSError:
-            raise InputError(file=path, got="missing", expected=wanted, remedy=REDO) from None
-        if facts is None or hashing.file_hash(body) != facts["sha256"]:
-            raise InputError(file=path, got=f"altered: {len(body)} bytes", expected=wanted, remedy=REDO)
+            size = None
+        if size is None:
+            raise InputError(file=path, got="missing", expected=wanted, remedy=REDO)
+        if facts is None or size != facts["bytes"] or hashing.file_hash(body) != facts["sha256"]:
+            raise InputError(file=path, got=f"altered: {size} bytes", expected=wanted, remedy=REDO)
         return body
 
     def one(self, stream: str, index: int) -> NDArray[Any]:

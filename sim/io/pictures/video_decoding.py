@@ -37,7 +37,7 @@ class PacketIndex:
     a group of packets begins that can be decoded by itself. rate: frames per second; promised: number of frames;
     seconds: duration; these three by the header, 0 if missing. broken: why reading stopped before the end of the file,
     "" if it did not. codec: libav's name of the codec. reorders: True if packets may be stored in another order than
-    they are shown.
+    they are shown. aspect: width / height of a stored pixel, 1 if unknown.
     """
 
     stamps: tuple[int | None, ...]
@@ -49,6 +49,7 @@ class PacketIndex:
     broken: str
     codec: str
     reorders: bool
+    aspect: Fraction = Fraction(1)
 
     def times(self) -> Array:
         """Return the times at which frames are shown, in s, ascending; unknown and repeated stamps are left out."""
@@ -104,8 +105,8 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
         if stream.codec_context is None:
             raise InputError(file=path, got="an unknown codec", expected="H.264 or the like", remedy=REMEDY)
         width, height = stream.codec_context.width, stream.codec_context.height
-        if not fits_picture(width, height):
-            got = f"{width}×{height} px"
+        if not fits_picture(width, height) or not fits_picture(*square_size(width, height, _aspect(stream))):
+            got = f"{width}×{height} px" + (f" of shape {aspect}" if (aspect := _aspect(stream)) != 1 else "")
             raise InputError(file=path, got=got, expected=PICTURE_SIZES, remedy="give a smaller video")
         stream.codec_context.thread_count = 1
         yield container, stream
@@ -139,8 +140,21 @@ def index_packets(path: Path) -> PacketIndex:
         return PacketIndex(
             tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base or Fraction(1, 1000),
             float(stream.average_rate or 0), int(stream.frames), _seconds(stream), broken, context.name,
-            bool(context.has_b_frames),
+            bool(context.has_b_frames), _aspect(stream),
         )  # fmt: skip
+
+
+def _aspect(stream: Any) -> Fraction:
+    """Return width / height of a pixel of a libav video stream, 1 if unknown."""
+    return stream.sample_aspect_ratio or stream.codec_context.sample_aspect_ratio or Fraction(1)
+
+
+def square_size(width: int, height: int, aspect: Fraction) -> tuple[int, int]:
+    """Return the (width, height) in px that show a picture with square pixels; the shorter side of a pixel grows.
+
+    width, height: of the stored picture, px. aspect: width / height of a stored pixel.
+    """
+    return (round(width * aspect), height) if aspect >= 1 else (width, round(height / aspect))
 
 
 def _seconds(stream: Any) -> float:
@@ -190,7 +204,7 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
             count += 1
             number = count if ranks is None or frame is None else ranks.get(frame.pts, 0)
             if frame is not None and not frame.is_corrupt and number and (some is None or number in some):
-                yield number, _picture(frame)
+                yield number, _picture(frame, index.aspect)
             if some is not None and number >= last:
                 return
 
@@ -223,11 +237,13 @@ def _decode_packet(stream: Any, packet: Any) -> list[Any]:
         return [None]
 
 
-def _picture(frame: Any) -> Image:
-    """Return a decoded libav frame as (H, W, 3) BGR uint8, turned upright by the rotation it states (quarter turns).
+def _picture(frame: Any, aspect: Fraction) -> Image:
+    """Return a decoded libav frame as (H, W, 3) BGR uint8 with square pixels, turned upright by the rotation it states
+    (quarter turns).
 
-    OpenCV converts the usual pixel format (yuv420p, BT.601, narrow range, even size). Other formats go through
-    swscale's exact conversion, which takes ten times as long; its default one darkens by one or two grey levels.
+    aspect: width / height of a stored pixel. OpenCV converts the usual pixel format (yuv420p, BT.601, narrow range,
+    even size). Other formats go through swscale's exact conversion, which takes ten times as long; its default one
+    darkens by one or two grey levels.
     """
     import cv2
 
@@ -236,5 +252,8 @@ def _picture(frame: Any) -> Image:
         image = np.asarray(cv2.cvtColor(frame.to_ndarray(), cv2.COLOR_YUV2BGR_I420), np.uint8)
     else:
         image = frame.reformat(format="bgr24", interpolation=EXACT).to_ndarray()
+    size = square_size(frame.width, frame.height, aspect)
+    if size != (frame.width, frame.height):
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), np.uint8)
     turns = round(frame.rotation / 90) % 4
     return np.ascontiguousarray(np.rot90(image, turns)) if turns else image

@@ -1,4 +1,6 @@
-"""Checks the values of a manifest.json whose seal is intact, so that no reader meets a value of another kind."""
+"""Checks a manifest.json whose seal is intact: its values, so that no reader meets a value of another kind, and, for
+exports, that it names every file of the sequence.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +10,9 @@ from typing import Any
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, INTEGER, PICTURE_SIDE, PICTURE_SIZES, SCALES, fits_picture
 from sim.io.files.value_check import TEXT, Rule, Rules, check_values, list_of, number, one_of, or_none, whole
-from sim.io.store.manifest import REDO
-from sim.io.store.streams import IMAGES, STREAMS
+from sim.io.store.manifest import MANIFEST, REDO, read_manifest
+from sim.io.store.streams import IMAGES, STREAMS, file_name
+from sim.types import BACKGROUNDS
 
 SIDES = list_of(whole(1, PICTURE_SIDE))
 SIZE = Rule(lambda v: SIDES.accepts(v) and len(v) == 2 and fits_picture(*v), f"[width, height], {PICTURE_SIZES}")
@@ -46,4 +49,31 @@ def check_manifest(path: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         raise InputError(
             file=path, place="sequence.image_size", got="null", expected="the size of the pictures", remedy=REDO
         )
+    return manifest
+
+
+def read_whole_manifest(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a sequence that is exported; its files are looked up, not read.
+
+    Raises InputError as `read_manifest` and `check_manifest`, if the manifest does not name the scenario or a picture
+    of its streams, and if a file is a link that leads out of the folder.
+    """
+    path = folder / MANIFEST
+    manifest = check_manifest(path, read_manifest(folder))
+    length, images = manifest["sequence"]["length"], manifest.get("images") or "png"
+    wanted = ["scenario.toml", "seqinfo.ini"]
+    for stream in manifest.get("streams", ()):
+        count = BACKGROUNDS if stream == "background" else length
+        wanted += [file_name(stream, images, k) for k in range(1, count + 1)]
+    missing = [name for name in wanted if name not in manifest["files"]]
+    if missing:
+        got = f"no {missing[0]}" + (f" and {len(missing) - 1} more" if len(missing) > 1 else "")
+        raise InputError(file=path, place="files", got=got, expected="every file of the sequence", remedy=REDO)
+    inside = folder.resolve()
+    for name in (MANIFEST, *manifest["files"]):
+        if not (folder / name).resolve().is_relative_to(inside):
+            raise InputError(
+                file=folder / name, got="a link that leads out of the sequence", expected="a file of the sequence",
+                remedy="export a copy that holds the files themselves (cp -rL)",
+            )  # fmt: skip
     return manifest

@@ -18,6 +18,8 @@ from sim.io.files import tables
 from sim.io.files.own_files import is_ours
 from sim.io.files.value_check import FLAG, TABLE, TEXT, Rules, check_values, number, one_of, or_none, whole
 from sim.io.store import seal
+from sim.io.store.manifest import MANIFEST
+from sim.io.store.manifest import MARKS as MANIFEST_MARKS
 from sim.types import Sequence
 
 RUN = "run.json"
@@ -72,8 +74,15 @@ def run_folder(path: Path) -> Path | None:
 def reject_foreign(folder: Path) -> None:
     """Raise InputError if the folder holds a file with a name of ours, but no run of ours: it would be replaced.
 
-    Its run.json tells whether the run is ours, without one its tracks.parquet.
+    Its run.json tells whether the run is ours, without one its tracks.parquet. Also raises InputError for the folder of
+    a stored sequence, or one inside it, which would no longer be what its manifest says.
     """
+    for place in (folder.absolute(), *folder.absolute().parents):
+        if is_ours(place / MANIFEST, MANIFEST_MARKS):
+            raise InputError(
+                file=folder, got=f"a place inside the stored sequence {place.name}", expected="a folder of its own",
+                remedy="choose another --out",
+            )  # fmt: skip
     found = [name for name in (RUN, EXACT, *NAMES) if (folder / name).exists()]
     if found and not is_ours(folder / found[0], MARKS):
         got = "a file of another program, or a damaged one"

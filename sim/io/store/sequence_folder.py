@@ -18,6 +18,7 @@ from scenarios.errors import InputError
 from scenarios.printable import printable
 from sim import hashing
 from sim.io.files import atomic, tables
+from sim.io.files.side_files import is_side_file
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_writer import NO_PICTURES, WrittenPictures, write_pictures
 from sim.io.pictures.stored_pictures import StoredPictures
@@ -79,7 +80,8 @@ def _refuse_foreign(folder: Path, names: set[str]) -> bool:
         ours = ours | read_manifest(folder)["files"].keys()
     found = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir())
     for path in [folder] if not folder.is_dir() else sorted(found):
-        if path.relative_to(folder).as_posix() not in ours:
+        inside = path.relative_to(folder)
+        if inside.as_posix() not in ours and not is_side_file(inside):
             raise InputError(
                 file=folder, got=f"{path}, a file that flockscope did not write", expected="its own files only",
                 remedy="move it away, or choose another --out",

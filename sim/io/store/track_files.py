@@ -15,6 +15,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.files import tables
 from sim.io.files.atomic import replace_sealed
+from sim.io.files.lock import hold_lock
 from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import event_dict, read_events
 from sim.io.store.group_files import groups_bytes, groups_csv
@@ -50,13 +51,15 @@ def write_tracks(
     pairs: the content of pairs.parquet (`pair_table`); None: no such file.
 
     Raises InputError if the tracks have wrong ids or unknown positions, a value of `info` is of the wrong kind, the
-    folder holds such a file of another program, or it cannot be written. Raises WorkError if the disk is full,
+    folder is a stored sequence or lies in one, it holds such a file of another program, another process writes to it,
+    or it cannot be written. Raises WorkError if the disk is full,
     ValueError if `info` holds NaN or infinity, TypeError if it holds what JSON cannot.
     """
     folder = Path(folder)
-    reject_foreign(folder)
     files = tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info, pairs=pairs)
-    replace_sealed(folder, files, RUN, NAMES)
+    with hold_lock(folder):
+        reject_foreign(folder)
+        replace_sealed(folder, files, RUN, NAMES)
     return folder
 
 

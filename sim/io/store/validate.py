@@ -14,6 +14,7 @@ from typing import Any
 from scenarios.errors import FlockscopeError, InputError
 from sim import hashing
 from sim.io.files.atomic import PARTIAL
+from sim.io.files.side_files import is_side_file
 from sim.io.formats.mot_folder import read_seqinfo
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
@@ -104,7 +105,9 @@ def _seqmaps(root: Path) -> Iterator[InputError]:
                 yield _problem(path, "missing", "the list of the split's sequences")
             continue
         listed = set(path.read_text(encoding="utf-8").splitlines()[1:])
-        there = {p.name for p in split.iterdir() if p.is_dir() and not p.name.startswith(PARTIAL)}
+        there = {
+            p.name for p in split.iterdir() if p.is_dir() and not (p.name.startswith(PARTIAL) or is_side_file(p.name))
+        }
         for name in sorted(listed - there):
             yield _problem(split / name, "missing", f"a sequence, as {path.name} says")
         for name in sorted(there - listed):
@@ -134,7 +137,8 @@ def _run(folder: Path) -> list[FlockscopeError]:
 def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
     named = {manifests.MANIFEST, *manifest["files"]}
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.relative_to(folder).as_posix() not in named:
+        inside = path.relative_to(folder)
+        if path.is_file() and inside.as_posix() not in named and not is_side_file(inside):
             yield _problem(path, "a file the manifest does not name", "only its own", remedy="move it elsewhere")
 
 

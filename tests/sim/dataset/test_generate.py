@@ -1,4 +1,5 @@
 import errno
+import json
 import os
 import signal
 import subprocess
@@ -14,6 +15,7 @@ from sim.dataset.generate import generate
 from sim.dataset.splits import split_of
 from sim.io.files import atomic
 from sim.io.source import open_source
+from sim.io.store.manifest import with_hash
 from sim.io.store.validate import validate
 from sim.workers.start import WorkerOptions
 from tests.fake_simulator import content, scenario
@@ -101,6 +103,35 @@ def test_complete_sequences_are_kept_and_others_redone(tmp_path, simulate):
     generate([Entry("x", scenario())], range(3), tmp_path)
     assert simulate.made == [0, 1]
     assert content(tmp_path) == before
+
+
+@pytest.mark.parametrize("harm", ["cut off", "another format", "altered", "a wrong value"])
+def test_a_sequence_with_an_invalid_manifest_is_not_replaced(tmp_path, simulate, harm):
+    """Nobody knows what it holds: perhaps another scenario, or a sequence of another version."""
+    (folder,) = generate([Entry("x", scenario())], range(1), tmp_path)
+    path = folder / "manifest.json"
+    manifest = json.loads(path.read_text())
+    changed = {"another format": {"format": 9}, "a wrong value": {"streams": 5}}.get(harm, {"seed": 7})
+    body = json.dumps({**manifest, **changed} if harm == "altered" else with_hash({**manifest, **changed}))
+    path.write_text(body[:200] if harm == "cut off" else body)
+    before = content(tmp_path)
+    simulate.asked.clear()
+    with pytest.raises(InputError, match=r"manifest.json.*delete that folder"):
+        generate([Entry("x", scenario())], range(2), tmp_path)
+    assert content(tmp_path) == before
+    assert simulate.made == []
+
+
+def test_side_files_are_nobodys(tmp_path, simulate):
+    """A folder with nothing else is empty, and a damaged sequence is replaced with them."""
+    folder = tmp_path / "flockscope-train/x-s00000"
+    folder.mkdir(parents=True)
+    (folder / ".DS_Store").write_text("")
+    generate([Entry("x", scenario())], range(1), tmp_path)
+    (folder / "._scenario.toml").write_text("")
+    (folder / "scenario.toml").write_text("")
+    generate([Entry("x", scenario())], range(1), tmp_path)
+    assert validate(tmp_path) == []
 
 
 def test_temporary_files_of_others_stay(tmp_path, simulate):

@@ -169,6 +169,7 @@ def test_a_folder_of_many_and_nobody_labelled_are_refused(tmp_path: Path, walk: 
         replay(walk, tmp_path / "none.toml")
 
 
+@pytest.mark.filterwarnings("ignore:CAVIAR's recordings are taken at 25 fps")
 @pytest.mark.parametrize("name", ["biwi/seq_hotel", "caviar/mwt1gt.xml", "mot/PETS09-S2L1-first200"])
 def test_real_recordings(shared_data: Path, name: str) -> None:
     made = replay(shared_data / name, ObservationSpec(), cut=Cut(5.0, 20.0), streams=())

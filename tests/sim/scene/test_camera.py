@@ -84,3 +84,16 @@ def test_scale_is_a_person_at_the_middle() -> None:
     assert px_per_m_at_centre(pinhole(90)) == pytest.approx(500 / 7)
     assert 0 < px_per_m_at_centre(pinhole(-5)) < 500  # the middle shows sky
     assert 0 < px_per_m_at_centre(pinhole(-30)) < 500  # no ground at all
+
+
+def test_at_and_above_the_horizon_there_is_no_ground_and_no_warning() -> None:
+    level = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    camera = Camera(
+        kind="pinhole", image=(160, 120), focal_px=(120.0, 120.0), centre_px=(80.0, 60.0),
+        position=np.array([0.0, 0.0, 2.0]), rotation=level,
+    )  # fmt: skip
+    uv = np.array([[80.0, 30.0], [80.0, 60.0], [80.0, 100.0]])
+    assert np.isfinite(to_ground(camera, uv)).all(axis=1).tolist() == [False, False, True]
+    J = ground_jacobian(camera, uv)
+    assert np.isfinite(J).all(axis=(1, 2)).tolist() == [False, False, True]
+    assert J[2, 1, 1] == pytest.approx(-2 * 120 / 40**2), "y = f h / (v - 60)"

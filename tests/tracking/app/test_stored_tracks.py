@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from sim.hashing import file_hash
+from sim.io.files.lock import lock_folder
 from sim.io.source import open_source
 from sim.io.store import seal
 from sim.io.store.run_seal import read_run
+from sim.io.store.validate import validate
 from tests.refusals import refused
 from tests.sealing import seal_again
 from tracking.app.cli import run
@@ -232,3 +236,62 @@ def test_a_sealed_fault_is_named_with_its_frame(made, tracks, tmp_path, capsys, 
         write_tracks(folder, wrong, fps=5.0, info=info)
     seal_again(folder)
     assert "tracks.parquet: frame 7, id " in refused(capsys, "score", made / "data", tracks)
+
+
+def test_one_run_at_a_time_writes_to_a_folder(made, tmp_path, capsys):
+    """The second command fails at once; a writer in Python fails, too, and inside the command it does not."""
+    pytest.importorskip("fcntl")
+    (source,) = (made / "data").rglob("*-s40000")
+    with lock_folder(tmp_path / "out"):
+        line = ["track", "blob", str(source), "--detections", "file", "--out", str(tmp_path / "out")]
+        with ThreadPoolExecutor(1) as other:
+            assert other.submit(run, line).result() == 2
+        assert "another run that writes here" in capsys.readouterr().err
+        (sequence,) = open_source(source)
+        tracked = track("blob", sequence, detections="file")
+        with ThreadPoolExecutor(1) as other, pytest.raises(InputError, match="another run that writes here"):
+            other.submit(tracked.write, tmp_path / "out", sequence).result()
+        tracked.write(tmp_path / "out", sequence)
+    assert validate(tmp_path / "out") == []
+    assert run(line) == 0
+
+
+def test_writers_of_one_folder_leave_a_whole_run(made, tmp_path):
+    """Each writer ends with success or with one clear error, and those with success leave a run."""
+    pytest.importorskip("fcntl")
+    (sequence,) = open_source(next((made / "data").rglob("*-s40000")))
+    tracked = track("blob", sequence, detections="file")
+
+    def write(_):
+        try:
+            tracked.write(tmp_path / "out", sequence)
+        except InputError as error:
+            return str(error).partition(": ")[2].partition(";")[0]
+        return "done"
+
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(write, range(60)))
+    assert set(found) <= {"got another run that writes here", "done"}
+    assert "done" in found
+    assert validate(tmp_path / "out") == []
+
+
+@pytest.mark.parametrize("below", ["", "tracks"])
+def test_tracks_are_not_written_into_a_stored_sequence(made, tmp_path, capsys, below):
+    data = Path(shutil.copytree(made / "data", tmp_path / "data"))
+    (folder,) = data.rglob("*-s40000")
+    before = sorted(data.rglob("*"))
+    line = ["track", "blob", folder, "--detections", "file", "--out", folder / below]
+    assert "inside the stored sequence" in refused(capsys, *line)
+    line = ["track", "blob", data, "--detections", "file", "--out", folder.parent]
+    assert "inside the stored sequence" in refused(capsys, *line)
+    assert sorted(data.rglob("*")) == before
+
+
+def test_side_files_are_no_tracks(made, tmp_path, capsys):
+    (tmp_path / "texts").mkdir()
+    name = next((made / "blob").iterdir()).name
+    shutil.copy(made / "blob" / name / "tracks.mot.txt", tmp_path / "texts" / f"{name}.txt")
+    (tmp_path / "texts" / f"._{name}.txt").write_bytes(b"\0\5\x16\7")
+    (source,) = (made / "data").rglob(name)
+    assert run(["score", str(source), str(tmp_path / "texts")]) == 0

@@ -70,6 +70,7 @@ def assert_perfect(found: Scores, without: Set[str] = frozenset()) -> None:
             assert value == pytest.approx(best, abs=1e-6), (key, found.surface, found.group_match)
 
 
+@pytest.mark.filterwarnings("ignore:CAVIAR's recordings are taken at 25 fps")
 @pytest.mark.parametrize(("place", "plane"), [("biwi/seq_hotel", "ground"), ("caviar/mwt1gt.xml", "image")])
 def test_labels_of_recordings_as_tracks_are_perfect(shared_data: Path, place: str, plane: str) -> None:
     (sequence,) = open_source(shared_data / place)

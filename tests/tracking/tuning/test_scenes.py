@@ -66,6 +66,7 @@ def test_a_recording_is_never_tuned_on(tmp_path):
         assert f"--{option}" in str(caught.value)
 
 
+@pytest.mark.filterwarnings("ignore:CAVIAR's recordings are taken at 25 fps")
 def test_real_recordings_are_never_tuned_on(tmp_path, shared_data):
     for name in ("mot/TUD-Campus", "biwi/seq_hotel", "caviar/mwt1gt.xml"):
         with pytest.raises(InputError, match="nothing is tuned on what was recorded"):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from scenarios.printable import counted
 from tracking.app import option_parsing
-from tracking.app.command_options import GenerateOptions, WebdatasetOptions
+from tracking.app.command_options import CocoOptions, GenerateOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 
@@ -58,16 +58,19 @@ def validate(folder: Path) -> CommandResult:
     return CommandResult({"problems": listed, "error": listed[0]}, "\n".join(lines), code=1)
 
 
-def export_coco(source: Path, out: Path) -> CommandResult:
-    """Writes one COCO file, the JSON file `out`, of all sequences with labelled boxes at the path `source`.
+def export_coco(options: CocoOptions) -> CommandResult:
+    """Writes COCO files, one per split, of all sequences with labelled boxes at the path of the options.
 
-    The result's data: "file", its path. An existing file is replaced. Raises InputError if the source cannot be opened,
-    no sequence has labelled boxes, or `out` cannot be written; WorkError if the disk is full.
+    The result's data: "files", their paths, "file", the only path, None if there are several, and "root", the folder
+    from which the names of pictures lead. Existing files are replaced. Raises InputError if the source cannot be
+    opened, no sequence has labelled boxes, or a file cannot be written; WorkError if the disk is full.
     """
     from sim.io.export.coco import coco
 
-    path = coco(source, out)
-    return CommandResult({"file": path}, str(path))
+    paths = coco(options.folder, options.out, options.min_visibility)
+    root = options.folder if options.folder.is_dir() else options.folder.parent
+    text = "\n".join([*map(str, paths), f"file names are relative to {root}"])
+    return CommandResult({"file": paths[0] if len(paths) == 1 else None, "files": paths, "root": root}, text)
 
 
 def export_kitti(source: Path, out: Path) -> CommandResult:

@@ -70,12 +70,13 @@ def track(options: TrackOptions) -> CommandResult:
     The result's data: "tracker", and "runs", a dictionary for each with keys of its run.json, "tracks" (number of ids)
     and "folder".
 
-    Raises InputError before the first frame if an option is wrong, if the source cannot be opened, if the tracker
-    cannot work on one of the sequences, if two sequences would share a folder, or if a folder holds files of another
-    program with names of ours; later if a picture, a detection or labels cannot be read or a folder cannot be written.
-    Raises WorkError if the tracker fails or the disk is full.
-    Tracks stored before an error stay.
+    Raises InputError before the first frame if an option is wrong, the source cannot be opened, the tracker cannot work
+    on one of the sequences, two sequences would share a folder, a folder is a stored sequence or holds files of another
+    program with names of ours, or another run writes to --out; later if a picture, a detection or labels cannot be read
+    or a folder cannot be written. Raises WorkError if the tracker fails or the disk is full. Tracks stored before an
+    error stay.
     """
+    from sim.io.files.lock import lock_folder
     from sim.io.source import open_source
     from sim.io.store.run_seal import reject_foreign, tracked_hash
     from tracking.tracker_registry import find
@@ -89,16 +90,17 @@ def track(options: TrackOptions) -> CommandResult:
         background=options.background,
     )  # fmt: skip
     folders = run_folders(sequences, options.source, options.out)
-    for folder in folders:
-        reject_foreign(folder)
-    _check_modes(setup, needs, sequences, options.background)
     rows = []
-    with setup.limited or nullcontext(), ProgressMeter("track", _total_frames(sequences)) as meter:
-        for sequence, folder in zip(sequences, folders, strict=True):
-            tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
-            run = setup.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
-            run.write(folder, sequence)
-            rows.append(_row(run, folder))
+    with lock_folder(options.out):
+        for folder in folders:
+            reject_foreign(folder)
+        _check_modes(setup, needs, sequences, options.background)
+        with setup.limited or nullcontext(), ProgressMeter("track", _total_frames(sequences)) as meter:
+            for sequence, folder in zip(sequences, folders, strict=True):
+                tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
+                run = setup.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
+                run.write(folder, sequence)
+                rows.append(_row(run, folder))
     return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(map(_line, rows)))
 
 

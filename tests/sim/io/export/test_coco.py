@@ -1,10 +1,12 @@
 import json
 from dataclasses import replace
 
+import cv2
+import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.export.coco import coco
+from sim.io.export.coco import coco, run_lengths
 from sim.io.store import sequence_folder
 from sim.io.store.validate import content_hash
 
@@ -22,9 +24,14 @@ def test_coco_has_every_box(tmp_path, make_sequence):
     assert [c["name"] for c in found["categories"]] == ["person"]
     assert found["info"]["content_hash"] == content_hash(tmp_path / "data")
     assert [i["id"] for i in found["images"]] == list(range(1, 25))
-    assert [a["id"] for a in found["annotations"]] == list(range(1, sum(len(t.id) for t in truths) + 1))
-    assert [a["track_id"] for a in found["annotations"]] == [i for t in truths for i in t.id.tolist()]
-    assert [a["group_id"] for a in found["annotations"]] == [g for t in truths for g in t.group.tolist()]
+    seen = [((t.box[:, :2] < (640, 480)) & (t.box[:, :2] + t.box[:, 2:] > 0)).all(axis=1) for t in truths]
+    assert [a["id"] for a in found["annotations"]] == list(range(1, sum(map(sum, seen)) + 1))
+    assert [a["track_id"] for a in found["annotations"]] == np.concatenate([t.id for t in truths])[
+        np.concatenate(seen)
+    ].tolist()
+    assert [a["group_id"] for a in found["annotations"]] == np.concatenate([t.group for t in truths])[
+        np.concatenate(seen)
+    ].tolist()
     images = {i["id"]: i for i in found["images"]}
     for a in found["annotations"]:
         image = images[a["image_id"]]
@@ -34,6 +41,107 @@ def test_coco_has_every_box(tmp_path, make_sequence):
         assert a["bbox"] == pytest.approx(t.box[row].tolist(), abs=0.006)
         assert a["area"] == pytest.approx(a["bbox"][2] * a["bbox"][3], abs=0.006)
     assert images[1]["width"] == 640
+
+
+def stored(folder, sequence, seed=1, **options):
+    return sequence_folder.write_sequence(folder, sequence, scenario="schema = 1\n", seed=seed, **options)
+
+
+def labelled_folder(path, rows, *, pictures=(), ini=""):
+    """A MOTChallenge folder; pictures: names below it, of 64 × 48 px."""
+    (path / "gt").mkdir(parents=True)
+    (path / "gt/gt.txt").write_text("".join(f"{row}\n" for row in rows))
+    (path / "seqinfo.ini").write_text(f"[Sequence]\nname={path.name}\nframeRate=5\n{ini}")
+    for name in pictures:
+        (path / name).parent.mkdir(exist_ok=True)
+        cv2.imwrite(str(path / name), np.zeros((48, 64, 3), np.uint8))
+
+
+def test_each_split_has_its_own_file(tmp_path, make_sequence):
+    """By the seeds of generated sequences, wherever they lie."""
+    for seed in (1, 2, 10_001, 20_001):
+        stored(tmp_path / f"data/mixed/s{seed}", replace(make_sequence(seed), name=f"s{seed}"), seed)
+    paths = coco(tmp_path / "data", tmp_path / "all.json")
+    assert [p.name for p in paths] == ["all-train.json", "all-val.json", "all-test.json"]
+    names = [[v["name"] for v in json.loads(p.read_text())["videos"]] for p in paths]
+    assert names == [["s1", "s2"], ["s10001"], ["s20001"]]
+    for p in paths:
+        found = json.loads(p.read_text())
+        assert [i["id"] for i in found["images"]] == list(range(1, len(found["images"]) + 1))
+    assert not (tmp_path / "all.json").exists()
+
+
+def test_recordings_are_split_by_their_folders(tmp_path):
+    for name in ("train/a", "val/b", "val/c"):
+        labelled_folder(tmp_path / "set" / name, ["1,1,5,5,9,9,1,1,1"])
+    paths = coco(tmp_path / "set", tmp_path / "x.json")
+    assert [p.name for p in paths] == ["x-train.json", "x-val.json"]
+    assert coco(tmp_path / "set/val", tmp_path / "y.json") == [tmp_path / "y.json"]
+
+
+def test_names_of_pictures_of_recordings_resolve(tmp_path):
+    """Another folder and file type than usual, numbers from 0; a frame without a picture is no image."""
+    pictures = [f"frames/frame_{k:04d}.png" for k in (0, 1, 3)]
+    rows = [f"{k},1,{5 * k},5,9,9,1,1,1" for k in (1, 2, 3, 4)]
+    labelled_folder(tmp_path / "set/s", rows, pictures=pictures, ini="imDir=frames\nimExt=.png\nseqLength=4\n")
+    for source in (tmp_path / "set", tmp_path / "set/s"):
+        with pytest.warns(UserWarning, match="pictures 0 to 3 are taken as frames 1 to 4"):
+            (path,) = coco(source, tmp_path / "out/c.json")
+        found = json.loads(path.read_text())
+        root = path.parent / found["info"]["root"]
+        assert root.resolve() == source
+        assert [(root / i["file_name"]).name for i in found["images"]] == [name.split("/")[1] for name in pictures]
+        assert all((root / i["file_name"]).is_file() for i in found["images"])
+        assert [(a["image_id"], a["bbox"][0]) for a in found["annotations"]] == [(1, 5), (2, 10), (3, 20)]
+        assert [i["frame"] for i in found["images"]] == [1, 2, 4]
+        assert found["images"][0]["width"] == 64
+
+
+def test_people_outside_the_picture_or_hardly_visible_are_left_out(tmp_path):
+    rows = [
+        "1,1,-20,5,20,9,1,1,1", "1,2,64,5,9,9,1,1,1", "1,3,5,48,9,9,1,1,1", "1,4,5,-30,9,29,1,1,1",
+        "1,5,-4,40,10,20,1,1,0.3", "1,6,10,10,5,5,1,1,0.1",
+    ]  # fmt: skip
+    labelled_folder(tmp_path / "s", rows, ini="imWidth=64\nimHeight=48\n")
+    (path,) = coco(tmp_path / "s", tmp_path / "c.json")
+    found = json.loads(path.read_text())["annotations"]
+    assert [a["track_id"] for a in found] == [5, 6]
+    assert found[0]["bbox"] == [-4, 40, 10, 20], "amodal and unclipped, as in gt.txt"
+    assert found[0]["segmentation"] == [[0, 40, 6, 40, 6, 48, 0, 48]], "the part inside the picture"
+    (path,) = coco(tmp_path / "s", tmp_path / "c.json", min_visibility=0.2)
+    assert [a["track_id"] for a in json.loads(path.read_text())["annotations"]] == [5]
+    with pytest.raises(InputError, match="--min-visibility: got 2"):
+        coco(tmp_path / "s", tmp_path / "c.json", min_visibility=2)
+
+
+def decoded(segmentation):
+    """The mask of uncompressed run lengths as COCO defines them: down the columns, zeros first."""
+    height, width = segmentation["size"]
+    counts = segmentation["counts"]
+    flat = np.repeat(np.arange(len(counts)) % 2, counts)
+    assert len(flat) == height * width
+    return flat.reshape(width, height).T.astype(bool)
+
+
+def test_masks_are_the_visible_pixels(tmp_path, make_pictured):
+    live = make_pictured(1, ("left", "ids"))
+    stored(tmp_path / live.name, live, streams=("left", "ids"))
+    (path,) = coco(tmp_path / live.name, tmp_path / "c.json")
+    found = json.loads(path.read_text())
+    frames = {i["id"]: i["frame"] for i in found["images"]}
+    assert any(a["area"] > 0 for a in found["annotations"])
+    for a in found["annotations"]:
+        right = live.load_pixels(frames[a["image_id"]]).ids == a["track_id"]
+        assert np.array_equal(decoded(a["segmentation"]), right)
+        assert a["area"] == right.sum()
+
+
+@pytest.mark.parametrize("ids", [np.zeros((3, 2), int), np.ones((3, 2), int), np.array([[1, 2, 1], [-2, 2, 0]])])
+def test_run_lengths(ids):
+    found = run_lengths(ids)
+    assert sorted(found) == sorted({int(k) for k in ids.ravel() if k > 0})
+    for person, counts in found.items():
+        assert np.array_equal(decoded({"size": ids.shape, "counts": counts}), ids == person)
 
 
 def test_nothing_to_export(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
+import shutil
 import tarfile
 from collections.abc import Callable
 from pathlib import Path
@@ -16,9 +17,11 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.export.webdataset import size_of, webdataset
-from sim.io.files import atomic
-from sim.io.source import open_source
+from sim.io.export.webdataset_samples import read_item
+from sim.io.files import atomic, tables
+from sim.io.source import open_source, sequence_folders
 from sim.io.store import sequence_folder
+from sim.io.store.manifest import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
 
 Sample = dict[str, bytes]
@@ -223,3 +226,46 @@ def test_a_stream_of_a_shard_needs_no_seeking(data: Path, tmp_path: Path) -> Non
     body = (tmp_path / "out" / "shard-000000.tar").read_bytes()
     with tarfile.open(fileobj=io.BytesIO(body), mode="r|") as tar:
         assert sum(1 for _ in tar) == len(members(tmp_path / "out" / "shard-000000.tar"))
+
+
+@pytest.mark.parametrize("samples", ["sequence", "frame"])
+def test_the_size_of_a_shard_is_known_before(data: Path, tmp_path: Path, samples: str) -> None:
+    """To the byte: shards are as full as whole sequences allow, also of frames, which leave most files out."""
+    items = [read_item(folder, samples) for folder in sequence_folders(data, "generated")]
+    shards = webdataset(data, tmp_path / "one", shard_size=1, samples=samples)["shards"]
+    assert [shard["bytes"] for shard in shards] == [-(-(i.bytes + 1024) // 10240) * 10240 for i in items]
+    full = -(-(sum(i.bytes for i in items[:2]) + 1024) // 10240) * 10240
+    shards = webdataset(data, tmp_path / "two", shard_size=full, samples=samples)["shards"]
+    assert (shards[0]["bytes"], len(shards[0]["sequences"])) == (full, 2)
+    shards = webdataset(data, tmp_path / "less", shard_size=full - 1, samples=samples)["shards"]
+    assert len(shards[0]["sequences"]) == 1
+
+
+def copied(data: Path, tmp_path: Path, change: Callable[[dict[str, Any], Path], None]) -> Path:
+    """A copy of the first sequence whose manifest is changed and sealed again."""
+    folder = Path(shutil.copytree(sequence_folders(data, "generated")[0], tmp_path / "flockscope-train/a"))
+    manifest = read_manifest(folder)
+    change(manifest, folder)
+    (folder / "manifest.json").write_bytes(tables.json_document(with_hash(manifest)))
+    return folder
+
+
+@pytest.mark.parametrize("samples", ["sequence", "frame"])
+def test_a_manifest_that_names_no_files_is_not_exported(data: Path, tmp_path: Path, samples: str) -> None:
+    folder = copied(data, tmp_path, lambda manifest, _: manifest.update(files={}))
+    with pytest.raises(InputError, match=r"files: got no scenario.toml and \d+ more"):
+        webdataset(folder, tmp_path / "out", samples=samples)
+    assert not list((tmp_path / "out").glob("*"))
+
+
+@pytest.mark.parametrize("samples", ["sequence", "frame"])
+def test_links_that_lead_out_of_a_sequence_are_not_exported(data: Path, tmp_path: Path, samples: str) -> None:
+    def link(manifest: dict[str, Any], folder: Path) -> None:
+        secret = tmp_path / "secret"
+        secret.write_bytes((folder / "scenario.toml").read_bytes())
+        (folder / "scenario.toml").unlink()
+        (folder / "scenario.toml").symlink_to(secret)
+
+    folder = copied(data, tmp_path, link)
+    with pytest.raises(InputError, match=r"scenario.toml: got a link that leads out of the sequence"):
+        webdataset(folder, tmp_path / "out", samples=samples)

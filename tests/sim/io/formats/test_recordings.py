@@ -94,7 +94,8 @@ def test_bad_biwi_is_one_line(tmp_path, groups, rows, word):
     assert "\n" not in str(error.value)
 
 
-OBJECT = '<object id="{}"><box h="8" w="16" xc="{}" yc="20"/></object>'
+DOES = "<hypothesislist><hypothesis><movement>walking</movement></hypothesis></hypothesislist>"
+OBJECT = '<object id="{}"><box h="8" w="16" xc="{}" yc="20"/>' + DOES + "</object>"
 GROUP = '<group id="{}"><members>{}</members></group>'
 
 
@@ -109,7 +110,8 @@ def xml(tmp_path, *frames, tag="dataset"):
 
 
 def test_meet_walk_together(shared_data):
-    (s,) = open_source(shared_data / "caviar" / "mwt1gt.xml")
+    with pytest.warns(UserWarning, match="taken at 25 fps, with pictures of 384×288 px"):
+        (s,) = open_source(shared_data / "caviar" / "mwt1gt.xml")
     assert (s.name, s.fps, s.length, s.image_size) == ("Meet_WalkTogether1", 25.0, 707, (384, 288))
     assert s.px_per_m == 28 / 1.7, "of the boxes of the first frames"
     found = caviar.read_xml(shared_data / "caviar" / "mwt1gt.xml")
@@ -120,7 +122,7 @@ def test_meet_walk_together(shared_data):
 
 def test_meet_walk_together_truth(shared_data):
     pytest.importorskip("sim.truth.merge_split_events")
-    t = open_source(shared_data / "caviar" / "mwt1gt.xml")[0].truth
+    t = open_source(shared_data / "caviar" / "mwt1gt.xml", fps=25)[0].truth
     assert (t.pos, t.groups, len(t.groups_px)) == (None, None, 707)
     assert t.box[0].tolist() == [18, 205, 14, 8]
     assert sum(len(g.id) for g in t.groups_px) == 182 + 82 + 10
@@ -144,8 +146,41 @@ def test_caviar_traps(tmp_path):
     assert found.label.tolist() == [4, 4, 5]
 
 
+@pytest.mark.parametrize(
+    ("objects", "what"),
+    [
+        ([OBJECT.format(1, 10).replace(DOES, "")], "no hypotheses"),
+        ([OBJECT.format(1, 10), OBJECT.format(2, 700)], "a larger picture"),
+        ([], "nobody"),
+    ],
+)
+def test_cvml_of_others_needs_a_frame_rate(tmp_path, objects, what):
+    """Neither CAVIAR's 25 fps nor its 384×288 px are assumed."""
+    path = xml(tmp_path, (objects, []))
+    with pytest.raises(InputError, match="--fps: got labels without frame rate"):
+        open_source(path)
+    (s,) = open_source(path, fps=12)
+    assert (s.fps, s.image_size) == (12, None), what
+
+
+def test_cvml_of_caviar_says_what_is_assumed(tmp_path):
+    path = xml(tmp_path, ([OBJECT.format(1, 10)], []))
+    with pytest.warns(UserWarning, match="taken at 25 fps, with pictures of 384×288 px"):
+        (s,) = open_source(path)
+    assert (s.fps, s.image_size) == (25, (384, 288))
+    assert open_source(path, fps=30)[0].fps == 30
+
+
+def test_cvml_without_frames_is_refused(tmp_path):
+    """Frames stand right below the root: others, deep in an XML of another program, were read as 0 frames."""
+    for body in ("", "<part><frame number='0'/></part>", "<a>" * 50 + "</a>" * 50):
+        (tmp_path / "clip.xml").write_text(f"<dataset>{body}</dataset>")
+        with pytest.raises(InputError, match="no <frame> in <dataset>"):
+            open_source(tmp_path / "clip.xml", fps=25)
+
+
 def test_a_caviar_of_nobody(tmp_path):
-    (s,) = open_source(xml(tmp_path, ([], []), ([], [])))
+    (s,) = open_source(xml(tmp_path, ([], []), ([], [])), fps=25)
     assert s.length == 2
     assert len(s.truth.frame) == 0
 

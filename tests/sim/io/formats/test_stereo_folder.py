@@ -84,3 +84,54 @@ def test_a_folder_with_right_pictures_is_a_stereo_recording(tmp_path) -> None:
     assert np.array_equal(right[7], made["img1_right"][7])
     with pytest.warns(UserWarning, match="frame 7"), pytest.warns(UserWarning, match="background sample"):
         assert len(track("stereo", sequence, detections="image")) == 12
+
+
+def test_right_pictures_are_numbered_like_the_left_ones(tmp_path) -> None:
+    """Also if the first right picture is lost: 000000.png of the left is frame 1, so 000002.png of the right is 3."""
+    for name, numbers in (("img1", range(4)), ("img1_right", (2, 3))):
+        (tmp_path / name).mkdir()
+        for k in numbers:
+            cv2.imwrite(str(tmp_path / name / f"{k:06d}.png"), np.full((*SIZE, 3), 10 * k, np.uint8))
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\n")
+    (sequence,) = open_source(tmp_path)
+    with pytest.warns(UserWarning, match="right: frame 1 has no readable picture"):
+        frames = list(sequence)
+    assert [f.image[0, 0, 0] for f in frames] == [0, 10, 20, 30]
+    assert [None if f.right is None else f.right[0, 0, 0] for f in frames] == [None, None, 20, 30]
+
+
+def test_right_pictures_without_numbers_are_as_many_as_the_left_ones(tmp_path) -> None:
+    for name, files in (("img1", "abc"), ("img1_right", "bc")):
+        (tmp_path / name).mkdir()
+        for file in files:
+            cv2.imwrite(str(tmp_path / name / f"{file}.png"), np.zeros((*SIZE, 3), np.uint8))
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\n")
+    with pytest.raises(InputError, match="2 pictures without numbers; expected 3, as in img1"):
+        open_source(tmp_path)
+
+
+@pytest.mark.parametrize("unit", [1000, 100])
+def test_a_baseline_that_is_not_in_metres_is_refused(tmp_path, unit) -> None:
+    """OpenCV's T is in the unit of the calibration board, often mm or cm."""
+    camera = rig(40.0)
+    left = np.array([[camera.focal_px[0], 0, 40, 0], [0, camera.focal_px[1], 30, 0], [0, 0, 1, 0]])
+    right = left.copy()
+    right[0, 3] = -camera.focal_px[0] * unit * 0.12
+    write_yaml(tmp_path / "pair.yml", camera, P1=left, P2=right)
+    with pytest.raises(InputError, match=rf"baseline: got {unit * 0.12:g} m.*divide by 1000"):
+        read_calibration(tmp_path / "pair.yml")
+
+
+def test_a_whole_calibration_in_mm_is_refused(tmp_path) -> None:
+    camera = rig(40.0)
+    write_yaml(tmp_path / "pair.yml", camera.replace(baseline=120.0), position=1000 * camera.position)
+    with pytest.raises(InputError, match=r"position: got height .*all lengths in metres"):
+        read_calibration(tmp_path / "pair.yml")
+
+
+def test_all_missing_keys_are_named_at_once(tmp_path) -> None:
+    write_yaml(tmp_path / "pair.yml", rig(40.0), image_width=None, position=None, rotation=None)
+    with pytest.raises(
+        InputError, match="image_width, rotation, position: got nothing; expected the keys image_width, "
+    ):
+        read_calibration(tmp_path / "pair.yml")

@@ -1,4 +1,5 @@
 import warnings
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -6,6 +7,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.pictures import video_decoding
 from sim.io.source import open_source
+from sim.types import Camera
 from tests.small_videos import SIZE, cut, damage, disc, picture, write_jpegs, write_video
 
 KINDS = {
@@ -140,6 +142,66 @@ def test_times_without_frames_are_told(tmp_path, name):
     (words,) = (str(warning.message) for warning in told)
     assert words == f"{name}: nothing for 3.0 s after frame 10 (1 more such); frames are numbered without the gap"
     assert [frame.index for frame in sequence] == list(range(1, 21))
+
+
+@pytest.mark.parametrize(
+    ("name", "steps", "rate"),
+    [
+        ("phone.mp4", [33] * 25 + [67] * 9 + [100] * 25, 1000 * 59 / (33 * 25 + 67 * 9 + 100 * 25)),
+        ("dark.mkv", [33] * 30 + [67] * 29, 1000 * 59 / (33 * 30 + 67 * 29)),
+        ("pause.mkv", [40] * 29 + [9000] + [80] * 29, 1000 * 58 / (40 * 29 + 80 * 29)),
+    ],
+)
+def test_a_rate_that_varies_is_frames_over_time(tmp_path, name, steps, rate):
+    """Each frame has the time that the file states; --fps replaces it. A reported gap counts for the times only."""
+    stamps = [0, *np.cumsum(steps).tolist()]
+    path = write_video(tmp_path / name, [picture(k) for k in range(60)], rate=1000, stamps=stamps)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        sequence = one(path)
+    assert any("by its time stamps, which vary" in str(w.message) for w in told)
+    assert sequence.fps == pytest.approx(rate, abs=0.001)
+    assert [f.t for f in sequence] == pytest.approx(np.array(stamps) / 1000, abs=1e-6)
+    assert [f.t for f in sequence.without_pictures()] == pytest.approx(np.array(stamps) / 1000, abs=1e-6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert [f.t for f in one(path, fps=10)] == pytest.approx([k / 10 for k in range(60)])
+
+
+def test_a_steady_rate_with_jitter_stays_steady(tmp_path):
+    stamps = [round(k * 1000 / 30) + (7 * k % 5) for k in range(40)]
+    path = write_video(tmp_path / "a.mkv", [picture(k) for k in range(40)], rate=30, stamps=stamps)
+    sequence = one(path)
+    assert sequence.fps == 30
+    assert [f.t for f in sequence] == pytest.approx([k / 30 for k in range(40)])
+
+
+@pytest.mark.parametrize(("aspect", "size"), [(Fraction(16, 11), (140, 64)), (Fraction(8, 9), (96, 72))])
+def test_pictures_have_square_pixels(tmp_path, aspect, size):
+    """A round thing stays round: the shorter side of a pixel grows. ffmpeg's players show the first as 140×64."""
+    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(2, 5)], aspect=aspect)
+    with pytest.warns(
+        UserWarning, match=f"{aspect.numerator}:{aspect.denominator} are made square: pictures of {size[0]}×"
+    ):
+        sequence = one(path)
+    assert sequence.image_size == size
+    images = [f.image for f in sequence]
+    assert [image.shape[1::-1] for image in images] == [size] * 3
+    assert [disc(image) for image in images] == pytest.approx([4.0 * k * size[0] / SIZE[0] for k in (2, 3, 4)], abs=3)
+
+
+def test_a_calibration_of_stored_pixels_serves_square_ones(tmp_path):
+    path = write_video(tmp_path / "a.mp4", [picture(0)], aspect=Fraction(16, 11))
+    camera = Camera(
+        kind="pinhole", image=SIZE, focal_px=(80.0, 80.0 * 16 / 11), centre_px=(48.0, 32.0),
+        position=np.array([0.0, 0.0, 3.0]), rotation=np.diag([1.0, -1.0, -1.0]),
+    )  # fmt: skip
+    with pytest.warns(UserWarning, match="made square"):
+        found = one(path, camera=camera).camera
+    assert found.image == (140, 64)
+    assert found.focal_px == pytest.approx((80 * 140 / 96, 80 * 16 / 11))
+    with pytest.warns(UserWarning, match="made square"), pytest.raises(InputError, match="a calibration for 96×96 px"):
+        one(path, camera=camera.replace(image=(96, 96)))
 
 
 def empty(path):

@@ -64,6 +64,78 @@ def test_two_pictures_of_a_frame_are_refused(tmp_path):
         open_source(folder(tmp_path / "a", ["000001.jpg", "000001.png"]))
 
 
+def rows(*frames):
+    return "".join(f"{frame},1,10,10,8,16,1,-1,-1,-1\n" for frame in frames)
+
+
+def names(numbers):
+    return [f"{k:06d}.jpg" for k in numbers]
+
+
+@pytest.mark.parametrize(
+    ("files", "frames", "ini", "right", "said"),
+    [
+        (names(range(4)), range(1, 5), "", [0, 1, 2, 3], "0 to 3 are taken as frames 1 to 4"),
+        (names(range(7, 10)), range(1, 4), "", [0, 1, 2], "7 to 9 are taken as frames 1 to 3"),
+        (names(range(7, 10)), range(1, 3), "seqLength=3\n", [0, 1, 2], "7 to 9 are taken as frames 1 to 3"),
+        (names(range(0, 40, 10)), range(1, 5), "", [0, 1, 2, 3], "0 to 30 in steps of 10"),
+        (names(range(2, 5)), (2, 4), "", [None, 0, 1, 2], ""),
+        (names(range(2, 9, 2)), (2, 6), "", [None, 0, None, 1, None, 2, None, 3], ""),
+        (names(range(1, 5)), (2,), "", [0, 1, 2, 3], ""),
+        (["b.jpg", "a.jpg"], (1, 2), "", [1, 0], "in the order of their names"),
+        (["1_left.jpg", "2_left.jpg", "10_left.jpg"], (1, 10), "", [0, 1, *[None] * 7, 2], ""),
+        (["cam2_0001_rgb.jpg", "cam2_0002_rgb.jpg"], (1, 2), "", [0, 1], ""),
+        (names(range(0, 40, 10)), (), "seqLength=4\n", [0, 1, 2, 3], ""),
+    ],
+)
+def test_labelled_frames_decide_which_frame_a_picture_is(tmp_path, files, frames, ini, right, said):
+    path = folder(tmp_path / "a", files, gt=rows(*frames), ini=ini)
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        open_source(path)
+    assert [said in str(w.message) for w in found] == [True] * bool(said)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert shown(path) == right
+
+
+@pytest.mark.parametrize(
+    ("files", "frames", "ini", "got"),
+    [
+        (names(range(5)), range(1, 5), "", "5 pictures numbered 0 to 4, and labels of frames 1 to 4"),
+        (names(range(5)), range(1, 5), "seqLength=5\n", "5 pictures numbered 0 to 4"),
+        (names(range(5, 20)), range(1, 9), "", "15 pictures numbered 5 to 19, and labels of frames 1 to 8"),
+        (names(range(50, 60)), range(1, 30), "", "10 pictures numbered 50 to 59"),
+        (names((1, 2, 4, 7)), range(1, 5), "", "4 pictures numbered 1 to 7, and labels of frames 1 to 4"),
+        (names((1, 2, 9)), (), "seqLength=4\n", "000009.jpg among 3 pictures"),
+        ([*names((1, 2)), "000001 (1).jpg"], (1, 2), "", r"000001 \(1\).jpg beside 000001.jpg"),
+        ([*names((1, 2)), "000001 copy.jpg", "x.jpg"], (), "", "000001 copy.jpg and 1 more beside 000001.jpg"),
+    ],
+)
+def test_pictures_that_may_be_shifted_against_labels_are_refused(tmp_path, files, frames, ini, got):
+    with pytest.raises(InputError, match=got):
+        open_source(folder(tmp_path / "a", files, gt=rows(*frames), ini=ini))
+
+
+def test_more_pictures_than_frames_are_told(tmp_path):
+    path = folder(tmp_path / "a", names(range(1, 6)), ini="seqLength=3\n")
+    with pytest.warns(UserWarning, match=r"2 pictures beyond frame 3 \(seqLength\) are not read"):
+        open_source(path)
+
+
+def test_side_files_are_ignored(tmp_path):
+    """Files of macOS, Windows and network disks: beside pictures, sequences, videos and their folders."""
+    path = folder(tmp_path / "data/a", names(range(1, 4)), gt=rows(1, 2, 3))
+    for name in ("._000001.jpg", "Thumbs.db", ".DS_Store"):
+        (path / "img1" / name).write_bytes(b"\0\5\x16\7")
+    for inside in ("__MACOSX/a/img1", "@eaDir/img1"):
+        (tmp_path / "data" / inside).mkdir(parents=True)
+        (tmp_path / "data" / inside / "000001.jpg").write_bytes(b"")
+    (tmp_path / "data/._a.mp4").write_bytes(b"")
+    assert [s.name for s in open_source(tmp_path / "data")] == ["a"]
+    assert shown(path) == [0, 1, 2]
+
+
 @pytest.mark.parametrize("suffix", [".jpg", ".png"])
 def test_a_lost_picture_is_told_once(tmp_path, capfd, suffix):
     """By us alone: libraries do not grumble on stderr."""

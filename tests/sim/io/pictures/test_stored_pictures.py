@@ -1,4 +1,5 @@
 import json
+import os
 from dataclasses import replace
 
 import cv2
@@ -329,3 +330,12 @@ def test_validate_counts_and_measures(tmp_path, make_pictured, images):
             (folder / here).write_bytes(body)
         relisted(folder, lambda m: m["files"].update({name: facts, extra: facts}))
         assert any(p.file == str(folder / extra) for p in validate(folder))
+
+
+def test_a_picture_that_became_a_fifo_is_missing(tmp_path, make_pictured):
+    """Its reader would wait for ever."""
+    read = stored(tmp_path / "a", make_pictured(3, ("left",)), ("left",), "png")
+    (tmp_path / "a/img1/000001.png").unlink()
+    os.mkfifo(tmp_path / "a/img1/000001.png")
+    with pytest.raises(InputError, match=r"000001.png: got missing"):
+        list(read)

@@ -201,9 +201,15 @@ def test_validate_reports_strangers_files_and_leftovers(tmp_path, make_sequence)
     sequence_folder.write_sequence(root / "a", make_sequence(5), scenario=SCENARIO, seed=5)
     (root / "a" / "note.txt").write_text("x")
     (root / ".partial-b-17").mkdir()
+    (root / "a" / "._note").write_text("")
+    (root / "a" / "img1").mkdir()
+    (root / "a" / "img1" / "Thumbs.db").write_text("")
+    (root / "__MACOSX").mkdir()
     got = [p.got for p in validate(tmp_path)]
     assert "a file the manifest does not name" in got
     assert "left by an interrupted run" in got
+    named = [str(p) for p in validate(tmp_path)]
+    assert not any(word in text for word in ("._note", "Thumbs", "__MACOSX") for text in named)
     with pytest.raises(InputError):
         validate(tmp_path / "nowhere")
 
