@@ -7,6 +7,7 @@ for a whole sequence.
 from __future__ import annotations
 
 from collections import deque
+from typing import Any
 
 import numpy as np
 
@@ -141,7 +142,7 @@ class PairBelief:
         self.past = deque((rows(p, np.nan) for p in self.past), self.past.maxlen)
         kept, means = np.flatnonzero(~new), self.means
 
-        def of_pairs(table: Array) -> Array:
+        def of_pairs(table: Any) -> Any:
             # Zeros that are not written take no memory, and most pairs are never near each other.
             out = np.zeros((len(old), len(old), *table.shape[1:]), table.dtype)
             if len(kept):

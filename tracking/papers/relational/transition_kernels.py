@@ -219,7 +219,7 @@ def join(
             if uniforms[m, p] >= share:  # alone, whoever is near
                 continue
             for c in neighbours:
-                i = some[c]
+                i = int(some[c])
                 dx, dy = pos[p, i, 0] - points[m, 0], pos[p, i, 1] - points[m, 1]
                 g = exist[p, i] * belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
                 near[label[p, i]] = max(near[label[p, i]], g)
