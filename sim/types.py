@@ -103,8 +103,7 @@ class Tracks(Frozen):
     plane: "ground", "space" (m) or "image" (px). unit "person": rows are people, group (N,) is the id of each person's
     group, -1 for alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s. cov (N,
     2D, 2D): covariance of x, y, (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in
-    [0, 1], or empty. groups None, events (): the tracker gives none. Those of people are then derived, in a copy
-    with `derived` True."""
+    [0, 1], or empty. groups None, events (): derived for people, `derived` is then True. own_events: never derived."""
 
     index: int
     t: float
@@ -120,6 +119,7 @@ class Tracks(Frozen):
     groups: Groups | None = None
     events: tuple[GroupEvent, ...] = ()
     derived: bool = False
+    own_events: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -109,14 +109,20 @@ def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config
 def _point(action: ArrayLike, size: int) -> Array:
     """Returns the action as a vector (size,), clipped to [-1, 1].
 
-    Raises InputError if it has another shape or is not finite.
+    Raises InputError if it is no array of numbers, has another shape or is not finite.
     """
-    point = np.asarray(action, float)
-    if point.shape != (size,) or not np.isfinite(point).all():
+    try:
+        point = np.asarray(action)
+    except ValueError:  # rows of different lengths
+        point = np.asarray(None)
+    if point.dtype.kind not in "biuf":
+        got = repr(action)[:80]
+    elif point.shape != (size,) or not np.isfinite(point).all():
         got = f"shape {point.shape}" if point.shape != (size,) else "NaN or infinity"
-        remedy = "give one number in [-1, 1] for each parameter of the space"
-        raise InputError(place="action", got=got, expected=f"({size},) finite numbers", remedy=remedy)
-    return np.asarray(np.clip(point, -1.0, 1.0))
+    else:
+        return np.asarray(np.clip(point.astype(float), -1.0, 1.0))
+    remedy = "give one number in [-1, 1] for each parameter of the space"
+    raise InputError(place="action", got=got, expected=f"({size},) finite numbers", remedy=remedy)
 
 
 def _to_unit(p: Param, value: Value) -> float:

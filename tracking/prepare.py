@@ -14,7 +14,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from scenarios.errors import FlockscopeError, InputError
+from scenarios.limits import INTEGER
 from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
 from tracking import image_scale, tracker_registry
 from tracking.config import Config
@@ -136,14 +139,18 @@ def prepare(
     none; seed: of their random numbers. Stored detections or labels are read here, and in mode "image" the
     background pictures.
 
-    Raises InputError if `sequence` is no Sequence, if the tracker, its parameters or the sensor settings are wrong, or
-    if tracker and sequence do not fit. Also if parameters are given to an instance or to a tracker without any, sensor
-    settings with a mode other than "truth", or files of the sequence cannot be read. Raises WorkError if the tracker
-    cannot be created, or in mode "truth" if an order of a simulated script was not fulfilled.
+    Raises InputError if `sequence` is no Sequence, the seed is no whole number of 0 or more in 64 bits, if the tracker,
+    its parameters or the sensor settings are wrong, or if tracker and sequence do not fit. Also if parameters are given
+    to an instance or to a tracker without any, sensor settings with a mode other than "truth", or files of the sequence
+    cannot be read. Raises WorkError if the tracker cannot be created, or in mode "truth" if an order of a simulated
+    script was not fulfilled.
     """
     if not isinstance(sequence, Sequence):
         remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
         raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
+    if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or not 0 <= seed <= INTEGER:
+        expected, remedy = f"a whole number from 0 to {INTEGER}", "give a smaller one, such as 0"
+        raise InputError(place="--seed", got=repr(seed), expected=expected, remedy=remedy)
     name, instance, config = _make(tracker, params)
     mode = choose_mode(instance.needs, sequence, detections)
     if sensor and mode != "truth":

@@ -90,14 +90,15 @@ def track(
     perfect. seed: for the tracker's and the sensor's random numbers. grouping: "belief", "rule", a TOML file of
     either, or the grouping itself, for a tracker that names no groups; None: the belief. If the tracker names groups,
     it has no effect, with a UserWarning. Another one says that the tracker's velocities are too far from its motion to
-    derive groups. progress: called with each frame's number, from 1, when the frame is done.
+    derive groups. If the tracker's first answer with people names no groups, later ones are replaced by derived ones,
+    with a UserWarning. progress: called with each frame's number, from 1, when the frame is done.
 
     Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit; later for a
     frame whose detections are not finite or whose picture cannot be read; after the last frame if tracks in the image
     have a scale of 0 or below. Raises WorkError if the tracker raises an exception or returns wrong tracks, or in mode
     "truth" if an order of a simulated script was not fulfilled.
     """
-    from tracking.grouping.grouped_tracks import names_groups, with_groups
+    from tracking.grouping.grouped_tracks import late_groups, names_groups, with_groups
     from tracking.grouping.velocity_check import velocity_warning
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
@@ -118,6 +119,14 @@ def track(
     if named and chosen is not None:
         warnings.warn(f"{prepared.name} names groups itself: --grouping has no effect", UserWarning, stacklevel=2)
     elif not named:
+        late = late_groups(reported)
+        if late is not None:
+            warnings.warn(
+                f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
+                "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group",
+                UserWarning,
+                stacklevel=2,
+            )
         fault = velocity_warning(prepared.name, reported, prepared.context.fps, scale.px_per_m, rule)
         if fault is not None:
             warnings.warn(fault, UserWarning, stacklevel=2)

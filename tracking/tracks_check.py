@@ -23,16 +23,17 @@ Fault = tuple[str, str]
 class ReportHistory:
     """What a tracker has reported in a sequence so far.
 
-    plane_and_unit: (plane, unit) of its first tracks, None before. ids: all track ids
+    plane_and_unit: (plane, unit) of its first tracks, None before. own_events: of its first tracks. ids: all track ids
     so far, of people or of groups. It starts empty.
     """
 
     plane_and_unit: tuple[str, str] | None = None
+    own_events: tuple[str, ...] = ()
     ids: set[int] = field(default_factory=set)
 
     def clear(self) -> None:
         """Forget everything, in place, for the start of another sequence."""
-        self.plane_and_unit = None
+        self.plane_and_unit, self.own_events = None, ()
         self.ids.clear()
 
 
@@ -43,12 +44,12 @@ def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory |
     tracks are wrong; the error names the tracker, the frame and the first fault.
 
     Checked are type, frame index, shapes, finite numbers (velocities may be nan: unknown), ids (int64, non-negative,
-    unique in the frame), groups and events. Plane and unit must be those of the first frame in `history`. Members of
-    groups and events must be ids that the tracker has reported in this frame or before; with unit "group" there may be
-    none. Any reported id may come back after a gap. Events must be emitted in this frame, start from frame 1 to this
-    one, and not end before they start. Filled in are empty scores (1) and, in events, `emitted` and `end` where they
-    are None (this frame). history: of this sequence; it is updated here, also if a fault is found later. None stands
-    for an empty history.
+    unique in the frame), groups and events. Plane, unit and own_events must be those of the first frame in `history`.
+    If own_events names kinds, events of other kinds are wrong. Members of groups and events must be ids that the
+    tracker has reported in this frame or before; with unit "group" there may be none. Any reported id may come back
+    after a gap. Events must be emitted in this frame, start from frame 1 to this one, and not end before they start.
+    Filled in are empty scores (1) and, in events, `emitted` and `end` where they are None (this frame). history: of
+    this sequence; it is updated here, also if a fault is found later. None stands for an empty history.
     """
     if isinstance(tracks, Tracks):
         tracks = _filled(tracks)
@@ -96,9 +97,16 @@ def _fault(tracks: Any, index: int, history: ReportHistory) -> Fault | None:
         return f"index {tracks.index}", f"index {index}"
     if tracks.plane not in ("ground", "space", "image") or tracks.unit not in ("person", "group"):
         return f"plane {tracks.plane!r}, unit {tracks.unit!r}", "plane ground, space or image; unit person or group"
-    history.plane_and_unit = first = history.plane_and_unit or (tracks.plane, tracks.unit)
+    if history.plane_and_unit is None:
+        history.plane_and_unit, history.own_events = (tracks.plane, tracks.unit), tracks.own_events
+    first, own = history.plane_and_unit, history.own_events
     if (tracks.plane, tracks.unit) != first:
         return f"plane {tracks.plane!r}, unit {tracks.unit!r}", f"plane {first[0]!r}, unit {first[1]!r} as before"
+    if tracks.own_events != own or not isinstance(own, tuple) or not set(own) <= set(EVENT_KINDS):
+        return (
+            f"own_events {tracks.own_events!r}",
+            f"a tuple of kinds of events ({', '.join(EVENT_KINDS)}), always the same",
+        )
     fault = _rows_fault(tracks) or _id_fault(tracks)
     if fault:
         return fault
@@ -106,7 +114,14 @@ def _fault(tracks: Any, index: int, history: ReportHistory) -> Fault | None:
     people = history.ids if tracks.unit == "person" else frozenset[int]()
     if tracks.groups is not None:
         fault = _groups_fault(tracks.groups, tracks.pos.shape[1], people)
-    return fault or _events_fault(tracks.events, index, people)
+    return fault or _events_fault(tracks.events, index, people) or _undeclared(tracks.events, own)
+
+
+def _undeclared(events: Iterable[GroupEvent], own: tuple[str, ...]) -> Fault | None:
+    """Returns the fault, as (got, expected), of an event of a kind that is not declared; None if `own`, the kinds
+    declared, is empty."""
+    kind = next((e.kind for e in events if own and e.kind not in own), None)
+    return None if kind is None else (f"an event of kind {kind!r}", f"one of own_events, {', '.join(own)}")
 
 
 def _rows_fault(tracks: Tracks) -> Fault | None:

@@ -34,8 +34,15 @@ def user_code(
 
 
 def what_was_raised(error: BaseException) -> str:
-    """Return the type of an exception and the first line of its message, as "SystemExit: 0"."""
-    return f"{type(error).__name__}: {error}".partition("\n")[0]
+    """Return the type of an exception and the first line of its message, as "SystemExit: 0".
+
+    The message of an exception whose own `__str__` fails says so.
+    """
+    try:
+        text = str(error)
+    except BaseException as failed:
+        text = f"a message that cannot be read: its __str__ raises {type(failed).__name__}"
+    return f"{type(error).__name__}: {text}".partition("\n")[0]
 
 
 def tracker_failed(tracker: str, method: str, place: str, error: BaseException) -> WorkError:

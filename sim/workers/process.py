@@ -156,7 +156,10 @@ def run_pickled(call: bytes) -> bytes:
             body = pickle.dumps(WorkResult(error=error, trace=trace))
             pickle.loads(body)
             return body
-        return pickle.dumps(WorkResult(error=RuntimeError(f"{type(error).__name__}: {error}"), trace=trace))
+        text = type(error).__name__
+        with suppress(BaseException):  # its __str__ may raise
+            text += f": {error}"
+        return pickle.dumps(WorkResult(error=RuntimeError(text), trace=trace))
 
 
 def _exit_with_parent() -> None:

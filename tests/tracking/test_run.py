@@ -11,7 +11,7 @@ from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import load
 from sim.io.store.track_files import write_tracks
 from sim.sequence import simulate
-from sim.types import Context, Detections, Frame, Groups, Sequence, Tracks, Truth
+from sim.types import Context, Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
@@ -291,3 +291,74 @@ def test_a_rule_of_groups_that_has_no_effect_is_said_to_have_none(recwarn):
     assert not [w for w in recwarn if "--grouping" in str(w.message)]
     with pytest.warns(UserWarning, match="group-pda names groups itself: --grouping has no effect"):
         track("group-pda", made, detections="file", grouping=LinkRule(near=1.0))
+
+
+class Naming(Stranger):
+    """Two people who stand side by side, whose tracker names them a group and says that they merged from frame 60 on.
+
+    first: the frame from which on groups are named, empty ones where there is none.
+    """
+
+    needs = ("points",)
+    first = 60
+    own_events = ()
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        id, late = np.array([1, 2]), frame.index >= 60
+        group, cov = np.full(2, 7 if late else -1), np.zeros((2, 4, 4))
+        groups = Groups.none() if self.first <= frame.index < 60 else None
+        merge = GroupEvent("merge", frame.index, None, None, (-1, -1), (7,), (1, 2), (0.0, 0.0))
+        events = (merge,) if frame.index == 60 else ()
+        pos = np.array([[1.0 + 0.1 * frame.index, 1.0], [1.0 + 0.1 * frame.index, 1.7]])
+        vel = np.full((2, 2), np.nan)
+        return Tracks(
+            frame.index, frame.t, "ground", "person", id, group, pos, vel, cov, None, np.ones(2), groups, events,
+            own_events=self.own_events,
+        )  # fmt: skip
+
+
+class NamingAlways(Naming):
+    first = 1
+
+
+class NamingDeclared(NamingAlways):
+    own_events = ("merge", "split")
+
+
+def standing(length):
+    """Frames with two detections, which `Naming` does not look at."""
+
+    def made():
+        for k in range(length):
+            yield Frame(k + 1, k / FPS, detections=Detections(k + 1, k / FPS, "ground", np.zeros((2, 2)), None))
+
+    return Sequence("standing", FPS, length, made, has_detections=True)
+
+
+@pytest.mark.filterwarnings("ignore:Naming")
+@pytest.mark.parametrize("tracker", [Naming, NamingAlways, NamingDeclared])
+@pytest.mark.parametrize("length", [30, 59, 61, 70])
+def test_what_a_tracker_reports_late_changes_no_earlier_frame(tracker, length):
+    whole, short = track(tracker, standing(90)), track(tracker, standing(length))
+    for a, b in zip(short, whole, strict=False):
+        assert a.group.tolist() == b.group.tolist()
+        assert a.groups.id.tolist() == b.groups.id.tolist()
+        assert [repr(e) for e in a.events] == [repr(e) for e in b.events]
+
+
+def test_groups_named_late_are_replaced_with_a_warning():
+    with pytest.warns(UserWarning, match=r"Naming: names groups from frame 60 on.*Groups\.none\(\)"):
+        run = track(Naming, standing(90))
+    assert run[40].group.tolist() == run[80].group.tolist() == [1, 1]
+    assert "grouping" in run.info
+
+
+def test_groups_named_from_the_first_frame_are_kept(recwarn):
+    run = track(NamingAlways, standing(90))
+    assert run[40].group.tolist() == [-1, -1]
+    assert run[80].group.tolist() == [7, 7]
+    assert not recwarn.list
+
+
+def test_events_of_declared_kinds_are_not_derived():
+    assert [(e.kind, e.emitted) for t in track(NamingDeclared, standing(90)) for e in t.events] == [("merge", 60)]

@@ -21,6 +21,7 @@ from scenarios.loading.toml_files import names as scenario_names
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import DetectionMode, Frame, Sequence, Tracks, Truth
+from tracking.grouping.grouped_tracks import with_groups
 from tracking.prepare import PreparedTracker, prepare
 from tracking.run import track
 from tracking.tracker_registry import find, names
@@ -109,6 +110,21 @@ def test_contract(scenario: str, tracker: str, mode: str) -> None:
     prefix = prepare(tracker, cut(scenario, mode, length // 2), detections=mode)
     assert content(run(prefix)) == content(tracks)[: length // 2], "a sequence cut short gives other tracks"
     assert content(run(ready)) == content(tracks), "after a reset the same input gives other tracks"
+
+
+@pytest.mark.parametrize("tracker", names())
+@pytest.mark.parametrize("scenario", ["cross", "mixed", "queue", "split", "street"])
+def test_derived_groups_and_events_do_not_look_ahead(scenario: str, tracker: str) -> None:
+    """Groups and events, reported or derived, of a sequence cut short are those of the whole one.
+
+    The last frame is left out: crossings and queues that are not over by then are reported there.
+    """
+    sequence = simulate(load(scenario, [f"camera.fps={FPS}"]), 40_001, 0, ())
+    tracks = run(prepare(tracker, first(sequence, 120), detections="file"))
+    whole = with_groups(tracks, FPS, 1.0)
+    assert any(t.events for t in whole)
+    for length in range(15, len(tracks), 15):
+        assert content(list(with_groups(tracks[:length], FPS, 1.0)))[:-1] == content(list(whole))[: length - 1]
 
 
 def reordered(sequence: Sequence, seed: int) -> Sequence:

@@ -127,6 +127,16 @@ def test_plane_and_unit_stay():
     refused(answer(3, unit="group", group=np.array([1, 2])), "unit 'group'; expected", history)
 
 
+def test_declared_kinds_of_events_stay_and_no_others_are_reported():
+    history = ReportHistory()
+    check(answer(3, own_events=("merge", "split"), events=(event(),)), history)
+    refused(answer(4), r"own_events \(\); expected .* always the same", history)
+    declared = answer(3, own_events=("merge",), events=(event(kind="split", before=(5,), after=(-1, -1)),))
+    refused(declared, "an event of kind 'split'; expected one of own_events, merge")
+    refused(answer(3, own_events=("meeting",)), "own_events .'meeting',.; expected a tuple of kinds of events .merge")
+    refused(answer(3, own_events="merge"), "own_events 'merge'")
+
+
 def test_trackers_of_groups():
     own = np.array([1, 2])
     check(answer(unit="group", group=own, groups=group(members=()), events=(event(members=()),)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import signal
 from dataclasses import dataclass
 from typing import ClassVar
@@ -11,6 +12,7 @@ import pytest
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from sim.types import Detections, Frame, Sequence
+from sim.workers.process import run_pickled
 from tracking.app.cli import run
 from tracking.config import Config, param
 from tracking.interrupts import is_interruption, recorded_interrupts
@@ -217,3 +219,54 @@ def test_in_a_search_the_trial_fails_and_the_search_goes_on(tmp_path, capsys, wo
 def test_a_search_whose_configs_exit_ends_with_an_error(tmp_path, capsys):
     assert search(tmp_path, "sys.exit(0)", "check of others") == 1
     assert '"got": "SystemExit: 0"' in capsys.readouterr().out
+
+
+class Unreadable(Exception):
+    def __str__(self):
+        raise ValueError("no text")
+
+
+class UnreadableExit(Unreadable, SystemExit):
+    pass
+
+
+@pytest.mark.parametrize("error", [Unreadable(), UnreadableExit()], ids=["Exception", "SystemExit"])
+def test_an_exception_whose_text_cannot_be_read(error):
+    tracker = Abrupt()
+    tracker.error = error
+    with pytest.raises(WorkError, match=f"got {type(error).__name__}: a message that cannot be read") as caught:
+        track(tracker, nobody())
+    assert caught.value.__cause__ is error
+
+
+def fails_unreadably(item):
+    class Local(Unreadable):
+        """It cannot be pickled either."""
+
+    raise Local()
+
+
+def test_an_unreadable_exception_passes_through_a_worker():
+    result = pickle.loads(run_pickled(pickle.dumps((fails_unreadably, 1))))
+    assert str(result.error) == "Local"
+
+
+def test_an_interrupt_that_a_tracker_makes_is_its_own(tmp_path, capsys):
+    """_thread.interrupt_main() runs the handler of Ctrl-C without a signal."""
+    assert run(command(tmp_path, "step", "__import__('_thread').interrupt_main()")) == 1
+    assert "gt, frame 3: got KeyboardInterrupt" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("seed", [2**63, 10**30, -1, 1.5, True])
+def test_a_wrong_seed_is_found_before_the_tracker_is_made(seed):
+    class Never(Abrupt):
+        def __init__(self):
+            raise AssertionError("made")
+
+    with pytest.raises(InputError, match=r"--seed: got .* expected a whole number from 0 to 9223372036854775807"):
+        track(Never, nobody(), seed=seed)
+
+
+def test_the_largest_seed():
+    for name in ("particle", "joint"):
+        assert len(track(name, nobody(), seed=2**63 - 1)) == 1

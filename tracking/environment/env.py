@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import closest
+from sim.dataset.splits import split_of
 from sim.types import DetectionMode, Image, Tracker
 from tracking.config import Config
 from tracking.detection_mode import choose_mode
@@ -83,7 +84,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     """An episode is one run of a tracker; an action, float32 (P,) in [-1, 1], sets its parameters; the reward is the
     gain in score. Observations: float32 (K,), statistics in [0, 1] and parameters in [-1, 1]. Arguments: the fields of
     TuningEnvOptions. State: sources, cache; config, rollout (the run, None before it) and score of the episode. Raises
-    InputError if an argument is wrong, there is no parameter to search, or a source lacks the detections."""
+    InputError if an argument is wrong, there is no parameter to search, a source lacks the detections, or simulated
+    sources have seeds of two splits."""
 
     metadata = METADATA
 
@@ -99,6 +101,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.config_class = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.config_class, given.params)
         self.sources = sources(given.suite, given.seeds, given.set)
+        _check_split(self.sources)
         self.mode = _detection_mode(self.tracker, self.sources, given.detections)
         self.space: Space = _action_parameters(self.config_class, self.mode, given.decision_every)
         self.cache = SourceCache(given.cache)
@@ -261,6 +264,15 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             "params": self.config.as_dict(),
             "refused": self.refused,
         }
+
+
+def _check_split(among: Iterable[Source]) -> None:
+    """Raises InputError if the seeds of the simulated sources are of two splits, such as training and test."""
+    seeds = sorted({s.seed for s in among if s.simulated})
+    found = {split_of(range(seed, seed + 1)) for seed in seeds}
+    if len(found) > 1:
+        got, remedy = f"{seeds[0]} to {seeds[-1]}: {', '.join(sorted(found))}", "give seeds of one split"
+        raise InputError(place="seeds", got=got, expected="seeds of one split", remedy=remedy)
 
 
 def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: DetectionMode | None) -> DetectionMode:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
+from typing import Any
 
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
 from tracking.environment.episode_cache import OpenedSource, SourceCache
@@ -104,9 +106,13 @@ class Rollout:
         start = time.perf_counter()
         self.prepared.reset(tracker_seed)
         self.seconds_tracking += time.perf_counter() - start
-        self._frames = self.prepared.frames()
+        self._frames: Iterator[Frame] | None = None
         self._next: Frame | None = None
         self.last: Frame | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # An iterator that draws or reads pictures cannot be copied: a copy begins one at its own next frame.
+        return {**self.__dict__, "_frames": None}
 
     @property
     def sequence(self) -> Sequence:
@@ -127,6 +133,9 @@ class Rollout:
         """
         last = self.length if upto is None else min(upto, self.length)
         while len(self.tracks) < last:
+            if self._frames is None:
+                done = len(self.tracks) + (self._next is not None)
+                self._frames = islice(self.prepared.frames(), done, None)
             self._next = frame = self._next or next(self._frames, None)
             if frame is None:
                 return

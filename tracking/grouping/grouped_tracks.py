@@ -7,10 +7,15 @@
   (tracking.grouping.merge_split_events).
 - Crossings and queues are measured by sim.truth.crossing_events and sim.truth.queue_detection.
 
+What the tracker reports itself is decided once, so that no later frame changes an earlier one:
+- Groups: by the first frame in which there are people (`names_groups`).
+- Events: by the kinds that the tracker declares (`Tracks.own_events`); of kinds that are not declared, from the frame
+  on in which it first reports one.
+
 An event is reported (`emitted`) in the frame in which it is known, and its `start` is the onset: a merge is known once
-the link holds, a crossing 2 s after its end, a queue 6 s after its start (3 s of waiting and 3 s in which people may
-advance). Crossings and queues that are not known by the end of the recording are reported in its last frame, so that
-this frame is not causal. A queue's `end` and `members` are those of the whole recording.
+the link holds, a crossing 2 s after its end, a queue 4.5 s after its end (3 s in which people may advance, and 1.5 s
+for which a line may be lost). Crossings and queues that are not known by the end of the recording are reported in its
+last frame, so that this frame is not causal.
 """
 
 from __future__ import annotations
@@ -25,8 +30,8 @@ from sim.io.formats.velocity import chords
 from sim.truth.crossing_events import SAME_BEFORE, crossings
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of
-from sim.truth.queue_detection import ADVANCE_TIME, QUEUE_TIME, queues
-from sim.types import EVENT_KINDS, Bools, GroupEvent, Groups, Tracks
+from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
+from sim.types import EVENT_KINDS, Array, Bools, GroupEvent, Groups, Ints, Tracks
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouping_choice import Grouping, default_grouping, links_of
 from tracking.grouping.merge_split_events import TrackedMotion, events_of_labels
@@ -75,12 +80,25 @@ def with_velocities(tracks: Sequence[Tracks], fps: float) -> Sequence[Tracks]:
 
 
 def names_groups(tracks: Sequence[Tracks]) -> bool:
-    """Return True if the tracker reports groups itself, in any frame of `tracks`.
+    """Return True if the tracker reports groups itself: decided by the first frame that has people or groups.
 
-    It does if there is a frame with unit "group", a `group` above -1, or `groups` that are not None (even without a
-    group). False for no tracks.
+    It does if the unit is "group", a `group` is above -1, or `groups` is not None (even without a group) in this frame.
+    False for no tracks.
     """
-    return any(t.unit == "group" or t.groups is not None or bool((t.group >= 0).any()) for t in tracks)
+    first = next((t for t in tracks if len(t.id) or t.groups is not None), None)
+    return first is not None and _has_groups(first)
+
+
+def late_groups(tracks: Sequence[Tracks]) -> int | None:
+    """Return the first frame with groups of a tracker that does not report groups in its first answer; else None.
+
+    Such groups are replaced by derived ones.
+    """
+    return None if names_groups(tracks) else next((t.index for t in tracks if _has_groups(t)), None)
+
+
+def _has_groups(tracks: Tracks) -> bool:
+    return tracks.unit == "group" or tracks.groups is not None or bool((tracks.group >= 0).any())
 
 
 def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
@@ -100,10 +118,11 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
     tracks: one tracker's, of a whole sequence, in order, one per frame from frame 1; the result has as many, marked as
     derived. fps: frames per second. px_per_m: px per m, used only if the tracks are in the image. rule: None stands for
     the default grouping.
-    - A tracker that names groups, in `group` or in the members of its `groups`, keeps them. Else the grouping forms
-      groups.
-    - Membership events (all kinds but cross and queue) are derived unless the tracker reported any of them.
-    - Crossings are derived unless it reported a crossing, queues unless it reported a queue.
+    - A tracker that names groups (`names_groups`), in `group` or in the members of its `groups`, keeps them. Else the
+      grouping forms groups, and groups that the tracker reports later are left out.
+    - Membership events (all kinds but cross and queue) are derived up to the frame from which on they are the
+      tracker's own: frame 1 if it declares one of these kinds, else the first frame in which it reports one.
+    - Crossings and queues are derived likewise, each kind for itself.
 
     No tracks, and sequences with a frame of unit "group", are returned as they are. Raises InputError if the tracks are
     in the image and px_per_m is not a number above 0.
@@ -111,49 +130,64 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
     given = list(tracks)
     if not given or any(t.unit == "group" for t in given):
         return given
-    rule = rule or default_grouping()
-    table = tabulate(given, fps, px_per_m, rule.smooth)
-    named = names_groups(given)
-    reported = {e.kind for t in given for e in t.events}
-    events: list[GroupEvent] = []
-    if not named or not reported & MEMBERSHIP_KINDS:
+    rule, named, own = rule or default_grouping(), names_groups(given), _own_events(given)
+    if not named:
+        given = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in given]
+    table, events = tabulate(given, fps, px_per_m, rule.smooth), list[GroupEvent]()
+    if not named or own.get("merge", math.inf) > 1:
         table, events = _grouped(table, named, fps, rule)
-    events = [e for e in events if not reported & MEMBERSHIP_KINDS]
-    return _filled(given, table, events + [e for e in _crossings_and_queues(table, fps) if e.kind not in reported])
+    events += _crossings_and_queues(table, fps)
+    return _filled(given, table, [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)])
+
+
+def _own_events(tracks: Sequence[Tracks]) -> dict[str, int]:
+    """Returns the frame from which on the events of a kind are the tracker's own, by kind; kinds that it never reports
+    are left out. All membership kinds have the first frame of any of them."""
+    found = dict.fromkeys(tracks[0].own_events, 1)
+    for t in tracks:
+        for event in t.events:
+            found.setdefault(event.kind, t.index)
+    membership = [frame for kind, frame in found.items() if kind in MEMBERSHIP_KINDS]
+    return {**found, **(dict.fromkeys(MEMBERSHIP_KINDS, min(membership)) if membership else {})}
 
 
 def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tuple[TracksTable, list[GroupEvent]]:
     """Returns the table with group ids filled in, and the membership events (people are columns + 1, frames count from
     1).
 
-    named: the tracker reports groups itself. Its groups are kept. If they equal those of the grouping, its events are
-    used, as their onsets are dated back. Else the events follow from the changes of the tracker's labels. If it reports
-    groups but none of its people has one, the table is returned as it is, without events. fps: frames per second.
+    named: the tracker reports groups itself. Its groups are kept. As long as they equal those of the grouping, its
+    events are used, as their onsets are dated back. From the first frame with another group on, the events follow from
+    the changes of the tracker's labels. fps: frames per second.
     """
     if named and (table.group < 0).all():
         return table, []
     links = links_of(table, fps, rule)
     motion = TrackedMotion(table.positions(), table.velocities(), fps)
     group, events = label_people(table.frame, table.column, motion, links, rule)
-    if named and not np.array_equal(group, table.group):
-        return table, events_of_labels(table.labels(), table.positions())
-    return replace(table, group=group), events
+    if not named:
+        return replace(table, group=group), events
+    other = table.frame[group != table.group]
+    equal = int(other[0]) if len(other) else table.length
+    changes = events_of_labels(table.labels(), table.positions()) if len(other) else []
+    early = [e for e in events if (e.emitted or e.start) <= equal]
+    return table, early + [e for e in changes if (e.emitted or e.start) > equal]
 
 
 def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:
     """Returns the crossings, then the queues, of the whole recording; `emitted` is the frame (from 1) in which each is
     known.
 
-    A crossing is known 2 s after its end, a queue 6 s after its start. An event that is not known by the end is emitted
-    in the last frame. Members are columns + 1, positions are in m. table: all tracks; fps: frames per second.
+    A crossing is known 2 s after its end, a queue once its people can no longer be advancing and its line no longer be
+    lost for a while. An event that is not known by the end is emitted in the last frame. Members are columns + 1,
+    positions are in m. table: all tracks; fps: frames per second.
     """
     pos, vel, label = table.positions(), table.velocities(), table.labels()
     present: Bools = np.isfinite(pos[..., 0])
     crossed = crossings(pos, vel, present, label, fps)
     queued = queues(pos, vel, present, label, fps)
-    after_cross, after_queue = frames_of(SAME_BEFORE, fps), frames_of(QUEUE_TIME, fps) + frames_of(ADVANCE_TIME, fps)
+    after_cross, after_queue = frames_of(SAME_BEFORE, fps), frames_of(ADVANCE_TIME, fps) + frames_of(BRIDGE_TIME, fps)
     return [replace(e, emitted=min(e.end + after_cross, table.length)) for e in crossed] + [
-        replace(e, emitted=min(e.start + after_queue - 1, table.length)) for e in queued
+        replace(e, emitted=min(e.end + after_queue, table.length)) for e in queued
     ]
 
 
@@ -190,10 +224,18 @@ def _groups_of_frames(given: Sequence[Tracks], table: TracksTable) -> list[Group
     """Returns a list of the Groups of every frame 1, 2, … of the sequence, in the tracks' unit (m or px); empty Groups
     for a frame without any.
 
-    Hulls go round footprints (16-gons on a circle of 0.25 m round each position), or round boxes if the tracks are in
-    the image and all have boxes. given: the tracks, at least one `Tracks` (else IndexError); table: the same as rows.
+    Hulls go round footprints (16-gons on a circle of 0.25 m round each position), or round boxes in frames in which
+    all tracks have boxes and lie in the image. given: the tracks, at least one `Tracks` (else IndexError); table: the
+    same as rows.
     """
     pos, vel, box = table.pos * table.scale, table.vel * table.scale, boxes_of_rows(given)
-    if box is not None:
-        return box_groups(table.frame, table.id, table.group, pos, vel, box, 0, table.length)
-    return groups_over_time(table.frame, table.id, table.group, pos, vel, 0, table.length, table.scale)
+    boxed = np.isfinite(box[:, 0])
+
+    def rows(kept: Bools) -> tuple[Ints, Ints, Ints, Array, Array]:
+        return table.frame[kept], table.id[kept], table.group[kept], pos[kept], vel[kept]
+
+    around = groups_over_time(*rows(~boxed), 0, table.length, table.scale)
+    if not boxed.any():
+        return around
+    in_boxes = box_groups(*rows(boxed), box[boxed], 0, table.length)
+    return [a if len(a.id) else b for a, b in zip(around, in_boxes, strict=True)]

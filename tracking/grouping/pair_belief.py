@@ -7,6 +7,7 @@ for a whole sequence.
 from __future__ import annotations
 
 from collections import deque
+from typing import Any
 
 import numpy as np
 
@@ -139,10 +140,16 @@ class PairBelief:
         self.log_odds, self.first_distance = square(self.log_odds, 0.0), square(self.first_distance, np.nan)
         self.total, self.count, self.first = rows(self.total, 0.0), rows(self.count, 0.0), rows(self.first, np.nan)
         self.past = deque((rows(p, np.nan) for p in self.past), self.past.maxlen)
-        pairs, means = np.where(new[:, None] | new, -1, old[:, None] * n + old).ravel(), self.means
-        means.total = np.concatenate([means.total, np.zeros((1, *means.total.shape[1:]))])[pairs]
-        means.weight = np.concatenate([means.weight, np.zeros((1, *means.weight.shape[1:]))])[pairs]
-        means.last = np.append(means.last, 0)[pairs]
+        kept, means = np.flatnonzero(~new), self.means
+
+        def of_pairs(table: Any) -> Any:
+            # Zeros that are not written take no memory, and most pairs are never near each other.
+            out = np.zeros((len(old), len(old), *table.shape[1:]), table.dtype)
+            if len(kept):
+                out[np.ix_(kept, kept)] = table.reshape(n, n, *table.shape[1:])[np.ix_(old[kept], old[kept])]
+            return out.reshape(-1, *table.shape[1:])
+
+        means.total, means.weight, means.last = (of_pairs(x) for x in (means.total, means.weight, means.last))
 
 
 def _distances(pos: Array) -> Array:

@@ -89,27 +89,25 @@ def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:
     """Returns a list with, for each frame, the tracker's group id of each track, (N,), in order of the tracks; -1 for a
     person alone.
 
-    It is `Tracks.group`, or, if that is -1 in the whole sequence, the group in `Tracks.groups` that lists the track as
-    a member; of several the last.
+    It is `Tracks.group`, or, of a person for whom that is -1, the group in `Tracks.groups` that lists the person as a
+    member; of several the last.
     """
-    if any((t.group >= 0).any() for t in tracks):
-        return [t.group for t in tracks]
     found = []
     for t in tracks:
         members = () if t.groups is None else zip(t.groups.id.tolist(), t.groups.members, strict=False)
         group_of = {p: g for g, people in members for p in people.tolist()}
-        found.append(np.array([group_of.get(p, -1) for p in t.id.tolist()], np.int64))
+        listed = np.array([group_of.get(p, -1) for p in t.id.tolist()], np.int64) if group_of else t.group
+        found.append(np.where(t.group >= 0, t.group, listed))
     return found
 
 
-def boxes_of_rows(tracks: Sequence[Tracks]) -> Array | None:
-    """Return the boxes (R, 4) left, top, width, height, px, of all tracks of a sequence, sorted by frame, then id, or
-    None.
+def boxes_of_rows(tracks: Sequence[Tracks]) -> Array:
+    """Return the boxes (R, 4) left, top, width, height, px, round which group hulls are drawn, sorted by frame, then
+    id; nan where hulls are not drawn round boxes: the tracks are not in the image or the frame has no boxes.
 
-    tracks: one `Tracks` per frame, in order; none raises IndexError. None if group hulls are not drawn round boxes: the
-    tracks are not in the image, a frame has tracks but no boxes, or there are no tracks in any frame.
+    tracks: one `Tracks` per frame, in order.
     """
-    if tracks[0].plane != "image" or any(t.box is None for t in tracks if len(t.id)):
-        return None
-    found = [t.box[np.argsort(t.id)] for t in tracks if t.box is not None and len(t.id)]
-    return np.concatenate(found) if found else None
+    return np.concatenate([
+        np.full((len(t.id), 4), np.nan) if t.box is None or t.plane != "image" else t.box[np.argsort(t.id)]
+        for t in tracks
+    ])  # fmt: skip

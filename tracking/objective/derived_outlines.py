@@ -13,6 +13,7 @@ import numpy as np
 from sim.geometry.footprints import FOOTPRINT
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, Bools, Ints, Tracks
+from tracking.grouping.grouped_tracks import names_groups
 from tracking.grouping.grouping_choice import default_grouping, links_of
 from tracking.grouping.tracks_table import TracksTable, boxes_of_rows, tabulate
 from tracking.objective.hull_overlaps import GroupOutlines
@@ -25,9 +26,10 @@ FROM_LEFT = np.roll(FOOTPRINT, -int(FOOTPRINT[:, 0].argmin()), axis=0)
 def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labelled: Bools) -> GroupOutlines:
     """Returns the hulls of groups of two or more people in the frames f where labelled[f] is true, sorted by frame.
 
-    tracks: of one tracker, of people, without `groups`, sorted by frame; none raises IndexError. If any track has a
-    group id, these ids define the groups, else the default grouping does. Hulls are drawn round boxes if the tracks are
-    in the image and every track has a box, else round footprints (16-gons on a circle of 0.25 m). Unit: m on the
+    tracks: of one tracker, of people, without `groups`, sorted by frame, with boxes in all frames or in none; none
+    raises IndexError. If the tracker names groups (`names_groups`), its group ids define the groups, else the default
+    grouping does. Hulls are drawn round boxes if the tracks are in the image and have boxes, else round footprints
+    (16-gons on a circle of 0.25 m). Unit: m on the
     ground, px in the image. fps: frames per second. px_per_m: px per m, used only in the image. labelled (length + 1,):
     bool by frame number from 1, index 0 unused. A centre is the mean position of the group's people in the frame. Group
     ids of the result are only row numbers. Without groups it has no rows.
@@ -35,27 +37,28 @@ def derived_outlines(tracks: Sequence[Tracks], fps: float, px_per_m: float, labe
     Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
     """
     table = tabulate(tracks, fps, px_per_m, default_grouping().smooth)
-    order, first = _grouped_rows(table, _group_of_rows(table, fps), labelled)
+    order, first = _grouped_rows(table, _group_of_rows(table, fps, names_groups(tracks)), labelled)
     pos = table.pos[order] * table.scale
     ends = np.append(first[1:], len(order)) if len(first) else first
     centre = np.add.reduceat(pos, first) / np.diff(first, append=len(order))[:, None] if len(first) else pos[:0]
-    box = boxes_of_rows(tracks)
-    vertex, ends = flat_footprint_hulls(pos, ends, table.scale) if box is None else _box_hulls(box[order], ends)
+    box = boxes_of_rows(tracks)[order]
+    boxed = len(box) > 0 and np.isfinite(box[0, 0])
+    vertex, ends = _box_hulls(box, ends) if boxed else flat_footprint_hulls(pos, ends, table.scale)
     rows = FrameRows(table.frame[order][first] + 1, np.arange(len(first)))
     return GroupOutlines.measured(rows, centre, vertex, ends)
 
 
-def _group_of_rows(table: TracksTable, fps: float) -> Ints:
+def _group_of_rows(table: TracksTable, fps: float, named: bool) -> Ints:
     """Returns a label for each of the R table rows (tracks in frames), (R,): equal for members of one group in a frame,
     -1 alone.
 
-    If any row has a group id of the tracker, these ids are returned, else the components that the default grouping
-    links: the label is the least column of the group, and a group of which one member is seen has -1. fps: frames per
+    If the tracker names groups (`named`), its ids are returned, else the components that the default grouping links:
+    the label is the least column of the group, and a group of which one member is seen has -1. fps: frames per
     second.
     """
     from tracking.objective import derived_outlines_kernels as kernels
 
-    if (table.group >= 0).any():
+    if named:
         return table.group
     rule = default_grouping()
     links = links_of(table, fps, rule)

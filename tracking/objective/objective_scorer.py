@@ -86,6 +86,7 @@ def _tracked_outlines(sides: ComparedSides, px_per_m: float) -> GroupOutlines:
     if all(t.unit == "group" for t in tracks):
         return _whole_outlines(sides)
     people_only = not any(t.unit == "group" or t.derived or t.groups is not None for t in tracks)
+    people_only = people_only and len({t.box is None for t in tracks if len(t.id)}) < 2
     if people_only and (tracks[0].plane != "image" or px_per_m > 0):
         return derived_outlines(tracks, fps, px_per_m, sides.frames)
     return GroupOutlines.of(tracked_groups(replace(sides, tracks=with_groups(tracks, fps, px_per_m))).counted)

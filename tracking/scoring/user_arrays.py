@@ -134,14 +134,14 @@ def _tracks(table: Table, length: int, fps: float, px_per_m: float, plane: Plane
     box, group, rows = table["box"], table["group"], len(table["frame"])
     pos = table["pos"] if plane == "ground" else box[:, :2] + box[:, 2:] / 2
     label = np.full(rows, -1, np.int64) if group is None else group
-    no_groups = Groups.none() if group is not None and (label < 0).all() else None
     cuts = np.searchsorted(table["frame"], np.arange(1, length + 2)).tolist()
 
     def at(index: int) -> Tracks:
         r, n = slice(cuts[index - 1], cuts[index]), cuts[index] - cuts[index - 1]
         return Tracks(
             index, (index - 1) / fps, plane, "person", table["id"][r], label[r], pos[r], np.full((n, 2), np.nan),
-            np.full((n, 4, 4), np.nan), None if box is None else box[r], np.ones(n), no_groups,
+            np.full((n, 4, 4), np.nan), None if box is None else box[r], np.ones(n),
+            Groups.none() if group is not None and (label[r] < 0).all() else None,
         )  # fmt: skip
 
     found = [at(index) for index in range(1, length + 1)]

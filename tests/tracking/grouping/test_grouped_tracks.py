@@ -116,10 +116,15 @@ def test_in_the_image_without_a_scale():
     assert len(derive(tracks(side_by_side()), FPS, math.nan)) == 200
 
 
+def naming(own):
+    """A pair whose tracker names its groups, own (T, 2), from the first frame on, where there is none yet."""
+    return [t.replace(groups=Groups.none() if (t.group < 0).all() else None) for t in tracks(side_by_side(), group=own)]
+
+
 def test_what_a_tracker_says_is_kept():
     own = np.full((200, 2), -1)
     own[30:] = 7
-    made = derive(tracks(side_by_side(), group=own), FPS)
+    made = derive(naming(own), FPS)
     assert [t.group.tolist() for t in made[28:32]] == [[-1, -1], [-1, -1], [7, 7], [7, 7]]
     assert events(made) == [(31, "form", 31, (-1, -1), (7,), (1, 2))]
     assert made[40].groups.id.tolist() == [7]
@@ -138,7 +143,10 @@ def test_crossings_and_queues_of_tracks():
     still = [walk((5, (-1, 0)), (7, (0, 0)), start=(5 + 0.8 * k, 0)) for k in range(3)]
     (row,) = [e for e in events(derive(tracks(still), FPS)) if e[1] == "queue"]
     assert row[2] == 51
-    assert row[0] == 51 + 30 + 30 - 1, "3 s, and 3 s more until waiting is told from advancing"
+    assert row[0] == 120, "it lasts to the end, and is not known before"
+    gone = [walk((5, (-1, 0)), (7, (0, 0)), (8, (0, 1)), start=(5 + 0.8 * k, 0)) for k in range(3)]
+    (row,) = [e for e in derive(tracks(gone), FPS) for e in e.events if e.kind == "queue"]
+    assert row.emitted == row.end + 30 + 15, "3 s until leaving is told from advancing, 1.5 s for a line that is lost"
 
 
 def test_who_joins_as_they_come_is_no_merge():
@@ -239,7 +247,7 @@ def test_named_groups_without_events_get_them():
     assert all(t.groups is g.groups for t, g in zip(made, named, strict=True))
     own = np.full((200, 2), -1)
     own[30:] = 7
-    named = [t.replace(events=(), derived=False) for t in derive(tracks(side_by_side(), group=own), FPS)]
+    named = [t.replace(events=(), derived=False) for t in derive(naming(own), FPS)]
     assert events(with_groups(named, FPS, 1.0)) == [(31, "form", 31, (-1, -1), (7,), (1, 2))]
 
 

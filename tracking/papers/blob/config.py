@@ -185,7 +185,8 @@ class BlobConfig(BackgroundSettings):
         The acceleration noises are roots of spectral densities, so sigma = noise / sqrt(dt) (ours): sigma is the
         standard deviation of the acceleration in a step, dt = 1 / fps s. Raises InputError if the first measurement of
         a new track would confirm it: its uncertainty rho at birth, relative to the steady state, is at or below
-        confirm_ratio.
+        confirm_ratio. If a step is longer than tentative_time, a new track has only this measurement to be confirmed
+        by, so that it may.
         """
         root = np.sqrt(fps)
         accel, size = self.accel_noise * root, self.size_accel_noise * root
@@ -195,5 +196,6 @@ class BlobConfig(BackgroundSettings):
             np.square([self.position_noise, self.position_noise, self.size_noise, self.size_noise]),
             np.square([self.speed_prior, self.speed_prior, self.size_rate_prior, self.size_rate_prior]),
         )
-        check_birth(made, self.confirm_ratio)
+        if made.dt <= self.tentative_time:
+            check_birth(made, self.confirm_ratio)
         return made

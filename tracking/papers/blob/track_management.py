@@ -7,6 +7,8 @@ by cost, explained misses, the rules of reporting and the field of view are ours
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
@@ -27,6 +29,8 @@ SCALE, RHO, BORN, SCORE, HITS, MISSES = range(6)
 """Rows of `numbers`."""
 CONFIRMED, MEASURED, MISS_EXPLAINED = range(3)
 """Rows of `flags`."""
+NUMBERS, FLAGS = ("scale", "rho", "born", "score", "hits", "misses"), ("confirmed", "measured", "miss_explained")
+"""Attributes that are views of the rows of `numbers` and `flags`."""
 
 
 class TrackedPeople:
@@ -76,6 +80,14 @@ class TrackedPeople:
         self.largest_log_det = 2 * float(np.log(max(self.explained_death_rho, self.birth_rho)))
         self.silence_rho = self._rho_after(config.report_coast)
         self.explained_silence_rho = max(self.silence_rho, self._rho_after(config.report_hidden))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy of a view has memory of its own: the rows are bound anew in the copy.
+        return {name: value for name, value in self.__dict__.items() if name not in (*NUMBERS, *FLAGS)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._bind(self.numbers, self.flags)
 
     def _bind(self, numbers: Array, flags: Bools) -> None:
         """Use `numbers` (6, N) and `flags` (3, N) as the tables, and bind their rows as views to attributes: scale,

@@ -18,6 +18,8 @@ from sim.types import Array, GroupEvent, Ints
 from tracking.grouping.group_labels import part_sets
 from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, event_of_change
 
+OWN_EVENTS = ("merge", "split", "form", "dissolve", "enter", "leave")
+"""Kinds of events that the tracker reports itself."""
 CHORD = 0.5
 """Time over which velocities are measured, s."""
 ARRIVAL = 1.0

@@ -62,7 +62,7 @@ from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
 from tracking.papers.joint.placement import place
-from tracking.papers.joint.reported_events import ReportedEvents
+from tracking.papers.joint.reported_events import OWN_EVENTS, ReportedEvents
 
 MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)
 """Keys of the random streams."""
@@ -275,7 +275,8 @@ class Joint:
         groups = reported_groups.no_groups(group)
         score, cov = np.ones(len(id)), cov * self.unit**2
         return Tracks(
-            frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov, box, score, groups, events
+            frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov, box, score, groups, events,
+            own_events=OWN_EVENTS,
         )  # fmt: skip
 
     def _groups(self, joint: Array, seen: Bools) -> list[Ints]:

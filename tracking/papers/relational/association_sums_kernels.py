@@ -95,20 +95,19 @@ def exact_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
 
 
 @njit(cache=True)
-def propagated_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
-    """Return the Bethe approximation of the log of the sum over all mappings, and write its marginals (n, m).
+def free_messages(W: Array, miss: Array, spare: Array) -> Array:
+    """Return the messages nu (n, m) of `propagated_sum`: the probability, by belief propagation, that no other row has
+    a column."""
+    psi, mu, nu = np.zeros(W.shape), np.zeros(W.shape), np.ones(W.shape)
+    _propagate(W, miss, spare, psi, mu, nu)
+    return nu
 
-    W (n, m), miss (n,), spare (m,): not negative. Messages of Williams & Lau 2014: with psi = W / (miss spare),
-    mu[i, j] = psi[i, j] / (1 + sum of psi nu over the other columns) and nu[i, j] = 1 / (1 + sum of mu over the other
-    rows). The value is exact for one row or one column, and a lower bound in all cases that were tried.
-    """
+
+@njit(cache=True)
+def _propagate(W, miss, spare, psi, mu, nu):  # type: ignore[no-untyped-def]
+    """Writes psi, mu and nu (n, m) of `propagated_sum`."""
     n, m = W.shape
-    psi, mu, nu = np.zeros((n, m)), np.zeros((n, m)), np.ones((n, m))
-    log_sum = 0.0
-    for i in range(n):
-        log_sum += math.log(max(miss[i], TINY))
     for j in range(m):
-        log_sum += math.log(max(spare[j], TINY))
         for i in range(n):
             psi[i, j] = W[i, j] / (max(miss[i], TINY) * max(spare[j], TINY))
     for _ in range(SWEEPS):
@@ -129,6 +128,24 @@ def propagated_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> flo
                 nu[i, j] = new
         if change < CONVERGED:
             break
+
+
+@njit(cache=True)
+def propagated_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
+    """Return the Bethe approximation of the log of the sum over all mappings, and write its marginals (n, m).
+
+    W (n, m), miss (n,), spare (m,): not negative. Messages of Williams & Lau 2014: with psi = W / (miss spare),
+    mu[i, j] = psi[i, j] / (1 + sum of psi nu over the other columns) and nu[i, j] = 1 / (1 + sum of mu over the other
+    rows). The value is exact for one row or one column, and a lower bound in all cases that were tried.
+    """
+    n, m = W.shape
+    psi, mu, nu = np.zeros((n, m)), np.zeros((n, m)), np.ones((n, m))
+    log_sum = 0.0
+    for i in range(n):
+        log_sum += math.log(max(miss[i], TINY))
+    for j in range(m):
+        log_sum += math.log(max(spare[j], TINY))
+    _propagate(W, miss, spare, psi, mu, nu)
     for i in range(n):
         whole = 1.0
         for j in range(m):

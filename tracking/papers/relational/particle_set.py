@@ -142,17 +142,17 @@ class ParticleSet:
         self.related = self.related[:, slots][:, :, slots]
         self.ancestor = self.ancestor[:, slots]
 
-    def add(self, pos: Array, vel: Array, exist: float, related: Bools) -> None:
-        """Add a slot with places pos (P, 2) and velocities vel (P, 2), the same existence in each particle, and
-        relations (P, K) to the slots so far; its weights are equal, or the particles' one weight."""
-        count, k = self.count, self.people
+    def add(self, pos: Array, vel: Array, exist: float) -> None:
+        """Add M slots with places pos (P, M, 2) and velocities vel (P, M, 2), the same existence in each particle, and
+        no relations; their weights are equal, or the particles' one weight."""
+        count, k, new = self.count, self.people, pos.shape[1]
         weights = self.weights[:, :1] if self.one_weight and k else np.full((count, 1), 1 / count)
-        self.weights = np.concatenate([self.weights, weights], axis=1)
-        self.pos = np.concatenate([self.pos, pos[:, None]], axis=1)
-        self.vel = np.concatenate([self.vel, vel[:, None]], axis=1)
-        self.exist = np.concatenate([self.exist, np.full((count, 1), exist)], axis=1)
-        grown = np.zeros((count, k + 1, k + 1), bool)
+        self.weights = np.concatenate([self.weights, np.repeat(weights, new, axis=1)], axis=1)
+        self.pos = np.concatenate([self.pos, np.ascontiguousarray(pos)], axis=1)
+        self.vel = np.concatenate([self.vel, np.ascontiguousarray(vel)], axis=1)
+        self.exist = np.concatenate([self.exist, np.full((count, new), exist)], axis=1)
+        grown = np.zeros((count, k + new, k + new), bool)
         grown[:, :k, :k] = self.related
-        grown[:, k, :k] = grown[:, :k, k] = related
         self.related = grown
-        self.ancestor = np.concatenate([self.ancestor, np.arange(count)[:, None]], axis=1)
+        own = np.repeat(np.arange(count)[:, None], new, axis=1)
+        self.ancestor = np.concatenate([self.ancestor, own], axis=1)

@@ -80,12 +80,14 @@ class Relational(Particle):
         if self.belief is not None:
             self.belief.keep(rows)
 
-    def _relations_of_newcomer(self, point: Array) -> Bools:
-        """Returns the relations (P, K) bool of a new person at `point` (2,), m: to all members of the group joined."""
-        p, label, share = self.particles, self.particles.labels(), self.config.newcomer_share
-        uniforms = self.draws[JOINING].random(p.count)
-        group = transition_kernels.join(p.pos, p.exist, label, point, share, uniforms, self._rules)
-        return np.asarray(label == group[:, None])
+    def _relate_newcomers(self, points: Array) -> None:
+        p, new = self.particles, len(points)
+        label = np.empty(p.exist.shape, np.int64)
+        known = np.ascontiguousarray(p.related[:, :-new, :-new])
+        particle_set_kernels.group_labels(known, label[:, :-new])
+        uniforms = self.draws[JOINING].random((new, p.count))
+        share = self.config.newcomer_share
+        transition_kernels.join(p.pos, p.exist, p.related, label, points, share, uniforms, self._rules)
 
     def _report(self, frame: Frame) -> Tracks:
         tracks, p = super()._report(frame), self.particles

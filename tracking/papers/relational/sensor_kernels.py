@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Bools, Ints
-from tracking.papers.relational.association_sums_kernels import sparse_sum
+from tracking.papers.relational.association_sums_kernels import EXACT_BITS, free_messages, sparse_sum
 
 
 @njit(cache=True)
@@ -58,32 +58,58 @@ def free_detections(W: Array, miss: Array) -> Array:
     mappings of the other people.
 
     W (K, M): mean weight of each person and detection; miss (K,): mean weight of the person without detection; both
-    over the particles; spare weights are 1.
+    over the particles; spare weights are 1. People are linked by detections that both may have. The sum is over the
+    linked people. Where it is propagated, one sum over all of them serves each person, with the messages of the others
+    alone (ours): one sum for each person would cost the cube of their number.
     """
     n, m = W.shape
-    free, others, found, spare = np.ones((n, m)), np.zeros((n, m)), np.empty((n, m)), np.ones(m)
-    linked, waiting = np.empty(n, np.bool_), np.empty(n, np.int64)
+    free, done = np.ones((n, m)), np.zeros(n, np.bool_)
+    rows, columns, reached = np.empty(n, np.int64), np.empty(m, np.int64), np.zeros(m, np.bool_)
     for k in range(n):
-        linked[:] = False
-        linked[k] = True
-        waiting[0], count, head = k, 1, 0
+        if done[k]:
+            continue
+        done[k] = True
+        rows[0], count, width, head = k, 1, 0, 0
         while head < count:
-            i = waiting[head]
+            i = rows[head]
             head += 1
             for j in range(m):
-                for other in range(n):
-                    if W[i, j] > 0 and W[other, j] > 0 and not linked[other]:
-                        linked[other] = True
-                        waiting[count] = other
-                        count += 1
-        if count == 1:
-            continue
-        for i in range(n):
-            others[i] = W[i] if linked[i] and i != k else np.zeros(m)
-        sparse_sum(others, miss, spare, found)
-        for j in range(m):
-            free[k, j] = max(1.0 - found[:, j].sum(), 0.0)
+                if W[i, j] > 0 and not reached[j]:
+                    reached[j] = True
+                    columns[width] = j
+                    width += 1
+                    for other in range(n):
+                        if W[other, j] > 0 and not done[other]:
+                            done[other] = True
+                            rows[count] = other
+                            count += 1
+        if count > 1:
+            _free_of_linked(W, miss, np.sort(rows[:count]), np.sort(columns[:width]), free)
     return free
+
+
+@njit(cache=True)
+def _free_of_linked(W, miss, rows, columns, free):  # type: ignore[no-untyped-def]
+    """Writes the probabilities of `free_detections` for linked people, rows (n',), and their detections, columns
+    (m',)."""
+    n, m = len(rows), len(columns)
+    block, spare = np.empty((n, m)), np.ones(m)
+    for a in range(n):
+        for b in range(m):
+            block[a, b] = W[rows[a], columns[b]]
+    found = np.empty((n, m))
+    if min(n - 1, m) > EXACT_BITS:
+        messages = free_messages(block, miss[rows], spare)
+        for a in range(n):
+            for b in range(m):
+                free[rows[a], columns[b]] = messages[a, b]
+        return
+    for a in range(n):
+        others = block.copy()
+        others[a] = 0.0
+        sparse_sum(others, miss[rows], spare, found)
+        for b in range(m):
+            free[rows[a], columns[b]] = max(1.0 - found[:, b].sum(), 0.0)
 
 
 @njit(cache=True)

@@ -25,10 +25,10 @@ class Slots:
     next_id: int = 1
 
     def add(self, size: Array) -> None:
-        """Add a person who is measured in this frame; size (2,): width, height of the box, px, nan without."""
-        self.id = np.append(self.id, -1)
-        self.missed = np.append(self.missed, 0.0)
-        self.size = np.concatenate([self.size, size[None]])
+        """Add people who are measured in this frame; size (M, 2): width, height of the boxes, px, nan without."""
+        self.id = np.append(self.id, np.full(len(size), -1))
+        self.missed = np.append(self.missed, np.zeros(len(size)))
+        self.size = np.concatenate([self.size, size])
 
     def keep(self, rows: Bools) -> None:
         """Remove all people but those where `rows` (K,) is True."""

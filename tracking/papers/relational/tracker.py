@@ -192,8 +192,9 @@ class Particle:
         self.diversity.weigh(self.particles)
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
-        for j in np.flatnonzero(said.nobody >= self.config.birth_doubt).tolist():
-            self._start(points[j], np.full(2, np.nan) if sizes is None else sizes[j])
+        new = said.nobody >= self.config.birth_doubt
+        if new.any():
+            self._start(points[new], np.full((int(new.sum()), 2), np.nan) if sizes is None else sizes[new])
 
     def _detection_probability(self) -> Array:
         """Returns the probability (K,) that each person is measured if existing (ours).
@@ -218,21 +219,21 @@ class Particle:
         self.particles.keep(rows)
         self.slots.keep(rows)
 
-    def _start(self, point: Array, size: Array) -> None:
-        """Add a person at a detection (secs. 2.1.1, 3.2): point (2,) m; size (2,): of the box, px, nan without.
+    def _start(self, points: Array, sizes: Array) -> None:
+        """Add people at detections (secs. 2.1.1, 3.2): points (M, 2) m; sizes (M, 2): of the boxes, px, nan without.
 
         Place and velocity are normal about the detection and about 0. The existence is the share of new people among
         new people and false alarms (ours).
         """
-        p, c, draws = self.particles, self.config, self.draws[BIRTHS].standard_normal((2, self.particles.count, 2))
+        p, c = self.particles, self.config
+        draws = self.draws[BIRTHS].standard_normal((len(points), 2, p.count, 2)).transpose(1, 2, 0, 3)
         exist = c.birth_rate * self.dt / (c.birth_rate * self.dt + c.clutter_density)
-        related = self._relations_of_newcomer(point)
-        p.add(point + self.noise * draws[0], c.speed_prior * draws[1], exist, related)
-        self.slots.add(size)
+        p.add(points + self.noise * draws[0], c.speed_prior * draws[1], exist)
+        self._relate_newcomers(points)
+        self.slots.add(sizes)
 
-    def _relations_of_newcomer(self, point: Array) -> Bools:
-        """Returns the relations (P, K) bool of a new person at `point` (2,), m, to those who are there: none."""
-        return np.zeros(self.particles.exist.shape, bool)
+    def _relate_newcomers(self, points: Array) -> None:
+        """Relate the last slots, of new people at `points` (M, 2), m, to others; people of `particle` are alone."""
 
     def _report(self, frame: Frame) -> Tracks:
         """Returns the Tracks of the frame: people who exist with at least `report_existence`, on the ground in m, in

@@ -27,6 +27,8 @@ at the same place, their loss per m of distance and per m/s of velocity differen
 
 NEGLIGIBLE = 1e-4
 """Pairs whose belonging is below this in every particle do not start to walk together."""
+FAR = 1e-6
+"""A new person does not join people whose belonging is below this in every particle."""
 
 
 @njit(cache=True)
@@ -177,26 +179,67 @@ def relate(
 
 
 @njit(cache=True)
-def join(pos: Array, exist: Array, label: Ints, place: Array, share: float, uniforms: Array, rules: Array) -> Ints:
-    """Return the group (P,) that a new person at `place` (2,), m, joins in each particle, -1 for alone (sec. 3.2).
+def join(
+    pos: Array, exist: Array, related: Bools, label: Ints, points: Array, share: float, uniforms: Array, rules: Array
+) -> None:
+    """Relate M new people, the last slots, to the groups that they join in each particle, one after the other (sec.
+    3.2); related (P, K, K) and the groups label (P, K) of the new people are changed.
 
-    pos (P, K, 2), m; exist (P, K); label (P, K): groups; uniforms (P,) in [0, 1); rules (4,). With the probability
-    `share` (the paper: 1/2) the person joins a group, people alone being groups of one; which one is drawn in
-    proportion to the belonging at the distance of the group's nearest member, at equal velocities (ours). Where these
-    sum to less than 1, the person is alone with what is missing.
+    pos (P, K, 2), m; exist (P, K): with the new people; points (M, 2), m: where they were detected; uniforms (M, P) in
+    [0, 1); rules (4,). With the probability `share` (the paper: 1/2) a person joins a group, people alone being groups
+    of one; which one is drawn in proportion to the belonging at the distance of the group's nearest member, at equal
+    velocities (ours). Where these sum to less than 1, the person is alone with what is missing. People whose belonging
+    is below FAR in all particles are left out, so that the cost of a person is that of the neighbours.
     """
     particles, n, _ = pos.shape
-    chosen, near = np.full(particles, -1), np.empty(n)
+    old = n - len(points)
+    box, near = np.empty((n, 4)), np.zeros(n)
+    groups, weight = np.empty(n, np.int64), np.empty(n)
+    for i in range(n):
+        box[i, 0], box[i, 1], box[i, 2], box[i, 3] = np.inf, -np.inf, np.inf, -np.inf
+        for p in range(particles):
+            x, y = pos[p, i, 0], pos[p, i, 1]
+            box[i, 0], box[i, 1] = min(box[i, 0], x), max(box[i, 1], x)
+            box[i, 2], box[i, 3] = min(box[i, 2], y), max(box[i, 3], y)
+    ends = np.empty(len(points), np.int64)
+    some, count = [np.int64(0) for _ in range(0)], 0
+    for m in range(len(points)):
+        for i in range(old + m):
+            dx = max(box[i, 0] - points[m, 0], points[m, 0] - box[i, 1], 0.0)
+            dy = max(box[i, 2] - points[m, 1], points[m, 1] - box[i, 3], 0.0)
+            if belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= FAR:
+                some.append(np.int64(i))
+                count += 1
+        ends[m] = count
     for p in range(particles):
-        near[:] = 0.0
-        for i in range(n):
-            dx, dy = pos[p, i, 0] - place[0], pos[p, i, 1] - place[1]
-            g = exist[p, i] * belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
-            near[label[p, i]] = max(near[label[p, i]], g)
-        left = uniforms[p] * max(near.sum(), 1.0)
-        for g in range(n):
-            left -= share * near[g]
-            if left < 0:
-                chosen[p] = g
-                break
-    return chosen
+        begin = 0
+        for m in range(len(points)):
+            new, neighbours, begin = old + m, range(begin, ends[m]), ends[m]
+            label[p, new] = new
+            if uniforms[m, p] >= share:  # alone, whoever is near
+                continue
+            for c in neighbours:
+                i = int(some[c])
+                dx, dy = pos[p, i, 0] - points[m, 0], pos[p, i, 1] - points[m, 1]
+                g = exist[p, i] * belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
+                near[label[p, i]] = max(near[label[p, i]], g)
+            total, found = 0.0, 0
+            for c in neighbours:
+                g = label[p, some[c]]
+                if near[g] > 0:
+                    total += near[g]
+                    at = found
+                    while at > 0 and groups[at - 1] > g:
+                        groups[at], weight[at] = groups[at - 1], weight[at - 1]
+                        at -= 1
+                    groups[at], weight[at] = g, near[g]
+                    near[g], found = 0.0, found + 1
+            left = uniforms[m, p] * max(total, 1.0)
+            for k in range(found):
+                left -= share * weight[k]
+                if left < 0:
+                    label[p, new] = groups[k]
+                    for i in range(groups[k], new):
+                        if label[p, i] == groups[k]:
+                            related[p, new, i] = related[p, i, new] = True
+                    break

@@ -445,3 +445,17 @@ def test_nobody_above_the_horizon_is_reported():
 def test_boxes_without_a_scale_are_refused(scale):
     with pytest.raises(InputError, match=r"context\.px_per_m"):
         run([at((100, 100))], context=Context(fps=FPS, px_per_m=scale))
+
+
+@pytest.mark.parametrize("fps", [0.001, 0.01, 0.1])
+def test_seconds_or_minutes_between_frames(fps):
+    """A new track has only its second measurement to be confirmed by. Someone who waits is one track."""
+    tracker = Blob()
+    tracker.reset(Context(fps, 40.0, image_size=(1000, 1000)), 0)
+    box = np.array([[100.0, 100, 28, 68], [400, 300, 28, 68]])
+    for k in range(1, 6):
+        t = (k - 1) / fps
+        found = Detections(k, t, "image", box[:, :2] + box[:, 2:] / 2, None, box, np.ones(2))
+        made = tracker.step(Frame(k, t, None, None, found), found)
+    assert made.id.tolist() == [1, 2]
+    assert np.allclose(made.box, box, atol=1.0)

@@ -56,7 +56,7 @@ def test_a_person_behind_a_pillar_is_kept(scene, kept):
 def people(*places):
     made = ParticleSet.empty(10)
     for place in places:
-        made.add(np.tile(place, (10, 1)), np.zeros((10, 2)), 1.0, np.zeros(made.exist.shape, bool))
+        made.add(np.tile(place, (10, 1))[:, None], np.zeros((10, 1, 2)), 1.0)
     return made
 
 

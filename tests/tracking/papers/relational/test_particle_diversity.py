@@ -15,7 +15,7 @@ def two(count):
     """Two people far from each other."""
     made = ParticleSet.empty(count)
     for x in (0.0, 50.0):
-        made.add(np.full((count, 2), x), np.zeros((count, 2)), 1.0, np.zeros(made.exist.shape, bool))
+        made.add(np.full((count, 1, 2), x), np.zeros((count, 1, 2)), 1.0)
     return made
 
 
@@ -37,7 +37,7 @@ def test_ancestors_of_people_who_come_and_go():
     particles.weights[:, 1] = np.arange(50) == 7
     particles.resample(0.5, "residual", 0.0, np.random.default_rng(0))
     particles.keep(np.array([False, True]))
-    particles.add(np.zeros((50, 2)), np.zeros((50, 2)), 1.0, np.zeros((50, 1), bool))
+    particles.add(np.zeros((50, 1, 2)), np.zeros((50, 1, 2)), 1.0)
     assert (particles.ancestor[:, 0] == 7).all()
     assert particles.ancestor[:, 1].tolist() == list(range(50))
 

@@ -26,7 +26,7 @@ def three(count=400, seed=0):
     rng, made = np.random.default_rng(seed), ParticleSet.empty(count)
     for x in (0.0, 0.4, 8.0):
         pos = rng.normal([x, 0.0], 0.1, (count, 2))
-        made.add(pos, rng.normal(0, 1, (count, 2)), 0.9, np.zeros(made.exist.shape, bool))
+        made.add(pos[:, None], rng.normal(0, 1, (count, 1, 2)), 0.9)
     return made
 
 
@@ -93,7 +93,7 @@ def test_a_new_person_has_the_one_weight_of_the_particles():
     particles = three()
     particles.share_weights(True)
     particles.weigh(np.random.default_rng(5).normal(0, 1, (400, 1)))
-    particles.add(np.zeros((400, 2)), np.zeros((400, 2)), 0.5, np.zeros((400, 3), bool))
+    particles.add(np.zeros((400, 1, 2)), np.zeros((400, 1, 2)), 0.5)
     assert np.array_equal(particles.weights[:, 3], particles.weights[:, 0])
 
 
@@ -117,7 +117,7 @@ def test_weights_of_a_person_are_those_of_the_joint_filter_with_the_others_avera
     every, alone = ParticleSet.empty(count * count), ParticleSet.empty(count)
     for made, places in ((every, pos), (alone, np.stack([x, y], axis=1))):
         for k in range(2):
-            made.add(places[:, k], np.zeros((made.count, 2)), 0.9, np.zeros(made.exist.shape, bool))
+            made.add(places[:, k, None], np.zeros((made.count, 1, 2)), 0.9)
     sensor.weigh(every, points, sight([0.9] * 2), 0.08, ParticleConfig(weights="joint"))
     sensor.weigh(alone, points, sight([0.9] * 2), 0.08, ParticleConfig())
     joint = every.weights[:, 0].reshape(count, count)
@@ -246,7 +246,7 @@ def test_a_displaced_point_is_the_persons_only_if_points_may_be_displaced():
 
 def placed_alone(place):
     particles = ParticleSet.empty(200)
-    particles.add(np.tile(place, (200, 1)), np.zeros((200, 2)), 1.0, np.zeros((200, 0), bool))
+    particles.add(np.tile(place, (200, 1))[:, None], np.zeros((200, 1, 2)), 1.0)
     return particles
 
 

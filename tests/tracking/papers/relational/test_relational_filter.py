@@ -14,7 +14,7 @@ from sim.types import Context, Detections, Frame
 from tracking.grouping.belief import UNSEEN, default_belief
 from tracking.grouping.pair_evidence import frames_per_step
 from tracking.grouping.pair_probabilities import pair_probabilities
-from tracking.papers.relational import sensor, transition_kernels
+from tracking.papers.relational import association_sums_kernels, sensor, sensor_kernels, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.relations import Relational
@@ -63,8 +63,7 @@ def placed(count, pos, vel=None, exist=1.0):
     vel = np.zeros_like(pos) if vel is None else np.asarray(vel, float)
     made = ParticleSet.empty(count)
     for place, velocity in zip(pos, vel, strict=True):
-        none = np.zeros(made.exist.shape, bool)
-        made.add(np.tile(place, (count, 1)), np.tile(velocity, (count, 1)), exist, none)
+        made.add(np.tile(place, (count, 1))[:, None], np.tile(velocity, (count, 1))[:, None], exist)
     return made
 
 
@@ -224,9 +223,12 @@ def test_a_newcomer_in_an_empty_scene_is_alone_and_beside_a_group_in_it_by_half(
         particles = placed(count, np.array(pos).reshape(-1, 2))
         for i, j in related:
             particles.related[:, i, j] = particles.related[:, j, i] = True
-        group = transition_kernels.join(
-            particles.pos, particles.exist, particles.labels(), np.array([0.0, 0.5]), 0.5, u, rules
-        )
+        place = np.array([[0.0, 0.5]])
+        particles.add(np.tile(place, (count, 1))[:, None], np.zeros((count, 1, 2)), 1.0)
+        label = particles.labels()
+        transition_kernels.join(particles.pos, particles.exist, particles.related, label, place, 0.5, u[None], rules)
+        assert np.array_equal(label, particles.labels())
+        group = np.where(label[:, -1] == len(pos), -1, label[:, -1])
         return [float((group == g).mean()) for g in range(-1, len(pos))]
 
     assert joined([]) == [1.0]
@@ -513,3 +515,45 @@ def test_the_belief_has_the_rows_of_the_people():
         assert len(tracker.belief.count) == tracker.particles.people
     assert tracker.particles.people == 2
     np.testing.assert_allclose(tracker.belief.past[-1][:, 1], [0, 6], atol=0.3)
+
+
+def test_newcomers_of_a_frame_join_as_if_one_came_after_the_other():
+    rules, count, draws = np.array([0.05, 5.9, 3.3, 5.9]), 500, np.random.default_rng(3)
+    old, new = draws.uniform(0, 6, (5, 2)), draws.uniform(0, 6, (7, 2))
+    uniforms = draws.random((len(new), count))
+
+    def joined(portions):
+        particles, begin = placed(count, old), 0
+        particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+        for points in np.split(new, portions):
+            label = np.empty((count, particles.people + len(points)), np.int64)
+            label[:, : particles.people] = particles.labels()
+            places = np.tile(points, (count, 1, 1))
+            particles.add(places, np.zeros_like(places), 0.7)
+            u = uniforms[begin : begin + len(points)]
+            transition_kernels.join(particles.pos, particles.exist, particles.related, label, points, 0.5, u, rules)
+            assert np.array_equal(label, particles.labels())
+            begin += len(points)
+        return particles.related
+
+    together = joined([])
+    assert np.array_equal(together, joined([1, 2, 3, 4, 5, 6]))
+    assert np.array_equal(together, together.transpose(0, 2, 1))
+    assert together[:, -2:, :-2].any()
+
+
+def test_free_detections_of_many_linked_people_are_those_of_one_sum_for_each():
+    """More than 12 people and detections in one component: messages of one propagation stand for many sums."""
+    draws = np.random.default_rng(1)
+    people, found = 20, 18
+    W, miss = (
+        draws.uniform(0, 3, (people, found)) * (draws.random((people, found)) < 0.25),
+        draws.uniform(0.05, 1, people),
+    )
+    free = sensor_kernels.free_detections(W, miss)
+    for k in range(people):
+        others, marginals = W.copy(), np.empty_like(W)
+        others[k] = 0.0
+        association_sums_kernels.sparse_sum(others, miss, np.ones(found), marginals)
+        mine = W[k] > 0
+        np.testing.assert_allclose(free[k, mine], 1 - marginals.sum(axis=0)[mine], atol=0.05)
