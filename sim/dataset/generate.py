@@ -6,12 +6,13 @@ The stored bytes depend on scenario, seed and versions only, not on the workers.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from uuid import uuid4
 
-from scenarios.errors import FlockscopeError, InputError, WorkError
+from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from scenarios.loading.resolve import Entry
 from sim.dataset.sequence_job import SequenceJob, lost_job, plan_jobs, run_job, stored_manifest
 from sim.dataset.splits import split_of
@@ -21,6 +22,8 @@ from sim.io.store.manifest import MANIFEST
 from sim.io.store.streams import check_streams
 from sim.workers.start import WorkerOptions, start_workers
 
+LEFT_OUT = 0.05
+"""Greatest share of sequences that may be left out because an order of their script did not come true."""
 QUEUED_JOBS = 100  # jobs that wait at a cluster's scheduler, beside one for each worker
 ONE_WORKER = WorkerOptions()
 Progress = Callable[[int, int, str], None]
@@ -37,6 +40,7 @@ def generate(
     progress: Progress | None = None,
     streams: Iterable[str] = ("left",),
     images: str = "jpg",
+    left_out: Callable[[str, OrderError], None] | None = None,
 ) -> list[Path]:
     """Write OUT/flockscope-<split>/<name>-s<seed>/ for every entry and seed, and OUT/seqmaps; returns the sequence
     folders.
@@ -49,7 +53,9 @@ def generate(
     40,000). workers: by default this process. The workers of a cluster must share the folder `out` under the same path.
     progress: called as progress(sequences done, sequences in all, name of the last one) after each, failed ones
     included. streams: pictures to store ("left", "right", "disparity", "ids", "background"; () for none). images: their
-    file type, "jpg", "png" or "mp4".
+    file type, "jpg", "png" or "mp4". left_out: called with the name and the reason of each sequence that is left out
+    because an order of its script did not come true; None warns. If that happens to more than 5 % of the sequences, it
+    is an error.
 
     Raises InputError before anything is simulated if an option or scenario is wrong, two entries share a name, a folder
     holds another sequence, or another process writes to `out`. If sequences fail, the others are made, and then an
@@ -76,10 +82,20 @@ def generate(
             complete = write_seqmap(root, split)
         except FlockscopeError as error:
             errors["seqmaps"] = error
-    errors = errors or {job.name: _not_visible(job) for job in jobs if job.name not in complete}
+    unfulfilled = {name: error for name, error in errors.items() if isinstance(error, OrderError)}
+    if len(unfulfilled) <= LEFT_OUT * len(jobs):
+        errors = {name: error for name, error in errors.items() if name not in unfulfilled}
+        for name, reason in unfulfilled.items():
+            (left_out or _warn)(name, reason)
+    made = [job for job in jobs if job.name not in unfulfilled]
+    errors = errors or {job.name: _not_visible(job) for job in made if job.name not in complete}
     if errors:
         raise _summary(errors, len(jobs))
-    return [job.folder for job in jobs]
+    return [job.folder for job in made]
+
+
+def _warn(name: str, error: OrderError) -> None:
+    warnings.warn(f"{name} is left out: {error.line()}", stacklevel=3)
 
 
 def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]:

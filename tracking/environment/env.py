@@ -18,13 +18,14 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, OrderError
 from scenarios.loading.toml_files import closest
+from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
 from sim.types import DetectionMode, Image, Tracker
 from tracking.config import Config
 from tracking.detection_mode import choose_mode
-from tracking.environment.episode_cache import DEFAULT_LIMIT, SourceCache
+from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, SourceCache
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
 from tracking.episode_source import Source, SourceSpec, sources
@@ -109,6 +110,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         size = {"statistics": len(NAMES), "parameters": len(lowest), "none": 1}[given.observation]
         self.observation_space = Box(lowest[:size], np.ones(size, np.float32))
         self.action_space = Box(-1.0, 1.0, (len(self.space),), np.float32)
+        self.left_out: dict[Source, str] = {}  # and why: scenes whose script does not come true
         self.source, self.base = self.sources[0], self.defaults
         self.metadata = self._metadata(self.source.fps)
         self._clear_episode()
@@ -147,9 +149,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         for name in options:
             _check_choice("options", name, RESET_OPTIONS)
         base = self.defaults if options.get("params") is None else config_of(self.config_class, options["params"])
-        source = self._draw_source(options)
-        opened = self.cache.open(source, streams_for(self.tracker, self.mode))
-        assert opened.truth is not None
+        source, opened = self._open_source(options)
         rollout = None if self.decision_every is None else self._rollout(base, source)
         if rollout is not None and not hasattr(rollout.prepared.tracker, "config"):
             expected, remedy = "a tracker that keeps its config as `config`", "see docs/reference/environment.md"
@@ -234,9 +234,24 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self._clear_episode()
         self.cache = SourceCache(self.cache.limit)
 
+    def _open_source(self, options: Mapping[str, Any]) -> tuple[Source, OpenedSource]:
+        """Draws sources until one's script comes true; raises its error if more than 5 % of the sources fail."""
+        while True:
+            source = self._draw_source(options)
+            opened = self.cache.open(source, streams_for(self.tracker, self.mode))
+            try:
+                assert opened.truth is not None
+                return source, opened
+            except OrderError as error:
+                known = source in self.left_out  # drawn again because nothing else fits the options
+                self.left_out[source] = error.line()
+                if known or len(self.left_out) > LEFT_OUT * len(self.sources):
+                    raise
+
     def _draw_source(self, options: Mapping[str, Any]) -> Source:
         name, seed = options.get("scenario"), options.get("seed")
         fitting = [s for s in self.sources if name in (None, s.name) and seed in (None, s.seed)]
+        fitting = [s for s in fitting if s not in self.left_out] or fitting
         if not fitting:
             names, seeds = sorted({s.name for s in self.sources}), sorted({s.seed for s in self.sources})
             expected = f"one of {', '.join(names)}, with a seed from {seeds[0]} to {seeds[-1]}"

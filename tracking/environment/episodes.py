@@ -34,6 +34,7 @@ class Episode:
     - frames: number of frames played.
     - seconds_tracking: time in the tracker with the checks of what it returns, s; `reset` included, reading frames not.
     - seconds_scoring: time for groups and scores, s.
+    - left_out: why the scene could not be played, as its script did not come true; "" if it was.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Episode:
     frames: int
     seconds_tracking: float
     seconds_scoring: float
+    left_out: str = ""
 
 
 def play(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from scenarios.errors import FlockscopeError, InputError, WorkError
+from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from sim.types import DetectionMode, Tracker
 from tracking.environment.episodes import Episode, Source, SourceCache
 from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
@@ -112,5 +112,7 @@ def _tracker_and_cache(
 def _attempt(task: EpisodeTask, tracker: TunedTracker, source_cache: SourceCache) -> EpisodeOrError:
     try:
         return tracker.play(task.source, task.values, task.detections, source_cache, task.every_score)
+    except OrderError as error:  # the scene's fault, whatever the parameters
+        return Episode(task.source.name, task.source.seed, float("nan"), {}, 0, 0.0, 0.0, error.line())
     except FlockscopeError as error:
         return error

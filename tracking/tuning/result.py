@@ -40,7 +40,8 @@ class TuningResult:
     - comparisons: winner and defaults on the test scenes; () if the defaults won.
     - taken_back: names of parameters that the best trial changed and the winner does not.
     - validation: two tuples, values by goal of the defaults and of the winner on the validation scenes.
-    - notes: remarks for the reader; study: name of the study.
+    - notes: remarks for the reader; study: name of the study. left_out: a line for each scene whose script did not
+      come true.
     """
 
     plan: SearchPlan = field(repr=False)
@@ -54,6 +55,7 @@ class TuningResult:
     validation: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     notes: tuple[str, ...] = ()
     study: str = ""
+    left_out: tuple[str, ...] = ()
 
     @property
     def default(self) -> Config:
@@ -111,7 +113,7 @@ class TuningResult:
         if chosen is not None:
             return [*lines, f"one of {len(self.front)} that no other trial beats by all goals"]
         lines += [c.line() for c in self.comparisons]
-        return [*lines, *self.notes]
+        return [*lines, *self.notes, *(f"left out: {scene}" for scene in self.left_out)]
 
     def to_toml(self, chosen: Candidate | None = None) -> str:
         """Returns a TOML text of all parameters of the winner, or of `chosen`, a candidate of the front.
@@ -134,8 +136,8 @@ class TuningResult:
         """Returns everything as nested dicts and lists for JSON; an unknown number is nan.
 
         Keys: settings, counts (trials, episodes, pruned, impossible), params, changed, taken_back, validation,
-        comparisons, candidates, front (empty with one goal), importance, notes, versions. `changed` (by parameter) and
-        `validation` (by goal) hold dicts of default and tuned value.
+        comparisons, candidates, front (empty with one goal), importance, notes, left_out, versions. `changed` (by
+        parameter) and `validation` (by goal) hold dicts of default and tuned value.
         """
         plan, seeds = self.plan, self.plan.seeds
         return {
@@ -162,6 +164,7 @@ class TuningResult:
             "front": [_candidate(c) for c in self.front] if len(plan.goals) > 1 else [],
             "importance": dict(self.importance),
             "notes": list(self.notes),
+            "left_out": list(self.left_out),
             "versions": versions(),
         }  # fmt: skip
 

@@ -10,22 +10,26 @@ docs/reference/tuning.md describes the method and what may be concluded from its
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, OrderError, WorkError
 from scenarios.printable import counted
+from sim.dataset.generate import LEFT_OUT
 from sim.io.files.own_files import refuse_foreign_file
 from sim.io.files.value_check import TABLE, TEXT, Rules, list_of
 from sim.types import Tracker
+from tracking.environment.episodes import Episode, Source
 from tracking.keyword_options import documented, from_keywords
 from tracking.tuning.comparison import Candidate, TrialRecord, pareto_front
 from tracking.tuning.goals import Goal
 from tracking.tuning.held_out_evaluation import HeldOutEvaluator, stored_in_study
 from tracking.tuning.options import Scenes, TuneOptions
-from tracking.tuning.parallel_episodes import PlayEpisodes, episode_player
+from tracking.tuning.parallel_episodes import EpisodeOrError, PlayEpisodes, episode_player
 from tracking.tuning.result import TuningResult
 from tracking.tuning.search_plan import SearchPlan, search_plan
 
@@ -72,10 +76,57 @@ def _search(options: TuneOptions) -> TuningResult:
     ):
         run_trials(study, play, progress)
         report = partial(progress, options.trials, options.trials)
-        found = _evaluated(plan, study, stored_in_study(study, play), report)
+        scenes = PlayedScenes(stored_in_study(study, play))
+        for source in plan.training:
+            scenes.check(source)
+        found = replace(_evaluated(plan, study, scenes, report), left_out=tuple(scenes.left_out.values()))
     if target is not None:
         found.write(target)
+    scenes.require_most()
     return found
+
+
+class PlayedScenes:
+    """Plays episodes and keeps a record of the scenes that are left out, because their script did not come true.
+
+    play: what plays them. State: scenes, all that were played or checked, by key of their source; left_out, a line for
+    each that was left out."""
+
+    def __init__(self, play: PlayEpisodes) -> None:
+        self.play = play
+        self.scenes: set[object] = set()
+        self.left_out: dict[object, str] = {}
+
+    def __call__(
+        self, sources: Sequence[Source], values: dict[str, Any], every_score: bool
+    ) -> Generator[EpisodeOrError, None, None]:
+        """Yields one result per source, as `play` does."""
+        with closing(self.play(sources, values, every_score)) as results:
+            for source, result in zip(sources, results, strict=False):
+                self._record(source, result.left_out if isinstance(result, Episode) else "")
+                yield result
+
+    def check(self, source: Source) -> None:
+        """Finds out whether the scene's script comes true, without playing it."""
+        try:
+            _ = source.open().truth
+            self._record(source, "")
+        except OrderError as error:
+            self._record(source, error.line())
+
+    def _record(self, source: Source, reason: str) -> None:
+        self.scenes.add(source.key)
+        if reason:
+            self.left_out[source.key] = f"{source.name} seed {source.seed}: {reason}"
+
+    def require_most(self) -> None:
+        """Raises WorkError if more than 5 % of the scenes were left out."""
+        if len(self.left_out) > LEFT_OUT * len(self.scenes):
+            first = next(iter(self.left_out.values()))
+            raise WorkError(
+                place="--suite", got=f"{len(self.left_out)} of {len(self.scenes)} scenes without their events: {first}",
+                expected="at most 5 % of the scenes left out", remedy="mend these scenes, or choose another suite",
+            )  # fmt: skip
 
 
 def _check_optuna() -> None:

@@ -14,7 +14,8 @@ from tracking.app.progress import ProgressMeter
 def generate(options: GenerateOptions) -> CommandResult:
     """Stores one sequence for every named scenario or suite entry and every seed, all seeds of an entry together.
 
-    The result's data: "sequences", the folders, and "folder", their parent. Stored sequences that are intact are kept.
+    The result's data: "sequences", the folders, "folder", their parent, and "left_out", name and reason of each
+    sequence whose script did not come true (at most 5 %). Stored sequences that are intact are kept.
 
     Raises InputError before anything is simulated for wrong options or scenarios, or a folder with another sequence. If
     sequences fail, the others are made first; then InputError is raised if all failures are wrong input, else
@@ -28,13 +29,17 @@ def generate(options: GenerateOptions) -> CommandResult:
     texts = [*option_parsing.sensor_settings(options.sensor), *options.settings]
     settings = option_parsing.scenario_settings(texts)
     streams, images = option_parsing.pictures(options.streams, options.images)
+    left_out: dict[str, str] = {}
     with ProgressMeter("generate") as meter:
         folders = make(
             options.names, seeds, options.out, set=settings, workers=WorkerOptions(options.workers, options.cluster),
             progress=meter.update, streams=streams, images=images,
+            left_out=lambda name, error: left_out.update({name: error.line()}),
         )  # fmt: skip
-    text = f"{counted(len(folders), 'sequence')} in {folders[0].parent}"
-    return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)
+    lines = [f"{counted(len(folders), 'sequence')} in {folders[0].parent}"]
+    lines += [f"left out: {name}: {reason}" for name, reason in left_out.items()]
+    data = {"sequences": folders, "folder": folders[0].parent, "left_out": left_out}
+    return CommandResult(data, "\n".join(lines))
 
 
 def validate(folder: Path) -> CommandResult:
