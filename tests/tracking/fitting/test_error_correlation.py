@@ -47,7 +47,7 @@ def wanted(lag: np.ndarray) -> np.ndarray:
 
 
 def test_correlations_of_errors_and_of_what_is_behind_misses() -> None:
-    truth = people(60)
+    truth = people(240)
     z = drawn(truth, PARTS)
     seen = correlations(truth, z, np.ones(len(z), bool))
     assert seen.lag[0] == pytest.approx(0.1)

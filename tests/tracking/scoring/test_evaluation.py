@@ -14,7 +14,7 @@ from sim.io.source import open_source
 from sim.io.store.sequence_folder import write_sequence
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
-from sim.types import Tracks, Truth
+from sim.types import EVENT_KINDS, Tracks, Truth
 from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.scoring import evaluate
@@ -42,7 +42,7 @@ def truth_as_tracks(true: Truth, plane: str = "ground", late: int = 0) -> list[T
         told = tuple(events.get(index, ()))
         cov = np.zeros((n, 4, 4))
         answer = Tracks(index, now.t, plane, "person", now.id, group, pos, vel, cov, now.box, np.ones(n), groups, told)
-        found.append(answer if not late else answer.replace(groups=None, events=()))
+        found.append(answer.replace(groups=None, events=()) if late else answer.replace(own_events=EVENT_KINDS))
     return found
 
 
@@ -156,7 +156,7 @@ def test_a_beginning_is_not_told_what_comes_later() -> None:
     bare = [
         t.replace(group=group, groups=None, events=()) for t, group in zip(truth_as_tracks(true), alone, strict=True)
     ]
-    for last in (crossing.end + 13, crossing.end + 30):
+    for last in (crossing.end + 20, crossing.end + 30):
         found, expected = evaluate(true, bare, frames=last), evaluate(true, bare[:last], frames=last)
         assert found["cross_TP"] == 1
         assert dict(found) == pytest.approx(dict(expected), abs=1e-12, nan_ok=True)
