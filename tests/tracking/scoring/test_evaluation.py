@@ -154,7 +154,8 @@ def test_a_beginning_is_not_told_what_comes_later() -> None:
     (crossing,) = (e for e in true.events if e.kind == "cross")
     alone = [np.full(len(true.at(index).id), -1) for index in range(1, true.length + 1)]
     bare = [
-        t.replace(group=group, groups=None, events=()) for t, group in zip(truth_as_tracks(true), alone, strict=True)
+        t.replace(group=group, groups=None, events=(), own_events=())
+        for t, group in zip(truth_as_tracks(true), alone, strict=True)
     ]
     for last in (crossing.end + 20, crossing.end + 30):
         found, expected = evaluate(true, bare, frames=last), evaluate(true, bare[:last], frames=last)
