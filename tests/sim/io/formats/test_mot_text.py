@@ -62,7 +62,7 @@ def test_a_folder_of_folders_is_a_dataset(shared_data):
 
 
 def test_nine_columns_are_flag_class_visibility(tmp_path):
-    rows = "1,1,0,0,5,5,1,1,0.25\n1,2,0,0,5,5,0,1,1\n1,3,0,0,5,5,1,7,1\n2,1,1,0,5,5,1,1,-1\n"
+    rows = "1,1,0,0,5,5,1,1,0.25\n1,2,0,0,5,5,0,1,1\n1,3,0,0,5,5,0,7,1\n2,1,1,0,5,5,1,1,-1\n"
     (s,) = open_source(folder(tmp_path, rows))
     assert s.truth.id.tolist() == [1, 1]
     assert s.truth.visibility.tolist() == [0.25, 1.0]
