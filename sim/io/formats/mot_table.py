@@ -39,19 +39,6 @@ class MotTable:
         nothing."""
         return np.asarray((self.box == -1).all(axis=1))
 
-    def ground(self) -> Array | None:
-        """Return the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1).
-
-        Returns None if the file has fewer than 10 columns, or if the position is unknown in all rows. That is the case
-        if z = -1 in all, or if all have the same position though a frame has several rows: zeros stand for unknown.
-        """
-        if self.rest.shape[1] < 4:
-            return None
-        known = self.rest[:, 3] != -1
-        if len(known) > len(np.unique(self.frame)) and (self.rest[:, 1:4] == self.rest[0, 1:4]).all():
-            return None
-        return np.where(known[:, None], self.rest[:, 1:4], np.nan) if known.any() else None
-
 
 def read_table(path: Path, *, length: int | None = None, boxless: bool = False) -> MotTable:
     """Read the MOTChallenge text file `path` of 6 to 10 columns: frame, id, left, top, width, height, and up to four

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from sim.arrays import repeated_ids
+from sim.io.formats.mot_ground import ground_positions
 from sim.io.formats.mot_people import labelled_people, of_class
 from sim.io.formats.mot_table import MotTable, read_table
 from sim.io.formats.velocity import differentiate
@@ -70,7 +71,8 @@ def read_detections(path: Path, length: int | None, person_class: int | None = N
     Raises InputError as read_table, and for a row without box (-1,-1,-1,-1) if any row lacks a ground point.
     """
     table = read_table(path, length=length, boxless=True)
-    ground, boxless = table.ground(), _reject_placeless(table)
+    ground = ground_positions(table)
+    boxless = _reject_placeless(table, ground)
     score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
     plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
     pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
@@ -80,10 +82,10 @@ def read_detections(path: Path, length: int | None, person_class: int | None = N
     return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
 
 
-def _reject_placeless(table: MotTable) -> Bools:
+def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
     """Return flags (N,), True for rows without box. Raise InputError for the first of them if any row lacks a ground
     position."""
-    ground, boxless = table.ground(), table.without_box()
+    boxless = table.without_box()
     if ground is None or np.isnan(ground).any():
         table.rows.reject(boxless, "a box, or x, y, z in every line", "give each line a box or a ground position")
     return boxless
@@ -128,7 +130,8 @@ def read_truth(
     row lacks a ground position, for an id twice in a frame, and for a visibility outside [0, 1] other than -1.
     """
     table = read_table(path, length=length, boxless=True)
-    boxed = not _reject_placeless(table).any()
+    ground = ground_positions(table, fps)
+    boxed = not _reject_placeless(table, ground).any()
     keep = labelled_people(table, person_class)
     reject_duplicate_ids(table, keep)
     order = np.flatnonzero(keep)
@@ -139,7 +142,6 @@ def read_truth(
         v = table.rest[:, 2]
         table.rows.reject((v > 1) | ((v < 0) & (v != -1)), "visibility from 0 to 1, or -1", "correct the last column")
         visibility = np.where(v[order] < 0, 1.0, v[order])
-    ground = table.ground()
     place = None if ground is None else ground[order]
     if not np.isfinite(px_per_m) and boxed:
         px_per_m = scale_of_all_boxes(box[:, 3])

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.io.formats.mot_ground import ground_positions
 from sim.io.formats.mot_people import of_class
 from sim.io.formats.mot_table import MotTable, read_table
 from sim.io.formats.mot_text import reject_duplicate_ids, unit_scores
@@ -43,7 +44,7 @@ def read_track_text(path: Path, fps: float, length: int | None, person_class: in
     order = np.lexsort((table.id, table.frame))
     order = order[people[order]]
     frame, id = table.frame[order], table.id[order]
-    ground = table.ground()
+    ground = ground_positions(table, fps)
     if ground is not None:
         remedy = "complete the line, or write z = -1 in all"
         table.rows.reject(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)

@@ -234,7 +234,7 @@ def test_one_position_for_all_is_none(tmp_path):
     path.write_text("1,1,5,5,10,20,1,0,0,0\n1,2,25,5,10,20,1,0,0,0\n")
     assert mot_text.read_truth(path, "x", 2.0).pos is None
     path.write_text("1,1,5,5,10,20,1,0,0,0\n2,1,25,5,10,20,1,0,0,0\n")
-    assert mot_text.read_truth(path, "x", 2.0).pos is not None, "one person may stand"
+    assert mot_text.read_truth(path, "x", 2.0).pos is None, "also of one person"
 
 
 def test_a_row_that_does_not_count_hides_no_duplicate(tmp_path):
