@@ -63,7 +63,7 @@ def frames_times_people(folder: Path) -> tuple[str, Read]:
 
 def rows_of_text(folder: Path) -> tuple[str, Read]:
     """MOT text of the greatest size."""
-    from sim.io.formats.mot_text import read_table
+    from sim.io.formats.mot_table import read_table
 
     path, line = folder / "t.txt", "{},{},100.00,100.00,50.00,100.00,1,1,1.000\n"
     people = 100

@@ -26,7 +26,7 @@ import numpy as np
 from benchmarks.support.options import add_data, new_parser
 from benchmarks.support.tables import head, row
 from benchmarks.support.timing import best_in_turn, best_times
-from sim.io.formats.mot_text import read_table
+from sim.io.formats.mot_table import read_table
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Groups, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups

@@ -34,6 +34,7 @@ def open_source(
     camera: Camera | str | Path | None = None,
     images: bool = True,
     background: str | None = None,
+    person_class: int | None = None,
 ) -> list[Sequence]:
     """Return the Sequences at a path: those of a folder sorted by path, subfolders before files; one for a single
     recording.
@@ -43,7 +44,8 @@ def open_source(
     fps: frames per second; px_per_m: image scale; camera: calibration or the path of its file. These three replace what
     a recording lacks or states; None: as the recording states, else unknown. images False leaves out the pictures of
     MOTChallenge folders; other formats ignore it. background: frames for background models, "first:N" or "spread:N";
-    None: spread:50, or the stored empty frames of a generated sequence.
+    None: spread:50, or the stored empty frames of a generated sequence. person_class: class of people in MOTChallenge
+    texts that have classes; None: 1, with a warning about others.
 
     Raises InputError if the path does not exist or holds no known format, a file is invalid, or an option is wrong or
     has no effect on the format. Generated sequences reject fps, px_per_m and camera. Warns about recordings without a
@@ -56,7 +58,9 @@ def open_source(
             raise InputError(place=option, got=value, expected=expected, remedy=f"correct {option}")
     if isinstance(camera, str | Path):
         camera = read_calibration(Path(camera))
-    options = RecordingOptions(fps, px_per_m, camera, images, None if background is None else parse_choice(background))
+    options = RecordingOptions(
+        fps, px_per_m, camera, images, None if background is None else parse_choice(background), person_class
+    )
     if not os.path.exists(path):
         raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
     if not os.path.isdir(path):
@@ -109,6 +113,7 @@ class RecordingOptions:
 
     fps: frames per second. px_per_m: image scale. camera: its calibration. images: False leaves out the pictures of
     MOTChallenge folders, True is the default. background: which frames are the sample for background models.
+    person_class: the class of people in MOTChallenge texts.
     """
 
     fps: float | None
@@ -116,6 +121,7 @@ class RecordingOptions:
     camera: Camera | None
     images: bool
     background: BackgroundChoice | None
+    person_class: int | None = None
 
     def reject(self, path: Path, kind: str, why: str, *names: str) -> None:
         """Raise InputError if any of the options `names` (fields of this class but `images`) is given, else do nothing.
@@ -123,7 +129,9 @@ class RecordingOptions:
         path, kind: the source and what it is, as "a BIWI recording". why: why the options have no effect on it. All
         three are for the error.
         """
-        given = [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) is not None]
+        given = [
+            f"--{name.removeprefix('person_').replace('_', '-')}" for name in names if getattr(self, name) is not None
+        ]
         if given:
             remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
             raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
@@ -132,17 +140,25 @@ class RecordingOptions:
 def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     suffix, o = path.suffix.lower(), options
     if suffix == ".xml":
-        o.reject(path, "a CAVIAR recording", "its truth is in the image, without pictures", "camera", "background")
+        o.reject(
+            path,
+            "a CAVIAR recording",
+            "its truth is in the image, without pictures",
+            "camera",
+            "background",
+            "person_class",
+        )
         return caviar.open_file(path, fps=o.fps, px_per_m=o.px_per_m)
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, o)
     if suffix in video.SUFFIXES:
+        o.reject(path, "a video", "it has no classes", "person_class")
         return video.open_video(
             path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, background=o.background or video.ANY
         )
     if suffix in (".txt", ".csv"):
         o.reject(path, "a text", "it has no pictures", "background")
-        return mot_folder.open_text(path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera)
+        return mot_folder.open_text(path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, person_class=o.person_class)
     raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy="check the path")
 
 
@@ -182,12 +198,21 @@ def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
         return _open_file(path, o)
     match _kind(path):
         case "generated":
-            o.reject(path, "a generated sequence", "it knows its own", "fps", "px_per_m", "camera")
+            o.reject(path, "a generated sequence", "it knows its own", "fps", "px_per_m", "camera", "person_class")
             return sequence_folder.open_sequence(path, background=o.background)
         case "biwi":
-            o.reject(path, "a BIWI recording", "it is in metres, without pictures", "px_per_m", "camera", "background")
+            o.reject(
+                path,
+                "a BIWI recording",
+                "it is in metres, without pictures",
+                "px_per_m",
+                "camera",
+                "background",
+                "person_class",
+            )
             return biwi.open_folder(path, fps=o.fps)
         case _:
             return mot_folder.open_folder(
-                path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, images=o.images, background=o.background
-            )
+                path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, images=o.images, background=o.background,
+                person_class=o.person_class,
+            )  # fmt: skip

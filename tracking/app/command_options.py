@@ -23,6 +23,7 @@ from tracking.app.shared_options import (
     Out,
     Params,
     People,
+    PersonClass,
     Probabilities,
     Rule,
     Scale,
@@ -84,6 +85,7 @@ class TrackOptions:
     numbers. fps: frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file;
     None if not given. background: "first:N" or "spread:N", the frames that a background model is trained on; None if
     not given. step_timeout: seconds that each reset and step of the tracker may take; None: no limit.
+    person_class: class of people in MOT texts; None: 1.
     """
 
     tracker: Tracker
@@ -100,6 +102,7 @@ class TrackOptions:
     camera: Calibration = None
     background: Background = None
     step_timeout: StepTimeout = None
+    person_class: PersonClass = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +112,7 @@ class GroupOptions:
     source: path of labelled people, a text with ids, or stored tracks. out: folder to write. grouping: file of the
     parameters that decide who belongs together; None: the defaults. probabilities: store those of all pairs. fps:
     frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration; None if not given.
+    person_class: class of people in MOT texts; None: 1.
     """
 
     source: People
@@ -118,6 +122,7 @@ class GroupOptions:
     fps: Fps = None
     px_per_m: Scale = None
     camera: Calibration = None
+    person_class: PersonClass = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +133,7 @@ class ScoreOptions:
     have. group_match: how groups are compared, by "hull" or "members". against: other tracks whose scores are
     subtracted; None: none. blocks: number of draws of blocks of frames for the intervals of a single recording; 0: no
     such intervals. fps: frames per second; None: the recording's own. px_per_m: pixels per metre; None if not given.
+    person_class: class of people in MOT texts; None: 1.
     """
 
     truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")]
@@ -150,6 +156,7 @@ class ScoreOptions:
     ] = 0
     fps: Fps = None
     px_per_m: Scale = None
+    person_class: PersonClass = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -270,6 +277,7 @@ class CocoOptions:
 
     folder: a sequence or dataset with labelled boxes. out: JSON file; with several splits, each has its own.
     min_visibility: people less visible are left out, 0 to 1.
+    person_class: class of people in MOT texts; None: 1.
     """
 
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A sequence or dataset with labelled boxes.")]
@@ -283,6 +291,7 @@ class CocoOptions:
         float,
         typer.Option("--min-visibility", min=0.0, max=1.0, metavar="V", help="Leave out people who are less visible."),
     ] = 0.0
+    person_class: PersonClass = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,6 +31,10 @@ Fps = Annotated[
     typer.Option("--fps", help="Frames per second of a recording, in place of its own. Not for generated sequences."),
 ]
 Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metre of a recording without a camera.")]
+PersonClass = Annotated[
+    int | None,
+    typer.Option("--class", min=0, metavar="N", help="Class of people (column 8) in MOT texts. Default: 1."),
+]
 Calibration = Annotated[
     Path | None,
     typer.Option("--camera", metavar="FILE", help="Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair."),

@@ -66,7 +66,10 @@ class StoredTracks:
                 expected=f"those of {sequence.source.get('path', 'this sequence')}",
                 remedy=f"{AGAIN}: its labels, scenario or settings are others",
             )  # fmt: skip
-        return TrackingRun(tuple(read_checked_tracks(self.path, fps=sequence.fps, length=sequence.length)), self.info)
+        tracks = read_checked_tracks(
+            self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class")
+        )
+        return TrackingRun(tuple(tracks), self.info)
 
 
 def find_tracks(path: Path) -> list[StoredTracks]:

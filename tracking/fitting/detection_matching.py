@@ -17,7 +17,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors, perturb_boxes
-from sim.io.formats import mot_text
+from sim.io.formats.mot_table import read_table
 from sim.io.store.truth_files import scores_or_ones
 from sim.scene.box_visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth
@@ -208,7 +208,7 @@ def _left_out(sequence: Sequence) -> tuple[Ints, Array] | None:
     path = Path(str(sequence.source.get("path", ""))) / "gt" / "gt.txt"
     if sequence.source.get("kind") != "mot" or not path.is_file():
         return None
-    table = mot_text.read_table(path)
+    table = read_table(path)
     if not table.rest.shape[1]:
         return None
     out = (table.id >= 0) & (table.rest[:, 0] == 0)

@@ -33,13 +33,16 @@ SPLITS = ("train", "training", "val", "valid", "validation", "test", "testing", 
 """Names of folders that divide recordings into splits."""
 
 
-def coco(source: str | Path, out: str | Path, min_visibility: float = 0.0) -> list[Path]:
+def coco(
+    source: str | Path, out: str | Path, min_visibility: float = 0.0, *, person_class: int | None = None
+) -> list[Path]:
     """Write the sequences of a source that have labelled boxes as COCO files, and return their paths.
 
     source: path of a dataset or recording. out: the JSON file, replaced if it exists. If sequences belong to several
     splits, each has a file of its own: `coco-train.json`, `coco-val.json` for `coco.json`. The split of a generated
     sequence follows its seed, that of a recording the folder it lies in (train, val, test, …). min_visibility: people
     who are less visible, 0 to 1, are left out. So are people outside the picture, and rows with an unknown box.
+    person_class: class of people in MOTChallenge texts; None: 1.
 
     Each frame is an image, each sequence a video, both numbered from 1. file_name is the path of the frame's picture or
     video relative to the source (a folder, else the folder of the file); info.root is the way there from the JSON file.
@@ -57,7 +60,9 @@ def coco(source: str | Path, out: str | Path, min_visibility: float = 0.0) -> li
             place="--min-visibility", got=min_visibility, expected="a number from 0 to 1", remedy="correct it"
         )
     source, out = Path(source), Path(out)
-    sequences = [s for s in open_source(source) if s.truth is not None and s.truth.box is not None]
+    sequences = [
+        s for s in open_source(source, person_class=person_class) if s.truth is not None and s.truth.box is not None
+    ]
     if not sequences:
         raise InputError(
             file=source, got="no labelled boxes", expected="a dataset with boxes", remedy="give a generated dataset"

@@ -18,9 +18,10 @@ from scenarios.regular_file import is_present
 from sim.io.files.numeric_text import read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
+from sim.io.formats.mot_table import read_table
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
-from sim.types import Camera, Frame, Image, Ints, Sequence
+from sim.types import Camera, Frame, Image, Ints, Sequence, Truth
 
 DEFAULT_FPS = 25.0
 
@@ -107,6 +108,7 @@ def open_folder(
     camera: Camera | None = None,
     images: bool = True,
     background: BackgroundChoice | None = None,
+    person_class: int | None = None,
 ) -> Sequence:
     """Return the MOTChallenge folder `path` (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
@@ -130,10 +132,10 @@ def open_folder(
     rate = frame_rate(fps, info.fps)
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    found = mot_text.read_detections(det, info.length) if is_present(det) else None
-    pictures = _find_pictures(path, info, gt, found)
+    found = mot_text.read_detections(det, info.length, person_class) if is_present(det) else None
+    pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
-    length = info.length or max(_labelled_frames(found, gt).max(initial=0).item(), pictures.last)
+    length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)
     if not length:
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
         raise InputError(file=path, got="nothing that tells its length", expected=expected, remedy="complete it")
@@ -161,14 +163,18 @@ def open_folder(
     def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
         return pictures.read(wanted, seen if images else pictures.first_size())
 
+    def truth() -> Truth:
+        return mot_text.read_truth(gt, info.name, rate, length, scale, person_class)
+
+    shown = {} if choice is None else {"background": str(choice)}
     return Sequence(
         name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
-        load_truth=(lambda: mot_text.read_truth(gt, info.name, rate, length, scale)) if gt.is_file() else None,
+        load_truth=truth if gt.is_file() else None,
         image_size=size, camera=None if camera is None else scaled_to_image(camera, size, path),
         px_per_m=scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **({} if choice is None else {"background": str(choice)})},
+        source={"kind": "mot", "path": str(path), **_class_named(person_class), **shown},
     )  # fmt: skip
 
 
@@ -179,13 +185,12 @@ def left_pictures(path: Path) -> PictureFolder:
     """
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
-    gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    return _find_pictures(path, info, gt, mot_text.read_detections(det, info.length) if is_present(det) else None)
+    return _find_pictures(path, info)
 
 
-def _find_pictures(path: Path, info: SeqInfo, gt: Path, found: mot_text.DetectionTable | None) -> PictureFolder:
-    labelled = (lambda: _labelled_frames(found, gt)) if is_present(gt) or found is not None else None
-    return find_pictures(path / info.image_dir, info.length, labelled)
+def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
+    texts = is_present(path / "gt" / "gt.txt") or is_present(path / "det" / "det.txt")
+    return find_pictures(path / info.image_dir, info.length, (lambda: _labelled_frames(path)) if texts else None)
 
 
 def _refuse_beyond(path: Path, pictures: PictureFolder, length: int) -> None:
@@ -215,13 +220,19 @@ def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, in
 
 
 def open_text(
-    path: Path, *, fps: float | None = None, px_per_m: float | None = None, camera: Camera | None = None
+    path: Path,
+    *,
+    fps: float | None = None,
+    px_per_m: float | None = None,
+    camera: Camera | None = None,
+    person_class: int | None = None,
 ) -> Sequence:
     """Return the MOT text file `path` as Sequence without pictures: its rows are detections if every id is -1, else
     truth.
 
     fps: frames per second; None: 25 with a warning. px_per_m: image scale; None: unknown (nan; the truth then takes the
-    boxes' median height / 1.7 m). camera: calibration, None if unknown; it is not scaled. The length is the last frame
+    boxes' median height / 1.7 m). camera: calibration, None if unknown; it is not scaled. person_class: the class of
+    people; None: 1, with a warning about rows of others. The length is the last frame
     in the file; the name is the file's, without suffix.
 
     Raises InputError if `fps` is not above 0, or if the file is unreadable, invalid or has no row, or a row has neither
@@ -229,30 +240,38 @@ def open_text(
     """
     rate = frame_rate(fps, None)
     scale = float("nan") if px_per_m is None else px_per_m
-    found = mot_text.read_detections(path, None)
-    if not len(found.frame):
+    table = read_table(path, boxless=True)
+    if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
-    length = int(found.frame.max(initial=0))
-    only_detections = bool((found.id == -1).all())
+    found = mot_text.read_detections(path, None, person_class)
+    length = int(table.frame.max(initial=0))
+    only_detections = bool((table.id == -1).all())
 
     def frames() -> Iterator[Frame]:
         for index in range(1, length + 1):
             here = found.at(index, rate) if only_detections else None
             yield Frame(index, (index - 1) / rate, detections=here)
 
+    def truth() -> Truth:
+        return mot_text.read_truth(path, path.stem, rate, length, scale, person_class)
+
     return Sequence(
         name=path.stem, fps=rate, length=length, frames=frames,
-        load_truth=None if only_detections else lambda: mot_text.read_truth(path, path.stem, rate, length, scale),
-        camera=camera, px_per_m=scale, has_detections=only_detections, source={"kind": "mot text", "path": str(path)},
+        load_truth=None if only_detections else truth,
+        camera=camera, px_per_m=scale, has_detections=only_detections,
+        source={"kind": "mot text", "path": str(path), **_class_named(person_class)},
     )  # fmt: skip
 
 
-def _labelled_frames(found: mot_text.DetectionTable | None, gt: Path) -> Ints:
-    """Return the frames (from 1) with a row in det.txt, given as table `found`, or in the file `gt`, ascending.
+def _labelled_frames(path: Path) -> Ints:
+    """Return the frames (from 1) with a row in det/det.txt or gt/gt.txt of the folder `path`, ascending.
 
-    Raises InputError if `gt` exists and is invalid.
+    Raises InputError if one of them is invalid.
     """
-    frames = [] if found is None else [found.frame]
-    if gt.is_file():
-        frames.append(mot_text.read_table(gt, boxless=True).frame)
+    texts = [text for text in (path / "det" / "det.txt", path / "gt" / "gt.txt") if text.is_file()]
+    frames = [read_table(text, boxless=True).frame for text in texts]
     return np.unique(np.concatenate([np.zeros(0, np.int64), *frames]))
+
+
+def _class_named(person_class: int | None) -> dict[str, int]:
+    return {} if person_class is None else {"class": person_class}

@@ -14,78 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import NumericTable, crowded, read_numbers
+from sim.io.formats.mot_ground import ground_positions
+from sim.io.formats.mot_people import labelled_people, of_class
+from sim.io.formats.mot_table import MotTable, read_table
 from sim.io.formats.velocity import differentiate
 from sim.scene.box_scale import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
-
-PEDESTRIAN = 1
-
-GROUND_COLUMNS = 4
-"""Columns of a text of ground positions alone: frame, id, x, y."""
-
-
-@dataclass(frozen=True)
-class MotTable:
-    """A MOTChallenge text file, N rows in the order of the file.
-
-    rows: the numbers as read, with their lines for errors. frame (N,): from 1. id (N,): of the person or track, usually
-    -1 for detections. box (N, 4): left, top, width, height in px, all -1 for no box. rest (N, 0 to 4): the columns
-    after the box: confidence or flag; then class and visibility, or x, y, z in m.
-    """
-
-    rows: NumericTable
-    frame: Ints
-    id: Ints
-    box: Array
-    rest: Array
-
-    def without_box(self) -> Bools:
-        """Return flags (N,), True for rows whose box is -1,-1,-1,-1, which means that the row has no box. Raises
-        nothing."""
-        return np.asarray((self.box == -1).all(axis=1))
-
-    def ground(self) -> Array | None:
-        """Return the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1).
-
-        Returns None if the file has fewer than 10 columns, or if the position is unknown in all rows. That is the case
-        if z = -1 in all, or if all have the same position though a frame has several rows: zeros stand for unknown.
-        """
-        if self.rest.shape[1] < 4:
-            return None
-        known = self.rest[:, 3] != -1
-        if len(known) > len(np.unique(self.frame)) and (self.rest[:, 1:4] == self.rest[0, 1:4]).all():
-            return None
-        return np.where(known[:, None], self.rest[:, 1:4], np.nan) if known.any() else None
-
-
-def read_table(path: Path, *, length: int | None = None, boxless: bool = False) -> MotTable:
-    """Read the MOTChallenge text file `path` of 6 to 10 columns: frame, id, left, top, width, height, and up to four
-    more; or of 4 columns: frame, id, x, y in m, which are read as rows without box, of confidence 1 and z = 0.
-
-    length: the last frame allowed; None: 1,000,000. boxless: True allows -1,-1,-1,-1 for "no box". A file without
-    lines gives a table without rows. Rows stay in the order of the file. Raises InputError if the file is unreadable,
-    and, with the line, if a cell is no finite number, the number of columns is wrong, a frame is outside 1 to `length`,
-    a frame or id is no integer, a number is beyond 1e6, a frame has more than 5000 lines, or a box has no area.
-    """
-    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS)
-    frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
-    box, rest = rows.values[:, 2:6], rows.values[:, 6:]
-    if rows.values.shape[1] == GROUND_COLUMNS:
-        box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
-    table = MotTable(rows, frame, id, box, rest)
-    last = FRAMES if length is None else length
-    rows.reject((frame < 1) | (frame > last), f"frames from 1 to {last}", "correct the frame, or seqLength")
-    rows.reject(crowded(frame), f"at most {DETECTIONS} lines of one frame", "check that this is the right file")
-    far = (np.abs(rows.values[:, 2:]) > COORDINATE).any(axis=1)
-    rows.reject(far, f"numbers within {COORDINATE:g}", "remove or correct the line")
-    flat = (table.box[:, 2:] <= 0).any(axis=1)
-    if boxless:
-        flat &= ~table.without_box()
-    rows.reject(flat, "boxes with width and height above 0", "remove or correct the line")
-    return table
 
 
 def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
@@ -124,29 +59,33 @@ class DetectionTable:
         return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
 
 
-def read_detections(path: Path, length: int | None) -> DetectionTable:
+def read_detections(path: Path, length: int | None, person_class: int | None = None) -> DetectionTable:
     """Read a det.txt: points on the ground (m) if every row has one, else the centres of the boxes in the image (px).
 
-    path: the file. length: the last frame allowed; None: 1,000,000. The boxes are None if any row lacks one. Scores are
+    path: the file. length: the last frame allowed; None: 1,000,000. person_class: the class of people, if the file has
+    classes; None: 1, with a warning about rows of other classes, which are left out.
+    The boxes are None if any row lacks one. Scores are
     1 if the file has none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1 (all 1 if
     equal). A file without lines gives no rows.
 
     Raises InputError as read_table, and for a row without box (-1,-1,-1,-1) if any row lacks a ground point.
     """
     table = read_table(path, length=length, boxless=True)
-    ground, boxless = table.ground(), _reject_placeless(table)
+    ground = ground_positions(table)
+    boxless = _reject_placeless(table, ground)
     score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
     plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
     pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
     order = np.argsort(table.frame, kind="stable")
+    order = order[of_class(table, np.ones(len(order), bool), person_class)[order]]
     box = None if boxless.any() else table.box[order]
     return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
 
 
-def _reject_placeless(table: MotTable) -> Bools:
+def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
     """Return flags (N,), True for rows without box. Raise InputError for the first of them if any row lacks a ground
     position."""
-    ground, boxless = table.ground(), table.without_box()
+    boxless = table.without_box()
     if ground is None or np.isnan(ground).any():
         table.rows.reject(boxless, "a box, or x, y, z in every line", "give each line a box or a ground position")
     return boxless
@@ -173,11 +112,15 @@ def unit_scores(score: Array) -> Array:
     return (score - score.min()) / span if span > 0 else np.ones_like(score)
 
 
-def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan")) -> Truth:
+def read_truth(
+    path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
+    person_class: int | None = None,
+) -> Truth:  # fmt: skip
     """Read a gt.txt as truth of people, without group labels: everybody is alone (-1), and no frame counts as labelled.
 
-    Rows with flag 0 or (in 8 or 9 columns) a class other than 1 are left out, as in MOTChallenge's own scoring; so are
-    negative ids. They must be valid all the same. The rest is sorted by (frame, id). name, fps (frames/s): of the
+    Rows with flag 0 or of another class than people are left out, as in MOTChallenge's own scoring; so are negative
+    ids. They must be valid all the same. person_class: the class of people; None: 1, with a warning about
+    others. The rest is sorted by (frame, id). name, fps (frames/s): of the
     sequence. length: number of frames; None: up to the last frame kept. px_per_m: image scale; nan: the median height
     of the boxes / 1.7 m, nan without boxes. Boxes are None if a row has none (-1,-1,-1,-1). Positions and velocities
     are None without ground positions, nan in rows where they are unknown; velocities are differences over 0.5 s.
@@ -187,13 +130,9 @@ def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_
     row lacks a ground position, for an id twice in a frame, and for a visibility outside [0, 1] other than -1.
     """
     table = read_table(path, length=length, boxless=True)
-    boxed = not _reject_placeless(table).any()
-    keep = table.id >= 0
-    nine = table.rest.shape[1] in (2, 3)
-    if table.rest.shape[1]:
-        keep &= table.rest[:, 0] != 0
-    if nine:
-        keep &= table.rest[:, 1] == PEDESTRIAN
+    ground = ground_positions(table, fps)
+    boxed = not _reject_placeless(table, ground).any()
+    keep = labelled_people(table, person_class)
     reject_duplicate_ids(table, keep)
     order = np.flatnonzero(keep)
     order = order[np.lexsort((table.id[order], table.frame[order]))]
@@ -203,7 +142,6 @@ def read_truth(path: Path, name: str, fps: float, length: int | None = None, px_
         v = table.rest[:, 2]
         table.rows.reject((v > 1) | ((v < 0) & (v != -1)), "visibility from 0 to 1, or -1", "correct the last column")
         visibility = np.where(v[order] < 0, 1.0, v[order])
-    ground = table.ground()
     place = None if ground is None else ground[order]
     if not np.isfinite(px_per_m) and boxed:
         px_per_m = scale_of_all_boxes(box[:, 3])

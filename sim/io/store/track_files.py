@@ -142,8 +142,13 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
     return read_checked_tracks(path, fps=fps, length=length)
 
 
-def read_checked_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:
-    """Read tracks as `read_tracks` does, but of a run that `check_run` found whole: no hash is compared again."""
+def read_checked_tracks(
+    path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: int | None = None
+) -> list[Tracks]:
+    """Read tracks as `read_tracks` does, but of a run that `check_run` found whole: no hash is compared again.
+
+    person_class: the class of people in a text of another program; None: 1.
+    """
     path = Path(path)
     folder = path if path.is_dir() else path.parent
     whole = path.is_dir() or path.name in WHOLE
@@ -155,7 +160,7 @@ def read_checked_tracks(path: str | Path, *, fps: float | None = None, length: i
             file=path, got="no tracks", expected="tracks.parquet, tracks.txt or a MOTChallenge text",
             remedy="give the folder that `flockscope track` made",
         )  # fmt: skip
-    found = read_track_text(text, 25.0 if fps is None else fps, length)
+    found = read_track_text(text, 25.0 if fps is None else fps, length, person_class)
     if not whole:
         return found
     groups = folder / "groups.csv"

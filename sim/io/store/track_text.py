@@ -13,16 +13,21 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.mot_text import MotTable, read_table, reject_duplicate_ids, unit_scores
+from sim.io.formats.mot_ground import ground_positions
+from sim.io.formats.mot_people import of_class
+from sim.io.formats.mot_table import MotTable, read_table
+from sim.io.formats.mot_text import reject_duplicate_ids, unit_scores
 from sim.io.formats.velocity import chords
 from sim.io.store.group_files import read_groups_csv
 from sim.types import Array, Ints, Plane, Tracks
 
 
-def read_track_text(path: Path, fps: float, length: int | None) -> list[Tracks]:
+def read_track_text(path: Path, fps: float, length: int | None, person_class: int | None = None) -> list[Tracks]:
     """Return the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`; frames without rows are empty.
 
-    length: None: to the last frame in the file. fps: frames/s. Tracks of a frame are sorted by id. Positions are on the
+    length: None: to the last frame in the file. fps: frames/s. person_class: the class of people, if the file has
+    classes; None: 1, with a warning about rows of other classes, which are left
+    out. Tracks of a frame are sorted by id. Positions are on the
     ground (m) if the file has them, else box centres in the image (px). Velocities are differences over 0.5 s,
     covariances nan, and everybody is alone (group -1). Boxes are None if a row lacks one. Scores are 1 if the file has
     none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1 (all 1 if equal).
@@ -34,16 +39,18 @@ def read_track_text(path: Path, fps: float, length: int | None) -> list[Tracks]:
     table = read_table(path, length=length, boxless=True)
     _reject_empty(table, length)
     table.rows.reject(table.id < 0, "ids from 0", "give each track an id")
-    reject_duplicate_ids(table, np.ones(len(table.id), bool))
+    people = of_class(table, np.ones(len(table.id), bool), person_class)
+    reject_duplicate_ids(table, people)
     order = np.lexsort((table.id, table.frame))
+    order = order[people[order]]
     frame, id = table.frame[order], table.id[order]
-    ground = table.ground()
+    ground = ground_positions(table, fps)
     if ground is not None:
         remedy = "complete the line, or write z = -1 in all"
         table.rows.reject(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)
     pos = _centres(table)[order] if ground is None else ground[order][:, :2]
     box = None if table.without_box().any() else table.box[order]
-    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(order)))[order]
+    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.id)))[order]
     plane: Plane = "image" if ground is None else "ground"
     vel, count = chords(frame, id, pos, fps), length or int(frame.max(initial=0))
     cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()

@@ -78,7 +78,10 @@ def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | 
 
 
 def _open(path: Path, options: GroupOptions) -> list[Sequence]:
-    return open_source(path, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=False)
+    return open_source(
+        path, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=False,
+        person_class=options.person_class,
+    )  # fmt: skip
 
 
 def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
@@ -89,9 +92,9 @@ def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
     """
     tracks.check()
     info, folder = tracks.info, tracks.path if tracks.path.is_dir() else tracks.path.parent
-    recording = RecordingOptions(options.fps, options.px_per_m, options.camera, True, None)  # type: ignore[arg-type]
+    recording = RecordingOptions(options.fps, options.px_per_m, options.camera, True, None, options.person_class)  # type: ignore[arg-type]
     stated = [name for name, known in (("fps", "fps" in info), ("px_per_m", info.get("plane") != "image")) if known]
-    recording.reject(folder, "a run", "run.json states it", "camera", *stated)
+    recording.reject(folder, "a run", "run.json states it", "camera", "person_class", *stated)
     scale, frames = info.get("px_per_m"), int(info.get("px_per_m_frames") or 0)
     if options.px_per_m is not None:
         scale, frames = options.px_per_m, 0

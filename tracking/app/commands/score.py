@@ -58,7 +58,9 @@ def score(options: ScoreOptions) -> CommandResult:
     Raises InputError if a file is wrong, if a sequence has no tracks or no labels, if truth and tracks cannot be
     compared as asked, if two runs cannot be compared in one plane, or if --blocks is given for several sequences.
     """
-    sequences = open_source(options.truth, fps=options.fps, px_per_m=options.px_per_m, images=False)
+    sequences = open_source(
+        options.truth, fps=options.fps, px_per_m=options.px_per_m, images=False, person_class=options.person_class
+    )
     method = ComparisonMethod(options.similarity, options.group_match)
     paths = [options.tracks] if options.against is None else [options.tracks, options.against]
     if options.blocks and len(sequences) > 1:

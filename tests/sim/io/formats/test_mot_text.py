@@ -62,7 +62,7 @@ def test_a_folder_of_folders_is_a_dataset(shared_data):
 
 
 def test_nine_columns_are_flag_class_visibility(tmp_path):
-    rows = "1,1,0,0,5,5,1,1,0.25\n1,2,0,0,5,5,0,1,1\n1,3,0,0,5,5,1,7,1\n2,1,1,0,5,5,1,1,-1\n"
+    rows = "1,1,0,0,5,5,1,1,0.25\n1,2,0,0,5,5,0,1,1\n1,3,0,0,5,5,0,7,1\n2,1,1,0,5,5,1,1,-1\n"
     (s,) = open_source(folder(tmp_path, rows))
     assert s.truth.id.tolist() == [1, 1]
     assert s.truth.visibility.tolist() == [0.25, 1.0]
@@ -234,7 +234,7 @@ def test_one_position_for_all_is_none(tmp_path):
     path.write_text("1,1,5,5,10,20,1,0,0,0\n1,2,25,5,10,20,1,0,0,0\n")
     assert mot_text.read_truth(path, "x", 2.0).pos is None
     path.write_text("1,1,5,5,10,20,1,0,0,0\n2,1,25,5,10,20,1,0,0,0\n")
-    assert mot_text.read_truth(path, "x", 2.0).pos is not None, "one person may stand"
+    assert mot_text.read_truth(path, "x", 2.0).pos is None, "also of one person"
 
 
 def test_a_row_that_does_not_count_hides_no_duplicate(tmp_path):

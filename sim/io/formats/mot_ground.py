@@ -1,0 +1,97 @@
+"""Decides whether columns 8 to 10 of a MOTChallenge text are ground positions in m: people in them must move as people.
+
+Other programs write categories, occlusion flags, zeros or pixels there.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from scenarios.regular_file import is_present
+from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable
+from sim.types import Array, Bools, Ints
+
+FASTEST = 12.0
+"""Speed in m/s that nobody exceeds on foot."""
+
+LONGEST = 12.0
+"""Step in m from one frame to the next, where the frame rate is unknown."""
+
+ENOUGH = 10
+"""Steps that are needed to judge speeds."""
+
+SHARED = 0.1
+"""Share of rows at the position of another row of their frame, above which these are no positions of people."""
+
+MOVED = 0.5
+"""A box that moves by more than this share of its height belongs to somebody who does not stand."""
+
+VOUCHERS = ("manifest.json", "camera.json", "run.json")
+"""Files beside a text, or in the folder above it, that vouch for positions in m."""
+
+
+def ground_positions(table: MotTable, fps: float | None = None) -> Array | None:
+    """Return the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1); None if there are none.
+
+    fps: frames/s, None if unknown. There are none if the text has fewer than 10 columns, if z = -1 in all rows, or if
+    all rows have the same whole numbers, or the same position though a frame has several rows. There are also none,
+    with a warning that says why, if people cannot move so and no manifest or camera file vouches for metres.
+    """
+    if table.rest.shape[1] < 4:
+        return None
+    xyz, known = table.rest[:, 1:4], np.asarray(table.rest[:, 3] != -1)
+    if not known.any():
+        return None
+    if table.rows.values.shape[1] != GROUND_COLUMNS and not _vouched(table):
+        alone = len(known) == len(np.unique(table.frame))
+        same = len(known) > 1 and bool((xyz == xyz[0]).all())
+        if same and (not alone or bool((xyz == np.round(xyz)).all())):
+            return None
+        doubt = _doubt(table, known, fps)
+        if doubt:
+            text = f"{table.rows.file}: columns 8 to 10 are not taken as metres: {doubt}; the boxes are used"
+            warnings.warn(text, stacklevel=3)
+            return None
+    return np.where(known[:, None], xyz, np.nan)
+
+
+def _vouched(table: MotTable) -> bool:
+    file = table.rows.file
+    return any(is_present(folder / name) for folder in (file.parent, file.parent.parent) for name in VOUCHERS)
+
+
+def _doubt(table: MotTable, known: Bools, fps: float | None) -> str:
+    """Return why the positions cannot be those of people in m; "" if they can."""
+    rows = np.flatnonzero(known)
+    xy, frame, id = table.rest[rows, 1:3], table.frame[rows], table.id[rows]
+    places, count = np.unique(np.c_[frame, xy], axis=0, return_counts=True)
+    if count[count > 1].sum() > SHARED * len(rows):
+        return "people of one frame have the same position"
+    if len(rows) > 3 and (xy == np.round(xy)).all() and 2 * len(np.unique(xy, axis=0)) <= len(places):
+        return "they hold few whole numbers, as categories or flags do"
+    order = np.lexsort((frame, id))
+    order = order[id[order] >= 0]
+    pairs = np.flatnonzero(np.diff(id[order]) == 0)
+    first, second = order[pairs], order[pairs + 1]
+    if not len(first):
+        return ""
+    step, gap = np.hypot(*(xy[second] - xy[first]).T), frame[second] - frame[first]
+    if _stand_while_boxes_move(table.box[rows], id, first, second, step):
+        return "they stay the same while the boxes move"
+    pace = step / np.maximum(gap, 1)
+    if len(pace) >= ENOUGH and np.quantile(pace, 0.75) * (fps or 1.0) > (LONGEST if fps is None else FASTEST):
+        return f"a quarter of the steps are faster than {FASTEST:g} m/s" + ("" if fps is None else f" at {fps:g} fps")
+    return ""
+
+
+def _stand_while_boxes_move(box: Array, id: Ints, first: Ints, second: Ints, step: Array) -> bool:
+    """Return True if most people whose boxes move keep one position. first, second: rows of each step, (S,)."""
+    people, who = np.unique(id[first], return_inverse=True)
+    centre = box[:, :2] + box[:, 2:] / 2
+    way = np.bincount(who, np.hypot(*(centre[second] - centre[first]).T))
+    height = np.bincount(who, box[first, 3]) / np.bincount(who)
+    moves = way > MOVED * height
+    stands = np.bincount(who, step > 0, minlength=len(people)) == 0
+    return bool(moves.any() and (moves & stands).sum() > moves.sum() / 2)

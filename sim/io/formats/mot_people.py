@@ -1,0 +1,93 @@
+"""Decides which rows of a MOTChallenge text are people: by the class in column 8, and by the flag in column 7."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable
+from sim.types import Array, Bools
+
+PEDESTRIAN = 1
+"""Class of a person from MOT16 on."""
+
+LABELS = "gt.txt"
+"""Name of a text of labels. Its column 7 is a flag; that of another text may be a confidence."""
+
+SHOWN = 8
+"""Most values that a message lists."""
+
+
+def labelled_people(table: MotTable, person_class: int | None) -> Bools:
+    """Return flags (N,), True for rows that are labelled people: an id from 0, a flag other than 0, the right class.
+
+    person_class: the class of people; None: 1, with a warning about rows of other classes. Column 7 of a text that is
+    no gt.txt counts as a flag only if all its values are 0, 1 or -1 and not all are 0. Raises InputError if there are
+    rows but no person, or if `person_class` is given and the text has no classes.
+    """
+    keep, file = np.asarray(table.id >= 0), table.rows.file
+    if len(keep) and not keep.any():
+        raise InputError(
+            file=file, place="column 2", got=f"negative ids in all {len(keep)} rows", expected="ids from 0",
+            remedy="give each person an id",
+        )  # fmt: skip
+    flag = table.rest[:, 0] if table.rest.shape[1] else np.ones(len(keep))
+    if file.name == LABELS or (np.isin(flag, (0, 1, -1)).all() and flag.any()):
+        keep &= flag != 0
+        if len(keep) and not keep.any():
+            raise InputError(
+                file=file, place="column 7", got=f"0 in all {len(keep)} rows, which leaves nobody",
+                expected="another flag than 0 for people", remedy="write 1 in column 7 of rows that count",
+            )  # fmt: skip
+    elif (flag == 0).all() and len(keep):
+        text = f"{file}: column 7 is 0 in all {len(keep)} rows; it is taken as a confidence, and all rows count"
+        warnings.warn(text, stacklevel=2)
+    if person_class is not None and _classes(table, True) is None:
+        raise InputError(
+            file=file, place="--class", got=f"{table.rows.values.shape[1]} columns without classes",
+            expected="a class in column 8", remedy="leave --class out",
+        )  # fmt: skip
+    return of_class(table, keep, person_class)
+
+
+def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
+    """Return `keep` (N,) without the rows of other classes than that of people; `keep` itself if there are no classes.
+
+    person_class: None: 1, with a warning about rows of other classes. Raises InputError if this leaves no row.
+    """
+    found = _classes(table, person_class is not None)
+    if found is None or not keep.any():
+        return keep
+    wanted = PEDESTRIAN if person_class is None else person_class
+    people: Bools = np.asarray(keep & (found == wanted))
+    file = table.rows.file
+    values, counts = np.unique(found[keep & ~people], return_counts=True)
+    words = ", ".join(f"{n} rows of class {v:g}" for v, n in zip(values[:SHOWN], counts[:SHOWN], strict=True))
+    words += ", …" if len(values) > SHOWN else ""
+    if not people.any():
+        raise InputError(
+            file=file, place="column 8", got=words, expected=f"people, of class {wanted}",
+            remedy="name the class of people with --class N",
+        )  # fmt: skip
+    if len(values) and person_class is None:
+        warnings.warn(f"{file}: {words} are left out; people are class {wanted} (--class says otherwise)", stacklevel=3)
+    return people
+
+
+def _classes(table: MotTable, named: bool) -> Array | None:
+    """Return column 8 (N,) if it holds classes, else None. named: True if the user named a class (--class).
+
+    8 or 9 columns have a class unless it is -1 in all rows. 10 columns have one if z is -1 in all rows, or the user
+    named one, and column 8 has whole numbers from 0.
+    """
+    if table.rest.shape[1] < 2 or table.rows.values.shape[1] == GROUND_COLUMNS:
+        return None
+    column = table.rest[:, 1]
+    if (column == -1).all():
+        return None
+    if table.rest.shape[1] < 4:
+        return column
+    no_place = named or (table.rest[:, 3] == -1).all()
+    return column if no_place and (column >= 0).all() and (column == np.round(column)).all() else None

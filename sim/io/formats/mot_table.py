@@ -1,0 +1,67 @@
+"""The rows of a MOTChallenge text, read strictly. A wrong line raises InputError that names it.
+
+Lines have 6 to 10 columns, the first of which are frame (from 1), id, and the box's left, top, width, height in px.
+Lines of 4 columns are frame, id and the ground position x, y in m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
+from sim.io.files.numeric_text import NumericTable, crowded, read_numbers
+from sim.types import Array, Bools, Ints
+
+GROUND_COLUMNS = 4
+"""Columns of a text of ground positions alone: frame, id, x, y."""
+
+
+@dataclass(frozen=True)
+class MotTable:
+    """A MOTChallenge text file, N rows in the order of the file.
+
+    rows: the numbers as read, with their lines for errors. frame (N,): from 1. id (N,): of the person or track, usually
+    -1 for detections. box (N, 4): left, top, width, height in px, all -1 for no box. rest (N, 0 to 4): the columns
+    after the box: confidence or flag; then class and visibility, or x, y, z in m.
+    """
+
+    rows: NumericTable
+    frame: Ints
+    id: Ints
+    box: Array
+    rest: Array
+
+    def without_box(self) -> Bools:
+        """Return flags (N,), True for rows whose box is -1,-1,-1,-1, which means that the row has no box. Raises
+        nothing."""
+        return np.asarray((self.box == -1).all(axis=1))
+
+
+def read_table(path: Path, *, length: int | None = None, boxless: bool = False) -> MotTable:
+    """Read the MOTChallenge text file `path` of 6 to 10 columns: frame, id, left, top, width, height, and up to four
+    more; or of 4 columns: frame, id, x, y in m, which are read as rows without box, of confidence 1 and z = 0.
+
+    length: the last frame allowed; None: 1,000,000. boxless: True allows -1,-1,-1,-1 for "no box". A file without
+    lines gives a table without rows. Rows stay in the order of the file. Raises InputError if the file is unreadable,
+    and, with the line, if a cell is no finite number, the number of columns is wrong, a frame is outside 1 to `length`,
+    a frame or id is no integer, a number is beyond 1e6, a frame has more than 5000 lines, or a box has no area.
+    """
+    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS)
+    frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
+    box, rest = rows.values[:, 2:6], rows.values[:, 6:]
+    if rows.values.shape[1] == GROUND_COLUMNS:
+        box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
+    table = MotTable(rows, frame, id, box, rest)
+    last = FRAMES if length is None else length
+    rows.reject((frame < 1) | (frame > last), f"frames from 1 to {last}", "correct the frame, or seqLength")
+    rows.reject(crowded(frame), f"at most {DETECTIONS} lines of one frame", "check that this is the right file")
+    far = (np.abs(rows.values[:, 2:]) > COORDINATE).any(axis=1)
+    rows.reject(far, f"numbers within {COORDINATE:g}", "remove or correct the line")
+    flat = (table.box[:, 2:] <= 0).any(axis=1)
+    if boxless:
+        flat &= ~table.without_box()
+    rows.reject(flat, "boxes with width and height above 0", "remove or correct the line")
+    return table

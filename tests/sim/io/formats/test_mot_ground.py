@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+
+from sim.io.source import open_source
+from sim.io.store.track_files import read_tracks
+
+
+def text(tmp_path, place, people=3, frames=12, name="res.txt"):
+    """A text whose boxes move by 10 px a frame; place(frame, person) gives columns 8 to 10."""
+    cells = (
+        (f, k, ",".join(f"{v:g}" for v in place(f, k))) for f in range(1, frames + 1) for k in range(1, people + 1)
+    )
+    (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / name).write_text("".join(f"{f},{k},{100 * k + 10 * f},50,20,50,1,{p}\n" for f, k, p in cells))
+    return tmp_path / name
+
+
+NOT_METRES = {
+    "class, occlusion": (lambda f, k: (1, (f + k) % 2, 0), "same position"),
+    "a category of each": (lambda f, k: (k, 0, 0), "few whole numbers"),
+    "flags that change": (lambda f, k: (k, f % 2, 0), "few whole numbers"),
+    "shares of each": (lambda f, k: (0.1 * k, 0.5, 0), "same while the boxes move"),
+    "pixels": (lambda f, k: (100 * k + 10 * f + 0.5, 50.5, 0), "faster than 12 m/s"),
+}
+
+
+@pytest.mark.parametrize("kind", NOT_METRES)
+def test_columns_that_cannot_be_metres(tmp_path, kind):
+    place, why = NOT_METRES[kind]
+    path = text(tmp_path, place)
+    with pytest.warns(UserWarning, match=f"not taken as metres: .*{why}"):
+        assert open_source(path, fps=25)[0].truth.pos is None
+    with pytest.warns(UserWarning, match="not taken as metres"):
+        found = read_tracks(path, fps=25)
+    assert found[0].plane == "image"
+
+
+@pytest.mark.parametrize("people", [1, 3])
+def test_zeros_are_unknown(tmp_path, people):
+    path = text(tmp_path, lambda f, k: (0, 0, 0), people)
+    assert open_source(path, fps=25)[0].truth.pos is None
+    assert read_tracks(path, fps=25)[0].plane == "image"
+
+
+def test_people_who_walk_or_stand_are_in_metres(tmp_path):
+    path = text(tmp_path, lambda f, k: (k + (0.05 * f if k > 1 else 0), 2.25, 0))
+    assert np.allclose(open_source(path, fps=25)[0].truth.pos[0], (1, 2.25))
+    assert read_tracks(path, fps=25)[0].plane == "ground"
+
+
+def test_a_camera_file_beside_it_vouches_for_metres(tmp_path):
+    path = text(tmp_path, lambda f, k: (k, 0, 0), name="S/gt/gt.txt")
+    (tmp_path / "S" / "camera.json").write_text("{}")
+    assert open_source(path, fps=25)[0].truth.pos[0].tolist() == [1, 0]

@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.source import open_source
+from sim.io.store.track_files import read_tracks
+
+BOX = "10,10,20,50"
+
+
+def rows(tails, frames=3):
+    """Rows of `frames` frames; person k has the columns tails[k] from the seventh on."""
+    cells = ((f, k, tail) for f in range(1, frames + 1) for k, tail in enumerate(tails, 1))
+    return "".join(f"{f},{k},{10 * k + f},10,20,50,{tail}\n" for f, k, tail in cells)
+
+
+def labels(tmp_path, tails):
+    (tmp_path / "S" / "gt").mkdir(parents=True)
+    (tmp_path / "S" / "gt" / "gt.txt").write_text(rows(tails))
+    return tmp_path / "S"
+
+
+def text(tmp_path, tails):
+    (tmp_path / "res.txt").write_text(rows(tails))
+    return tmp_path / "res.txt"
+
+
+@pytest.mark.parametrize("tails", [["1,2,1", "1,1,1", "1,2,1"], ["1,2,1,-1", "1,1,1,-1", "1,2,1,-1"]])
+def test_classes_left_out_are_counted_and_can_be_named(tmp_path, tails):
+    folder = labels(tmp_path, tails)
+    with pytest.warns(UserWarning, match="6 rows of class 2 are left out; people are class 1"):
+        assert set(open_source(folder, fps=25)[0].truth.id) == {2}
+    assert set(open_source(folder, fps=25, person_class=2)[0].truth.id) == {1, 3}
+
+
+@pytest.mark.parametrize("wrong", [0, 2])
+def test_a_class_that_leaves_nobody_is_an_error_that_counts(tmp_path, wrong):
+    folder = labels(tmp_path, [f"1,{wrong},1"] * 2)
+    with pytest.raises(InputError, match=rf"got 6 rows of class {wrong}.*--class") as error:
+        _ = open_source(folder, fps=25)[0].truth
+    assert "\n" not in str(error.value)
+    assert len(open_source(folder, fps=25, person_class=wrong)[0].truth.id) == 6
+
+
+def test_rows_to_be_ignored_need_no_warning(tmp_path):
+    folder = labels(tmp_path, ["1,1,1", "0,7,1", "0,3,1"])
+    assert set(open_source(folder, fps=25)[0].truth.id) == {1}
+
+
+def test_a_class_of_a_text_without_classes_is_refused(tmp_path):
+    with pytest.raises(InputError, match="without classes"):
+        _ = open_source(labels(tmp_path, ["1,-1,-1,-1"]), fps=25, person_class=2)[0].truth
+
+
+def test_unknown_classes_leave_everybody(tmp_path):
+    assert set(open_source(labels(tmp_path, ["1,-1,-1"] * 2), fps=25)[0].truth.id) == {1, 2}
+
+
+@pytest.mark.parametrize("tail", ["-1", "0.5", "-1,-1,-1,-1"])
+def test_confidences_of_results_leave_everybody(tmp_path, tail):
+    assert set(open_source(text(tmp_path, [tail, "0.0" + tail[2:] if "." in tail else tail]), fps=25)[0].truth.id) == {
+        1,
+        2,
+    }
+
+
+def test_confidences_that_are_all_zero_are_said(tmp_path):
+    with pytest.warns(UserWarning, match="column 7 is 0 in all 6 rows"):
+        assert len(open_source(text(tmp_path, ["0", "0"]), fps=25)[0].truth.id) == 6
+
+
+def test_labels_that_are_all_to_be_ignored_are_an_error(tmp_path):
+    with pytest.raises(InputError, match=r"column 7.*0 in all 6 rows"):
+        _ = open_source(labels(tmp_path, ["0,1,1"] * 2), fps=25)[0].truth
+
+
+def test_labels_without_ids_are_an_error(tmp_path):
+    (tmp_path / "gt").mkdir()
+    (tmp_path / "gt" / "gt.txt").write_text(f"1,-1,{BOX},1,1,1\n")
+    with pytest.raises(InputError, match="negative ids in all 1 rows"):
+        _ = open_source(tmp_path, fps=25)[0].truth
+
+
+def test_no_row_is_no_error(tmp_path):
+    (tmp_path / "gt").mkdir()
+    (tmp_path / "gt" / "gt.txt").write_text("")
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=25\nseqLength=3\n")
+    assert len(open_source(tmp_path)[0].truth.id) == 0
+
+
+@pytest.mark.parametrize("more", ["", ",-1"])
+def test_tracks_of_other_classes_are_left_out_with_a_warning(tmp_path, more):
+    path = text(tmp_path, ["0.9,1,-1" + more, "0.9,3,-1" + more])
+    with pytest.warns(UserWarning, match="3 rows of class 3 are left out"):
+        found = read_tracks(path, fps=25)
+    assert np.concatenate([t.id for t in found]).tolist() == [1, 1, 1]
+
+
+def test_tracks_without_a_person_are_refused(tmp_path):
+    with pytest.raises(InputError, match="6 rows of class 3"):
+        read_tracks(text(tmp_path, ["0.9,3,-1"] * 2), fps=25)
+
+
+def test_detections_have_classes_too(tmp_path):
+    path = tmp_path / "det.txt"
+    path.write_text(f"1,-1,{BOX},0.9,0,-1\n1,-1,{BOX},0.9,2,-1\n")
+    with pytest.raises(InputError, match="1 rows of class 0, 1 rows of class 2"):
+        open_source(path, fps=25)
+    (frame,) = open_source(path, fps=25, person_class=0)[0]
+    assert len(frame.detections.box) == 1
