@@ -140,7 +140,7 @@ class Sensor(Model):
     - detect_prob: probability that a fully visible person of usual size is detected. It is multiplied by visibility ^
       occlusion_power and by min(1, box height in px / (2 small_px)), which is 1 if small_px is 0. Below min_visibility
       it is 0.
-    - persistence: correlation of misses from frame to frame. clutter_rate: mean number of false alarms per frame.
+    - persistence: correlation of misses 0.1 s apart. clutter_rate: mean number of false alarms per frame.
     - noise_px: standard deviation of each box edge, px. noise_m: of points along each axis, m.
     - box: "visible" (boxes of the visible parts) or "amodal" (of whole people). hide: artificial occlusions.
     - points: "seen" (true position with noise_m, displaced by as much as the visible part's foot is from the whole
@@ -179,7 +179,7 @@ class Sensor(Model):
     small_px: NonNegative = Field(
         12.0, description="box height at which the probability of detection is halved, px; 0 = no effect"
     )
-    persistence: Share = Field(0.0, description="correlation of misses from frame to frame")
+    persistence: Share = Field(0.0, description="correlation of misses 0.1 s apart")
     hide: tuple[Hide, ...] = Field((), description="artificial occlusions")
     by_visibility: Curve | None = Field(
         None,
