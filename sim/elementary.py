@@ -30,11 +30,11 @@ SQRT_HALF, TAN_22_5 = 0.7071067811865476, 0.4142135623730951
 
 POWERS_OF_2 = np.ldexp(1.0, np.arange(-1074, 1024))
 # series from the highest power down
-EXP_SERIES = tuple(1.0 / factorial(n) for n in range(13, -1, -1))
+E2, E3, E4, E5, E6, E7, E8, E9, E10, E11, E12, E13 = (1.0 / factorial(n) for n in range(2, 14))
 SIN_SERIES = tuple((-1.0) ** n / factorial(2 * n + 1) for n in range(8, -1, -1))
 COS_SERIES = tuple((-1.0) ** n / factorial(2 * n) for n in range(8, -1, -1))
 ATANH_SERIES = tuple(1.0 / (2 * n + 1) for n in range(11, -1, -1))
-ATAN_SERIES = tuple((-1.0) ** n / (2 * n + 1) for n in range(21, -1, -1))
+ATAN_BLOCKS = tuple(tuple((-1.0) ** n / (2 * n + 1) for n in range(k, k + 4)) for k in range(20, -1, -4))
 
 # Wichura 1988, algorithm AS 241 (PPND16): numerators and denominators of the normal quantile near 0.5, then in the
 # tail, for r = sqrt(-log(tail)) up to 5 and beyond
@@ -69,9 +69,12 @@ def exp(x: Any) -> Any:
     x = np.minimum(np.maximum(x, LEAST), GREATEST)
     k = np.floor(x * PER_LN2 + 0.5)
     r = (x - k * LN2_HIGH) - k * LN2_LOW
-    series = 0.0 * r
-    for c in EXP_SERIES:
-        series = series * r + c
+    q = r * r
+    four = q * q  # in blocks of four powers, which a processor computes side by side
+    series = E12 + E13 * r
+    series = ((E8 + E9 * r) + q * (E10 + E11 * r)) + four * series
+    series = ((E4 + E5 * r) + q * (E6 + E7 * r)) + four * series
+    series = ((1.0 + r) + q * (E2 + E3 * r)) + four * series
     return series * POWERS_OF_2[np.int64(k) + 1074]
 
 
@@ -127,9 +130,10 @@ def atan2(y: Any, x: Any) -> Any:
     far, steep, behind = np.float64(t > TAN_22_5), np.float64(b > a), np.float64(x < 0.0)
     r = far * ((t - 1.0) / (t + 1.0)) + (1.0 - far) * t
     q = r * r
-    series = 0.0 * q
-    for c in ATAN_SERIES:
-        series = series * q + c
+    two = q * q
+    four, series = two * two, 0.0 * q
+    for a0, a1, a2, a3 in ATAN_BLOCKS:
+        series = ((a0 + a1 * q) + two * (a2 + a3 * q)) + four * series
     angle = series * r + far * QUARTER_PI
     angle = steep * (2.0 * QUARTER_PI - angle) + (1.0 - steep) * angle
     angle = behind * (PI - angle) + (1.0 - behind) * angle

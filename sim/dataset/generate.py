@@ -6,7 +6,6 @@ The stored bytes depend on scenario, seed and versions only, not on the workers.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +29,15 @@ Progress = Callable[[int, int, str], None]
 """Called as progress(sequences done, sequences in all, name of the last one)."""
 
 
+class Folders(list[Path]):
+    """The folders of the sequences made. left_out: by name, the error of each sequence whose script did not come
+    true."""
+
+    def __init__(self, folders: Iterable[Path], left_out: dict[str, OrderError]) -> None:
+        super().__init__(folders)
+        self.left_out = left_out
+
+
 def generate(
     entries: Iterable[Entry | str],
     seeds: range,
@@ -40,8 +48,7 @@ def generate(
     progress: Progress | None = None,
     streams: Iterable[str] = ("left",),
     images: str = "jpg",
-    left_out: Callable[[str, OrderError], None] | None = None,
-) -> list[Path]:
+) -> Folders:
     """Write OUT/flockscope-<split>/<name>-s<seed>/ for every entry and seed, and OUT/seqmaps; returns the sequence
     folders.
 
@@ -53,9 +60,10 @@ def generate(
     40,000). workers: by default this process. The workers of a cluster must share the folder `out` under the same path.
     progress: called as progress(sequences done, sequences in all, name of the last one) after each, failed ones
     included. streams: pictures to store ("left", "right", "disparity", "ids", "background"; () for none). images: their
-    file type, "jpg", "png" or "mp4". left_out: called with the name and the reason of each sequence that is left out
-    because an order of its script did not come true; None warns. If that happens to more than 5 % of the sequences, it
-    is an error.
+    file type, "jpg", "png" or "mp4".
+
+    A sequence is left out if an order of its script did not come true; the result's `left_out` holds the reasons. If
+    that happens to more than 5 % of the sequences, it is an error.
 
     Raises InputError before anything is simulated if an option or scenario is wrong, two entries share a name, a folder
     holds another sequence, or another process writes to `out`. If sequences fail, the others are made, and then an
@@ -85,17 +93,13 @@ def generate(
     unfulfilled = {name: error for name, error in errors.items() if isinstance(error, OrderError)}
     if len(unfulfilled) <= LEFT_OUT * len(jobs):
         errors = {name: error for name, error in errors.items() if name not in unfulfilled}
-        for name, reason in unfulfilled.items():
-            (left_out or _warn)(name, reason)
+    else:
+        unfulfilled = {}
     made = [job for job in jobs if job.name not in unfulfilled]
     errors = errors or {job.name: _not_visible(job) for job in made if job.name not in complete}
     if errors:
         raise _summary(errors, len(jobs))
-    return [job.folder for job in made]
-
-
-def _warn(name: str, error: OrderError) -> None:
-    warnings.warn(f"{name} is left out: {error.line()}", stacklevel=3)
+    return Folders((job.folder for job in made), unfulfilled)
 
 
 def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]:

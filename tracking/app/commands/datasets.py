@@ -29,14 +29,13 @@ def generate(options: GenerateOptions) -> CommandResult:
     texts = [*option_parsing.sensor_settings(options.sensor), *options.settings]
     settings = option_parsing.scenario_settings(texts)
     streams, images = option_parsing.pictures(options.streams, options.images)
-    left_out: dict[str, str] = {}
     with ProgressMeter("generate") as meter:
         folders = make(
             options.names, seeds, options.out, set=settings, workers=WorkerOptions(options.workers, options.cluster),
             progress=meter.update, streams=streams, images=images,
-            left_out=lambda name, error: left_out.update({name: error.line()}),
         )  # fmt: skip
     lines = [f"{counted(len(folders), 'sequence')} in {folders[0].parent}"]
+    left_out = {name: reason.line() for name, reason in folders.left_out.items()}
     lines += [f"left out: {name}: {reason}" for name, reason in left_out.items()]
     data = {"sequences": folders, "folder": folders[0].parent, "left_out": left_out}
     return CommandResult(data, "\n".join(lines))
