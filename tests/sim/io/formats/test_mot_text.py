@@ -85,12 +85,6 @@ def test_detections_with_points_are_on_the_ground(tmp_path):
     assert s.truth is None
 
 
-def test_scores_of_any_range_come_into_0_to_1():
-    assert mot_text.unit_scores(np.array([0.2, 1.0])).tolist() == [0.2, 1.0]
-    assert mot_text.unit_scores(np.array([-1.0, -1.0])).tolist() == [1.0, 1.0]
-    assert mot_text.unit_scores(np.array([-2.0, 0.0, 2.0])).tolist() == [0.0, 0.5, 1.0]
-
-
 GOOD = "1,1,0,0,5,5,1,1,1\n"
 
 

@@ -300,7 +300,8 @@ def test_speeds_that_nobody_has(tmp_path, capsys, rows, options, expected):
 def test_without_people(tmp_path, capsys):
     """Nobody labelled, and a person alone: tables without groups."""
     (tmp_path / "walk" / "gt").mkdir(parents=True)
-    (tmp_path / "walk" / "gt" / "gt.txt").write_text("3,1,5,5,10,20,0,1,1\n")
+    (tmp_path / "walk" / "gt" / "gt.txt").write_text("")
+    (tmp_path / "walk" / "seqinfo.ini").write_text("[Sequence]\nseqLength=3\n")
     found = done(capsys, "group", tmp_path / "walk", "--fps", 10, "--out", tmp_path / "g")
     assert (found["runs"][0]["people"], found["runs"][0]["groups"]) == (0, [])
     line = ["group", tmp_path / "walk", "--fps", 10, "--probabilities", "--out", tmp_path / "h"]
