@@ -14,9 +14,9 @@ def unit_scores(score: Array) -> tuple[Array, str]:
     """Return the finite scores (N,) in [0, 1], and how they were mapped, "" if they were not.
 
     If at most 2 % of the scores lie outside [0, 1], or one of them, these are clipped. Otherwise s becomes
-    1 / (1 + exp(-(s - c) / d)): the lower quartile c becomes 0.5, the median c + d ln 3 becomes about 0.75. If the two are
-    equal, d is 1. c is rounded to two digits and d to one, so that a few more scores seldom move them. Equal scores outside
-    [0, 1] become 1.
+    1 / (1 + exp(-(s - c) / d)): the lower quartile c becomes 0.5, the median c + d ln 3 becomes about 0.75. If the two
+    are equal, d is 1. c is rounded to two digits and d to one, so that a few more scores seldom move them. Equal scores
+    outside [0, 1] become 1.
     """
     outside = (score < 0) | (score > 1)
     count = int(outside.sum())

@@ -314,7 +314,7 @@ BAD = {
     "no place": ("1,1,-1,-1,-1,-1,1,-1,-1,-1\n", "line 1"),
     "some places": ("1,1,5,5,10,20,1,3,4,0\n1,2,5,5,10,20,1,-1,-1,-1\n", "frame 1, id 2: got no position"),
     "an id twice": ("1,1,5,5,10,20,1\n1,1,6,5,10,20,1\n", "each id once in a frame"),
-    "words": ("frame,id,x,y\n1,1,2,3\n", "line 1"),
+    "words": ("frame,id,a,b\n1,1,2,3\n", "line 1"),
     "five columns": ("1,1,2,3,4\n", "6 to 10 or 4 columns"),
     "nothing": ("", "no row"),
 }
