@@ -270,3 +270,11 @@ def test_chords_look_back_only():
     mixed = np.array([3, 1, 4, 0, 2])
     np.testing.assert_allclose(chords(frame[mixed], id[mixed], pos[mixed], 10.0, 0.2), want[mixed])
     assert chords(frame[:0], id[:0], pos[:0], 10.0).shape == (0, 2)
+
+
+def test_copied_names_of_sequences_are_said_and_the_folders_names_count(tmp_path):
+    for name in ("cam1", "cam2"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "seqinfo.ini").write_text("[Sequence]\nname=MOT17-02\nframeRate=30\nseqLength=3\n")
+    with pytest.warns(UserWarning, match="MOT17-02 is the name of 2 sequences"):
+        assert [s.name for s in open_source(tmp_path)] == ["cam1", "cam2"]

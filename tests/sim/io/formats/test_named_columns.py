@@ -54,5 +54,5 @@ def test_frame_rates_are_plain_numbers(tmp_path, rate):
 def test_unknown_columns_are_refused_with_the_way_to_name_them(tmp_path, body):
     path = tmp_path / "five.csv"
     path.write_text(body)
-    with pytest.raises(InputError, match="line 1: .*name the columns in the first line"):
+    with pytest.raises(InputError, match=r"line 1: .*name the columns in the first line"):
         open_source(path, fps=25)
