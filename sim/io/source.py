@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import os
 import os.path
-from dataclasses import dataclass
+import warnings
+from collections import Counter
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scenarios.errors import InputError
@@ -74,7 +76,26 @@ def open_source(
                 remedy="give the sequence or dataset first, then the tracks: swap the arguments",
             )  # fmt: skip
         raise InputError(file=path, got="a folder without sequences", expected=KINDS, remedy="check the path")
-    return [_open_folder(p, options) for p in found]
+    return _distinct([_open_folder(p, options) for p in found])
+
+
+def _distinct(sequences: list[Sequence]) -> list[Sequence]:
+    """Return the sequences, those MOTChallenge folders named for the folder whose seqinfo.ini has the name of another.
+
+    Warns about them.
+    """
+    count = Counter(s.name for s in sequences)
+    answers = []
+    for each in sequences:
+        if count[each.name] > 1 and each.source["kind"] == "mot":
+            folder = Path(each.source["path"])
+            text = (
+                f"{folder / 'seqinfo.ini'}: name: {each.name} is the name of {count[each.name]} sequences; it is called"
+            )
+            warnings.warn(f"{text} {folder.name}, as its folder", stacklevel=3)
+            each = replace(each, name=folder.name)
+        answers.append(each)
+    return answers
 
 
 def holds_sequences(folder: Path) -> bool:

@@ -17,6 +17,8 @@ from scenarios.limits import DETECTIONS, TEXT_BYTES
 from scenarios.regular_file import read_regular
 from sim.types import Array, Bools, Ints
 
+NAME_THEM = "name the columns in the first line, as frame,id,x,y or frame,id,left,top,width,height"
+
 WHOLE = re.compile("[-+]?[0-9]{1,18}")
 
 
@@ -87,17 +89,20 @@ def whole_number(text: str) -> int:
     return int(text)
 
 
-def read_numbers(path: Path, columns: tuple[int, int], also: int | None = None) -> NumericTable:
+def read_numbers(
+    path: Path, columns: tuple[int, int], also: int | None = None, *, header: bool = False
+) -> NumericTable:
     """Read all non-empty lines of a text file as rows of numbers, separated by commas if the first has one, else by
     blanks.
 
-    columns: (least, greatest) number of columns. also: another number that is allowed; None: none. A file without lines
+    columns: (least, greatest) number of columns. also: another number that is allowed; None: none. header: True
+    skips the first line. A file without lines
     gives a table of shape (0, columns[0]). Comments and headers are not allowed.
 
     Raises InputError if the file is unreadable or not UTF-8. Raises InputError with the line if a cell is not a finite
     number, the lines differ in their number of columns, or that number is not allowed.
     """
-    numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
+    numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()][header:]
     if not numbered:
         return NumericTable(path, np.zeros((0, columns[0])), np.zeros(0, np.int64))
     lines = np.array([k for k, _ in numbered], np.int64)
@@ -111,7 +116,7 @@ def read_numbers(path: Path, columns: tuple[int, int], also: int | None = None) 
     low, high = columns
     if not low <= values.shape[1] <= high and values.shape[1] != also:
         span = (str(low) if low == high else f"{low} to {high}") + ("" if also is None else f" or {also}")
-        rows.reject(np.ones(len(lines), bool), f"{span} columns", "check that this is the right file")
+        rows.reject(np.ones(len(lines), bool), f"{span} columns", NAME_THEM)
     rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", "remove or correct the line")
     return rows
 
@@ -126,17 +131,18 @@ def _first_bad_line(path: Path, numbered: list[tuple[int, str]], separator: str 
     width = len(numbered[0][1].split(separator))
     for k, line in numbered:
         cells = line.split(separator)
-        bad = next((c for c in cells if not _is_number(c)), None)
+        bad = next((c for c in cells if not is_number_text(c)), None)
         if bad is not None or len(cells) != width:
             got = repr(bad.strip()) if bad is not None else f"{len(cells)} columns"
             expected = "a number" if bad is not None else f"{width} columns, as in the first line"
-            return InputError(
-                file=path, place=f"line {k}", got=got, expected=expected, remedy="remove or correct the line"
-            )
+            remedy = "remove or correct the line"
+            if line.startswith("#"):
+                remedy = f"remove the lines that begin with #, and {NAME_THEM}"
+            return InputError(file=path, place=f"line {k}", got=got, expected=expected, remedy=remedy)
     return InputError(file=path, got="unreadable numbers", expected="rows of numbers", remedy="check the file")
 
 
-def _is_number(cell: str) -> bool:
+def is_number_text(cell: str) -> bool:
     """Return True if numpy reads the cell as a number: unlike float(), it takes no underscore and ASCII digits only."""
     try:
         float(cell)

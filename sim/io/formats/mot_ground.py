@@ -13,14 +13,11 @@ from scenarios.regular_file import is_present
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable
 from sim.types import Array, Bools, Ints
 
-FASTEST = 12.0
-"""Speed in m/s that nobody exceeds on foot."""
-
 LONGEST = 12.0
-"""Step in m from one frame to the next, where the frame rate is unknown."""
+"""Step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing."""
 
 ENOUGH = 10
-"""Steps that are needed to judge speeds."""
+"""Rows or steps that are needed to judge by how many of them something is true."""
 
 SHARED = 0.1
 """Share of rows at the position of another row of their frame, above which these are no positions of people."""
@@ -32,10 +29,10 @@ VOUCHERS = ("manifest.json", "camera.json", "run.json")
 """Files beside a text, or in the folder above it, that vouch for positions in m."""
 
 
-def ground_positions(table: MotTable, fps: float | None = None) -> Array | None:
+def ground_positions(table: MotTable) -> Array | None:
     """Return the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1); None if there are none.
 
-    fps: frames/s, None if unknown. There are none if the text has fewer than 10 columns, if z = -1 in all rows, or if
+    There are none if the text has fewer than 10 columns, if z = -1 in all rows, or if
     all rows have the same whole numbers, or the same position though a frame has several rows. There are also none,
     with a warning that says why, if people cannot move so and no manifest or camera file vouches for metres.
     """
@@ -49,7 +46,7 @@ def ground_positions(table: MotTable, fps: float | None = None) -> Array | None:
         same = len(known) > 1 and bool((xyz == xyz[0]).all())
         if same and (not alone or bool((xyz == np.round(xyz)).all())):
             return None
-        doubt = _doubt(table, known, fps)
+        doubt = _doubt(table, known)
         if doubt:
             text = f"{table.rows.file}: columns 8 to 10 are not taken as metres: {doubt}; the boxes are used"
             warnings.warn(text, stacklevel=3)
@@ -62,7 +59,7 @@ def _vouched(table: MotTable) -> bool:
     return any(is_present(folder / name) for folder in (file.parent, file.parent.parent) for name in VOUCHERS)
 
 
-def _doubt(table: MotTable, known: Bools, fps: float | None) -> str:
+def _doubt(table: MotTable, known: Bools) -> str:
     """Return why the positions cannot be those of people in m; "" if they can."""
     rows = np.flatnonzero(known)
     xy, frame, id = table.rest[rows, 1:3], table.frame[rows], table.id[rows]
@@ -71,6 +68,9 @@ def _doubt(table: MotTable, known: Bools, fps: float | None) -> str:
         return "people of one frame have the same position"
     if len(rows) > 3 and (xy == np.round(xy)).all() and 2 * len(np.unique(xy, axis=0)) <= len(places):
         return "they hold few whole numbers, as categories or flags do"
+    inside = ((xy >= table.box[rows, :2]) & (xy <= table.box[rows, :2] + table.box[rows, 2:])).all(axis=1)
+    if len(rows) >= ENOUGH and inside.mean() > 0.5:
+        return "most lie inside their own boxes, as pixels do"
     order = np.lexsort((frame, id))
     order = order[id[order] >= 0]
     pairs = np.flatnonzero(np.diff(id[order]) == 0)
@@ -81,8 +81,8 @@ def _doubt(table: MotTable, known: Bools, fps: float | None) -> str:
     if _stand_while_boxes_move(table.box[rows], id, first, second, step):
         return "they stay the same while the boxes move"
     pace = step / np.maximum(gap, 1)
-    if len(pace) >= ENOUGH and np.quantile(pace, 0.75) * (fps or 1.0) > (LONGEST if fps is None else FASTEST):
-        return f"a quarter of the steps are faster than {FASTEST:g} m/s" + ("" if fps is None else f" at {fps:g} fps")
+    if len(pace) >= ENOUGH and np.quantile(pace, 0.75) > LONGEST:
+        return f"a quarter of the steps are longer than {LONGEST:g} m per frame"
     return ""
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from sim.io.files.numeric_text import NumericTable, crowded, read_numbers
+from sim.io.formats.named_columns import column_names, read_named
 from sim.types import Array, Bools, Ints
 
 GROUND_COLUMNS = 4
@@ -49,7 +50,8 @@ def read_table(path: Path, *, length: int | None = None, boxless: bool = False) 
     and, with the line, if a cell is no finite number, the number of columns is wrong, a frame is outside 1 to `length`,
     a frame or id is no integer, a number is beyond 1e6, a frame has more than 5000 lines, or a box has no area.
     """
-    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS)
+    named = column_names(path)
+    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS) if named is None else read_named(path, named)
     frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] == GROUND_COLUMNS:

@@ -8,6 +8,7 @@ frame, id and the ground position x, y in m. A wrong line raises InputError that
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from sim.arrays import repeated_ids
 from sim.io.formats.mot_ground import ground_positions
 from sim.io.formats.mot_people import labelled_people, of_class
 from sim.io.formats.mot_table import MotTable, read_table
+from sim.io.formats.unit_scores import unit_scores
 from sim.io.formats.velocity import differentiate
 from sim.scene.box_scale import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
@@ -65,15 +67,17 @@ def read_detections(path: Path, length: int | None, person_class: int | None = N
     path: the file. length: the last frame allowed; None: 1,000,000. person_class: the class of people, if the file has
     classes; None: 1, with a warning about rows of other classes, which are left out.
     The boxes are None if any row lacks one. Scores are
-    1 if the file has none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1 (all 1 if
-    equal). A file without lines gives no rows.
+    1 if the file has none; scores outside [0, 1] are mapped into it as `unit_scores` does, with a
+    warning. A file without lines gives no rows.
 
     Raises InputError as read_table, and for a row without box (-1,-1,-1,-1) if any row lacks a ground point.
     """
     table = read_table(path, length=length, boxless=True)
     ground = ground_positions(table)
     boxless = _reject_placeless(table, ground)
-    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
+    score, told = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
+    if told:
+        warnings.warn(f"{path}: {told}", stacklevel=2)
     plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
     pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
     order = np.argsort(table.frame, kind="stable")
@@ -100,18 +104,6 @@ def ground_cells(xyz: Sequence[float]) -> str:
     return f"{x},{y},{z if z != '-1.000' else '-1.001'}"
 
 
-def unit_scores(score: Array) -> Array:
-    """Return the scores (N,), finite, brought into [0, 1].
-
-    `score` itself is returned if all its values lie in [0, 1] or there are none. Otherwise the lowest becomes 0, the
-    highest 1, and the others are scaled linearly; if all are equal they become 1.
-    """
-    if len(score) == 0 or (score.min() >= 0 and score.max() <= 1):
-        return score
-    span = score.max() - score.min()
-    return (score - score.min()) / span if span > 0 else np.ones_like(score)
-
-
 def read_truth(
     path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
     person_class: int | None = None,
@@ -130,7 +122,7 @@ def read_truth(
     row lacks a ground position, for an id twice in a frame, and for a visibility outside [0, 1] other than -1.
     """
     table = read_table(path, length=length, boxless=True)
-    ground = ground_positions(table, fps)
+    ground = ground_positions(table)
     boxed = not _reject_placeless(table, ground).any()
     keep = labelled_people(table, person_class)
     reject_duplicate_ids(table, keep)

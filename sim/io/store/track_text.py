@@ -16,7 +16,8 @@ from scenarios.errors import InputError
 from sim.io.formats.mot_ground import ground_positions
 from sim.io.formats.mot_people import of_class
 from sim.io.formats.mot_table import MotTable, read_table
-from sim.io.formats.mot_text import reject_duplicate_ids, unit_scores
+from sim.io.formats.mot_text import reject_duplicate_ids
+from sim.io.formats.unit_scores import unit_scores
 from sim.io.formats.velocity import chords
 from sim.io.store.group_files import read_groups_csv
 from sim.types import Array, Ints, Plane, Tracks
@@ -30,7 +31,7 @@ def read_track_text(path: Path, fps: float, length: int | None, person_class: in
     out. Tracks of a frame are sorted by id. Positions are on the
     ground (m) if the file has them, else box centres in the image (px). Velocities are differences over 0.5 s,
     covariances nan, and everybody is alone (group -1). Boxes are None if a row lacks one. Scores are 1 if the file has
-    none; if one is outside [0, 1], all are scaled so that the lowest is 0 and the highest 1 (all 1 if equal).
+    none; scores outside [0, 1] are mapped into it as `unit_scores` does.
 
     Raises InputError if the file is unreadable, a line is invalid, a frame is beyond `length`, an id is negative or
     stands twice in a frame, only some lines have a ground position, a line has neither box nor ground position, or the
@@ -44,13 +45,13 @@ def read_track_text(path: Path, fps: float, length: int | None, person_class: in
     order = np.lexsort((table.id, table.frame))
     order = order[people[order]]
     frame, id = table.frame[order], table.id[order]
-    ground = ground_positions(table, fps)
+    ground = ground_positions(table)
     if ground is not None:
         remedy = "complete the line, or write z = -1 in all"
         table.rows.reject(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)
     pos = _centres(table)[order] if ground is None else ground[order][:, :2]
     box = None if table.without_box().any() else table.box[order]
-    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.id)))[order]
+    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.id)))[0][order]
     plane: Plane = "image" if ground is None else "ground"
     vel, count = chords(frame, id, pos, fps), length or int(frame.max(initial=0))
     cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()

@@ -20,7 +20,8 @@ NOT_METRES = {
     "a category of each": (lambda f, k: (k, 0, 0), "few whole numbers"),
     "flags that change": (lambda f, k: (k, f % 2, 0), "few whole numbers"),
     "shares of each": (lambda f, k: (0.1 * k, 0.5, 0), "same while the boxes move"),
-    "pixels": (lambda f, k: (100 * k + 10 * f + 0.5, 50.5, 0), "faster than 12 m/s"),
+    "pixels": (lambda f, k: (100 * k + 10 * f + 0.5, 50.5, 0), "inside their own boxes"),
+    "jumps": (lambda f, k: (50.5 * ((f + k) % 4), 7.5, 0), "longer than 12 m"),
 }
 
 

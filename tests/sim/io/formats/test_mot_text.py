@@ -85,12 +85,6 @@ def test_detections_with_points_are_on_the_ground(tmp_path):
     assert s.truth is None
 
 
-def test_scores_of_any_range_come_into_0_to_1():
-    assert mot_text.unit_scores(np.array([0.2, 1.0])).tolist() == [0.2, 1.0]
-    assert mot_text.unit_scores(np.array([-1.0, -1.0])).tolist() == [1.0, 1.0]
-    assert mot_text.unit_scores(np.array([-2.0, 0.0, 2.0])).tolist() == [0.0, 0.5, 1.0]
-
-
 GOOD = "1,1,0,0,5,5,1,1,1\n"
 
 
@@ -276,3 +270,11 @@ def test_chords_look_back_only():
     mixed = np.array([3, 1, 4, 0, 2])
     np.testing.assert_allclose(chords(frame[mixed], id[mixed], pos[mixed], 10.0, 0.2), want[mixed])
     assert chords(frame[:0], id[:0], pos[:0], 10.0).shape == (0, 2)
+
+
+def test_copied_names_of_sequences_are_said_and_the_folders_names_count(tmp_path):
+    for name in ("cam1", "cam2"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "seqinfo.ini").write_text("[Sequence]\nname=MOT17-02\nframeRate=30\nseqLength=3\n")
+    with pytest.warns(UserWarning, match="MOT17-02 is the name of 2 sequences"):
+        assert [s.name for s in open_source(tmp_path)] == ["cam1", "cam2"]

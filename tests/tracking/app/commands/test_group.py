@@ -300,7 +300,8 @@ def test_speeds_that_nobody_has(tmp_path, capsys, rows, options, expected):
 def test_without_people(tmp_path, capsys):
     """Nobody labelled, and a person alone: tables without groups."""
     (tmp_path / "walk" / "gt").mkdir(parents=True)
-    (tmp_path / "walk" / "gt" / "gt.txt").write_text("3,1,5,5,10,20,0,1,1\n")
+    (tmp_path / "walk" / "gt" / "gt.txt").write_text("")
+    (tmp_path / "walk" / "seqinfo.ini").write_text("[Sequence]\nseqLength=3\n")
     found = done(capsys, "group", tmp_path / "walk", "--fps", 10, "--out", tmp_path / "g")
     assert (found["runs"][0]["people"], found["runs"][0]["groups"]) == (0, [])
     line = ["group", tmp_path / "walk", "--fps", 10, "--probabilities", "--out", tmp_path / "h"]
@@ -313,7 +314,7 @@ BAD = {
     "no place": ("1,1,-1,-1,-1,-1,1,-1,-1,-1\n", "line 1"),
     "some places": ("1,1,5,5,10,20,1,3,4,0\n1,2,5,5,10,20,1,-1,-1,-1\n", "frame 1, id 2: got no position"),
     "an id twice": ("1,1,5,5,10,20,1\n1,1,6,5,10,20,1\n", "each id once in a frame"),
-    "words": ("frame,id,x,y\n1,1,2,3\n", "line 1"),
+    "words": ("frame,id,a,b\n1,1,2,3\n", "line 1"),
     "five columns": ("1,1,2,3,4\n", "6 to 10 or 4 columns"),
     "nothing": ("", "no row"),
 }

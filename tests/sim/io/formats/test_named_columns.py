@@ -1,0 +1,58 @@
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.source import open_source
+
+BOXES = {
+    "frame,id,x,y,w,h": "{f},7,10,20,30,40",
+    "Frame,ID,Left,Top,Width,Height": "{f},7,10,20,30,40",
+    "id,frame,x1,y1,x2,y2,extra": "7,{f},10,20,40,60,5",
+    "frame,id,cx,cy,w,h": "{f},7,25,40,30,40",
+}
+
+
+@pytest.mark.parametrize("header", BOXES)
+def test_named_boxes(tmp_path, header):
+    path = tmp_path / "a.csv"
+    path.write_text(header + "\n" + "".join(BOXES[header].format(f=f) + "\n" for f in (1, 2)))
+    truth = open_source(path, fps=25)[0].truth
+    assert truth.id.tolist() == [7, 7]
+    assert truth.frame.tolist() == [1, 2]
+    assert truth.box.tolist() == [[10, 20, 30, 40]] * 2
+
+
+def test_named_positions(tmp_path):
+    path = tmp_path / "five.csv"
+    path.write_text("frame,id,x,y,group\n1,1,0.5,1,1\n2,1,0.6,1,1\n")
+    assert open_source(path, fps=25)[0].truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
+
+
+def test_named_boxes_without_ids_are_detections(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("frame,x,y,w,h,score\n1,10,20,30,40,0.5\n")
+    (frame,) = open_source(path, fps=25)[0]
+    assert frame.detections.box.tolist() == [[10, 20, 30, 40]]
+    assert frame.detections.score.tolist() == [0.5]
+
+
+@pytest.mark.parametrize("header", ["frame,id,u,v,w,h", "time,id,x,y,w,h", "frame,frame_id,x,y,w,h"])
+def test_other_names_are_refused(tmp_path, header):
+    path = tmp_path / "a.csv"
+    path.write_text(header + "\n1,1,2,3,4,5\n")
+    with pytest.raises(InputError, match=f"line 1: got columns {header}; expected frame and a box"):
+        open_source(path, fps=25)
+
+
+@pytest.mark.parametrize("rate", ["1_0", "\u0661\u0660"])
+def test_frame_rates_are_plain_numbers(tmp_path, rate):
+    (tmp_path / "seqinfo.ini").write_text(f"[Sequence]\nframeRate={rate}\nseqLength=3\n", encoding="utf-8")
+    with pytest.raises(InputError, match="frameRate: got"):
+        open_source(tmp_path)
+
+
+@pytest.mark.parametrize("body", ["1,1,0.1,1,1\n2,1,0.2,1,1\n", "# ID frame x/cm y/cm\n1 1 20 30 170\n"])
+def test_unknown_columns_are_refused_with_the_way_to_name_them(tmp_path, body):
+    path = tmp_path / "five.csv"
+    path.write_text(body)
+    with pytest.raises(InputError, match=r"line 1: .*name the columns in the first line"):
+        open_source(path, fps=25)
