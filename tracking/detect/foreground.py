@@ -20,7 +20,6 @@ from sim.types import Array, Bools, Context, Image
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
-from tracking.detect.mog2 import Mog2, Mog2Settings
 from tracking.detect.person_size import PersonSize
 
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
@@ -50,43 +49,28 @@ class Segmented:
 class Foreground:
     """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
 
-    State: model, the background model (`Background` or `Mog2`); px_per_m, the scale of the image, nan or 0 while it is
+    State: model, the background model; px_per_m, the scale of the image, nan or 0 while it is
     unknown (first the context's; the tracker may set it later); most_foreground, the largest plausible share of
     foreground, 0 to 1. The constructor raises InputError for an unusable background sample, AssertionError for none.
     """
 
-    def __init__(
-        self,
-        context: Context,
-        settings: BackgroundSettings,
-        most_foreground: float,
-        segmentation: str = "horprasert",
-    ) -> None:
+    def __init__(self, context: Context, settings: BackgroundSettings, most_foreground: float) -> None:
         """Train the background model on the context's background sample, which must not be None (AssertionError).
 
-        settings: of the model. most_foreground: largest plausible share of foreground, 0 to 1. segmentation: "mog2" for
-        OpenCV's mixture of Gaussians; any other text stands for the five-class model "horprasert".
+        settings: of the model. most_foreground: largest plausible share of foreground, 0 to 1.
 
-        Raises InputError if the sample has a wrong shape or dtype, fewer than 10 frames or, with the five-class model,
-        shows too little background.
+        Raises InputError if the sample has a wrong shape or dtype, fewer than 10 frames or shows too little background.
         """
         assert context.background is not None
         self.px_per_m = context.px_per_m
         self.most_foreground = most_foreground
-        self.model: Background | Mog2
-        if segmentation == "mog2":
-            self.model = Mog2(context.background, context.fps, Mog2Settings.like(settings))
-        else:
-            self.model = Background(context.background, context.fps, settings)
+        self.model = Background(context.background, context.fps, settings)
 
     def follow(self, settings: BackgroundSettings, most_foreground: float) -> None:
         """Replace the settings of the background model and most_foreground (share, 0 to 1); what the model learned
         stays."""
         self.most_foreground = most_foreground
-        if isinstance(self.model, Mog2):
-            self.model.follow(Mog2Settings.like(settings))
-        else:
-            self.model.follow(settings)
+        self.model.follow(settings)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -113,9 +97,9 @@ class Foreground:
     def adapt(self, seen: Segmented, protected: Bools) -> None:
         """Let the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
 
-        seen: the result of the last `segment`, as that call also set the brightness of the model. The five-class model
-        changes every fourth row per call. `seen.plausible` is not looked at: the caller leaves implausible pictures
-        out. Returns nothing.
+        seen: the result of the last `segment`, as that call also set the brightness of the model. Each call changes
+        every fourth row. `seen.plausible` is not looked at: the caller leaves implausible pictures out. Returns
+        nothing.
         """
         self.model.adapt(seen.image, seen.classes, protected)
 
