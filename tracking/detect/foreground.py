@@ -19,7 +19,8 @@ import numpy as np
 from sim.types import Array, Bools, Context, Image
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
-from tracking.detect.background_settings import BackgroundSettings
+from tracking.detect.background_settings import NEVER, BackgroundSettings
+from tracking.detect.ghosts import Ghosts
 from tracking.detect.person_size import PersonSize
 
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
@@ -65,6 +66,7 @@ class Foreground:
         self.px_per_m = context.px_per_m
         self.most_foreground = most_foreground
         self.model = Background(context.background, context.fps, settings)
+        self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.ghost_time < NEVER else None
 
     def follow(self, settings: BackgroundSettings, most_foreground: float) -> None:
         """Replace the settings of the background model and most_foreground (share, 0 to 1); what the model learned
@@ -81,6 +83,11 @@ class Foreground:
     def scale(self) -> float:
         """Scale of the image, px per m. While it is unknown: that of an image that is ASSUMED_HEIGHT = 18 m high."""
         return self.px_per_m if self.px_per_m > 0 else self.shape[0] / ASSUMED_HEIGHT
+
+    @property
+    def least_area(self) -> float:
+        """Fewest pixels of a blob."""
+        return max(LEAST_AREA * self.scale**2, LEAST_PIXELS)
 
     def segment(self, image: Image) -> Segmented:
         """Returns the pixel classes and the cleaned foreground mask of a picture (H, W, 3) BGR uint8 (secs. 3.2, 3.3).
@@ -102,6 +109,13 @@ class Foreground:
         nothing.
         """
         self.model.adapt(seen.image, seen.classes, protected)
+        if seen.plausible and self.ghosts is not None:
+            model = self.model
+            found = self.ghosts.find(
+                seen.image, model.gain, seen.mask, model.mean, model.settings.ghost_time, self.scale, self.least_area
+            )
+            if found is not None:
+                model.mend(found, self.ghosts.colour)
 
     def person_blobs(self, mask: Bools) -> blobs.Blobs:
         """Returns the blobs of a cleaned mask (H, W) bool that are large enough to be people or parts of them, the
@@ -110,7 +124,7 @@ class Foreground:
         They have at least 0.0125 m^2 at the image's scale, and at least 12 pixels (sec. 3.3). No such blob gives 0
         rows.
         """
-        return blobs.find(mask, max(LEAST_AREA * self.scale**2, LEAST_PIXELS))
+        return blobs.find(mask, self.least_area)
 
     def learn_person_size(self, size: PersonSize, sample: Image) -> None:
         """Let `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8.
