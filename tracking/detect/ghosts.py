@@ -50,7 +50,7 @@ class Ghosts:
         """noise (3,): standard deviation of the camera's noise per channel, grey levels; fps: frames per second."""
         self.reach = np.asarray(REACH * noise, np.float32)
         self.colour: Floats = np.zeros((3, *shape), np.float32)
-        self.sightings = np.zeros(shape, np.int64)
+        self.sightings: Floats = np.zeros(shape, np.float32)
         self._every = max(1, round(SIGHTING * fps))
         self._step = self._every / fps
         self._frames = 0
