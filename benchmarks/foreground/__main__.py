@@ -4,6 +4,7 @@
     python -m benchmarks.foreground rendered [--seeds 20000:20002] [--size 640x480] [--dark]
     python -m benchmarks.foreground adaptation [--seed 40000] [--out adaptation.svg]
     python -m benchmarks.foreground opening [--seeds 0:8]
+    python -m benchmarks.foreground ghosts [--seeds 0:1]
 
 highway: CDnet 2014, FOLDER/cdnet-highway. All frames without a mask train the models, the others are scored, each as it
 is and after cleaning (majority, opening, closing at 20 px per m). Masks: 255 foreground; 0 and 50 not; 50 shadow; 85
@@ -28,6 +29,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from benchmarks.foreground import ghosts
 from benchmarks.foreground.adaptation import adaptation
 from benchmarks.foreground.opening import opening
 from benchmarks.support.mog2 import Mog2
@@ -181,10 +183,10 @@ def add_sequence(
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["highway", "rendered", "adaptation", "opening"])
+    parser.add_argument("mode", choices=["highway", "rendered", "adaptation", "opening", "ghosts"])
     add_data(parser)
     parser.add_argument("--out", type=Path, help="highway: a picture of the classes; adaptation: the chart")
-    add_seeds(parser, "20000:20002", what="rendered, opening: ")
+    add_seeds(parser, "20000:20002", what="rendered, opening, ghosts: ")
     parser.add_argument("--size", default="640x480", help="rendered: size of the image")
     parser.add_argument("--dark", action="store_true", help="rendered: a sweep over the threshold `dark`")
     parser.add_argument("--seed", type=int, default=40_000, help="adaptation")
@@ -195,6 +197,8 @@ def main() -> None:
         rendered(args.seeds, args.size, args.dark)
     elif args.mode == "opening":
         opening(args.seeds)
+    elif args.mode == "ghosts":
+        ghosts.compare(args.seeds)
     else:
         adaptation(args.seed, args.out or Path("adaptation.svg"))
 

@@ -63,4 +63,5 @@ class Mog2:
 
 def background_model(curve: str) -> AbstractContextManager[None]:
     """Returns a context within which trackers from pixels use MOG2 if the curve is named so, else the five classes."""
-    return replaced_code([(foreground, "Background", Mog2)] if curve == MOG2 else [])
+    mog2 = [(foreground, "Background", Mog2), (foreground, "NEVER", 0.0)]  # ghosts are not looked for
+    return replaced_code(mog2 if curve == MOG2 else [])

@@ -11,7 +11,6 @@ from typing import ClassVar
 from scenarios.errors import InputError
 from tracking.config import Config, param
 
-
 NEVER = 1e9
 """s: a time that switches off what would happen after it."""
 

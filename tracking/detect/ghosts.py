@@ -70,7 +70,7 @@ class Ghosts:
         still = self.sightings >= max(math.ceil(ghost_time / self._step) + 1, LEAST_SIGHTINGS)
         regions = blobs.find(mask & still, least)
         band = max(round(BAND_M * px_per_m), LEAST_BAND)
-        found = np.zeros(mask.shape, np.uint8)
+        found = np.zeros(mask.shape, bool)
         for k, (left, top, wide, high) in enumerate(regions.box.astype(int)):
             margin = 2 * band
             part = (
@@ -79,8 +79,8 @@ class Ghosts:
             )
             region = regions.label[part] == k + 1
             if has_left(region, mask[part], model[:, *part], self.colour[:, *part], band):
-                found[part] |= cv2.dilate(region.astype(np.uint8), blobs.disc(2 * band + 1))
-        return np.asarray(found.astype(bool) & still) if found.any() else None
+                found[part] |= cv2.dilate(region.astype(np.uint8), blobs.disc(2 * band + 1)).astype(bool)
+        return np.asarray(found & still) if found.any() else None
 
 
 def has_left(region: Bools, mask: Bools, model: Floats, colour: Floats, band: int) -> bool:

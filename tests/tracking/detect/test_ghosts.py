@@ -1,4 +1,4 @@
-"""Ghosts: what left becomes background at once, what came and stands never; at any frame rate, in colour and in grey."""
+"""Ghosts: what left becomes background at once, what came and stands never; at any frame rate, colour or grey."""
 
 from __future__ import annotations
 
