@@ -74,3 +74,11 @@ def adapt(image, classes, protected, mean, var, gain, rows, fast, slow):
     spread = np.maximum(var + fast * (np.square(away * gain) - var), background_training.FLOOR**2)
     moved = np.maximum(mean + np.where(seen, fast, slow) * away, 1.0)
     return np.where(moves, moved, mean), np.where(moves & seen, spread, var)
+
+
+def watch(image, gain, reach, colour, sightings):
+    """Mean colour (3, H, W) since the last change, and sightings since then (H, W), after one more picture."""
+    seen = np.moveaxis(image.astype(float), -1, 0) / gain[:, None, None]
+    same = np.all(np.abs(seen - colour) <= reach[:, None, None], axis=0)
+    sightings = np.where(same, sightings + 1, 1)
+    return colour + (seen - colour) / np.minimum(sightings, 30), sightings

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.support.chart import Panel, lines
+from benchmarks.support.mog2 import MOG2, background_model
 from benchmarks.support.tables import head, interval, row
 from scenarios import load
 from scenarios.errors import InputError
@@ -50,13 +51,13 @@ SWEEPS = {
         {
             "pixels": PIXELS,
             "no shadow classes": ("image", {"dark": 1.0, "bright": 1.0}),
-            "MOG2": ("image", {"segmentation": "mog2"}),
+            MOG2: PIXELS,
         },
     ),
     "noise": Sweep(
         "noise, grey levels",
         {str(n): [f"picture.noise={n}"] for n in (0, 3, 6, 12, 24)},
-        {"pixels": PIXELS, "MOG2": ("image", {"segmentation": "mog2"})},
+        {"pixels": PIXELS, MOG2: PIXELS},
     ),
     "light": Sweep(
         "light",
@@ -91,7 +92,8 @@ def measure(chosen: Sweep, motions: Sequence[tuple[str, Motion]]) -> dict[str, n
             assert sequence.truth is not None
             for name, (mode, parameters) in chosen.curves.items():
                 try:
-                    run = track("blob", sequence, params=parameters, detections=mode)  # type: ignore[arg-type]
+                    with background_model(name):
+                        run = track("blob", sequence, params=parameters, detections=mode)  # type: ignore[arg-type]
                 except InputError as error:  # the noise is so large that no pixel has a background
                     print(f"  {name}: {error}")
                     continue

@@ -4,6 +4,7 @@
     python -m benchmarks.foreground rendered [--seeds 20000:20002] [--size 640x480] [--dark]
     python -m benchmarks.foreground adaptation [--seed 40000] [--out adaptation.svg]
     python -m benchmarks.foreground opening [--seeds 0:8]
+    python -m benchmarks.foreground ghosts [--seeds 0:1]
 
 highway: CDnet 2014, FOLDER/cdnet-highway. All frames without a mask train the models, the others are scored, each as it
 is and after cleaning (majority, opening, closing at 20 px per m). Masks: 255 foreground; 0 and 50 not; 50 shadow; 85
@@ -28,8 +29,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from benchmarks.foreground import ghosts
 from benchmarks.foreground.adaptation import adaptation
 from benchmarks.foreground.opening import opening
+from benchmarks.support.mog2 import Mog2
 from benchmarks.support.options import add_data, add_seeds, new_parser, seeds_text
 from scenarios import load
 from sim import simulate
@@ -37,7 +40,6 @@ from sim.types import Sequence
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
-from tracking.detect.mog2 import Mog2
 
 SCALE = 20.0  # px per m
 COLOURS = np.array([[0, 0, 0], [255, 255, 255], [0, 255, 255], [0, 160, 0], [0, 0, 255]], np.uint8)
@@ -105,8 +107,7 @@ def highway(folder: Path, out: Path | None) -> None:
     print(f"{len(sample)} frames to train on, {len(tests)} with masks")
     made = {name: MODELS[name] for name in ("five classes", "without shadow classes", "MOG2")}
     made |= {f"dark = {dark:g}": five_classes(dark=dark) for dark in (0.6, 0.5, 0.3, 0.2, 0.1, 0.05)}
-    deep = Mog2(sample[:10], 25.0).settings.from_dict({"shadow": 0.1})
-    made["MOG2, shadows down to 0.1"] = lambda sample, fps: Mog2(sample, fps, deep)
+    made["MOG2, shadows down to 0.1"] = lambda sample, fps: Mog2(sample, fps, BackgroundSettings(dark=0.1))
     print(f"{'':28s}   as it is                      cleaned\n{'':28s}" + "       F1      P      R shadow" * 2)
     for name, maker in made.items():
         model = maker(sample, 25.0)
@@ -182,10 +183,10 @@ def add_sequence(
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["highway", "rendered", "adaptation", "opening"])
+    parser.add_argument("mode", choices=["highway", "rendered", "adaptation", "opening", "ghosts"])
     add_data(parser)
     parser.add_argument("--out", type=Path, help="highway: a picture of the classes; adaptation: the chart")
-    add_seeds(parser, "20000:20002", what="rendered, opening: ")
+    add_seeds(parser, "20000:20002", what="rendered, opening, ghosts: ")
     parser.add_argument("--size", default="640x480", help="rendered: size of the image")
     parser.add_argument("--dark", action="store_true", help="rendered: a sweep over the threshold `dark`")
     parser.add_argument("--seed", type=int, default=40_000, help="adaptation")
@@ -196,6 +197,8 @@ def main() -> None:
         rendered(args.seeds, args.size, args.dark)
     elif args.mode == "opening":
         opening(args.seeds)
+    elif args.mode == "ghosts":
+        ghosts.compare(args.seeds)
     else:
         adaptation(args.seed, args.out or Path("adaptation.svg"))
 

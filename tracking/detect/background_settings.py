@@ -11,6 +11,9 @@ from typing import ClassVar
 from scenarios.errors import InputError
 from tracking.config import Config, param
 
+NEVER = 1e9
+"""s: a time that switches off what would happen after it."""
+
 
 @dataclass(frozen=True)
 class BackgroundSettings(Config):
@@ -64,6 +67,16 @@ class BackgroundSettings(Config):
         "from pixels: time constant with which all other pixels adapt, except protected ones (ours)",
         "log",
         sees="pixels",
+    )
+    ghost_time: float = param(
+        1.0,
+        (0.1, NEVER),
+        "s",
+        "from pixels: a region that has stood still for this time and shows what left, not what came, becomes "
+        "background; 1e9: never (ours)",
+        "log",
+        sees="pixels",
+        online=False,
     )
     gain: str = param(
         "global",

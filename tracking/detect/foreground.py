@@ -19,8 +19,8 @@ import numpy as np
 from sim.types import Array, Bools, Context, Image
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
-from tracking.detect.background_settings import BackgroundSettings
-from tracking.detect.mog2 import Mog2, Mog2Settings
+from tracking.detect.background_settings import NEVER, BackgroundSettings
+from tracking.detect.ghosts import Ghosts
 from tracking.detect.person_size import PersonSize
 
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
@@ -50,43 +50,29 @@ class Segmented:
 class Foreground:
     """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
 
-    State: model, the background model (`Background` or `Mog2`); px_per_m, the scale of the image, nan or 0 while it is
+    State: model, the background model; px_per_m, the scale of the image, nan or 0 while it is
     unknown (first the context's; the tracker may set it later); most_foreground, the largest plausible share of
     foreground, 0 to 1. The constructor raises InputError for an unusable background sample, AssertionError for none.
     """
 
-    def __init__(
-        self,
-        context: Context,
-        settings: BackgroundSettings,
-        most_foreground: float,
-        segmentation: str = "horprasert",
-    ) -> None:
+    def __init__(self, context: Context, settings: BackgroundSettings, most_foreground: float) -> None:
         """Train the background model on the context's background sample, which must not be None (AssertionError).
 
-        settings: of the model. most_foreground: largest plausible share of foreground, 0 to 1. segmentation: "mog2" for
-        OpenCV's mixture of Gaussians; any other text stands for the five-class model "horprasert".
+        settings: of the model. most_foreground: largest plausible share of foreground, 0 to 1.
 
-        Raises InputError if the sample has a wrong shape or dtype, fewer than 10 frames or, with the five-class model,
-        shows too little background.
+        Raises InputError if the sample has a wrong shape or dtype, fewer than 10 frames or shows too little background.
         """
         assert context.background is not None
         self.px_per_m = context.px_per_m
         self.most_foreground = most_foreground
-        self.model: Background | Mog2
-        if segmentation == "mog2":
-            self.model = Mog2(context.background, context.fps, Mog2Settings.like(settings))
-        else:
-            self.model = Background(context.background, context.fps, settings)
+        self.model = Background(context.background, context.fps, settings)
+        self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.ghost_time < NEVER else None
 
     def follow(self, settings: BackgroundSettings, most_foreground: float) -> None:
         """Replace the settings of the background model and most_foreground (share, 0 to 1); what the model learned
         stays."""
         self.most_foreground = most_foreground
-        if isinstance(self.model, Mog2):
-            self.model.follow(Mog2Settings.like(settings))
-        else:
-            self.model.follow(settings)
+        self.model.follow(settings)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -97,6 +83,11 @@ class Foreground:
     def scale(self) -> float:
         """Scale of the image, px per m. While it is unknown: that of an image that is ASSUMED_HEIGHT = 18 m high."""
         return self.px_per_m if self.px_per_m > 0 else self.shape[0] / ASSUMED_HEIGHT
+
+    @property
+    def least_area(self) -> float:
+        """Fewest pixels of a blob."""
+        return max(LEAST_AREA * self.scale**2, LEAST_PIXELS)
 
     def segment(self, image: Image) -> Segmented:
         """Returns the pixel classes and the cleaned foreground mask of a picture (H, W, 3) BGR uint8 (secs. 3.2, 3.3).
@@ -113,11 +104,18 @@ class Foreground:
     def adapt(self, seen: Segmented, protected: Bools) -> None:
         """Let the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
 
-        seen: the result of the last `segment`, as that call also set the brightness of the model. The five-class model
-        changes every fourth row per call. `seen.plausible` is not looked at: the caller leaves implausible pictures
-        out. Returns nothing.
+        seen: the result of the last `segment`, as that call also set the brightness of the model. Each call changes
+        every fourth row. `seen.plausible` is not looked at: the caller leaves implausible pictures out. Returns
+        nothing.
         """
         self.model.adapt(seen.image, seen.classes, protected)
+        if seen.plausible and self.ghosts is not None:
+            model = self.model
+            found = self.ghosts.find(
+                seen.image, model.gain, seen.mask, model.mean, model.settings.ghost_time, self.scale, self.least_area
+            )
+            if found is not None:
+                model.mend(found, self.ghosts.colour)
 
     def person_blobs(self, mask: Bools) -> blobs.Blobs:
         """Returns the blobs of a cleaned mask (H, W) bool that are large enough to be people or parts of them, the
@@ -126,7 +124,7 @@ class Foreground:
         They have at least 0.0125 m^2 at the image's scale, and at least 12 pixels (sec. 3.3). No such blob gives 0
         rows.
         """
-        return blobs.find(mask, max(LEAST_AREA * self.scale**2, LEAST_PIXELS))
+        return blobs.find(mask, self.least_area)
 
     def learn_person_size(self, size: PersonSize, sample: Image) -> None:
         """Let `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8.

@@ -18,7 +18,6 @@ from tracking.detect.background import (
 )
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.background_training import FLOOR, train
-from tracking.detect.mog2 import Mog2
 
 SIGMA = np.array([3.0, 2.0, 4.0])
 FPS = 10.0
@@ -354,9 +353,8 @@ def test_a_sample_that_is_none_is_refused_in_one_line(sample, words):
         Background(sample, FPS)
 
 
-@pytest.mark.parametrize("maker", [Background, Mog2])
-def test_a_frame_of_another_kind_is_refused(maker):
-    made = maker(shots(scene()), FPS)
+def test_a_frame_of_another_kind_is_refused():
+    made = Background(shots(scene()), FPS)
     for wrong in (np.zeros((20, 20, 3), np.uint8), np.zeros((40, 50), np.uint8), np.zeros((40, 50, 3))):
         with pytest.raises(InputError, match="as the background sample"):
             made.classify(wrong)
@@ -369,26 +367,7 @@ def test_foreground_that_adapts_faster_than_background_is_refused():
         BackgroundSettings(background_time=30, foreground_time=20)
 
 
-# --- the other source -------------------------------------------------------------------------------------------------
-
-
-def test_mog2_speaks_the_same_classes():
-    mean = np.broadcast_to(np.array([110.0, 120.0, 100.0]), (40, 50, 3))
-    made = Mog2(shots(mean), FPS)
-    picture = mean.copy()
-    picture[5:20, 5:20], picture[5:20, 30:45] = (30, 220, 30), mean[5:20, 30:45] * 0.7
-    picture = np.round(picture).astype(np.uint8)
-    classes = made.classify(picture)
-    assert share(classes[5:20, 5:20], FOREGROUND) > 0.95
-    assert share(classes[5:20, 30:45], SHADOW) > 0.95
-    assert share(classes[22:], BACKGROUND) > 0.95
-    keep = np.zeros((40, 50), bool)
-    keep[5:20, 5:20] = True
-    for _ in range(600):
-        made.adapt(picture, classes, keep)
-    after = made.classify(picture)
-    assert share(after[5:20, 5:20], FOREGROUND) > 0.95
-    assert share(after[5:20, 30:45], BACKGROUND) > 0.95
+# --- grey and extreme pictures ---------------------------------------------------------------------------------------
 
 
 def test_without_colours_whatever_differs_in_brightness_is_foreground():

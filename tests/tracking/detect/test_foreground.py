@@ -1,4 +1,4 @@
-"""The pipeline of all trackers from pixels: plausible frames, protected places, scale, person blobs, either model."""
+"""The pipeline of all trackers from pixels: plausible frames, protected places, scale, person blobs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.foreground import ASSUMED_HEIGHT, Foreground, convex_areas
-from tracking.detect.mog2 import Mog2
 from tracking.detect.person_size import PersonSize
 
 SCALE, PERSON = TALL / 1.7, (160.0, 180.0, TALL)
@@ -23,8 +22,8 @@ def context(scale=SCALE, people=()):
     return Context(painted.FPS, scale, image_size=(painted.WIDE, painted.HIGH), background=sample)
 
 
-def made(scale=SCALE, *, most=0.6, segmentation="horprasert", people=(), **settings):
-    return Foreground(context(scale, people), BackgroundSettings(**settings), most, segmentation)
+def made(scale=SCALE, *, most=0.6, people=(), **settings):
+    return Foreground(context(scale, people), BackgroundSettings(**settings), most)
 
 
 def picture(*people, seed=1):
@@ -42,16 +41,13 @@ def test_a_segmented_picture_is_the_cleaned_foreground_of_the_models_classes():
     assert seen.mask[int(180 - TALL / 2), 160]
 
 
-@pytest.mark.parametrize("segmentation", ["horprasert", "mog2"])
-def test_either_model_finds_the_person(segmentation):
-    pipeline = made(segmentation=segmentation, dark=0.4, background_time=7.0)
+def test_a_person_is_one_blob_and_settings_are_followed():
+    pipeline = made(dark=0.4, background_time=7.0)
     found = pipeline.person_blobs(pipeline.segment(picture(PERSON)).mask)
     assert len(found) == 1
     assert found.ellipse[0, :2] == pytest.approx([160, 180 - TALL / 2], abs=4)
-    assert isinstance(pipeline.model, Mog2) == (segmentation == "mog2")
     pipeline.follow(BackgroundSettings(dark=0.2, background_time=9.0), 0.01)
     assert pipeline.model.settings.background_time == 9.0
-    assert getattr(pipeline.model.settings, "shadow", 0.2) == 0.2
     assert not pipeline.segment(picture(PERSON)).plausible
 
 

@@ -98,16 +98,6 @@ class BlobConfig(BackgroundSettings):
         before=1.0,
     )
 
-    segmentation: str = param(
-        "horprasert",
-        ("horprasert", "mog2"),
-        "",
-        "from pixels: horprasert: five classes of pixels (the paper); mog2: OpenCV's mixture of Gaussians",
-        "categorical",
-        online=False,
-        before="horprasert",
-        sees="pixels",
-    )
     split: bool = param(
         True,
         (True, False),

@@ -61,7 +61,7 @@ class PixelUpdater:
             image_scale.required(context.px_per_m)
         self.people, self.context = people, context
         self.size = PersonSize(context)
-        self.foreground = Foreground(context, config, config.most_foreground, config.segmentation)
+        self.foreground = Foreground(context, config, config.most_foreground)
         self.foreground.learn_person_size(self.size, context.background)
         self._take_scale()
         self.upright_var = np.inf if self.size.above else np.radians(UPRIGHT) ** 2

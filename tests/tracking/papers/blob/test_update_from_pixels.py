@@ -227,12 +227,6 @@ def test_a_track_that_lies_stands_up_where_templates_measure_it():
         assert mine(t, b) == mine(made[11], pair[11][1])
 
 
-def test_mog2_follows_the_same_settings():
-    config, seen = BlobConfig(segmentation="mog2", dark=0.3, background_time=7.0), []
-    track([[]], config, watch=lambda tracker, _: seen.append(tracker.updater.foreground.model.settings))
-    assert (seen[0].shadow, seen[0].background_time) == (0.3, 7.0)
-
-
 def test_windows_follow_the_image_while_nobody_was_seen():
     scales = []
     for k in (1, 3):

@@ -1,0 +1,97 @@
+"""Ghosts: what left becomes background at once, what came and stands never; at any frame rate, colour or grey."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.types import Context
+from tests import painted
+from tests import reference_background as reference
+from tests.painted import TALL
+from tracking.detect import ghosts_kernels
+from tracking.detect.background_settings import NEVER, BackgroundSettings
+from tracking.detect.foreground import Foreground
+
+SCALE, PERSON, OTHER = TALL / 1.7, (160.0, 180.0, TALL), (240.0, 200.0, TALL)
+LOOKS = ["colour", "grey"]
+
+
+def picture(people, seed, look="colour"):
+    image = painted.picture(people, np.random.default_rng(seed))
+    return image if look == "colour" else np.repeat(image[..., 1:2], 3, -1)
+
+
+def made(people, look="colour", fps=10.0, **settings):
+    sample = np.stack([picture(people, seed, look) for seed in range(20)])
+    return Foreground(
+        Context(fps, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample),
+        BackgroundSettings(**settings),
+        0.6,
+    )
+
+
+def watch(pipeline, people, seconds, look="colour", protected=None):
+    """Shows the people for some seconds; returns the blobs of the next picture."""
+    keep = np.zeros(pipeline.shape, bool) if protected is None else protected
+    for k in range(round(seconds * pipeline.model.fps)):
+        pipeline.adapt(pipeline.segment(picture(people, 100 + k, look)), keep)
+    return pipeline.person_blobs(pipeline.segment(picture(people, 99, look)).mask)
+
+
+@pytest.mark.parametrize("look", LOOKS)
+@pytest.mark.parametrize("fps", [2.5, 7.0, 30.0])
+def test_who_stood_in_the_whole_sample_leaves_no_ghost(fps, look):
+    assert len(watch(made([PERSON], look, fps, ghost_time=NEVER), [], 3.0, look)) == 1
+    pipeline = made([PERSON], look, fps)
+    assert len(watch(pipeline, [], 0.5, look)) == 1
+    assert not len(watch(pipeline, [], 2.5, look))
+    ground, body = painted.ground(), painted.shape(PERSON)
+    expected = ground if look == "colour" else np.repeat(ground[..., 1:2], 3, -1)
+    learned = np.moveaxis(pipeline.model.mean, 0, -1)
+    assert (np.abs(learned - expected)[body].max(-1) < 10).mean() > 0.9
+    assert len(pipeline.person_blobs(pipeline.segment(picture([PERSON], 7, look)).mask)) == 1
+
+
+@pytest.mark.parametrize("look", LOOKS)
+@pytest.mark.parametrize("fps", [2.5, 7.0, 30.0])
+def test_who_comes_and_stands_is_not_absorbed(fps, look):
+    pipeline, never = made([], look, fps), made([], look, fps, ghost_time=NEVER)
+    for each in (pipeline, never):
+        assert len(watch(each, [PERSON], 10.0, look)) == 1
+    assert np.array_equal(pipeline.model.mean, never.model.mean)
+
+
+def test_a_ghost_goes_while_another_person_stands():
+    found = watch(made([PERSON]), [OTHER], 3.0)
+    assert len(found) == 1
+    assert found.ellipse[0, 0] == pytest.approx(OTHER[0], abs=5)
+
+
+def test_a_ghost_that_a_track_protects_goes_too():
+    """A ghost has a confirmed track, as it never moves."""
+    pipeline = made([PERSON])
+    assert not len(watch(pipeline, [], 3.0, protected=np.ones(pipeline.shape, bool)))
+
+
+def test_a_ghost_waits_until_its_edge_is_free():
+    """Somebody stands in front of the ghost: its edge is theirs."""
+    x, foot, h = PERSON
+    larger = (x, foot + 8, 1.3 * h)
+    assert len(watch(made([PERSON]), [larger], 3.0)) == 1
+
+
+def test_the_kernel_equals_its_twin():
+    r = np.random.default_rng(0)
+    gain, reach = np.array([1.1, 0.9, 1.0], np.float32), np.array([7.37, 8.37, 9.37], np.float32)
+    colour, sightings = np.zeros((3, 12, 15), np.float32), np.zeros((12, 15), np.float32)
+    twin = colour.astype(float), sightings.astype(float)
+    still = r.integers(30, 200, (12, 15, 3))
+    for k in range(40):
+        noise = r.integers(-5, 6, still.shape) + 60 * (r.random((12, 15, 1)) < 0.03)
+        image = (still + noise).astype(np.uint8)
+        ghosts_kernels.watch(image, gain, reach, colour, sightings)
+        twin = reference.watch(image, gain, reach, *twin)
+        np.testing.assert_allclose(colour, twin[0], rtol=1e-4, err_msg=str(k))
+        assert np.array_equal(sightings, twin[1])
+    assert sightings.max() > ghosts_kernels.MEMORY

@@ -1,0 +1,113 @@
+"""Ghosts: places where the background model shows something that has left (ours).
+
+People who stand through most of the background sample are learned as background. When they leave, the ground that they
+uncover differs from the model, and is foreground without anybody there: a ghost. A ghost and a person who stands differ
+in one respect. At the edge of the region, either the picture or the model has a step in colour: the picture if
+something came, the model if something left.
+
+A region of the foreground is a ghost if
+    still    its pixels have kept their colour for `ghost_time`
+    open     at most of its edge it borders on background, not on other foreground
+    left     along that edge the steps of the model sum to at least STEPS times those of the picture
+The step at a pixel of the edge is the difference of the mean colours inside the region and outside the foreground,
+within BAND_M of the pixel, in the channel where it is largest.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+
+from sim.types import Bools, Image
+from tracking.detect import blobs, ghosts_kernels
+from tracking.detect.background_kernels import Floats
+
+SIGHTING = 0.25
+"""s from one look at the pixels to the next. A walking person uncovers a pixel in about this time."""
+REACH = 3.5
+"""Noises (standard deviations of the camera) within which a pixel's colour is the same."""
+LEAST_SIGHTINGS = 3
+"""Fewest looks at a still pixel, whatever the frame rate."""
+BAND_M, LEAST_BAND = 0.1, 2
+"""m and px: half width of the window in which colours on both sides of an edge are averaged. People and pictures of
+them in a background model have soft edges, as people sway."""
+OPEN = 0.5
+"""Least share of the edge that borders on background."""
+STEPS = 2.0
+"""Least ratio of the model's steps to the picture's."""
+
+
+class Ghosts:
+    """Finds ghosts in the foreground of a still camera, H x W px.
+
+    State: colour (3, H, W), float32, the mean colour at gain 1 of each pixel since it last changed, grey levels;
+    sightings (H, W), the looks at it since then; reach (3,), grey levels, the largest change that is noise.
+    """
+
+    def __init__(self, shape: tuple[int, ...], noise: Floats, fps: float) -> None:
+        """noise (3,): standard deviation of the camera's noise per channel, grey levels; fps: frames per second."""
+        self.reach = np.asarray(REACH * noise, np.float32)
+        self.colour: Floats = np.zeros((3, *shape), np.float32)
+        self.sightings: Floats = np.zeros(shape, np.float32)
+        self._every = max(1, round(SIGHTING * fps))
+        self._step = self._every / fps
+        self._frames = 0
+
+    def find(
+        self, image: Image, gain: Floats, mask: Bools, model: Floats, ghost_time: float, px_per_m: float, least: float
+    ) -> Bools | None:
+        """Returns the pixels (H, W) of ghosts and of a band round them that are still, None if there is no ghost.
+
+        image (H, W, 3) uint8 and its gain (3,); mask (H, W): its foreground; model (3, H, W): the background model's
+        colours at gain 1. ghost_time: s. px_per_m: scale of the image. least: fewest pixels of a region.
+        """
+        self._frames += 1
+        if self._frames % self._every:
+            return None
+        ghosts_kernels.watch(image, gain, self.reach, self.colour, self.sightings)
+        still = self.sightings >= max(math.ceil(ghost_time / self._step) + 1, LEAST_SIGHTINGS)
+        regions = blobs.find(mask & still, least)
+        band = max(round(BAND_M * px_per_m), LEAST_BAND)
+        found = np.zeros(mask.shape, bool)
+        for k, (left, top, wide, high) in enumerate(regions.box.astype(int)):
+            margin = 2 * band
+            part = (
+                slice(max(top - margin, 0), top + high + margin),
+                slice(max(left - margin, 0), left + wide + margin),
+            )
+            region = regions.label[part] == k + 1
+            if has_left(region, mask[part], model[:, *part], self.colour[:, *part], band):
+                found[part] |= cv2.dilate(region.astype(np.uint8), blobs.disc(2 * band + 1)).astype(bool)
+        return np.asarray(found & still) if found.any() else None
+
+
+def has_left(region: Bools, mask: Bools, model: Floats, colour: Floats, band: int) -> bool:
+    """True if the model, and not the picture, has steps in colour at the edge of a region.
+
+    region, mask (H, W): the region, and all foreground; model, colour (3, H, W): colours of the model and of the
+    picture, grey levels at gain 1; band: px on both sides of the edge.
+    """
+    edge = cv2.dilate(region.astype(np.uint8), blobs.disc(3)).astype(bool) & ~region
+    border = edge & ~mask
+    if np.count_nonzero(border) <= OPEN * np.count_nonzero(edge):
+        return False
+    of_model, of_picture = (steps(region, ~mask, planes, band)[border].sum() for planes in (model, colour))
+    return bool(of_model >= STEPS * of_picture)
+
+
+def steps(inside: Bools, outside: Bools, planes: Floats, band: int) -> Floats:
+    """Returns the difference (H, W) of mean colours inside and outside, in the channel where it is largest.
+
+    planes (3, H, W): colours. The means are over the window of 2 band + 1 px round each pixel; without pixels on one
+    side its mean is 0.
+    """
+    means = [_means(planes, where.astype(np.float32), band) for where in (inside, outside)]
+    return np.asarray(np.max(np.abs(means[0] - means[1]), axis=0), np.float32)
+
+
+def _means(planes: Floats, where: Floats, band: int) -> Floats:
+    size = (2 * band + 1, 2 * band + 1)
+    count = np.maximum(cv2.boxFilter(where, -1, size, normalize=False), 1)
+    return np.stack([cv2.boxFilter(plane * where, -1, size, normalize=False) / count for plane in planes])
