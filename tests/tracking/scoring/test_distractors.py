@@ -40,7 +40,7 @@ def crowded(seed: int, top: int = 13) -> tuple[np.ndarray, np.ndarray]:
             box = [*(start[k] + 3 * frame + r.normal(0, 1, 2)), 40.0, 100.0]
             gt.append([frame, k + 1, *box, int(k == 0 or r.random() < 0.8), kind[k], 1])
             for n in range(int(r.random() < 0.9) + int(r.random() < 0.2)):
-                moved = np.array(box) + [*r.normal(0, 8, 2), 0, 0]
+                moved = np.add(box, [*r.normal(0, 8, 2), 0, 0])
                 tracks.append([frame, 20 + k + 14 * n, *moved, 0.9, -1, -1, -1])
     return np.array(gt), np.array(tracks)
 
