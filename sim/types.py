@@ -252,6 +252,16 @@ class Motion(Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Unscored(Frozen):
+    """L labelled rows that are not scored, sorted by frame. frame (L,). box (L, 4): left, top, width, height in px.
+    distractor (L,): True if a track on this box is left out of the scores."""
+
+    frame: Ints
+    box: Array
+    distractor: Bools
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Near(Frozen):
     """Hard negatives (gt/near.csv), K rows: persons with ids a and b satisfy the merge rule (nearer than 1.5 m,
     velocities within 0.5 m/s, for 2 s) from frame start to end (from 1, both inclusive), but are not in one group. All
@@ -318,7 +328,8 @@ class Truth(Frozen):
     and outside the image. z (R,): height of the ground, m. heading (R,): rad. height (R,): of the person, m. groups,
     groups_px: T Groups, on the ground (m) and in the image (px). labelled (T,): True for frames with group labels.
     events, near (strangers who walk like a group): measured from the motion. orders: of the script, () without.
-    px_per_m: image scale, nan if unknown. fps: frames/s. Fields that may be None are None if unknown."""
+    px_per_m: image scale, nan if unknown. fps: frames/s. unscored: rows beside the people, None without
+    distractors. Fields that may be None are None if unknown."""
 
     name: str
     fps: float
@@ -342,6 +353,7 @@ class Truth(Frozen):
     events: tuple[GroupEvent, ...] | None = None
     near: Near | None = None
     orders: tuple[Order, ...] = ()
+    unscored: Unscored | None = None
 
     def rows(self, index: int) -> slice:
         """Return the slice of the rows of frame `index` (from 1); an empty slice if that frame has none."""

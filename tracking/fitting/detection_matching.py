@@ -17,6 +17,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors, perturb_boxes
+from sim.io.formats.mot_distractors import DISTRACTORS
 from sim.io.formats.mot_table import read_table
 from sim.io.store.truth_files import scores_or_ones
 from sim.scene.box_visibility import image_size_of_boxes, with_visibility
@@ -25,7 +26,6 @@ from tracking.filters.assignment import optimal
 
 GATE = 0.3  # least overlap of a match
 IGNORED = 0.5  # least overlap of an unmatched detection with an unscored box for the detection to be dropped
-DISTRACTORS = (2, 7, 8, 12)  # MOTChallenge classes: people on vehicles, static people, distractors, reflections
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.clear import clear
+from tracking.scoring.distractors import without_distractors
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.hota import hota
@@ -151,11 +152,14 @@ class Scorer:
         """Returns the truth's and the tracker's data in the frames f where frames[f] is true, before people are mapped.
 
         tracks: one tracker's, of these frames only, sorted by frame. frames (length + 1,): bool by frame number. In the
-        result `frames` keeps only labelled frames, and `mapping` is -1 for every tracked row.
+        result `frames` keeps only labelled frames, and `mapping` is -1 for every tracked row. Tracked people on
+        distractors are left out.
         """
         kept = frames[self.people.rows.frame]
         true = self.people if kept.all() else self.people.keep(kept)
         est, plane = tracked_people(tracks), plane_of(self.truth, tracks)
+        if self.truth.unscored is not None:
+            est = without_distractors(self.truth, self.truth.unscored, est)
         nobody = np.full(len(est.rows), -1, np.int64)
         return ComparedSides(self.truth, tracks, self.labelled & frames, true, est, nobody, plane)
 

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.types import Groups, Plane, Tracks, Truth
+from scenarios.limits import COORDINATE, DETECTIONS, FRAME_RATES, FRAMES, is_number
+from sim.types import Bools, Groups, Ints, Plane, Tracks, Truth
 from tracking.grouping.grouped_tracks import derive
 from tracking.scoring.evaluation import Scores, evaluate
 from tracking.scoring.group_scores import GroupMatch
@@ -21,6 +22,10 @@ from tracking.scoring.people_comparison import Similarity
 
 COLUMNS = {"frame": (), "id": (), "pos": (2,), "box": (4,), "group": ()}  # name: shape of one row
 PERSON_HEIGHT = 1.7  # m: assumed height of the median box
+RANGES = {"frame": (1, FRAMES), "id": (0, 2**53), "group": (-1, 2**53), "pos": (-COORDINATE, COORDINATE)}
+RANGES |= {"box": RANGES["pos"]}
+"""Least and greatest value of a column, as in files."""
+MEMORY = 10.0  # s: groups and events depend on what was there at most that long before
 
 Table = dict[str, Any]
 
@@ -50,13 +55,18 @@ def score_arrays(
     for 1.7 m. similarity: compares people by "boxes", "ground" or "image"; None: by boxes if both have them, else by
     positions. group_match: matches groups by "hull" or "members".
 
-    Raises ValueError if a column is unknown, missing, of a wrong shape or not finite, if columns differ in length, if
-    ids, frames or groups are not whole, if a frame is below 1, if fps is not a finite number above 0, if both tables
+    The bounds are those of files: frames from 1 to 1,000,000, ids from 0, groups from -1, coordinates within 1e6, boxes
+    with an area, at most 5000 rows of one frame, 0.01 to 1000 frames per second. Ids that are texts must be numbered
+    first.
+
+    Raises ValueError if a column is unknown, missing, of a wrong shape, or holds a value that is no number or is out of
+    bounds; if columns differ in length, if ids, frames or groups are not whole, if fps is out of bounds, if both tables
     lack a common kind of position or the one of `similarity`, or if an id occurs twice in one frame. Raises InputError
     if groups must be derived in the image and px_per_m is not above 0, or unknown because there are no true boxes.
     """
-    if not (np.isfinite(fps) and fps > 0):
-        raise ValueError(f"fps: got {fps}, expected a number above 0")
+    low, high = FRAME_RATES
+    if not is_number(fps, low, high):
+        raise ValueError(f"fps: got {fps!r}, expected a number from {low:g} to {high:g}")
     true, est = _table(truth, "truth"), _table(tracks, "tracks")
     filled = [table for table in (true, est) if len(table["frame"])]
     plane: Plane = "ground" if all(table["pos"] is not None for table in filled) else "image"
@@ -86,8 +96,10 @@ def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
     for name, values in table.items():
         if values is not None and len(values) != len(frame):
             raise ValueError(f"{side}: got {len(values)} rows of {name}, expected {len(frame)}, as of frame")
-    if len(frame) and frame.min() < 1:
-        raise ValueError(f"{side}: got frame {frame.min()}, expected frames from 1 on: add to all of them")
+    distinct, count = np.unique(frame, return_counts=True)
+    if (count > DETECTIONS).any():
+        most = int(np.argmax(count))
+        raise ValueError(f"{side}: got {count[most]} rows of frame {distinct[most]}, expected at most {DETECTIONS}")
     order = np.lexsort((id, frame))
     return {name: None if values is None else values[order] for name, values in table.items()}
 
@@ -105,13 +117,29 @@ def _column(given: ArrayLike, name: str, side: str) -> Any:
     if values.shape[1:] != shape or values.ndim == 0:
         expected = ("rows", *shape)
         raise ValueError(f"{side}: got {name} of shape {values.shape}, expected ({', '.join(map(str, expected))})")
+    if values.size and values.dtype.kind not in "iuf":
+        first = values.ravel().tolist()[0]
+        remedy = "" if shape else ": number them, as by np.unique(…, return_inverse=True)"
+        raise ValueError(f"{side}: got {first!r} in {name}, expected {'' if shape else 'whole '}numbers{remedy}")
     if not np.isfinite(values).all():
         raise ValueError(f"{side}: got a {name} that is not finite, expected numbers")
+    _require_range(values, name, side)
     if shape:
         return values.astype(float)
     if not np.array_equal(values, values.astype(np.int64)):
         raise ValueError(f"{side}: got a {name} that is not whole, expected whole numbers")
     return values.astype(np.int64)
+
+
+def _require_range(values: Any, name: str, side: str) -> None:
+    """Raises ValueError for the first finite value of a column that is out of bounds, or a box without area."""
+    low, high = RANGES[name]
+    outside = values[(values < low) | (values > high)]
+    if outside.size:
+        words = f"from 1 on, to {FRAMES:,}" if name == "frame" else f"from {low:g} to {high:,}"
+        raise ValueError(f"{side}: got {outside[0]} in {name}, expected numbers {words}")
+    if name == "box" and (values[:, 2:] <= 0).any():
+        raise ValueError(f"{side}: got a box without area, expected width and height above 0")
 
 
 def _scale(box: Any) -> float:
@@ -123,8 +151,8 @@ def _scale(box: Any) -> float:
 
 
 def _tracks(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> list[Tracks]:
-    """Returns one `Tracks` of people per frame 1 … length, with velocities and covariances nan and scores 1; [] if
-    length is 0.
+    """Returns `Tracks` of people, with velocities and covariances nan and scores 1; [] if length is 0. Of the frames
+    1 … length those are left out in which nothing is and nothing can change (`_live_frames`).
 
     table: checked columns, sorted by frame; fps: frames per second; plane: "ground" takes pos, "image" the centres of
     the boxes. With a group column groups and events are derived from it, and px_per_m (px per metre) scales image
@@ -134,18 +162,36 @@ def _tracks(table: Table, length: int, fps: float, px_per_m: float, plane: Plane
     box, group, rows = table["box"], table["group"], len(table["frame"])
     pos = table["pos"] if plane == "ground" else box[:, :2] + box[:, 2:] / 2
     label = np.full(rows, -1, np.int64) if group is None else group
-    cuts = np.searchsorted(table["frame"], np.arange(1, length + 2)).tolist()
+    live = _live_frames(table["frame"], length, fps)
+    first, after = (np.searchsorted(table["frame"], live, side).tolist() for side in ("left", "right"))
 
-    def at(index: int) -> Tracks:
-        r, n = slice(cuts[index - 1], cuts[index]), cuts[index] - cuts[index - 1]
+    def at(index: int, low: int, high: int) -> Tracks:
+        r, n = slice(low, high), high - low
         return Tracks(
             index, (index - 1) / fps, plane, "person", table["id"][r], label[r], pos[r], np.full((n, 2), np.nan),
             np.full((n, 4, 4), np.nan), None if box is None else box[r], np.ones(n),
             Groups.none() if group is not None and (label[r] < 0).all() else None,
         )  # fmt: skip
 
-    found = [at(index) for index in range(1, length + 1)]
+    found = [at(*each) for each in zip(live.tolist(), first, after, strict=True)]
     return found if group is None or not rows else derive(found, fps, px_per_m)
+
+
+def _live_frames(frame: Ints, length: int, fps: float) -> Ints:
+    """Returns the frame numbers, ascending, of frames with rows, of the 10 s after each, and 1 and `length`.
+
+    Groups and events of these frames are the same with and without the other frames. frame: sorted, of all rows.
+    """
+    if not length:
+        return np.zeros(0, np.int64)
+    live: Bools = np.zeros(length + 1, bool)
+    live[[1, length]] = True
+    occupied = np.unique(frame)
+    reach = int(np.ceil(MEMORY * fps))
+    step = np.zeros(length + 2, np.int64)
+    np.add.at(step, occupied, 1)
+    np.add.at(step, np.minimum(occupied + reach + 1, length + 1), -1)
+    return np.flatnonzero(live | (np.cumsum(step)[: length + 1] > 0))
 
 
 def _truth(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> Truth:
@@ -164,6 +210,8 @@ def _truth(table: Table, length: int, fps: float, px_per_m: float, plane: Plane)
     if group is None:
         return truth
     derived = _tracks(table, length, fps, px_per_m, plane)
-    groups = tuple(t.groups or Groups.none() for t in derived)
+    nobody = Groups.none()
+    by_frame = {t.index: t.groups or nobody for t in derived}
+    groups = tuple(by_frame.get(index, nobody) for index in range(1, length + 1))
     events = tuple(replace(e, emitted=None) for t in derived for e in t.events)
     return truth.replace(events=events, **{"groups" if plane == "ground" else "groups_px": groups})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -66,12 +67,17 @@ class Comparison:
             return "no sure difference"
         return "better" if (self.difference > 0) == self.higher else "worse"
 
+    @property
+    def difference_words(self) -> str:
+        """The difference with its interval; without it if an end is unknown (nan)."""
+        known = math.isfinite(self.low) and math.isfinite(self.high)
+        return f"{self.difference:+.4f}" + (f" [{self.low:+.4f}, {self.high:+.4f}]" if known else " (no interval)")
+
     def line(self) -> str:
         """Returns one line of text: scenes, key, before → after, difference with its interval, number of sequences,
         verdict.
         """
-        ends = f"[{self.low:+.4f}, {self.high:+.4f}]"
-        change = f"{self.before:.4f} → {self.after:.4f}, {self.difference:+.4f} {ends}"
+        change = f"{self.before:.4f} → {self.after:.4f}, {self.difference_words}"
         return f"{self.scenes}: {self.key} {change}, {counted(self.sequences, 'sequence')}: {self.verdict}"
 
 

@@ -198,7 +198,7 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
     best = max(gains, key=lambda c: goal.gain(c.before, c.after))
     if best.sequences < 2:
         return ["the defaults stay: one validation scene says nothing of others; give more --validation seeds"]
-    ends = f"{best.difference:+.4f} [{best.low:+.4f}, {best.high:+.4f}], {counted(best.sequences, 'sequence')}"
+    ends = f"{best.difference_words}, {counted(best.sequences, 'sequence')}"
     return [f"the defaults stay: nothing is surely better on the validation scenes; at best {goal.key} {ends}"]
 
 

@@ -44,7 +44,7 @@ def labelled_people(table: MotTable, person_class: int | None) -> Bools:
     elif (flag == 0).all() and len(keep):
         text = f"{file}: column 7 is 0 in all {len(keep)} rows; it is taken as a confidence, and all rows count"
         warnings.warn(text, stacklevel=2)
-    if person_class is not None and _classes(table, True) is None:
+    if person_class is not None and classes_of(table, True) is None:
         raise InputError(
             file=file, place="--class", got=f"{table.rows.values.shape[1]} columns without classes",
             expected="a class in column 8", remedy="leave --class out",
@@ -57,7 +57,7 @@ def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
 
     person_class: None: 1, with a warning about rows of other classes. Raises InputError if this leaves no row.
     """
-    found = _classes(table, person_class is not None)
+    found = classes_of(table, person_class is not None)
     if found is None or not keep.any():
         return keep
     wanted = PEDESTRIAN if person_class is None else person_class
@@ -76,7 +76,7 @@ def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
     return people
 
 
-def _classes(table: MotTable, named: bool) -> Array | None:
+def classes_of(table: MotTable, named: bool) -> Array | None:
     """Return column 8 (N,) if it holds classes, else None. named: True if the user named a class (--class).
 
     8 or 9 columns have a class unless it is -1 in all rows. 10 columns have one if z is -1 in all rows, or the user

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from sim.arrays import repeated_ids
+from sim.io.formats.mot_distractors import unscored_rows
 from sim.io.formats.mot_ground import ground_positions
 from sim.io.formats.mot_people import labelled_people, of_class
 from sim.io.formats.mot_table import MotTable, read_table
@@ -145,5 +146,5 @@ def read_truth(
         vel=None if place is None else differentiate(frame, id, place[:, :2], fps),
         box=box if boxed else None, visibility=visibility,
         z=None if place is None else place[:, 2],
-        labelled=np.zeros(frames, bool),
+        labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip

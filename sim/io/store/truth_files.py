@@ -126,7 +126,7 @@ def read_truth(folder: Path) -> Truth:
         frame=frame, id=id, group=table.ints("group"),
         pos=several("x", "y"), vel=several("vx", "vy"), box=several(*BOX), visible_box=several(*VISIBLE),
         visibility=table.floats("visibility"),
-        **{name: several(name) for name, _ in SINGLE},
+        z=several("z"), heading=several("heading"), height=several("height"), truncation=several("truncation"),
         groups=_groups(gt / "groups.parquet"), groups_px=_groups(gt / "groups_px.parquet"),
         labelled=None if labelled is None else _flags(table, labelled, length),
         events=tuple(e for e, _ in read_events(gt / "events.json")) if is_present(gt / "events.json") else None,

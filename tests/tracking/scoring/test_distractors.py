@@ -1,0 +1,111 @@
+"""Tracks on distractors are left out of the scores, as by TrackEval's preprocessing of MOTChallenge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.io.source import open_source
+from sim.io.store.track_files import read_tracks
+from sim.types import Truth
+from tests.reference_trackeval import CLEAR, HOTA, IDENTITY, KEYS
+from tracking.scoring.evaluation import Scores, evaluate
+from tracking.scoring.frame_weights import weighted_scorer
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+QUIET = {"PRINT_CONFIG": False}
+FRAMES = 12
+
+
+def written(folder: Path, gt: np.ndarray, tracks: np.ndarray, name: str) -> tuple[Path, Path]:
+    """A sequence folder with gt/gt.txt, and the text of tracks where TrackEval looks for it."""
+    text, told = folder / "gt" / name / "gt" / "gt.txt", folder / "trackers" / "t" / "data" / f"{name}.txt"
+    for path, rows in ((text, gt), (told, tracks)):
+        path.parent.mkdir(parents=True)
+        path.write_text("".join(",".join(f"{v:.10g}" for v in row) + "\n" for row in rows.tolist()))
+    (text.parents[1] / "seqinfo.ini").write_text(f"[Sequence]\nname={name}\nframeRate=10\nseqLength={FRAMES}\n")
+    return text.parents[1], told
+
+
+def crowded(seed: int, top: int = 13) -> tuple[np.ndarray, np.ndarray]:
+    """Labels of classes 1 … `top`, some with flag 0, that overlap each other, and tracks near most of them."""
+    r = np.random.default_rng(seed)
+    gt, tracks = [], []
+    start, kind = r.uniform(0, 150, (14, 2)), np.where(r.random(14) < 0.5, 1, r.integers(1, top + 1, 14))
+    kind[0], kind[1] = 1, min(8, top)
+    for frame in range(1, FRAMES + 1):
+        for k in np.flatnonzero(r.random(14) < 0.9):
+            box = [*(start[k] + 3 * frame + r.normal(0, 1, 2)), 40.0, 100.0]
+            gt.append([frame, k + 1, *box, int(k == 0 or r.random() < 0.8), kind[k], 1])
+            for n in range(int(r.random() < 0.9) + int(r.random() < 0.2)):
+                moved = np.add(box, [*r.normal(0, 8, 2), 0, 0])
+                tracks.append([frame, 20 + k + 14 * n, *moved, 0.9, -1, -1, -1])
+    return np.array(gt), np.array(tracks)
+
+
+def theirs(folder: Path, name: str, benchmark: str, preprocessing: bool) -> dict[str, float]:
+    trackeval = pytest.importorskip("trackeval", reason="trackeval is installed by `make test`")
+    config = {
+        "GT_FOLDER": str(folder / "gt"), "TRACKERS_FOLDER": str(folder / "trackers"), "BENCHMARK": benchmark,
+        "SKIP_SPLIT_FOL": True, "SEQ_INFO": {name: FRAMES}, "DO_PREPROC": preprocessing, **QUIET,
+    }  # fmt: skip
+    dataset, metrics = trackeval.datasets.MotChallenge2DBox(config), trackeval.metrics
+    data = dataset.get_preprocessed_seq_data(dataset.get_raw_seq_data("t", name), "pedestrian")
+    quiet = {"THRESHOLD": 0.5, **QUIET}
+    families = ((metrics.HOTA(), HOTA), (metrics.CLEAR(quiet), CLEAR), (metrics.Identity(quiet), IDENTITY))
+    found = {key: metric.eval_sequence(data)[KEYS.get(key, key)] for metric, keys in families for key in keys}
+    return {key: float(np.mean(value)) for key, value in found.items()}
+
+
+def ours(source: Path, tracks: Path) -> tuple[Truth, Scores]:
+    (sequence,) = open_source(source)
+    truth = sequence.truth
+    assert truth is not None
+    return truth, evaluate(truth, read_tracks(tracks, fps=10, length=FRAMES))
+
+
+@pytest.mark.parametrize("name", ["MOT17-99", "MOT20-99"])
+@pytest.mark.parametrize("seed", range(4))
+def test_equal_to_trackeval(tmp_path: Path, name: str, seed: int) -> None:
+    source, tracks = written(tmp_path, *crowded(seed), name)
+    expected = theirs(tmp_path, name, name[:5], preprocessing=True)
+    truth, found = ours(source, tracks)
+    for key, value in expected.items():
+        assert found[key] == pytest.approx(value, abs=1e-9), key
+    weighted = weighted_scorer(truth, read_tracks(tracks, fps=10, length=FRAMES))(np.ones((1, FRAMES)))[0]
+    assert weighted[list(found).index("MOTA")] == pytest.approx(expected["MOTA"], abs=1e-9)
+
+
+def test_without_other_classes_nothing_is_left_out(tmp_path: Path) -> None:
+    gt, told = crowded(5, top=1)
+    source, tracks = written(tmp_path, gt, told, "MOT17-99")
+    expected = theirs(tmp_path, "MOT17-99", "MOT17", preprocessing=False)
+    truth, found = ours(source, tracks)
+    assert truth.unscored is None
+    for key, value in expected.items():
+        assert found[key] == pytest.approx(value, abs=1e-9), key
+
+
+def test_a_vehicle_without_motor_is_a_distractor_in_mot20_alone(tmp_path: Path) -> None:
+    gt = np.array([[1, 1, 0, 0, 40, 100, 1, 1, 1], [1, 2, 500, 0, 40, 100, 0, 6, 1]])
+    for name, false in (("MOT17-01", 1), ("MOT20-01", 0)):
+        rows = np.c_[gt[:, :6], np.ones(2), -np.ones((2, 3))]
+        assert ours(*written(tmp_path / name, gt, rows, name))[1]["FP"] == false
+
+
+def test_a_person_who_stands_on_a_distractor_keeps_the_track(tmp_path: Path) -> None:
+    """The track fits the person better; a second track is matched to the distractor and left out."""
+    gt = np.array([[1, 1, 0, 0, 40, 100, 1, 1, 1], [1, 2, 4, 0, 40, 100, 0, 7, 1]])
+    one = np.array([[1, 5, 1, 0, 40, 100, 1, -1, -1, -1]])
+    two = np.r_[one, [[1, 6, 5, 0, 40, 100, 1, -1, -1, -1]]]
+    for name, rows in (("one", one), ("two", two)):
+        found = ours(*written(tmp_path / name, gt, rows, "MOT17-01"))[1]
+        assert (found["TP"], found["FP"], found["FN"]) == (1, 0, 0), name
+
+
+def test_classes_that_are_not_those_of_motchallenge_have_no_distractors(tmp_path: Path) -> None:
+    gt = np.array([[1, 1, 0, 0, 40, 100, 1, 1, 1], [1, 2, 500, 0, 40, 100, 1, 7, 1], [1, 3, 900, 0, 9, 9, 1, 40, 1]])
+    rows = np.c_[gt[:2, :6], np.ones(2), -np.ones((2, 3))]
+    assert ours(*written(tmp_path, gt, rows, "S"))[1]["FP"] == 1
