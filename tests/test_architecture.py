@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("scenarios", "sim", "tracking")
 LINES = 500
 SCORING = (
+    "scenarios.limits",
     "tracking.scoring",
     "tracking.grouping.grouped_tracks",
     "scenarios.errors",

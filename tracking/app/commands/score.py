@@ -160,7 +160,7 @@ def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = D
     """Returns the scores of one run: a tracker's tracks of one sequence, with the words of run.json on its detections.
 
     method: how people and groups are compared. Raises InputError if the sequence has no labels or cannot be compared in
-    this way, or the scale in px per m is not above 0 where groups are derived in the image. Raises ValueError if an id
+    this way, or the scale in px per m is not above 0 where groups are derived in the image, or an id
     occurs twice in one frame.
     """
     if sequence.truth is None:
@@ -174,6 +174,10 @@ def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = D
         raise InputError(
             file=sequence.name, place="--similarity", got=str(error), expected="what both sides have",
             remedy="choose another --similarity",
+        ) from None  # fmt: skip
+    except ValueError as error:
+        raise InputError(
+            file=sequence.name, got=str(error), expected="each id once in a frame", remedy="remove one of the two rows",
         ) from None  # fmt: skip
     return SequenceScores(sequence.name, scores, input_summary(run.info))
 

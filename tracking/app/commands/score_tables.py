@@ -96,7 +96,7 @@ def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means:
     table = empty_table()
     table.add_column("sequence", overflow="fold")
     for key in keys:
-        table.add_column(key.removeprefix("group_").removesuffix("_core"), justify="right", no_wrap=True)
+        table.add_column(_heading(key, rows), justify="right", no_wrap=True)
     for row in rows:
         table.add_row(printable(row.sequence), *(number(key, row.scores[key]) for key in keys))
     if any(math.isfinite(means[key]["low"]) for key in keys):
@@ -104,6 +104,13 @@ def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means:
             cells = (number(key, means[key][part], mean=True) for key in keys)
             table.add_row(name, *cells, style="bold" if part == "mean" else None)
     return with_title(title, table)
+
+
+def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
+    """Returns the key as the heading of a column; with its unit if that depends on where people are compared."""
+    unit = "/".join(dict.fromkeys("m" if row.scores.surface == "ground" else "px" for row in rows))
+    short = key.removeprefix("group_").removesuffix("_core")
+    return f"{short} ({unit})" if CATALOGUE[key].unit == "m | px" else short
 
 
 def empty_table() -> Any:

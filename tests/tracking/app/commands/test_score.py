@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.io.store.track_files import write_tracks
 from sim.sequence import simulate
@@ -15,7 +16,9 @@ from sim.types import Sequence
 from tests.groups_as_wholes import wholes
 from tracking import track
 from tracking.app.cli import run
+from tracking.app.commands.score import score_run
 from tracking.app.commands.score_tables import is_sure
+from tracking.run import TrackingRun
 from tracking.scoring import evaluate, one_plane
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
@@ -289,3 +292,20 @@ def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:
 def test_other_tracks_must_be_there(made: Path, capsys) -> None:
     assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "nothing")]) == 2
     assert "nothing" in capsys.readouterr().err
+
+
+def test_lengths_are_printed_with_their_unit(made: Path, tmp_path: Path, capsys) -> None:
+    (tmp_path / "S.txt").write_text("1,1,10,20,40,100,1\n2,1,12,20,40,100,1\n")
+    assert run(["score", str(tmp_path / "S.txt"), str(tmp_path / "S.txt"), "--fps", "10"]) == 0
+    assert "GOSPA (px)" in capsys.readouterr().out
+    assert run(["score", str(made / "data"), str(made / "truth")]) == 0
+    assert "GOSPA (m)" in capsys.readouterr().out
+
+
+def test_an_id_twice_in_a_frame_names_the_sequence() -> None:
+    sequence = simulate(load("merge"), 5, streams=())
+    tracks = track("blob", sequence)
+    first = next(k for k, t in enumerate(tracks) if len(t.id) > 1)
+    twice = tracks[first].replace(id=np.zeros(len(tracks[first].id), np.int64))
+    with pytest.raises(InputError, match=rf"{sequence.name}.*tracks: id 0 is twice in frame {first + 1}"):
+        score_run(sequence, TrackingRun((*tracks[:first], twice, *tracks[first + 1 :]), tracks.info))
