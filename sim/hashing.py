@@ -53,9 +53,11 @@ def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> st
     """Return the SHA-256 (64 hex digits) of a scenario, seed, repeat and truth; it does not depend on what is rendered.
 
     scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies. All fields
-    of the truth count except its name. truth None (a sequence without truth) has a hash of its own.
+    of the truth count except its name and what is left out of the scores. truth None (a sequence without truth) has a
+    hash of its own.
     """
-    named = None if truth is None else {f.name: getattr(truth, f.name) for f in fields(truth) if f.name != "name"}
+    counted = [f.name for f in fields(Truth) if f.name not in ("name", "unscored")]
+    named = None if truth is None else {name: getattr(truth, name) for name in counted}
     return canonical_hash(("truth", scenario, seed, repeat, named))
 
 

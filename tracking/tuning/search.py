@@ -36,6 +36,8 @@ from tracking.tuning.search_plan import SearchPlan, search_plan
 if TYPE_CHECKING:
     from tracking.tuning.study import SearchStudy
 
+UNFULFILLED = "unfulfilled"
+"""Attribute of a study: for each training scene why it is left out, "" if it is not."""
 JOURNAL = ".journal"
 """Suffix of the journal beside `--out`."""
 
@@ -77,8 +79,12 @@ def _search(options: TuneOptions) -> TuningResult:
         run_trials(study, play, progress)
         report = partial(progress, options.trials, options.trials)
         scenes = PlayedScenes(stored_in_study(study, play))
-        for source in plan.training:
-            scenes.check(source)
+        known = study.optuna.user_attrs.get(UNFULFILLED)
+        if known is None:
+            known = [_unfulfilled(source) for source in plan.training]
+            study.optuna.set_user_attr(UNFULFILLED, known)
+        for source, reason in zip(plan.training, known, strict=True):
+            scenes.record(source, reason)
         found = replace(_evaluated(plan, study, scenes, report), left_out=tuple(scenes.left_out.values()))
     if target is not None:
         found.write(target)
@@ -86,10 +92,19 @@ def _search(options: TuneOptions) -> TuningResult:
     return found
 
 
+def _unfulfilled(source: Source) -> str:
+    """Returns why the script of a scene does not come true, "" if it does."""
+    try:
+        _ = source.open().truth
+    except OrderError as error:
+        return error.line()
+    return ""
+
+
 class PlayedScenes:
     """Plays episodes and keeps a record of the scenes that are left out, because their script did not come true.
 
-    play: what plays them. State: scenes, all that were played or checked, by key of their source; left_out, a line for
+    play: what plays them. State: scenes, all that were counted, by key of their source; left_out, a line for
     each that was left out."""
 
     def __init__(self, play: PlayEpisodes) -> None:
@@ -103,18 +118,11 @@ class PlayedScenes:
         """Yields one result per source, as `play` does."""
         with closing(self.play(sources, values, every_score)) as results:
             for source, result in zip(sources, results, strict=False):
-                self._record(source, result.left_out if isinstance(result, Episode) else "")
+                self.record(source, result.left_out if isinstance(result, Episode) else "")
                 yield result
 
-    def check(self, source: Source) -> None:
-        """Finds out whether the scene's script comes true, without playing it."""
-        try:
-            _ = source.open().truth
-            self._record(source, "")
-        except OrderError as error:
-            self._record(source, error.line())
-
-    def _record(self, source: Source, reason: str) -> None:
+    def record(self, source: Source, reason: str) -> None:
+        """Counts a scene; reason: why it was left out, "" if it was not."""
         self.scenes.add(source.key)
         if reason:
             self.left_out[source.key] = f"{source.name} seed {source.seed}: {reason}"

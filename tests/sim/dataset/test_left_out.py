@@ -7,7 +7,7 @@ import pytest
 from scenarios.errors import OrderError, WorkError
 from sim.dataset import sequence_job
 from sim.dataset.generate import generate
-from tracking.tuning.search import PlayedScenes
+from tracking.tuning.search import PlayedScenes, _unfulfilled
 
 store = sequence_job.simulate_and_store
 
@@ -53,10 +53,10 @@ def test_a_search_counts_its_scenes():
 
     scenes = PlayedScenes(lambda *_: iter(()))
     for seed in range(20):
-        scenes.check(Scene(seed))
+        scenes.record(one := Scene(seed), _unfulfilled(one))
     scenes.require_most()
     assert [line.split(":")[0] for line in scenes.left_out.values()] == ["cross seed 7"]
     few = PlayedScenes(lambda *_: iter(()))
-    few.check(Scene(7))
+    few.record(Scene(7), _unfulfilled(Scene(7)))
     with pytest.raises(WorkError, match="1 of 1 scenes"):
         few.require_most()

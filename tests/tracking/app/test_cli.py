@@ -408,7 +408,8 @@ def test_ctrl_c_that_became_another_error(place, capsys, monkeypatch):
 
     def load(*_: object) -> None:
         try:
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
+            time.sleep(1)
         except KeyboardInterrupt:
             raise ImportError("a library failed to import")  # noqa: B904
 
