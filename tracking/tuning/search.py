@@ -117,8 +117,9 @@ class PlayedScenes:
     ) -> Generator[EpisodeOrError, None, None]:
         """Yields one result per source, as `play` does."""
         with closing(self.play(sources, values, every_score)) as results:
-            for source, result in zip(sources, results, strict=False):
-                self.record(source, result.left_out if isinstance(result, Episode) else "")
+            given = iter(sources)
+            for result in results:  # to its end, as `stored_in_study` stores behind the last one
+                self.record(next(given), result.left_out if isinstance(result, Episode) else "")
                 yield result
 
     def record(self, source: Source, reason: str) -> None:

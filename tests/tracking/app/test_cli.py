@@ -406,10 +406,9 @@ def test_without_arguments_it_explains_itself(capsys):
 def test_ctrl_c_that_became_another_error(place, capsys, monkeypatch):
     """As libraries make of one that ends their import."""
 
-    def load(*_: object) -> None:
+    def load(*_: object, **__: object) -> None:
         try:
-            signal.raise_signal(signal.SIGINT)
-            time.sleep(1)
+            raise KeyboardInterrupt
         except KeyboardInterrupt:
             raise ImportError("a library failed to import")  # noqa: B904
 
