@@ -45,11 +45,14 @@ class FrameTimes:
         """Returns the number (from 1) of the frame nearest to a tick; the later one of two."""
         return min(int(np.floor(tick * self.fps / SCRIPT_RATE + 0.5)) + 1, len(self.tick))
 
+    def within(self, tick: int) -> slice:
+        """Returns the frames from a tick on and before the next one."""
+        return slice(*np.searchsorted(self.tick, (tick, tick + 1)))
+
     def states(self, tick: int, steps: Array) -> Array:
-        """Returns the states (K, ...) in the K frames from a tick to the next one, given those of its steps (STEPS + 1,
-        ...)."""
-        first, last = np.searchsorted(self.tick, (tick, tick + 1))
-        k, share = self.step[first:last], self.share[first:last].reshape(-1, *[1] * (steps.ndim - 1))
+        """Returns the states (K, P, D) in the K frames within a tick, given those of its steps (STEPS + 1, P, D)."""
+        frames = self.within(tick)
+        k, share = self.step[frames], self.share[frames, None, None]
         low, high = steps[k], steps[k + 1]
         return np.where(share == 0.0, low, (1.0 - share) * low + share * high)
 

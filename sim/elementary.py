@@ -140,11 +140,6 @@ def atan2(y: Any, x: Any) -> Any:
     return angle * (1.0 - 2.0 * np.float64(y < 0.0))
 
 
-def tan(x: Any) -> Any:
-    """Returns the tangent of x, rad."""
-    return sin(x) / cos(x)
-
-
 def power(x: Any, exponent: float) -> Any:
     """Returns x to the power `exponent` for x >= 0; 0 to the power 0 is 1."""
     if exponent == 0.0:

@@ -124,11 +124,10 @@ class World:
                 ticks.state[tick], ticks.intent[tick] = state, group
             return self._motion(ticks, ticks, frames)
         shown = _Record.empty(len(frames.tick), len(self.members))
-        shown.intent[:] = -1
         for tick, (state, group) in enumerate(self.ticks(max(count, int(frames.tick[-1]) + 2))):
             if tick:  # what lies between two ticks is known at the second one
-                shown.state[frames.tick == tick - 1] = frames.states(tick - 1, self.between)
-            shown.intent[frames.tick == tick] = group
+                shown.state[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
+            shown.intent[frames.within(tick)] = group
             if tick < count:
                 ticks.state[tick], ticks.intent[tick] = state, group
         return self._motion(ticks, shown, frames)

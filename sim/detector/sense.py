@@ -79,8 +79,8 @@ def _true_detections(
     n, u = person_draws(truth, seed, repeat, sensor)
     hidden = _artificially_hidden(truth, sensor, people)
     p = detection_probability(truth, sensor, camera)
-    within = normal_quantile(np.where((p > 0.0) & (p < 1.0), p, 0.5))
-    seen = np.where((p > 0.0) & (p < 1.0), n[:, DETECT] < within, p >= 1.0) & ~hidden
+    open_ = (p > 0.0) & (p < 1.0)
+    seen = np.where(open_, n[:, DETECT] < normal_quantile(np.where(open_, p, 0.5)), p >= 1.0) & ~hidden
     base = _sensed_boxes(truth, sensor)
     if base is not None:
         seen &= np.isfinite(base).all(axis=1)

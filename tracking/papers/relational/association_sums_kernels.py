@@ -178,6 +178,29 @@ def dense_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
 
 
 @njit(cache=True)
+def linked(W, start, row_done, column_done, rows, columns):  # type: ignore[no-untyped-def]
+    """Writes the connected component of W (n, m) that row `start` is in: its rows and columns, in the order in which
+    they are reached. Marks them as done and returns (number of rows, number of columns)."""
+    n, m = W.shape
+    row_done[start] = True
+    rows[0], count, width, head = start, 1, 0, 0
+    while head < count:
+        i = rows[head]
+        head += 1
+        for j in range(m):
+            if W[i, j] > 0 and not column_done[j]:
+                column_done[j] = True
+                columns[width] = j
+                width += 1
+                for k in range(n):
+                    if W[k, j] > 0 and not row_done[k]:
+                        row_done[k] = True
+                        rows[count] = k
+                        count += 1
+    return count, width
+
+
+@njit(cache=True)
 def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
     """Return the log of the sum over all mappings, -inf if it is 0, and write the marginals (n, m).
 
@@ -191,21 +214,7 @@ def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
     for start in range(n):
         if row_done[start]:
             continue
-        row_done[start] = True
-        rows[0], count, width, head = start, 1, 0, 0
-        while head < count:
-            i = rows[head]
-            head += 1
-            for j in range(m):
-                if W[i, j] > 0 and not column_done[j]:
-                    column_done[j] = True
-                    columns[width] = j
-                    width += 1
-                    for k in range(n):
-                        if W[k, j] > 0 and not row_done[k]:
-                            row_done[k] = True
-                            rows[count] = k
-                            count += 1
+        count, width = linked(W, start, row_done, column_done, rows, columns)
         log_sum += _component_sum(W, miss, spare, marginals, rows[:count], columns[:width])
     for j in range(m):
         if not column_done[j]:

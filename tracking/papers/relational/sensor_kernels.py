@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Bools, Ints
-from tracking.papers.relational.association_sums_kernels import EXACT_BITS, free_messages, sparse_sum
+from tracking.papers.relational.association_sums_kernels import EXACT_BITS, free_messages, linked, sparse_sum
 
 
 @njit(cache=True)
@@ -68,21 +68,7 @@ def free_detections(W: Array, miss: Array) -> Array:
     for k in range(n):
         if done[k]:
             continue
-        done[k] = True
-        rows[0], count, width, head = k, 1, 0, 0
-        while head < count:
-            i = rows[head]
-            head += 1
-            for j in range(m):
-                if W[i, j] > 0 and not reached[j]:
-                    reached[j] = True
-                    columns[width] = j
-                    width += 1
-                    for other in range(n):
-                        if W[other, j] > 0 and not done[other]:
-                            done[other] = True
-                            rows[count] = other
-                            count += 1
+        count, width = linked(W, k, done, reached, rows, columns)
         if count > 1:
             _free_of_linked(W, miss, np.sort(rows[:count]), np.sort(columns[:width]), free)
     return free

@@ -32,6 +32,20 @@ FAR = 1e-6
 
 
 @njit(cache=True)
+def _boxes(pos):  # type: ignore[no-untyped-def]
+    """Returns the boxes (K, 4) round all particles of each person: least x, greatest x, least y, greatest y."""
+    particles, n, _ = pos.shape
+    box = np.empty((n, 4))
+    for i in range(n):
+        box[i, 0], box[i, 1], box[i, 2], box[i, 3] = np.inf, -np.inf, np.inf, -np.inf
+        for p in range(particles):
+            x, y = pos[p, i, 0], pos[p, i, 1]
+            box[i, 0], box[i, 1] = min(box[i, 0], x), max(box[i, 1], x)
+            box[i, 2], box[i, 3] = min(box[i, 2], y), max(box[i, 3], y)
+    return box
+
+
+@njit(cache=True)
 def move(
     pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, shared: Array, table: Array, coupling: Array,
     alike: Array, pairs: Ints, spread: Array, dt: float,
@@ -130,14 +144,8 @@ def near_pairs(pos: Array, related: Bools, rules: Array) -> Ints:
     pos (P, K, 2), m; related (K, K): pairs that walk together in any particle; rules (4,). Pairs that do not, and whose
     boxes round all particles are so far apart that their belonging is below NEGLIGIBLE, are left out (ours).
     """
-    particles, n, _ = pos.shape
-    box, found, count = np.empty((n, 4)), np.empty((n * (n - 1) // 2, 2), np.int64), 0
-    for i in range(n):
-        box[i, 0], box[i, 1], box[i, 2], box[i, 3] = np.inf, -np.inf, np.inf, -np.inf
-        for p in range(particles):
-            x, y = pos[p, i, 0], pos[p, i, 1]
-            box[i, 0], box[i, 1] = min(box[i, 0], x), max(box[i, 1], x)
-            box[i, 2], box[i, 3] = min(box[i, 2], y), max(box[i, 3], y)
+    n = pos.shape[1]
+    box, found, count = _boxes(pos), np.empty((n * (n - 1) // 2, 2), np.int64), 0
     for i in range(n):
         for j in range(i + 1, n):
             dx = max(box[i, 0] - box[j, 1], box[j, 0] - box[i, 1], 0.0)
@@ -193,14 +201,8 @@ def join(
     """
     particles, n, _ = pos.shape
     old = n - len(points)
-    box, near = np.empty((n, 4)), np.zeros(n)
+    box, near = _boxes(pos), np.zeros(n)
     groups, weight = np.empty(n, np.int64), np.empty(n)
-    for i in range(n):
-        box[i, 0], box[i, 1], box[i, 2], box[i, 3] = np.inf, -np.inf, np.inf, -np.inf
-        for p in range(particles):
-            x, y = pos[p, i, 0], pos[p, i, 1]
-            box[i, 0], box[i, 1] = min(box[i, 0], x), max(box[i, 1], x)
-            box[i, 2], box[i, 3] = min(box[i, 2], y), max(box[i, 3], y)
     ends = np.empty(len(points), np.int64)
     some, count = [np.int64(0) for _ in range(0)], 0
     for m in range(len(points)):
