@@ -1,11 +1,13 @@
 """Compiles kernels: numba's njit, whose cache finds a place on every machine.
 
 numba caches compiled kernels beside their files or in the user's cache folder. In a container neither may be writable,
-and numba then refuses to compile. The cache goes to a temporary folder of the user in that case, or is left out.
+and numba then refuses to compile. The cache goes to a temporary folder of the user in that case, or is left out. numba
+looks at the file of a kernel alone; here, a change of what a kernel imports makes it compile anew, too.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 import tempfile
@@ -16,6 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numba
+import numpy as np
+from numba.core.dispatcher import Dispatcher
 
 config: Any = numba.config
 NO_CACHE = (
@@ -38,14 +42,31 @@ def cached_njit(**options: Any) -> Callable[[Any], Any]:
         if not config.CACHE_DIR and not _numba_finds_a_place(os.path.dirname(function.__code__.co_filename)):
             config.CACHE_DIR = temporary_cache() or ""
         try:
-            return numba.njit(**options)(function)
+            kernel = numba.njit(**options)(function)
         except RuntimeError as error:
             if "cannot cache function" not in str(error):
                 raise
             _warn_once()
             return numba.njit(**{**options, "cache": False})(function)
+        file = kernel._cache._cache_file
+        file._source_stamp = (file._source_stamp, _used_by(function))
+        return kernel
 
     return compiled
+
+
+def _used_by(function: Any) -> str:
+    """Return a hash of what is compiled into a kernel beside its own file: constants, and kernels of other files."""
+    used = hashlib.sha256()
+    for name, value in sorted(function.__globals__.items()):
+        if isinstance(value, Dispatcher) and value.__module__ != function.__module__ and value._cache:
+            value = value._cache._cache_file._source_stamp
+        elif isinstance(value, np.ndarray):
+            value = value.tobytes()
+        elif not isinstance(value, bool | int | float | tuple):
+            continue
+        used.update(f"{name} {value!r}\n".encode())
+    return used.hexdigest()
 
 
 if TYPE_CHECKING:  # a kernel is for mypy what numba's own decorator makes of it

@@ -1,7 +1,4 @@
-"""The functions of `sim.elementary` compiled for scalars, to be called by other kernels.
-
-numba's cache does not notice changes in another file: delete the caches after a change there (CONTRIBUTING.md).
-"""
+"""The functions of `sim.elementary` compiled for scalars, to be called by other kernels."""
 
 from __future__ import annotations
 

@@ -14,9 +14,6 @@ Model: boids inside a group (separation: members repel each other; alignment: th
 cohesion: they keep their places), and a power law of the time to collision between strangers (Karamouzas, Skinner & Guy
 2014). *Ours*: groups also avoid each other as wholes, so strangers walk round a group and seldom through it. A group
 waits at its gathering point until all members are there.
-
-numba bakes the integers below into the compiled kernels, and its cache does not notice a change in this file. Delete
-`sim/crowd/__pycache__` after changing one.
 """
 
 from __future__ import annotations

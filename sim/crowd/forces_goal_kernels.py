@@ -1,7 +1,6 @@
 """Forces towards goals, as numba kernels: ways of groups, places in formations, doors, queues, stairs.
 
-`drive` is the entry. sim.crowd.forces names all columns, slots and units. No kernel calls a kernel of another file,
-because numba's cache does not notice changes in other files.
+`drive` is the entry. sim.crowd.forces names all columns, slots and units.
 """
 
 from __future__ import annotations

@@ -151,3 +151,42 @@ def test_every_kernel_is_compiled_here():
     """numba's own njit ends with an error where its cache has no place."""
     modules = [p for folder in ("scenarios", "sim", "tracking") for p in (ROOT / folder).rglob("*.py")]
     assert [p.name for p in modules if imports_numba(p.read_text(encoding="utf-8"))] == ["compiler.py"]
+
+
+USED = """
+from sim.compiler import njit
+FACTOR = {factor}
+@njit(cache=True)
+def term(x):
+    return x + {term}
+"""
+USER = """
+from sim.compiler import njit
+from used import FACTOR, term
+@njit(cache=True)
+def user(x):
+    return later(x)
+@njit(cache=True)
+def later(x):
+    return FACTOR * term(x)
+if __name__ == "__main__":
+    print(user(1), len(user.stats.cache_hits))
+"""
+
+
+@pytest.mark.parametrize(
+    ("factor", "term", "expected"),
+    [(10, 1, "20 1"), (20, 1, "40 0"), (10, 2, "30 0")],
+    ids=["same", "constant", "kernel"],
+)
+def test_a_kernel_is_compiled_anew_when_what_it_imports_changed(tmp_path, factor, term, expected):
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}", "NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def printed(factor, term):
+        (tmp_path / "used.py").write_text(USED.format(factor=factor, term=term))
+        command = [sys.executable, "-B", str(tmp_path / "user.py")]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip()
+
+    (tmp_path / "user.py").write_text(USER)
+    assert printed(10, 1) == "20 0"
+    assert printed(factor, term) == expected
