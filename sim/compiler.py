@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
-from numba.core.dispatcher import Dispatcher
 
 config: Any = numba.config
 NO_CACHE = (
@@ -48,19 +47,25 @@ def cached_njit(**options: Any) -> Callable[[Any], Any]:
                 raise
             _warn_once()
             return numba.njit(**{**options, "cache": False})(function)
-        file = kernel._cache._cache_file
-        file._source_stamp = (file._source_stamp, _used_by(function))
+        stored = _stored(kernel)
+        stored._source_stamp = (stored._source_stamp, _used_by(function))
         return kernel
 
     return compiled
+
+
+def _stored(kernel: Any) -> Any:
+    """Return numba's record of the compiled code in the cache; None if that is not cached, or no kernel."""
+    return getattr(getattr(kernel, "_cache", None), "_cache_file", None)
 
 
 def _used_by(function: Any) -> str:
     """Return a hash of what is compiled into a kernel beside its own file: constants, and kernels of other files."""
     used = hashlib.sha256()
     for name, value in sorted(function.__globals__.items()):
-        if isinstance(value, Dispatcher) and value.__module__ != function.__module__ and value._cache:
-            value = value._cache._cache_file._source_stamp
+        stored = _stored(value)
+        if stored and value.__module__ != function.__module__:
+            value = stored._source_stamp
         elif isinstance(value, np.ndarray):
             value = value.tobytes()
         elif not isinstance(value, bool | int | float | tuple):

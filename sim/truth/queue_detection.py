@@ -170,27 +170,18 @@ def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
 
 def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
     """Returns the lines of waiting people in every `stride`-th frame from frame 0, ordered by frame, then by least
-    column.
-
-    pos, vel (T, P, 2): m, m/s. waits (T, P): the person waits. A line of two people is left out unless each of them is
-    in a line of 3 (QUEUE_PEOPLE) or more in some examined frame.
+    column. pos, vel (T, P, 2): m, m/s. waits (T, P): the person waits.
     """
     t, p = np.nonzero(waits[::stride])
     i, j = close_pairs(t, pos[t * stride, p], MAX_SPACING)
-    tables = list(queue_shapes(pos[t * stride, p], i, j))
-    queuing = np.zeros(waits.shape[1], bool)
-    for c in tables:
-        long = np.arange(c.rows.shape[1]) < np.where(c.count >= QUEUE_PEOPLE, c.count, 0)[:, None]
-        queuing[p[c.rows[long]]] = True
     made: list[_LineNow] = []
-    for c in tables:
-        kept = (c.count >= QUEUE_PEOPLE) | queuing[p[c.rows[:, :2]]].all(axis=1)
-        made += _of_table(c, t * stride, p, vel, kept)
+    for c in queue_shapes(pos[t * stride, p], i, j):
+        made += _of_table(c, t * stride, p, vel)
     return sorted(made, key=lambda m: (m.t, min(m.order)))
 
 
-def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array, kept: Bools) -> Iterator[_LineNow]:
-    """Yields those lines of the table c (M ordered sets of people) whose flag in kept (M,) is True.
+def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array) -> Iterator[_LineNow]:
+    """Yields the lines of the table c (M ordered sets of people).
 
     t, p: frame (from 0) and column of the person in each row that c.rows refers to. vel (T, P, 2): m/s; nan counts as
     0.
@@ -199,7 +190,7 @@ def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array, kept: Bools) -> Iter
     mean = np.where(within[..., None], np.nan_to_num(vel[t[c.rows], p[c.rows]]), 0.0).sum(axis=1) / c.count[:, None]
     along, aside = (mean * c.u).sum(axis=1), mean[:, 1] * c.u[:, 0] - mean[:, 0] * c.u[:, 1]
     columns = [t[c.rows[:, 0]], c.count, *c.u.T, *c.middle.T, along, aside]
-    table = zip(p[c.rows][kept].tolist(), *(x[kept].tolist() for x in columns), strict=True)
+    table = zip(p[c.rows].tolist(), *(x.tolist() for x in columns), strict=True)
     for people, when, n, ux, uy, x, y, forward, sideways in table:
         yield _LineNow(when, tuple(people[:n]), (ux, uy), (x, y), (forward, sideways))
 
