@@ -42,7 +42,7 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.recording_intervals import recording_differences
 from tracking.run import track
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.frame_weights import weighted_scorer
+from tracking.scoring.frame_weights import weighted_scorers
 from tracking.tracker_registry import find
 from tracking.tuning import tune
 from tracking.tuning.options import TuneOptions
@@ -152,7 +152,8 @@ def print_comparison(name: str, sequence: Sequence, mode: str, chosen: dict[str,
     assert truth is not None
     every = list(CATALOGUE)
     at = [every.index(key) for key in KEYS[name]]
-    scorers = {which: weighted_scorer(truth, tracks_of(name, sequence, mode, c)) for which, c in chosen.items()}
+    runs = [tracks_of(name, sequence, mode, c) for c in chosen.values()]
+    scorers = dict(zip(chosen, weighted_scorers(truth, runs), strict=True))
     print(
         f"{name} on {sequence.name}, {truth.length / truth.fps:.0f} s, {mode}; in brackets minus the present defaults"
     )

@@ -53,10 +53,10 @@ def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> st
     """Return the SHA-256 (64 hex digits) of a scenario, seed, repeat and truth; it does not depend on what is rendered.
 
     scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies. All fields
-    of the truth count except its name and what is left out of the scores. truth None (a sequence without truth) has a
-    hash of its own.
+    of the truth count except its name, camera and scene, and what is left out of the scores. truth None (a sequence
+    without truth) has a hash of its own.
     """
-    counted = [f.name for f in fields(Truth) if f.name not in ("name", "unscored")]
+    counted = [f.name for f in fields(Truth) if f.name not in ("name", "unscored", "camera", "scene")]
     named = None if truth is None else {name: getattr(truth, name) for name in counted}
     return canonical_hash(("truth", scenario, seed, repeat, named))
 

@@ -329,7 +329,8 @@ class Truth(Frozen):
     groups_px: T Groups, on the ground (m) and in the image (px). labelled (T,): True for frames with group labels.
     events, near (strangers who walk like a group): measured from the motion. orders: of the script, () without.
     px_per_m: image scale, nan if unknown. fps: frames/s. unscored: rows beside the people, None without
-    distractors. Fields that may be None are None if unknown."""
+    distractors. camera, scene: of the sequence, by which boxes are compared on the ground. Fields that may be None are
+    None if unknown."""
 
     name: str
     fps: float
@@ -354,6 +355,8 @@ class Truth(Frozen):
     near: Near | None = None
     orders: tuple[Order, ...] = ()
     unscored: Unscored | None = None
+    camera: Camera | None = None
+    scene: Scene | None = None
 
     def rows(self, index: int) -> slice:
         """Return the slice of the rows of frame `index` (from 1); an empty slice if that frame has none."""
@@ -432,7 +435,7 @@ class Sequence:
             return None
         cached: Truth | None = self.__dict__.get("_truth")
         if cached is None:
-            cached = self.load_truth()
+            cached = self.load_truth().replace(camera=self.camera, scene=self.scene)
             self.__dict__["_truth"] = cached
         return cached
 

@@ -33,8 +33,7 @@ from tracking.grouping.known_people import people_as_tracks
 from tracking.recording_intervals import recording_differences, recording_intervals
 from tracking.run import track
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.frame_weights import weighted_scorer
-from tracking.scoring.one_plane import in_one_plane
+from tracking.scoring.frame_weights import weighted_scorers
 from tracking.scoring.people_and_groups import INSIDE
 
 DRAWS = 1000
@@ -107,7 +106,7 @@ def labelled_recording(
 
 def with_intervals(truth: Truth, answers: Sequence[Tracks], keys: Sequence[str]) -> list[tuple[float, float, float]]:
     """Returns value, low and high end of each score; the ends are nan where the interval is unknown."""
-    return chosen(keys, recording_intervals(truth, weighted_scorer(truth, answers), DRAWS))
+    return chosen(keys, recording_intervals(truth, weighted_scorers(truth, [answers])[0], DRAWS))
 
 
 def paired_on_recording(
@@ -119,8 +118,7 @@ def paired_on_recording(
     of the frames. The ends are nan where the interval is unknown, as for a difference of 0 in all draws. Raises
     IncomparableError if the runs cannot lie in one plane.
     """
-    before, today, similarity = in_one_plane(truth, before, today)
-    later, earlier = (weighted_scorer(truth, tracks, similarity) for tracks in (today, before))
+    later, earlier = weighted_scorers(truth, [today, before])
     return chosen(keys, recording_differences(truth, later, earlier, DRAWS))
 
 

@@ -174,16 +174,18 @@ class Rollout:
         derived in the image and the image scale is 0 or less.
         """
         start = time.perf_counter()
-        px_per_m = self.prepared.px_per_m(self.tracks)
-        found = self._every_score(px_per_m) if every else self.opened.judge.scores(self.tracks, px_per_m)
+        px_per_m, pixels = self.prepared.px_per_m(self.tracks), self.prepared.mode == "image"
+        found = self._every_score(px_per_m) if every else self.opened.judge.scores(self.tracks, px_per_m, pixels)
         self.seconds_scoring += time.perf_counter() - start
         return {key: value for key, value in found.items() if value == value}
 
     def _every_score(self, px_per_m: float) -> Mapping[str, float]:
         from tracking.grouping.grouped_tracks import with_groups
+        from tracking.run import TrackingRun
 
         tracks = with_groups(self.tracks, self.prepared.context.fps, px_per_m) if self.tracks else ()
-        return self.opened.judge.scorer.evaluate(tracks, frames=len(self.tracks))
+        run, judge = TrackingRun(tuple(tracks), {"detections": self.prepared.mode}), self.opened.judge
+        return judge.scorer.evaluate(run, similarity=judge.similarity, frames=len(run))
 
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:

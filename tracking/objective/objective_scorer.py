@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,39 +23,56 @@ from tracking.scoring.evaluation import Scorer, chosen_frames, objective_of
 from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
 from tracking.scoring.group_scores import f1, matched_groups
 from tracking.scoring.hota import hota
+from tracking.scoring.one_plane import in_one_plane
 from tracking.scoring.people_and_groups import Surface, bare_groups, hulls_of
-from tracking.scoring.people_comparison import people_pairs, usual_similarity
+from tracking.scoring.people_comparison import Similarity, people_pairs
 from tracking.scoring.rows import FrameRows
 
 
 class ObjectiveScorer:
     """Computes the objective (mean of HOTA and group_F1_hull) of any number of trackers against one truth.
 
-    Made from that Truth. State: scorer, a `Scorer` of the truth, which must not change; _outlines, a dict of the
+    Made from that Truth and the similarity of people, None by the data. State: scorer, a `Scorer` of the truth, which
+    must not change; _outlines, a dict of the
     outlines of the true groups by surface ("ground" or "image") used so far, None where the truth has no group shapes.
     """
 
-    def __init__(self, truth: Truth) -> None:
-        self.scorer = Scorer(truth)
+    def __init__(self, truth: Truth, similarity: Similarity | None = None) -> None:
+        self.scorer, self.similarity = Scorer(truth), similarity
         self._outlines: dict[Surface, GroupOutlines | None] = {}
 
-    def scores(self, tracks: Sequence[Tracks], px_per_m: float) -> dict[str, float]:
+    def scores(self, tracks: Sequence[Tracks], px_per_m: float, pixels: bool = False) -> dict[str, float]:
         """Returns a dict of HOTA, group_F1_hull and objective over the frames 1 … last, the frame of the last `Tracks`.
 
         The objective is the mean of the other two; if one is nan the other, if both are nan nan. tracks: one tracker's,
         sorted by frame, no id twice in a frame (not checked); without any, HOTA and objective are 0 and group_F1_hull
-        is nan. px_per_m: scale for deriving groups in the image; nan takes the truth's. The result equals
-        `evaluate(truth, with_groups(tracks, fps, px_per_m), frames=last)` under these keys. A score is nan where it is
-        nan there: HOTA for a tracker of whole groups, group_F1_hull without labelled groups or shapes.
+        is nan. px_per_m: scale for deriving groups in the image; nan takes the truth's. pixels: the tracker works on
+        pictures. The result equals `evaluate(truth, with_groups(tracks, fps, px_per_m), frames=last)` under these keys.
+        A score is nan where it is nan there: HOTA for a tracker of whole groups, group_F1_hull without labelled groups
+        or shapes.
 
         Raises IncomparableError if boxes or positions to be compared are missing, and InputError if groups must be
         derived in the image and the scale is 0 or less.
         """
+        truth = self.scorer.truth
+        (moved,), similarity = in_one_plane(truth, [tracks], [pixels], self.similarity)
+        if moved is not tracks:
+            judge = self if self.scorer.judge(tracks, moved) is self.scorer else self.of_feet
+            (tracks,), _ = in_one_plane(truth, [with_groups(tracks, truth.fps, px_per_m)], [pixels], similarity)
+            return judge._compared(tracks, similarity, px_per_m)
+        return self._compared(tracks, similarity, px_per_m)
+
+    @cached_property
+    def of_feet(self) -> ObjectiveScorer:
+        """The scorer of tracks that were moved to the ground by their boxes."""
+        return ObjectiveScorer(self.scorer.of_feet.truth, self.similarity)
+
+    def _compared(self, tracks: Sequence[Tracks], similarity: Similarity, px_per_m: float) -> dict[str, float]:
         truth, last = self.scorer.truth, tracks[-1].index if tracks else 0
         sides = self.scorer.sides(tracks, chosen_frames(last, truth.length))
         found = {"HOTA": float("nan"), "group_F1_hull": float("nan")}
         if not sides.groups_only:
-            found["HOTA"] = hota(people_pairs(sides, usual_similarity(truth, tracks)))["HOTA"]
+            found["HOTA"] = hota(people_pairs(sides, similarity))["HOTA"]
         true = self._true_outlines(sides.surface) if sides.frames.any() else None
         if true is not None:
             true, est = true.until(last), _tracked_outlines(sides, px_per_m)

@@ -24,6 +24,7 @@ from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.hota import hota
 from tracking.scoring.identity import identity
 from tracking.scoring.matching import mapped_people
+from tracking.scoring.one_plane import from_pixels, grounded, in_one_plane, on_feet
 from tracking.scoring.people_and_groups import (
     PersonRows,
     Surface,
@@ -37,7 +38,6 @@ from tracking.scoring.people_comparison import (
     Similarity,
     people_pairs,
     plane_of,
-    usual_similarity,
 )
 from tracking.scoring.position_errors import position_scores
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
@@ -106,8 +106,8 @@ def evaluate(
     is nan.
 
     tracks: the tracker's `Tracks`, one per frame, in any order; of two with equal frame the later is used. similarity:
-    compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"), d being their distance. None: boxes
-    if both sides have them, else the plane of the tracks. group_match: matches groups by IoU of their hulls ("hull") or
+    compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"), d being their distance. None follows
+    the data, as tracking.scoring.one_plane says. group_match: matches groups by IoU of their hulls ("hull") or
     Jaccard index of their members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None
     all frames. A frame without tracks counts as empty.
 
@@ -124,14 +124,20 @@ def evaluate(
 class Scorer:
     """Scores any number of trackers against one truth.
 
-    State: truth; labelled (length + 1,), bool by frame number: the frame has labelled groups; the true people and
-    groups as rows of arrays, built at first use and kept. The truth must not change meanwhile.
+    State: truth, on the ground if its boxes can be; labelled (length + 1,), bool by frame number: the frame has
+    labelled groups; the true people and groups as rows of arrays, built at first use and kept. The truth must not
+    change meanwhile.
     """
 
     def __init__(self, truth: Truth) -> None:
-        self.truth = truth
-        self.labelled = labelled_frames(truth)
+        self.truth = grounded(truth)
+        self.labelled = labelled_frames(self.truth)
         self._groups: dict[Surface, TrueGroups] = {}
+
+    @cached_property
+    def of_feet(self) -> Scorer:
+        """The scorer of tracks that were moved to the ground by their boxes: true people stand where their boxes do."""
+        return Scorer(on_feet(self.truth))
 
     @cached_property
     def people(self) -> PersonRows:
@@ -171,50 +177,71 @@ class Scorer:
         group_match: GroupMatch = "hull",
         frames: int | range | None = None,
     ) -> Scores:
-        """Returns every score of the catalogue for one tracker against this truth, as the function `evaluate` does.
+        """Returns every score of the catalogue for one tracker against this truth, as the function `evaluate` does."""
+        (found,) = self.evaluate_all([tracks], similarity=similarity, group_match=group_match, frames=frames)
+        return found
 
-        tracks: one `Tracks` per frame, any order; of two with equal frame the later is used. similarity: "boxes",
-        "ground", "image" or None (boxes if both sides have them, else the tracks' plane). group_match: "hull" or
-        "members". frames: n for frames 1 … n, a range, or None for all. A frame without tracks counts as empty. Groups
-        and events that the tracks lack come from the default grouping. Scores of people are nan for a tracker of whole
-        groups. Scores of groups and events are nan if no chosen frame is labelled.
+    def evaluate_all(
+        self,
+        runs: Sequence[Iterable[Tracks]],
+        *,
+        similarity: Similarity | None = None,
+        group_match: GroupMatch = "hull",
+        frames: int | range | None = None,
+    ) -> list[Scores]:
+        """Returns the scores of several runs, all compared in one plane and by one similarity; else as `evaluate`.
 
-        Raises IncomparableError if boxes or positions are missing, ValueError if an id occurs twice in one frame,
-        InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
+        Raises what `evaluate` raises, and IncomparableError if the runs fit no common plane.
         """
-        compared = self.compare(tracks, similarity, chosen_frames(frames, self.truth.length))
-        sides, found = compared.sides, dict.fromkeys(CATALOGUE, float("nan"))
-        if compared.people is not None:
-            found |= people_scores(compared.people)
-            where, frames_scored = (sides.surface, sides.plane, sides.scale), int(compared.inside.sum())
-            found |= position_scores(sides.true, sides.est, sides.mapping, *where, frames_scored)
-        if compared.groups is not None:
-            scores = weighted_groups_and_events(sides, compared.groups, group_match)
-            found |= unweighted(scores, len(sides.frames))
-        found["objective"] = objective_of(found)
-        return Scores(found, compared.similarity, sides.surface, group_match)
+        return [
+            _scores(one, group_match)
+            for one in self.compare(runs, similarity, chosen_frames(frames, self.truth.length))
+        ]
 
-    def compare(self, tracks: Iterable[Tracks], similarity: Similarity | None, inside: Bools) -> MatchedSides:
-        """Returns this truth and one tracker's tracks with people mapped, ready to be counted.
+    def compare(
+        self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None, inside: Bools
+    ) -> list[MatchedSides]:
+        """Returns this truth and the tracks of each run with people mapped, ready to be counted.
 
-        tracks: one `Tracks` per frame, any order; of two with equal frame the later is used. similarity: as in
-        `evaluate`. inside (length + 1,): bool by frame number, the frames to score.
+        runs: `Tracks` in any order, at most one per frame counts. similarity: as in `evaluate`. inside (length + 1,):
+        bool by frame number, the frames to score.
 
-        Raises IncomparableError if boxes or positions are missing, and InputError if groups must be derived in the
-        image and `truth.px_per_m` is 0 or less.
+        Raises IncomparableError if boxes or positions are missing or the runs fit no common plane, and InputError if
+        groups must be derived in the image and `truth.px_per_m` is 0 or less.
         """
+        ordered = [_in_order(run, inside) for run in runs]
+        moved, chosen = in_one_plane(self.truth, ordered, [from_pixels(run) for run in runs], similarity)
+        judges = [self.judge(given, run) for given, run in zip(ordered, moved, strict=True)]
+        return [judge._matched(run, chosen, inside) for judge, run in zip(judges, moved, strict=True)]
+
+    def judge(self, given: Sequence[Tracks], moved: Sequence[Tracks]) -> Scorer:
+        """Returns the scorer for a run that was `given`, and is compared as `moved`: this one, or that of feet."""
+        return self.of_feet if moved is not given and plane_of(self.truth, moved) == "ground" else self
+
+    def _matched(self, given: Sequence[Tracks], similarity: Similarity, inside: Bools) -> MatchedSides:
         truth = self.truth
-        given: Sequence[Tracks] = _in_order(tracks, inside)
         labelled = bool((self.labelled & inside).any())
         if labelled and (truth.events is not None or any(t.groups is None for t in given)):
             given = with_groups(given, truth.fps, truth.px_per_m)
         sides, pairs = self.sides([t for t in given if inside[t.index]], inside), None
-        chosen = similarity or usual_similarity(truth, sides.tracks)
         if not sides.groups_only:
-            pairs = people_pairs(sides, chosen)
+            pairs = people_pairs(sides, similarity)
             sides = replace(sides, mapping=mapped_people(pairs))
         groups = self.groups(sides.surface).in_frames(inside, inside[self.people.rows.frame]) if labelled else None
-        return MatchedSides(sides, inside, chosen, pairs, groups)
+        return MatchedSides(sides, inside, similarity, pairs, groups)
+
+
+def _scores(compared: MatchedSides, group_match: GroupMatch) -> Scores:
+    sides, found = compared.sides, dict.fromkeys(CATALOGUE, float("nan"))
+    if compared.people is not None:
+        found |= people_scores(compared.people)
+        where, frames_scored = (sides.surface, sides.plane, sides.scale), int(compared.inside.sum())
+        found |= position_scores(sides.true, sides.est, sides.mapping, *where, frames_scored)
+    if compared.groups is not None:
+        scores = weighted_groups_and_events(sides, compared.groups, group_match)
+        found |= unweighted(scores, len(sides.frames))
+    found["objective"] = objective_of(found)
+    return Scores(found, compared.similarity, sides.surface, group_match)
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:

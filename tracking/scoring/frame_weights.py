@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.types import Array, Tracks, Truth
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import Scorer, chosen_frames
+from tracking.scoring.evaluation import MatchedSides, Scorer, chosen_frames
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import Similarity
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
@@ -24,16 +24,16 @@ PORTION = 100
 """Draws that are computed together: bounds memory."""
 
 
-def weighted_scorer(
+def weighted_scorers(
     truth: Truth,
-    tracks: Sequence[Tracks],
+    runs: Sequence[Sequence[Tracks]],
     similarity: Similarity | None = None,
     group_match: GroupMatch = "hull",
     frames: int | range | None = None,
-) -> Callable[[Array], Array]:
-    """Returns a function from weights of frames to scores.
+) -> list[Callable[[Array], Array]]:
+    """Returns for each run of one sequence a function from weights of frames to scores; all are compared alike.
 
-    The argument of that function is an array (D, length) of D draws of weights, 0 or more, of the frames 1 … length.
+    The argument of such a function is an array (D, length) of D draws of weights, 0 or more, of the frames 1 … length.
     Their mean should be 1: counts such as `IDSW` are sums of weights. The result is an array (D, K) of all scores in
     the order of `CATALOGUE`. It is nan where `evaluate` gives nan, and where the frames of a score's denominator have
     no weight.
@@ -43,15 +43,18 @@ def weighted_scorer(
     IDP, IDR and IDTP assign ids anew for each draw, because their definition is the best assignment of weighted
     frames. A true event has the weight of its start, a false one that of its reported start.
 
-    tracks: one tracker's `Tracks`, one per frame. Groups that the tracker leaves out are derived first. similarity:
-    "boxes", "ground", "image" or None (boxes if both sides have them); group_match: "hull" or "members". frames: a
+    runs: one `Tracks` per frame each. Groups that a tracker leaves out are derived first. similarity: "boxes",
+    "ground", "image" or None (by the data); group_match: "hull" or "members". frames: a
     number n scores frames 1 … n, a range only its frames, None all; weights of other frames have no effect.
 
     Raises IncomparableError if boxes or positions to compare are missing, ValueError if an id occurs twice in one
     frame, and InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
     """
-    compared = Scorer(truth).compare(tracks, similarity, chosen_frames(frames, truth.length))
-    size = truth.length + 1
+    found = Scorer(truth).compare(runs, similarity, chosen_frames(frames, truth.length))
+    return [_weighted(one, truth.length + 1, group_match) for one in found]
+
+
+def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Callable[[Array], Array]:
     parts: list[WeightedScores] = []
     if compared.people is not None:
         parts += [weighted_people(compared.people, size), weighted_positions(compared.sides, compared.inside)]

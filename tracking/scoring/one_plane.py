@@ -1,67 +1,145 @@
-"""Puts the tracks of two runs into one plane, so that their scores have one unit and one surface and can be subtracted.
+"""What is compared: a property of the data, so that the scores of any number of runs can be laid side by side.
 
-Foreground pixels are never projected to the ground, so the common plane of a run in the image and one on the ground is
-the image. Tracks of people on the ground are moved there if they have boxes.
+Calibrated data (positions on the ground, or boxes and a camera) are compared on the ground, boxes by the foot points of
+both sides.
+Other data are compared by overlap of boxes if everybody has one, else by position in the image. Tracks from pixels are
+never projected to the ground, as a blob's foot is no person's: with such a run, all runs of calibrated data are
+compared in the image.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from sim.truth.group_hulls import box_groups
-from sim.types import Array, Bools, Tracks, Truth
+from sim.detector.box_noise import foot_points
+from sim.scene.terrain import height_at
+from sim.truth.group_hulls import box_groups, frame_groups, groups_over_time
+from sim.types import Array, Bools, GroupEvent, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups
-from tracking.scoring.people_comparison import IncomparableError, Similarity, plane_of, usual_similarity
+from tracking.scoring.people_comparison import IncomparableError, Similarity, plane_of
+
+CLIMB = 8
+"""Steps in which the height of the ground below a foot point is found."""
+
+
+def grounded(truth: Truth) -> Truth:
+    """Returns the truth with people and groups on the ground if it has boxes and a camera only; else unchanged."""
+    if truth.pos is not None or truth.box is None or truth.camera is None:
+        return truth
+    return on_feet(truth)
+
+
+def on_feet(truth: Truth) -> Truth:
+    """Returns a truth with boxes and a camera with people and groups where the boxes stand on the ground."""
+    assert truth.box is not None, "only boxes have feet"
+    pos = _feet(truth.box, truth)
+    there = np.isfinite(pos).all(axis=1)
+    rows = (truth.frame[there], truth.id[there], truth.group[there], pos[there], np.full_like(pos[there], np.nan))
+    labelled = truth.groups is not None or truth.groups_px is not None
+    groups = tuple(groups_over_time(*rows, 1, truth.length)) if labelled else None
+    return truth.replace(pos=pos, vel=None, groups=groups)
 
 
 def in_one_plane(
-    truth: Truth, first: Sequence[Tracks], second: Sequence[Tracks], similarity: Similarity | None = None
-) -> tuple[Sequence[Tracks], Sequence[Tracks], Similarity]:
-    """Returns the tracks of two runs of one sequence in one plane, and the similarity of people to use for both.
+    truth: Truth, runs: Sequence[Sequence[Tracks]], pixels: Sequence[bool], similarity: Similarity | None = None
+) -> tuple[list[Sequence[Tracks]], Similarity]:
+    """Returns the tracks of all runs of one sequence in one plane, and the similarity of people to use for all.
 
-    first, second: one `Tracks` per frame. If one run lies in the image and the other on the ground, the latter is moved
-    to the image; else both are returned as they are. similarity: is returned if given. None: "boxes" if the truth and
-    both runs have them, else "image" or "ground", where both runs lie.
+    truth: as `grounded` returns it. runs: one `Tracks` per frame each, in order; pixels: for each, if it comes from
+    pixels. similarity: "ground" or "image" moves all runs there; None follows the data. Tracks that are in the right
+    plane are returned as they are. Those that were moved to the ground are to be compared with `on_feet`.
 
-    Raises IncomparableError if one run lies in the image, and the other on the ground without boxes of people.
+    Raises IncomparableError if a run on the ground must be moved to the image, and has no boxes of people.
     """
-    runs = [first, second]
-    surfaces = ["image" if plane_of(truth, run) == "image" else "ground" for run in runs]
-    if surfaces[0] != surfaces[1]:
-        k = surfaces.index("ground")
-        runs[k] = in_image(with_groups(runs[k], truth.fps, truth.px_per_m))
-    both: Similarity = "image" if "image" in surfaces else "ground"
-    boxes = all(usual_similarity(truth, run) == "boxes" for run in runs)
-    return runs[0], runs[1], similarity or ("boxes" if boxes else both)
+    ground = similarity == "ground"
+    if similarity in (None, "boxes"):
+        ground = truth.pos is not None and all(
+            _can_be_grounded(truth, run, own) for run, own in zip(runs, pixels, strict=True)
+        )
+    moved = [_on_ground(truth, run) if ground else _in_image(truth, run) for run in runs]
+    if similarity is not None:
+        return moved, similarity
+    if ground:
+        return moved, "ground"
+    boxed = truth.camera is None and truth.box is not None and all(_boxed(run) for run in runs)
+    return moved, "boxes" if boxed else "image"
 
 
-def in_image(tracks: Sequence[Tracks]) -> list[Tracks]:
-    """Returns tracks of people on the ground as tracks in the image, at the centres of their boxes.
+def from_pixels(run: Iterable[Tracks]) -> bool:
+    """Returns True if the tracker of a run worked on pictures, as its `info` says. Other tracks have no `info`."""
+    return getattr(run, "info", {}).get("detections") == "image"
 
-    tracks: with boxes and groups. Ids, groups and events stay; the hulls of groups are those of their members' boxes.
-    Velocities are nan.
 
-    Raises IncomparableError for tracks of whole groups, and for people without boxes.
+def _boxed(run: Sequence[Tracks]) -> bool:
+    """Returns True if all people of a run have boxes."""
+    return all(t.box is not None and t.unit == "person" for t in run if len(t.id))
+
+
+def _can_be_grounded(truth: Truth, run: Sequence[Tracks], pixels: bool) -> bool:
+    """Returns True if a run is on the ground, or can be moved there: it has boxes, not from pixels, and a camera."""
+    return plane_of(truth, run) != "image" or (truth.camera is not None and _boxed(run) and not pixels)
+
+
+def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
+    """Returns a run in the image at the foot points of its boxes; as it is if it is on the ground, or has none."""
+    if plane_of(truth, run) != "image" or truth.camera is None or not _boxed(run):
+        return run
+    return [_track_on_ground(t, truth) for t in run]
+
+
+def _track_on_ground(t: Tracks, truth: Truth) -> Tracks:
+    pos = np.zeros((0, 2)) if t.box is None else _feet(t.box, truth)
+    vel = np.full_like(pos, np.nan)
+    there = np.isfinite(pos).all(axis=1)
+    named = t.groups is not None or bool((t.group >= 0).any())
+    groups = frame_groups(t.id[there], t.group[there], pos[there], vel[there]) if named else None
+    return t.replace(plane="ground", pos=pos, vel=vel, groups=groups, events=_events_at(t, pos))
+
+
+def _feet(box: Array, truth: Truth) -> Array:
+    """Returns the ground points x, y (R, 2) in m below boxes (R, 4) px; nan where a box stands on no visible ground."""
+    assert truth.camera is not None, "only boxes of a calibrated sequence have feet on the ground"
+    z = np.zeros(len(box))
+    pos = foot_points(box, z, truth.camera)
+    scene = truth.scene
+    for _ in range(CLIMB if scene is not None and scene.stairs else 0):
+        assert scene is not None
+        z = height_at(scene, pos)
+        pos = foot_points(box, z, truth.camera)
+    return pos
+
+
+def _in_image(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
+    """Returns a run on the ground as one in the image, at the centres of its boxes; as it is if it is in the image.
+
+    Ids, groups and events stay; the hulls of groups are those of their members' boxes. Velocities are nan. Raises
+    IncomparableError for tracks of whole groups, and for people without boxes.
     """
-    if any(len(t.id) and (t.box is None or t.unit == "group") for t in tracks):
-        what = "groups without people" if any(t.unit == "group" for t in tracks) else "people without boxes"
-        raise IncomparableError(f"one run in the image (px), the other on the ground (m) with {what}")
-    return [_in_image(t) for t in tracks]
+    if plane_of(truth, run) == "image":
+        return run
+    if not _boxed(run):
+        what = "groups without people" if any(t.unit == "group" for t in run) else "people without boxes"
+        raise IncomparableError(f"runs in the image (px), and one on the ground (m) with {what}")
+    return [_track_in_image(t) for t in with_groups(run, truth.fps, truth.px_per_m)]
 
 
-def _in_image(t: Tracks) -> Tracks:
+def _track_in_image(t: Tracks) -> Tracks:
     box = np.zeros((0, 4)) if t.box is None else t.box
     middle, none = box[:, :2] + box[:, 2:] / 2, np.full((len(box), 2), np.nan)
     order = np.argsort(t.id)
     rows = (t.id[order], t.group[order], middle[order], none, box[order])
     groups = box_groups(np.full(len(box), t.index), *rows, t.index, 1)[0]
-    events = tuple(replace(e, pos=_centre(middle, np.isin(t.id, e.members))) for e in t.events)
-    return t.replace(plane="image", pos=middle, vel=none, groups=groups, events=events)
+    return t.replace(plane="image", pos=middle, vel=none, groups=groups, events=_events_at(t, middle))
 
 
-def _centre(middle: Array, rows: Bools) -> tuple[float, float]:
-    x, y = middle[rows].mean(axis=0) if rows.any() else (float("nan"), float("nan"))
+def _events_at(t: Tracks, pos: Array) -> tuple[GroupEvent, ...]:
+    """Returns the events of t at the mean of their members' new positions (N, 2), nan without any."""
+    return tuple(replace(e, pos=_centre(pos, np.isin(t.id, e.members))) for e in t.events)
+
+
+def _centre(pos: Array, rows: Bools) -> tuple[float, float]:
+    x, y = pos[rows].mean(axis=0) if rows.any() else (float("nan"), float("nan"))
     return float(x), float(y)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -31,19 +31,6 @@ def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
     """
     own = "image" if truth.pos is None else "ground"
     return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else own)
-
-
-def usual_similarity(truth: Truth, tracks: Iterable[Tracks]) -> Similarity:
-    """Returns how people are compared by default: "boxes" if the truth and every non-empty frame of the tracks have
-    boxes.
-
-    Else "image" if the first non-empty frame of the tracks is in the image, else "ground". Tracks without anybody count
-    as having boxes.
-    """
-    some = [t for t in tracks if len(t.id)]
-    if truth.box is not None and all(t.box is not None for t in some):
-        return "boxes"
-    return "image" if some and some[0].plane == "image" else "ground"
 
 
 def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:

@@ -12,7 +12,7 @@ from sim.io.store.track_files import read_tracks
 from sim.types import Truth
 from tests.reference_trackeval import CLEAR, HOTA, IDENTITY, KEYS
 from tracking.scoring.evaluation import Scores, evaluate
-from tracking.scoring.frame_weights import weighted_scorer
+from tracking.scoring.frame_weights import weighted_scorers
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 QUIET = {"PRINT_CONFIG": False}
@@ -74,7 +74,7 @@ def test_equal_to_trackeval(tmp_path: Path, name: str, seed: int) -> None:
     truth, found = ours(source, tracks)
     for key, value in expected.items():
         assert found[key] == pytest.approx(value, abs=1e-9), key
-    weighted = weighted_scorer(truth, read_tracks(tracks, fps=10, length=FRAMES))(np.ones((1, FRAMES)))[0]
+    weighted = weighted_scorers(truth, [read_tracks(tracks, fps=10, length=FRAMES)])[0](np.ones((1, FRAMES)))[0]
     assert weighted[list(found).index("MOTA")] == pytest.approx(expected["MOTA"], abs=1e-9)
 
 

@@ -197,8 +197,8 @@ def test_the_similarity_is_the_one_asked_for() -> None:
     box = np.array([[0, 0, 10, 20], [100, 0, 10, 20]], float)
     true = truth([Scene(TWO)], box=box)
     seen = [t.replace(box=box + np.array([5, 0, 0, 0])) for t in tracks([Scene(TWO)])]
-    assert evaluate(true, seen).similarity == "boxes"
-    assert evaluate(true, seen)["MOTA"] == -1  # IoU 1/3
+    assert evaluate(true, seen).similarity == "ground"
+    assert evaluate(true, seen, similarity="boxes")["MOTA"] == -1  # IoU 1/3
     assert evaluate(true, seen, similarity="ground")["MOTA"] == 1
     assert evaluate(true, seen, similarity="image")["MOTA"] == 1  # 5 px of 80
 

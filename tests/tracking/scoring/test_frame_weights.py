@@ -16,14 +16,14 @@ from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.frame_weights import weighted_scorer
+from tracking.scoring.frame_weights import weighted_scorers
 
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
 PAIR = {1: ((1, 2), None)}
 
 
 def scored(true, answers, weights, **options) -> dict[str, float]:
-    (row,) = weighted_scorer(true, answers, **options)(np.array([weights], float))
+    (row,) = weighted_scorers(true, [answers], **options)[0](np.array([weights], float))
     return dict(zip(CATALOGUE, row.tolist(), strict=True))
 
 
@@ -103,7 +103,7 @@ def test_each_draw_is_by_itself() -> None:
     true, answers = simulated()
     r = np.random.default_rng(0)
     weights = r.exponential(1.0, (3, true.length))
-    score = weighted_scorer(true, answers["people"])
+    score = weighted_scorers(true, [answers["people"]])[0]
     together = score(weights)
     for row, expected in zip(weights, together, strict=True):
         assert np.allclose(score(row[None])[0], expected, rtol=1e-12, atol=1e-12, equal_nan=True)

@@ -54,7 +54,7 @@ def test_a_generated_dataset(tmp_path: Path, capsys) -> None:
         lengths[folder.name] = open_source(folder)[0].length
     expected = theirs(tmp_path / "data", tmp_path / "trackers", lengths)
     capsys.readouterr()
-    assert run(["score", str(data), str(tmp_path / "tracks"), "--json"]) == 0
+    assert run(["score", str(data), str(tmp_path / "tracks"), "--similarity", "boxes", "--json"]) == 0
     exact = {row["name"]: row for row in json.loads(capsys.readouterr().out)["sequences"]}
     for name, scores in expected.items():
         text, told = data / name / "gt" / "gt.txt", texts / f"{name}.txt"

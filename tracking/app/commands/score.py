@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,24 +20,24 @@ from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.recording_intervals import recording_differences, recording_intervals
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
-from tracking.scoring import evaluate
 from tracking.scoring.catalogue import ALL, CATALOGUE
-from tracking.scoring.frame_weights import weighted_scorer
+from tracking.scoring.evaluation import Scorer
+from tracking.scoring.frame_weights import weighted_scorers
 from tracking.scoring.group_scores import GroupMatch
-from tracking.scoring.one_plane import in_one_plane
 from tracking.scoring.people_comparison import IncomparableError, Similarity
 from tracking.stats import SURE, mean_interval, paired
 
 INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{seconds:.4g}} s"
-MOVED = "both runs are compared in the image, because one of them lies there"
+MOVED = "all tracks are compared {plane}"
+SURFACE_WORDS = {"ground": "on the ground, boxes by their foot points", "image": "in the image, as some lie there"}
 
 
 @dataclass(frozen=True)
 class ComparisonMethod:
     """How tracks are compared with the truth.
 
-    similarity: of people, "boxes" (overlap), "ground" or "image" (distance); None: boxes if both sides have them, else
-    the plane of the tracks. group_match: of groups, by "hull" (overlap) or "members" (common people).
+    similarity: of people, "boxes" (overlap), "ground" or "image" (distance); None: by the data. group_match: of groups,
+    by "hull" (overlap) or "members" (common people).
     """
 
     similarity: Similarity | None = None
@@ -114,21 +114,11 @@ def _score_all(sequences: list[Sequence], paths: list[Path], method: ComparisonM
 
 
 def _scored_alike(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMethod) -> list[ScoredRun]:
-    """Returns one or two runs of a sequence with their scores; two are put into one plane first."""
-    notes = [""] * len(runs)
-    if len(runs) == 2 and sequence.truth is not None:
-        try:
-            *tracks, similarity = in_one_plane(sequence.truth, runs[0], runs[1], method.similarity)
-        except IncomparableError as error:
-            raise InputError(
-                file=sequence.name, place="--against", got=str(error), expected="two runs that can lie in one plane",
-                remedy="track both from the same detections",
-            ) from None  # fmt: skip
-        notes = [MOVED if given is not run else "" for given, run in zip(tracks, runs, strict=True)]
-        runs = [TrackingRun(tuple(given), run.info) for given, run in zip(tracks, runs, strict=True)]
-        method = replace(method, similarity=similarity)
-    note = next((note for note in notes if note), "")
-    return [ScoredRun(score_run(sequence, run, method), run, method, note) for run in runs]
+    """Returns the runs of a sequence with their scores, all compared in one plane and by one similarity."""
+    rows = score_runs(sequence, runs, method)
+    moved = {"ground" if run[0].plane != "image" else "image" for run in runs if len(run)} - {rows[0].scores.surface}
+    note = MOVED.format(plane=SURFACE_WORDS[rows[0].scores.surface]) if moved else ""
+    return [ScoredRun(row, run, method, note) for row, run in zip(rows, runs, strict=True)]
 
 
 def _paired_differences(rows: list[SequenceScores], others: list[SequenceScores]) -> Means:
@@ -147,9 +137,8 @@ def _block_intervals(sequence: Sequence, scored: list[ScoredRun], draws: int) ->
     """
     truth = sequence.truth
     assert truth is not None
-    scorers = [
-        weighted_scorer(truth, each.run.tracks, each.method.similarity, each.method.group_match) for each in scored
-    ]
+    method = scored[0].method
+    scorers = weighted_scorers(truth, [each.run for each in scored], method.similarity, method.group_match)
     found = _by_key(recording_intervals(truth, scorers[0], draws))
     if len(scored) == 1:
         return found, None
@@ -157,7 +146,13 @@ def _block_intervals(sequence: Sequence, scored: list[ScoredRun], draws: int) ->
 
 
 def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = DEFAULT) -> SequenceScores:
-    """Returns the scores of one run: a tracker's tracks of one sequence, with the words of run.json on its detections.
+    """Returns the scores of one run, as `score_runs` does."""
+    (row,) = score_runs(sequence, [run], method)
+    return row
+
+
+def score_runs(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMethod = DEFAULT) -> list[SequenceScores]:
+    """Returns the scores of runs of one sequence, compared alike, with the words of run.json on their detections.
 
     method: how people and groups are compared. Raises InputError if the sequence has no labels or cannot be compared in
     this way, or the scale in px per m is not above 0 where groups are derived in the image, or an id
@@ -169,17 +164,19 @@ def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = D
             remedy="give one with gt/",
         )  # fmt: skip
     try:
-        scores = evaluate(sequence.truth, run, similarity=method.similarity, group_match=method.group_match)
+        scores = Scorer(sequence.truth).evaluate_all(runs, similarity=method.similarity, group_match=method.group_match)
     except IncomparableError as error:
         raise InputError(
-            file=sequence.name, place="--similarity", got=str(error), expected="what both sides have",
-            remedy="choose another --similarity",
+            file=sequence.name, place="--similarity", got=str(error), expected="what all sides have",
+            remedy="choose another --similarity, or track from the same detections",
         ) from None  # fmt: skip
     except ValueError as error:
         raise InputError(
             file=sequence.name, got=str(error), expected="each id once in a frame", remedy="remove one of the two rows",
         ) from None  # fmt: skip
-    return SequenceScores(sequence.name, scores, input_summary(run.info))
+    return [
+        SequenceScores(sequence.name, found, input_summary(run.info)) for found, run in zip(scores, runs, strict=True)
+    ]
 
 
 def _short_notes(sequence: Sequence) -> list[str]:

@@ -12,15 +12,16 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.io.store.track_files import write_tracks
 from sim.sequence import simulate
-from sim.types import Sequence
+from sim.types import Sequence, Tracks
 from tests.groups_as_wholes import wholes
 from tracking import track
 from tracking.app.cli import run
 from tracking.app.commands.score import score_run
 from tracking.app.commands.score_tables import is_sure
 from tracking.run import TrackingRun
-from tracking.scoring import evaluate, one_plane
+from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.one_plane import in_one_plane
 from tracking.stats import mean_interval
 
 
@@ -179,37 +180,59 @@ def test_what_differs_comes_first(made: Path, capsys) -> None:
     assert lines[:2] == ["these tracks and --against differ in", "  detections: truth / file"]
 
 
-def in_image(made: Path, folder: Path, scene: Sequence) -> Path:
-    """A run of one sequence whose people lie in the image."""
-    answers = [t.replace(plane="image") for t in one_plane.in_image(track("blob", scene, detections="file"))]
-    info = {"tracker": "blob", "sequence": "merge-s00005", "plane": "image", "fps": scene.fps, "detections": "image"}
-    write_tracks(folder / "merge-s00005", answers, fps=scene.fps, camera=scene.camera, scene=scene.scene, info=info)
+def seen(scene: Sequence) -> list[Tracks]:
+    """blob's tracks at the centres of their boxes in the image."""
+    (moved,), _ = in_one_plane(scene.truth, [track("blob", scene, detections="file")], [False], "image")
+    return moved
+
+
+def in_image(folder: Path, scene: Sequence, detections: str) -> Path:
+    """A run of one sequence whose people lie in the image; from pixels if `detections` is "image"."""
+    info = {"tracker": "blob", "sequence": "merge-s00005", "plane": "image", "fps": scene.fps, "detections": detections}
+    answers, place = seen(scene), folder / "merge-s00005"
+    write_tracks(place, answers, fps=scene.fps, camera=scene.camera, scene=scene.scene, info=info)
     return folder
 
 
-def test_two_runs_are_compared_in_one_plane(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
-    """One run lies in the image, the other on the ground: metres were subtracted from pixels."""
+def test_runs_are_compared_in_one_plane(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
+    """One run is from pixels, the other on the ground: metres were subtracted from pixels."""
     data = made / "data" / "flockscope-train" / "merge-s00005"
-    image = in_image(made, tmp_path / "image", scene)
+    image = in_image(tmp_path / "image", scene, "image")
     alone = scored(capsys, data, made / "file")["sequences"][0]
-    assert alone["surface"] == "ground"
+    assert (alone["similarity"], alone["surface"]) == ("ground", "ground")
     for paths in ([made / "file", image], [image, made / "file"]):
         found = scored(capsys, data, paths[0], "--against", paths[1])
         (row,) = found["sequences"]
-        assert (row["similarity"], row["surface"]) == ("boxes", "image")
+        assert (row["similarity"], row["surface"]) == ("image", "image")
         assert row["GOSPA"] > 5 * alone["GOSPA"], "px"
         assert {d["mean"] for key, d in found["difference"].items() if key in ("GOSPA", "HOTA", "group_F1")} == {0.0}
-        assert "both runs are compared in the image" in found["notes"][0]
+        assert "all tracks are compared in the image" in found["notes"][0]
         assert {"plane", "detections"} <= {d["what"] for d in found["differences"]}
+
+
+def test_boxes_are_compared_by_their_feet_where_the_camera_is_known(
+    made: Path, scene: Sequence, tmp_path: Path, capsys
+) -> None:
+    """A text of boxes was scored by overlap beside tracks on the ground; its HOTA was .26 lower for the same tracks."""
+    data = made / "data" / "flockscope-train" / "merge-s00005"
+    folder = in_image(tmp_path / "image", scene, "file")
+    text = tmp_path / "merge-s00005.txt"
+    text.write_text((folder / "merge-s00005" / "tracks.mot.txt").read_text())
+    (ground,) = scored(capsys, data, made / "file")["sequences"]
+    for path in (folder, text):
+        (row,) = scored(capsys, data, path)["sequences"]
+        assert (row["similarity"], row["surface"]) == ("ground", "ground")
+        assert row["HOTA"] == pytest.approx(ground["HOTA"], abs=0.1)
+        assert row["HOTA"] > scored(capsys, data, path, "--similarity", "boxes")["sequences"][0]["HOTA"] + 0.05
 
 
 def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
     data, folder = made / "data" / "flockscope-train" / "merge-s00005", tmp_path / "wholes"
     write_tracks(folder / "merge-s00005", wholes(scene, "ground"), fps=scene.fps)
-    image = in_image(made, tmp_path / "image", scene)
+    image = in_image(tmp_path / "image", scene, "image")
     assert run(["score", str(data), str(folder), "--against", str(image)]) == 2
     error = capsys.readouterr().err
-    assert "one run in the image (px), the other on the ground (m) with groups without people" in error
+    assert "runs in the image (px), and one on the ground (m) with groups without people" in error
     assert run(["score", str(data), str(folder), "--against", str(made / "file")]) == 0
 
 
@@ -269,7 +292,7 @@ def test_tables(made: Path, capsys) -> None:
     assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "truth")]) == 0
     output = capsys.readouterr().out
     for words in (
-        "groups, strict", "groups, core", "\nmembers\n", "\nevents\n", "people compared by overlap (IoU) of boxes",
+        "groups, strict", "groups, core", "\nmembers\n", "\nevents\n", "people compared by 1 - distance / 2 m on the ground",
         "groups compared by overlap (IoU) of hulls, on the ground, m", "in pairs over 2 sequences (fewer than 100",
     ):  # fmt: skip
         assert words in output
