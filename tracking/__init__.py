@@ -1,8 +1,8 @@
 """From frames to scores: detectors, trackers, grouping, scoring, tuning, the commands.
 
 `tracking.track(tracker, sequence)` returns a run's tracks, `tracking.group(sequence)` the groups of labelled people,
-`tracking.evaluate(truth, tracks)` the scores of either, and `tracking.tune(tracker, suite)` searches parameters. Each
-is imported when it is first used.
+`tracking.evaluate(truth, tracks)` the scores of either, `tracking.compare(sequences, runs)` a ranking of several runs,
+and `tracking.tune(tracker, suite)` searches parameters. Each is imported when it is first used.
 `import tracking` also registers the Gymnasium environment (tracking.gymnasium_registration).
 """
 
@@ -13,15 +13,17 @@ from typing import TYPE_CHECKING, Any
 from tracking.gymnasium_registration import register_when_imported
 
 if TYPE_CHECKING:
+    from tracking.comparison import compare
     from tracking.run import group, track
     from tracking.scoring import evaluate
     from tracking.tuning import tune
 
-__all__ = ["evaluate", "group", "track", "tune"]
+__all__ = ["compare", "evaluate", "group", "track", "tune"]
 
 register_when_imported()
 
 _HOME = {
+    "compare": "tracking.comparison",
     "evaluate": "tracking.scoring",
     "group": "tracking.run",
     "track": "tracking.run",

@@ -17,7 +17,7 @@ import numpy as np
 from sim.detector.box_noise import foot_points
 from sim.scene.terrain import height_at
 from sim.truth.group_hulls import box_groups, frame_groups, groups_over_time
-from sim.types import Array, Bools, GroupEvent, Tracks, Truth
+from sim.types import Array, Bools, GroupEvent, Groups, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.people_comparison import IncomparableError, Similarity, plane_of
 
@@ -92,11 +92,20 @@ def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
 
 def _track_on_ground(t: Tracks, truth: Truth) -> Tracks:
     pos = np.zeros((0, 2)) if t.box is None else _feet(t.box, truth)
-    vel = np.full_like(pos, np.nan)
-    there = np.isfinite(pos).all(axis=1)
+    moved = t.replace(plane="ground", pos=pos, vel=np.full_like(pos, np.nan), events=_events_at(t, pos))
     named = t.groups is not None or bool((t.group >= 0).any())
-    groups = frame_groups(t.id[there], t.group[there], pos[there], vel[there]) if named else None
-    return t.replace(plane="ground", pos=pos, vel=vel, groups=groups, events=_events_at(t, pos))
+    return moved.replace(groups=groups_of_people(moved) if named else None)
+
+
+def groups_of_people(t: Tracks) -> Groups:
+    """Returns the groups of tracks of people that follow from `group`: hulls round boxes in the image, else round
+    footprints. People at unknown positions are left out.
+    """
+    there = np.isfinite(t.pos).all(axis=1)
+    rows = (t.id[there], t.group[there], t.pos[there], t.vel[there])
+    if t.plane != "image" or t.box is None:
+        return frame_groups(*rows)
+    return box_groups(np.full(len(rows[0]), t.index), *rows, t.box[there], t.index, 1)[0]
 
 
 def _feet(box: Array, truth: Truth) -> Array:
@@ -129,10 +138,8 @@ def _in_image(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
 def _track_in_image(t: Tracks) -> Tracks:
     box = np.zeros((0, 4)) if t.box is None else t.box
     middle, none = box[:, :2] + box[:, 2:] / 2, np.full((len(box), 2), np.nan)
-    order = np.argsort(t.id)
-    rows = (t.id[order], t.group[order], middle[order], none, box[order])
-    groups = box_groups(np.full(len(box), t.index), *rows, t.index, 1)[0]
-    return t.replace(plane="image", pos=middle, vel=none, groups=groups, events=_events_at(t, middle))
+    moved = t.replace(plane="image", pos=middle, vel=none, events=_events_at(t, middle))
+    return moved.replace(groups=groups_of_people(moved))
 
 
 def _events_at(t: Tracks, pos: Array) -> tuple[GroupEvent, ...]:

@@ -1,0 +1,67 @@
+"""The oracle: what the best tracker could report from the given detections."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tracking
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
+from tracking.run import track
+from tracking.scoring import evaluate
+from tracking.scoring.oracle import oracle
+
+
+@pytest.fixture(scope="module", params=["merge", "stairs", "queue"])
+def scene(request):
+    return simulate(load(request.param), 3)
+
+
+@pytest.mark.parametrize("similarity", [None, "boxes", "image"])
+def test_the_oracle_only_misses(scene, similarity) -> None:
+    found = evaluate(scene.truth, oracle(scene, {}, similarity), similarity=similarity)
+    assert found.similarity == (similarity or "ground")
+    assert (found["FP"], found["IDSW"], found["group_IDSW"]) == (0, 0, 0)
+    assert 0 < found["FN"] < 0.35 * len(scene.truth.id)
+    for key in ("merge_F1", "queue_F1", "cross_F1"):
+        assert np.isnan(found[key]) or found[key] == 1, key
+    assert not np.isfinite(found["group_F1"]) or found["group_F1"] > 0.7
+
+
+def test_without_faults_of_the_detector_the_oracle_is_perfect(scene) -> None:
+    found = evaluate(scene.truth, oracle(scene, {"detections": "truth"}))
+    assert found["HOTA"] == pytest.approx(1)
+    assert found["objective"] == pytest.approx(1)
+
+
+def test_the_oracle_gets_what_the_tracker_got(scene) -> None:
+    poor = track("blob", scene, detections="truth", sensor={"detect_prob": 0.5, "clutter_rate": 3.0}, seed=4)
+    best = evaluate(scene.truth, oracle(scene, poor.info))
+    assert best["FP"] == 0
+    assert 0.3 * len(scene.truth.id) < best["FN"] < 0.7 * len(scene.truth.id)
+    again = oracle(scene, {**poor.info, "seed": 5})
+    assert any(len(a.id) != len(b.id) for a, b in zip(oracle(scene, poor.info), again, strict=True))
+
+
+def test_of_pixels_the_oracle_has_what_is_visible(scene) -> None:
+    run = oracle(scene, {"detections": "image"})
+    found = evaluate(scene.truth, run)
+    assert found.similarity == "image"
+    assert (found["IDSW"], found["merge_F1"] != 0) == (0, True)
+    hidden = sum(scene.truth.visibility == 0)
+    assert sum(len(t.id) for t in run) == len(scene.truth.id) - hidden
+
+
+def test_compare_ranks_runs_and_shows_the_oracle() -> None:
+    scenes = [simulate(load("split"), seed) for seed in range(2)]
+    runs = {name: [track(name, scene, detections="file") for scene in scenes] for name in ("blob", "relational")}
+    found = tracking.compare(scenes, runs)
+    table = found.to_arrow("HOTA").to_pydict()
+    assert table["run"][0] == "oracle"
+    assert set(table["run"][1:]) == {"blob", "relational"}
+    assert table["first"] == [None, 1, 1]
+    assert table["mean"][1] >= table["mean"][2]
+    for name, row in runs.items():
+        expected = np.mean([evaluate(s.truth, run)["HOTA"] for s, run in zip(scenes, row, strict=True)])
+        assert table["HOTA"][table["run"].index(name)] == pytest.approx(expected)

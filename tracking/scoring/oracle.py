@@ -1,0 +1,95 @@
+"""The oracle of a sequence: the detections that a tracker got, with the ids and groups of the true people they match.
+
+It is the best that any tracker can report from these detections without smoothing: no false alarm, no switch, the true
+groups and events of the people who were detected. What it lacks in a score is the detector's, not the tracker's. Of
+pixels it has the boxes of what is visible of each person.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from sim.types import EVENT_KINDS, Context, DetectionMode, Detections, Frame, Groups, Ints, Sequence, Tracks, Truth
+from tracking.prepare import prepare
+from tracking.run import TrackingRun
+from tracking.scoring.evaluation import Scorer, chosen_frames
+from tracking.scoring.one_plane import groups_of_people
+from tracking.scoring.people_comparison import Similarity
+
+
+class _Detections:
+    """A tracker that reports every detection as a track of one frame."""
+
+    needs: tuple[str, ...] = ("boxes", "points")
+
+    def reset(self, context: Context, seed: int) -> None:
+        pass
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        assert detections is not None, "a tracker of boxes or points gets detections"
+        count, dims = detections.pos.shape
+        id, alone = np.arange(count), np.full(count, -1)
+        vel, cov = np.full((count, dims), np.nan), np.full((count, 2 * dims, 2 * dims), np.nan)
+        rows = (id, alone, detections.pos, vel, cov, detections.box, detections.score)
+        return Tracks(frame.index, frame.t, detections.plane, "person", *rows, Groups.none())
+
+
+def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None) -> TrackingRun:
+    """Returns the oracle's tracks of a sequence with truth.
+
+    given: the content of run.json of the run beside which it stands: "detections" (the mode), "sensor" and "seed" say
+    what that tracker got; {} stands for the stored detections, else the labels. similarity: as of `evaluate`.
+
+    Raises InputError if the sequence has no such detections.
+    """
+    truth = sequence.truth
+    assert truth is not None, "an oracle knows the truth"
+    mode: DetectionMode = given.get("detections") or ("file" if sequence.has_detections else "truth")
+    info = {"tracker": "oracle", "detections": mode, "sensor": given.get("sensor") or {}}
+    if mode == "image":
+        seen = (_visible(truth, index) for index in range(1, truth.length + 1))
+        return TrackingRun(tuple(_with_events(t, truth) for t in seen), info)
+    seed = given.get("seed") or 0
+    prepared = prepare(_Detections(), sequence, detections=mode, sensor=given.get("sensor"), seed=seed)
+    prepared.reset(seed)
+    reported = [prepared.tracker.step(f, f.detections) for f in prepared.frames() if f.index <= truth.length]
+    (compared,) = Scorer(truth).compare([reported], similarity, chosen_frames(None, truth.length))
+    sides, true = compared.sides, compared.sides.true
+    cuts = np.cumsum([0, *(len(t.id) for t in sides.tracks)]).tolist()
+    rows = [sides.mapping[a:b] for a, b in pairwise(cuts)]
+    named = [_named(t, true.rows.id, true.group, row) for t, row in zip(sides.tracks, rows, strict=True)]
+    return TrackingRun(tuple(_with_events(t, truth) for t in named), info)
+
+
+def _named(t: Tracks, id: Ints, group: Ints, row: Ints) -> Tracks:
+    """Returns tracks with the ids and groups of the true people in these rows (N,); those of row -1 are left out."""
+    kept = row >= 0
+    box = None if t.box is None else t.box[kept]
+    return t.replace(
+        id=id[row[kept]], group=group[row[kept]], pos=t.pos[kept], vel=t.vel[kept], cov=t.cov[kept], box=box,
+        score=t.score[kept] if len(t.score) else t.score,
+    )  # fmt: skip
+
+
+def _visible(truth: Truth, index: int) -> Tracks:
+    """Returns the boxes of what is visible of each person in one frame, with true ids and groups."""
+    box = truth.box if truth.visible_box is None else truth.visible_box
+    assert box is not None, "people in pictures have boxes"
+    rows = np.arange(len(truth.id))[truth.rows(index)]
+    rows = rows[np.isfinite(box[rows]).all(axis=1) & (truth.visibility[rows] > 0)]
+    none = np.full((len(rows), 2), np.nan)
+    cov, score = np.full((len(rows), 4, 4), np.nan), np.ones(len(rows))
+    middle = box[rows, :2] + box[rows, 2:] / 2
+    who = (truth.id[rows], truth.group[rows])
+    return Tracks(index, (index - 1) / truth.fps, "image", "person", *who, middle, none, cov, box[rows], score)
+
+
+def _with_events(t: Tracks, truth: Truth) -> Tracks:
+    """Returns tracks with the true events that start in their frame; neither events nor groups are derived."""
+    events = tuple(replace(e, emitted=t.index) for e in truth.events or () if e.start == t.index)
+    return t.replace(groups=groups_of_people(t), events=events, own_events=EVENT_KINDS)

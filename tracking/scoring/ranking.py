@@ -1,0 +1,79 @@
+"""Ranks runs that were scored on the same sequences: means, paired differences, and ranges of ranks.
+
+Two runs are parted if the paired interval of their difference does not hold 0. The intervals of all pairs hold together
+with 95 %: Student's, at the level 5 % / number of pairs (Bonferroni). With two runs it is the usual paired interval. A
+run's rank range goes from 1 + the number of runs that are surely better, to the number of runs that are not surely
+worse. Runs that nothing parts share their ranks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.stats import FEWEST, LEVEL, mean_interval
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """R runs in order of their means, best first; runs of equal mean in the order given.
+
+    - order (R,): index of each run as given. mean, low, high (R,): mean over sequences and its own 95 % interval.
+    - first, last (R,): the range of ranks, from 1.
+    - less, less_low, less_high (R, R): mean of run i minus run j over the same sequences, with the joint interval.
+    - better (R, R): run i is surely better than run j.
+    - sequences: number of sequences in which all scores are known; only these count.
+    """
+
+    order: Ints
+    mean: Array
+    low: Array
+    high: Array
+    first: Ints
+    last: Ints
+    less: Array
+    less_low: Array
+    less_high: Array
+    better: Bools
+    sequences: int
+
+
+def rank(values: Array, upwards: bool = True) -> Ranking:
+    """Returns the ranking of R runs by their scores on S sequences, values (R, S); nan where unknown.
+
+    upwards: a larger score is better. With fewer than 6 sequences (FEWEST) no difference is sure, so all runs share all
+    ranks.
+    """
+    known = np.isfinite(values).all(axis=0)
+    scores = values[:, known]
+    runs, count = scores.shape
+    less, low, high = _joint_intervals(scores)
+    ahead = low > 0 if upwards else high < 0
+    better = ahead & (count >= FEWEST)
+    mean, own_low, own_high = mean_interval(scores.T) if count else (np.full(runs, np.nan),) * 3
+    order = np.argsort(-mean if upwards else mean, kind="stable")
+    first, last = 1 + better.sum(axis=0), runs - better.sum(axis=1)
+    pairs = np.ix_(order, order)
+    own = mean[order], own_low[order], own_high[order]
+    ranks = first[order], last[order]
+    return Ranking(order, *own, *ranks, less[pairs], low[pairs], high[pairs], better[pairs], count)
+
+
+def _joint_intervals(scores: Array) -> tuple[Array, Array, Array]:
+    """Returns the mean differences (R, R) of runs' scores (R, S), row minus column, and the ends of their intervals,
+    which hold all together with the probability LEVEL. The ends are nan for fewer than two sequences.
+    """
+    from scipy.special import stdtrit
+
+    runs, count = scores.shape
+    if count < 2:
+        unknown = np.full((runs, runs), np.nan)
+        return scores.sum(axis=1)[:, None] - scores.sum(axis=1) if count else unknown, unknown, unknown
+    pairs = max(runs * (runs - 1) // 2, 1)
+    t = stdtrit(count - 1, 1 - (1 - LEVEL) / (2 * pairs))
+    difference = scores[:, None] - scores[None]
+    less = difference.mean(axis=2)
+    half = t * difference.std(axis=2, ddof=1) / np.sqrt(count)
+    return less, less - half, less + half
