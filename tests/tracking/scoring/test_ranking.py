@@ -21,7 +21,7 @@ def draws(count: int, runs: int, sequences: int, better: float = 0.0):
 @pytest.mark.parametrize("sequences", [6, 12, 36])
 def test_copies_of_one_tracker_share_all_ranks(sequences: int) -> None:
     """Plain intervals of 28 pairs would part some of eight copies in most draws."""
-    tied = [(found.first == 1).all() and (found.last == 8).all() for found in map(rank, draws(1000, 8, sequences))]
+    tied = [(found.first == 1).all() and (found.last == 8).all() for found in map(rank, draws(4000, 8, sequences))]
     assert np.mean(tied) >= 0.95
     plain = [any(paired(s[:1].T, s[1:].T)[1] > 0) for s in draws(200, 8, sequences)]
     assert np.mean(plain) > 0.05

@@ -292,7 +292,8 @@ def test_tables(made: Path, capsys) -> None:
     assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "truth")]) == 0
     output = capsys.readouterr().out
     for words in (
-        "groups, strict", "groups, core", "\nmembers\n", "\nevents\n", "people compared by 1 - distance / 2 m on the ground",
+        "groups, strict", "groups, core", "\nmembers\n", "\nevents\n",
+        "people compared by 1 - distance / 2 m on the ground",
         "groups compared by overlap (IoU) of hulls, on the ground, m", "in pairs over 2 sequences (fewer than 100",
     ):  # fmt: skip
         assert words in output
