@@ -9,6 +9,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim.io.files.side_files import is_hidden
+from sim.io.formats.box_columns import BoxScale
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
@@ -46,8 +47,10 @@ class StoredTracks:
         if folder is not None:
             check_run(folder)
 
-    def read(self, sequence: Sequence) -> TrackingRun:
+    def read(self, sequence: Sequence, box_scale: BoxScale | None = None) -> TrackingRun:
         """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`.
+
+        box_scale: factors of x and y of the boxes of a text of another program; None: 1. It has no effect on a run.
 
         Whether a run is whole is left to `check`. Raises InputError if run.json states another frame rate or other
         labels than the sequence's, or there are no tracks. Also if a MOTChallenge text has a frame beyond the
@@ -67,8 +70,9 @@ class StoredTracks:
                 remedy=f"{AGAIN}: its labels, scenario or settings are others",
             )  # fmt: skip
         tracks = read_checked_tracks(
-            self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class")
-        )
+            self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class"),
+            box_scale=box_scale,
+        )  # fmt: skip
         return TrackingRun(tuple(tracks), self.info)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.regular_file import is_present
 from sim.io.files.numeric_text import is_number_text, read_text
 from sim.io.formats import mot_text
+from sim.io.formats.box_columns import BoxScale
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.mot_table import read_table
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
@@ -109,6 +111,7 @@ def open_folder(
     images: bool = True,
     background: BackgroundChoice | None = None,
     person_class: int | None = None,
+    box_scale: BoxScale | None = None,
 ) -> Sequence:
     """Return the MOTChallenge folder `path` (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
@@ -118,7 +121,8 @@ def open_folder(
     None: unknown (nan; the truth then takes the boxes' median height / 1.7 m). camera: its calibration, scaled to the
     picture size; None: unknown. images False leaves the pictures out; otherwise they are decoded one by one while
     iterating. A frame without a readable picture has none, with a warning. background: sample of frames for background
-    models; None for 50 frames spread over the recording, fewer if it is shorter. The length is that of seqinfo.ini,
+    models; None for 50 frames spread over the recording, fewer if it is shorter. box_scale: factors of x and y of the
+    boxes of det.txt; None: 1. The length is that of seqinfo.ini,
     else the last frame of gt.txt, det.txt and the pictures.
 
     Raises InputError if seqinfo.ini, det.txt or an option is invalid, two pictures are the same frame, nothing tells
@@ -132,7 +136,12 @@ def open_folder(
     rate = frame_rate(fps, info.fps)
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    found = mot_text.read_detections(det, info.length, person_class) if is_present(det) else None
+    found = mot_text.read_detections(det, info.length, person_class, box_scale) if is_present(det) else None
+    if box_scale is not None and found is None:
+        remedy = "leave it out: labels are not scaled"
+        raise InputError(
+            file=path, got="--box-scale", expected="none for a recording without det/det.txt", remedy=remedy
+        )
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)
@@ -174,7 +183,7 @@ def open_folder(
         px_per_m=scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **_class_named(person_class), **shown},
+        source={"kind": "mot", "path": str(path), **_named(person_class, box_scale), **shown},
     )  # fmt: skip
 
 
@@ -226,14 +235,15 @@ def open_text(
     px_per_m: float | None = None,
     camera: Camera | None = None,
     person_class: int | None = None,
+    box_scale: BoxScale | None = None,
 ) -> Sequence:
     """Return the MOT text file `path` as Sequence without pictures: its rows are detections if every id is -1, else
     truth.
 
     fps: frames per second; None: 25 with a warning. px_per_m: image scale; None: unknown (nan; the truth then takes the
     boxes' median height / 1.7 m). camera: calibration, None if unknown; it is not scaled. person_class: the class of
-    people; None: 1, with a warning about rows of others. The length is the last frame
-    in the file; the name is the file's, without suffix.
+    people; None: 1, with a warning about rows of others. box_scale: factors of x and y of the boxes; None: 1. The
+    length is the last frame in the file; the name is the file's, without suffix.
 
     Raises InputError if `fps` is not above 0, or if the file is unreadable, invalid or has no row, or a row has neither
     box nor ground position. Reading the truth raises InputError for an id twice in a frame, or an invalid visibility.
@@ -243,7 +253,7 @@ def open_text(
     table = read_table(path, boxless=True)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
-    found = mot_text.read_detections(path, None, person_class)
+    found = mot_text.read_detections(path, None, person_class, box_scale)
     length = int(table.frame.max(initial=0))
     only_detections = bool((table.id == -1).all())
 
@@ -253,13 +263,13 @@ def open_text(
             yield Frame(index, (index - 1) / rate, detections=here)
 
     def truth() -> Truth:
-        return mot_text.read_truth(path, path.stem, rate, length, scale, person_class)
+        return mot_text.read_truth(path, path.stem, rate, length, scale, person_class, box_scale)
 
     return Sequence(
         name=path.stem, fps=rate, length=length, frames=frames,
         load_truth=None if only_detections else truth,
         camera=camera, px_per_m=scale, has_detections=only_detections,
-        source={"kind": "mot text", "path": str(path), **_class_named(person_class)},
+        source={"kind": "mot text", "path": str(path), **_named(person_class, box_scale)},
     )  # fmt: skip
 
 
@@ -273,5 +283,6 @@ def _labelled_frames(path: Path) -> Ints:
     return np.unique(np.concatenate([np.zeros(0, np.int64), *frames]))
 
 
-def _class_named(person_class: int | None) -> dict[str, int]:
-    return {} if person_class is None else {"class": person_class}
+def _named(person_class: int | None, box_scale: BoxScale | None) -> dict[str, Any]:
+    given = {"class": person_class, "box_scale": box_scale}
+    return {key: value for key, value in given.items() if value is not None}
