@@ -44,6 +44,9 @@ SCALES = (1.0, 1 / 3, 0.5, 2 / 3, 0.75, 4 / 3, 1.5, 2.0, 3.0, 4.0)
 UNITS = {0.01: "cm", 0.001: "mm", 0.3048: "ft"}
 """Lengths in m that positions are given in by mistake."""
 
+SQUARES = (1, 320, 416, 512, 608, 640, 768, 800, 960, 1024, 1280)
+"""Sides in px of square pictures that detectors stretch a picture to; 1: shares of the picture."""
+
 SIDE = 3.0
 """Side in m of the square that stands for a position."""
 
@@ -117,20 +120,23 @@ class Reading:
     """A way to read the tracks, and how well it matches.
 
     columns: their order, by names of a header line. scale: factors of x and y. frames: how the frames are numbered, in
-    words; "" as they are. labels: the labels are read so, not the tracks. share: of boxes that match.
+    words; "" as they are. labels: the labels are read so, not the tracks. simple: the scale follows from the
+    size of the pictures. share: of boxes that match.
     """
 
     columns: str
     scale: tuple[float, float] = (1.0, 1.0)
     frames: str = ""
     labels: bool = False
+    simple: bool = False
     share: float = 0.0
 
     @property
     def effort(self) -> int:
         """How far the reading is from the usual one; the lower, the simpler."""
         other = self.columns not in ("left,top,width,height", "x,y")
-        return bool(self.frames) + other + 2 * (self.scale != (1.0, 1.0)) + self.labels
+        scaled = 0 if self.scale == (1.0, 1.0) else 2 if self.scale[0] == self.scale[1] or self.simple else 4
+        return bool(self.frames) + other + scaled + self.labels
 
 
 def likely_misreading(
@@ -255,28 +261,34 @@ def _rounded(true: Side, est: Side, found: Reading, size: tuple[int, int] | None
     one = float(np.sqrt(found.scale[0] * found.scale[1]))
     simple = [(u, u) for u in UNITS] if true.points else []
     simple += [(f, f) for f in (float(Fraction(one).limit_denominator(4)), one)]
-    simple += [] if size is None else [(float(size[0]), float(size[1]))]
+    simple += [] if size is None else [(size[0] / side, size[1] / side) for side in SQUARES]
     for scale in simple:
         near = all(abs(s / f - 1) < 0.05 for s, f in zip(scale, found.scale, strict=True))
         reading = _scaled(true, est, found, np.array(scale)) if near else found
         if near and reading.share >= ABOUT * found.share:
-            return reading
+            return replace(reading, simple=True)
     return found
 
 
 def _other_frames(true: Side, est: Side, usual: Reading) -> Iterator[Reading]:
-    """Yields readings with other frame numbers: shifted, at another rate, or in the column of the ids."""
+    """Yields readings with other frame numbers: shifted, at another rate, or in the column of the ids.
+
+    Of these the first is taken that matches about as much as the best, as shifts of a slow person are alike.
+    """
     frame, labelled = est.rows.frame, true.rows.frame
     ends = {int(labelled[0] - frame[0]), int(labelled[-1] - frame[-1])}
     maps = {f"{k:+d}": frame + k for k in sorted({*SHIFTS, *ends} - {0}, key=abs)}
     maps |= {f"1, {1 + n}, {1 + 2 * n}, …": (frame - 1) * n + 1 for n in RATES}
     maps["id"] = est.rows.id
+    found = []
     for words, numbers in maps.items():
         inside = (numbers >= 1) & (numbers <= labelled[-1])
         moved = est.keep(inside).in_frames(numbers[inside])
         common = np.intersect1d(labelled, moved.rows.frame)
         if len(common) and 2 * inside.sum() >= len(frame):
-            yield replace(usual, frames=words, share=_share(*_some(common, true, moved)))
+            found.append(replace(usual, frames=words, share=_share(*_some(common, true, moved))))
+    most = max((r.share for r in found), default=0.0)
+    yield from [r for r in found if r.share >= ABOUT * most][:1]
 
 
 def _simplest(found: list[Reading], share: float) -> Reading | None:
@@ -307,22 +319,28 @@ def _words(best: Reading) -> str:
 
 def _remedy(best: Reading, usual: Reading, size: tuple[int, int] | None, own: bool) -> str:
     """Returns what the user can do, as a sentence without a full stop."""
-    text = "the labels" if best.labels else "the text that was tracked" if own else "the tracks"
-    columns, parts = best.columns, []
     if best.frames and best.frames != "id":
         return "Number the frames of both alike"
-    if best.scale[0] in UNITS and usual.columns == "x,y":
-        columns = ",".join(f"{axis}_{UNITS[best.scale[0]]}" for axis in columns.split(","))
+    text = "the labels" if best.labels else "the text that was tracked" if own else "the tracks"
+    points, parts = usual.columns == "x,y", []
+    unit = UNITS.get(best.scale[0]) if points else None
+    columns = best.columns if unit is None else ",".join(f"{axis}_{unit}" for axis in best.columns.split(","))
     if best.frames or columns != usual.columns:
+        first = "id,frame" if best.frames else "frame,id"
+        parts.append(f"name all columns in a first line of {text}: {first},{columns},…")
+    if best.scale != (1.0, 1.0) and points and unit is None:
+        parts.append(f"give the positions of {text} in m")
+    elif best.scale != (1.0, 1.0) and not points:
         parts.append(
-            f"name all columns in a first line of {text}: {'id,frame' if best.frames else 'frame,id'},{columns},…"
+            f"add --box-scale {_factor(best.scale)}{' to `flockscope track`' if own else ''}{_made(best, size)}"
         )
-    if best.scale != (1.0, 1.0) and columns[1] != "_":
-        pictures = (
-            ""
-            if size is None
-            else f" (boxes of {size[0] / best.scale[0]:.0f} × {size[1] / best.scale[1]:.0f} pictures)"
-        )
-        parts.append(f"add --box-scale {_factor(best.scale)}{' to `flockscope track`' if own else ''}{pictures}")
     words = " and ".join(parts)
     return words[0].upper() + words[1:]
+
+
+def _made(best: Reading, size: tuple[int, int] | None) -> str:
+    """Returns the size of the pictures that the boxes were made in, in brackets; "" if it is unknown."""
+    if size is None:
+        return ""
+    width, height = (side / factor for side, factor in zip(size, best.scale, strict=True))
+    return " (shares of the picture)" if width < 2 else f" (boxes of pictures of {width:.0f} × {height:.0f})"
