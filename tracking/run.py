@@ -91,9 +91,9 @@ def track(
     perfect. seed: for the tracker's and the sensor's random numbers. grouping: "belief", "rule", a TOML file of
     either, or the grouping itself, for a tracker that names no groups; None: the belief. If the tracker names groups,
     it has no effect, with a UserWarning. Another one says that the tracker's velocities are too far from its motion to
-    derive groups, or that most detections score
-    too low to start a track. If the tracker's first answer with people names no groups, later ones are replaced by derived ones,
-    with a UserWarning. progress: called with each frame's number, from 1, when the frame is done.
+    derive groups, or that most detections score too low to start a track. If the tracker's first answer with people
+    names no groups, later ones are replaced by derived ones, with a UserWarning. progress: called with each frame's
+    number, from 1, when the frame is done.
 
     Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit; later for a
     frame whose detections are not finite or whose picture cannot be read; after the last frame if tracks in the image

@@ -18,7 +18,7 @@ import numpy as np
 from sim.arrays import repeated_ids
 from sim.io.formats.box_columns import BoxScale, corner_doubt, require_pixels
 from sim.io.formats.mot_distractors import unscored_rows
-from sim.io.formats.mot_ground import ground_positions
+from sim.io.formats.mot_ground import ground_positions, require_metres
 from sim.io.formats.mot_people import labelled_people, of_class
 from sim.io.formats.mot_table import MotTable, read_table
 from sim.io.formats.unit_scores import unit_scores
@@ -131,10 +131,12 @@ def read_truth(
     Visibility is 1 where the file has none or -1.
 
     Raises InputError as read_table (unreadable file, invalid line, frame beyond `length`), for a row without box if any
-    row lacks a ground position, for an id twice in a frame, and for a visibility outside [0, 1] other than -1.
+    row lacks a ground position, for an id twice in a frame, and for a visibility outside [0, 1] other than -1. Also
+    for positions without boxes that cannot be in metres.
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     require_pixels(table.rows, table.boxes())
+    require_metres(table, fps)
     ground = ground_positions(table)
     boxed = not _reject_placeless(table, ground).any()
     keep = labelled_people(table, person_class)

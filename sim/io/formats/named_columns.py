@@ -22,7 +22,7 @@ NAMES = {
     "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_index"),
     "id": ("id", "track_id", "trackid", "person_id", "ped_id", "target_id"),
     "score": ("score", "conf", "confidence"),
-    "class": ("class", "class_id", "category_id"),
+    "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
     "left": ("left", "bb_left", "xmin", "x1"),
     "top": ("top", "bb_top", "ymin", "y1"),
     "right": ("right", "xmax", "x2"),

@@ -14,7 +14,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.box_columns import BoxScale, require_pixels
-from sim.io.formats.mot_ground import ground_positions
+from sim.io.formats.mot_ground import ground_positions, require_metres
 from sim.io.formats.mot_people import of_class
 from sim.io.formats.mot_table import MotTable, read_table
 from sim.io.formats.mot_text import reject_duplicate_ids
@@ -51,6 +51,7 @@ def read_track_text(
     order = np.lexsort((table.id, table.frame))
     order = order[people[order]]
     frame, id = table.frame[order], table.id[order]
+    require_metres(table, fps)
     ground = ground_positions(table)
     if ground is not None:
         remedy = "complete the line, or write z = -1 in all"
