@@ -60,7 +60,8 @@ class StoredTracks:
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             raise InputError(
                 file=seal, place="fps", got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",
-                remedy=f"read the sequence with --fps {fps:g}, as `track` did",
+                remedy=f"track it again with --fps {sequence.fps:g}, or, if {fps:g} is the true rate, read the "
+                f"sequence with --fps {fps:g}, as `track` did",
             )  # fmt: skip
         tracked = self.info.get("truth_hash")
         if tracked is not None and tracked_hash(sequence) not in (None, tracked):
@@ -127,7 +128,7 @@ def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[
         matched = [(sequences[0], stored[0])]
     else:
         by_name = _by_name(stored)
-        matched = [(sequence, _named(sequence.name, by_name, stored)) for sequence in sequences]
+        matched = [(sequence, _named(sequence, by_name, stored)) for sequence in sequences]
     for _, each in matched:
         each.check()
     _refuse_mixture([each for _, each in matched])
@@ -148,18 +149,25 @@ def _by_name(stored: list[StoredTracks]) -> dict[str, StoredTracks]:
     return found
 
 
-def _named(name: str, by_name: dict[str, StoredTracks], stored: list[StoredTracks]) -> StoredTracks:
-    """Returns the tracks of the sequence `name`. Raises InputError if there are none; of an unfinished run among
-    `stored`, which cannot tell what it tracked, that it is unfinished."""
-    if name in by_name:
-        return by_name[name]
+def _named(sequence: Sequence, by_name: dict[str, StoredTracks], stored: list[StoredTracks]) -> StoredTracks:
+    """Returns the tracks of the sequence. Raises InputError if there are none; of an unfinished run among
+    `stored`, which cannot tell what it tracked, that it is unfinished.
+
+    If tracks have the name of the sequence's folder, the error names the seqinfo.ini that calls it otherwise.
+    """
+    if sequence.name in by_name:
+        return by_name[sequence.name]
     for each in stored:
         if not each.info:
             each.check()
+    folder, remedy = Path(sequence.source.get("path", "")), "track it first, or give the right folder"
+    if folder.name in by_name and (folder / "seqinfo.ini").is_file():
+        remedy = (
+            f"name={sequence.name} in {folder / 'seqinfo.ini'} is another than its folder's, {folder.name}: correct it"
+        )
     raise InputError(
         file=stored[0].path.parent if len(stored) > 1 else stored[0].path,
-        got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {name}",
-        remedy="track it first, or give the right folder",
+        got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {sequence.name}", remedy=remedy,
     )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, i
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.regular_file import is_present
 from sim.io.files.numeric_text import is_number_text, read_text
+from sim.io.files.side_files import is_hidden
 from sim.io.formats import mot_text
 from sim.io.formats.box_columns import BoxScale
 from sim.io.formats.calibration import scaled_to_image
@@ -83,10 +84,11 @@ def read_seqinfo(path: Path) -> SeqInfo:
     )
 
 
-def frame_rate(given: float | None, found: float | None) -> float:
+def frame_rate(given: float | None, found: float | None, path: Path | None = None) -> float:
     """Return the frames per second: `given` by the user (--fps), else `found` in the recording, else 25 with a warning.
 
-    given, found: None if unknown. Raises InputError if `given` is not from 0.01 to 1000.
+    given, found: None if unknown. path: the recording; if there is a video beside it, the warning names its rate.
+    Raises InputError if `given` is not from 0.01 to 1000.
     """
     if given is not None:
         low, high = FRAME_RATES
@@ -95,11 +97,41 @@ def frame_rate(given: float | None, found: float | None) -> float:
             raise InputError(place="fps", got=given, expected=expected, remedy="correct --fps")
         return given
     if found is None:
+        video = None if path is None else _video_beside(path)
         # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
+        if video is not None and video[1] != DEFAULT_FPS:
+            text = f"{path}: without a frame rate; taken at {DEFAULT_FPS:g} fps, but {video[0].name} beside it has "
+            text += f"{video[1]:g}: give --fps {video[1]:g}"
         warnings.warn(text, stacklevel=3)
         return DEFAULT_FPS
     return found
+
+
+def _is_video(path: Path) -> bool:
+    from sim.io.formats import video
+
+    return path.suffix.lower() in video.SUFFIXES and not is_hidden(path) and path.is_file()
+
+
+def _video_beside(path: Path) -> tuple[Path, float] | None:
+    """Return the video beside a text or folder that has its name, else the only one there, and its frames per second.
+
+    None if there is none, or its rate cannot be told.
+    """
+    from sim.io.formats import video
+
+    around = [path.parent, path] if path.is_dir() else [path.parent]
+    found = [p for folder in around for p in sorted(folder.iterdir()) if _is_video(p)]
+    own = [p for p in found if p.stem == path.stem or p.parent == path] or (found if not path.is_dir() else [])
+    if len(own) != 1:
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return own[0], float(f"{video.open_video(own[0]).fps:.5g}")
+    except InputError:
+        return None
 
 
 def open_folder(
@@ -133,7 +165,7 @@ def open_folder(
     """
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
-    rate = frame_rate(fps, info.fps)
+    rate = frame_rate(fps, info.fps, path)
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found = mot_text.read_detections(det, info.length, person_class, box_scale) if is_present(det) else None
@@ -248,7 +280,7 @@ def open_text(
     Raises InputError if `fps` is not above 0, or if the file is unreadable, invalid or has no row, or a row has neither
     box nor ground position. Reading the truth raises InputError for an id twice in a frame, or an invalid visibility.
     """
-    rate = frame_rate(fps, None)
+    rate = frame_rate(fps, None, path)
     scale = float("nan") if px_per_m is None else px_per_m
     table = read_table(path, boxless=True)
     if not len(table.frame):

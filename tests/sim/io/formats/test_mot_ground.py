@@ -102,5 +102,5 @@ def test_positions_alone_are_in_metres_or_refused(tmp_path, unit, header):
         assert open_source(path, fps=25)[0].truth.pos.max() < 3
         return
     for read in (lambda: open_source(path, fps=25)[0].truth, lambda: read_tracks(path, fps=25)):
-        with pytest.raises(InputError, match="half of the steps faster than 1.*m/s; expected positions"):
+        with pytest.raises(InputError, match=r"half of the steps faster than 1.*m/s; expected positions"):
             read()
