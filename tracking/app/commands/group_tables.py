@@ -29,9 +29,8 @@ def group_row(run: TrackingRun, folder: Path) -> Row:
 
     Keys: sequence, plane, px_per_m (None if unknown), px_per_m_frames, fps, frames; median_speed (m/s, None if
     unknown); people (number of ids), people_in_groups (number of those ever in a group); groups, a list in order of
-    first frames of "id", "members" (all ids ever in it), "size" (most people at a time), "start", "end" (frames, from 1),
-    "seconds" (from the start of the
-    first to the end of the last frame); events, the number of each kind; folder.
+    first frames of "id", "members" (all ids ever in it), "size" (most people at a time), "start", "end" (frames, from
+    1), "seconds" (from the start of the first to the end of the last frame); events, the number of each kind; folder.
     """
     count = [len(t.id) for t in run]
     frame = np.repeat(np.array([t.index for t in run], np.int64), count)
