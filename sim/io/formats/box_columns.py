@@ -30,6 +30,12 @@ STAY = 0.5
 SMOOTH = 0.3
 """Corners: the difference of x2 and x1 varies by less than this part of what x2 does."""
 
+BEYOND = 0.2
+"""Share of boxes beyond the picture, above which they are those of larger pictures."""
+
+MANY, PART = 100, 0.7
+"""So many boxes reach further than this part of both sides of the picture."""
+
 NO_ID = "frame,left,top,width,height,score"
 
 
@@ -92,6 +98,23 @@ def corner_doubt(box: Array) -> str:
         f"all {len(box)} boxes look like x1,y1,x2,y2, but are read as left,top,width,height; "
         "if they are corners, name the columns in the first line: frame,id,x1,y1,x2,y2,…"
     )
+
+
+def size_doubt(box: Array, size: tuple[int, int]) -> str:
+    """Return what speaks for boxes (B, 4) of pictures of another size (width, height) than this; "" for nothing.
+
+    Many boxes then lie beyond the picture, or all of many keep to its upper left part.
+    """
+    if not len(box):
+        return ""
+    beyond = (box[:, :2] >= size).any(axis=1).mean()
+    right, bottom = (box[:, :2] + box[:, 2:]).max(axis=0)
+    words = f"pictures of {size[0]} × {size[1]}; if the boxes are those of pictures of another size, add --box-scale"
+    if beyond > BEYOND:
+        return f"{beyond:.0%} of the boxes lie beyond the {words}"
+    if len(box) >= MANY and right <= PART * size[0] and bottom <= PART * size[1]:
+        return f"all {len(box)} boxes lie in the upper left {right:.0f} × {bottom:.0f} px of the {words}"
+    return ""
 
 
 def parse_box_scale(text: str) -> BoxScale:

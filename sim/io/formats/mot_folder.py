@@ -19,7 +19,7 @@ from scenarios.regular_file import is_present
 from sim.io.files.numeric_text import is_number_text, read_text
 from sim.io.files.side_files import is_hidden
 from sim.io.formats import mot_text
-from sim.io.formats.box_columns import BoxScale
+from sim.io.formats.box_columns import BoxScale, size_doubt
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.mot_table import read_table
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
@@ -183,6 +183,9 @@ def open_folder(
     _refuse_beyond(path, pictures, length)
     seen = pictures.first_size() if images else None
     size = _picture_size(ini, info.image_size, seen)
+    doubt = "" if found is None or found.box is None or size is None else size_doubt(found.box, size)
+    if doubt:
+        warnings.warn(f"{det}: {doubt}", stacklevel=2)
     if background is not None and not pictures.files:
         got, remedy = "--background", "leave it out: it has none"
         raise InputError(file=path, got=got, expected="none for a recording without pictures", remedy=remedy)

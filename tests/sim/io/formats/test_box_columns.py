@@ -1,5 +1,8 @@
 """Texts whose columns 3 to 6 are no left, top, width and height in pixels."""
 
+import re
+import warnings
+
 import numpy as np
 import pytest
 
@@ -98,6 +101,32 @@ def test_labels_are_not_scaled(tmp_path):
     written(tmp_path / "gt", people(), "gt.txt")
     with pytest.raises(InputError, match="none for a recording without det"):
         open_source(tmp_path, fps=10, box_scale="2")
+
+
+@pytest.mark.filterwarnings("always")
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (0.5, "all 160 boxes lie in the upper left 500 × 500 px of the pictures of 1000 × 1000"),
+        (2, "[67].% of the boxes lie beyond the pictures of 1000 × 1000"), (1, ""),
+    ],
+)  # fmt: skip
+def test_boxes_of_pictures_of_another_size(tmp_path, factor, words):
+    """The warning is gone with the right --box-scale."""
+    (tmp_path / "det").mkdir()
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\nseqLength=9\nimWidth=1000\nimHeight=1000\n")
+    spread = np.linspace(0, 950, 160)
+    box = np.c_[spread, np.random.default_rng(1).permutation(spread), np.full((160, 2), 50)]
+    written(tmp_path / "det", np.c_[1 + np.arange(160) % 9, np.full(160, -1), box * factor], "det.txt")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        open_source(tmp_path)
+    assert len(told) == bool(words)
+    assert re.search(words, str(told[0].message) if told else "")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        open_source(tmp_path, box_scale=str(1 / factor))
+    assert not told
 
 
 @pytest.mark.filterwarnings("always")
