@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Literal
 
 import numpy as np
 
@@ -49,6 +50,9 @@ SQUARES = (1, 320, 416, 512, 608, 640, 768, 800, 960, 1024, 1280)
 
 SIDE = 3.0
 """Side in m of the square that stands for a position."""
+
+Given = Literal["text", "run", "arrays"]
+"""What the tracks are: a text of another program, arrays, or a run of ours, whose detections were read wrongly."""
 
 Order = Callable[[Array], Array]
 
@@ -140,13 +144,12 @@ class Reading:
 
 
 def likely_misreading(
-    truth: Truth, tracks: SequenceOf[Tracks], *, size: tuple[int, int] | None = None, own: bool = False
+    truth: Truth, tracks: SequenceOf[Tracks], *, size: tuple[int, int] | None = None, given: Given = "text"
 ) -> str:
     """Returns a warning if hardly any tracked person matches a label though both sides have people, else "".
 
-    size: width and height of the pictures in px, None if unknown. own: the tracks are a run of ours, so that the input
-    of `flockscope track` must be read otherwise. Returns "" for trackers of groups, and if the two sides have neither
-    boxes nor positions on the ground in common.
+    size: width and height of the pictures in px, None if unknown. given: what the tracks are, for the remedy. Returns ""
+    for trackers of groups, and if the two sides have neither boxes nor positions on the ground in common.
     """
     sides = _comparable(truth, tracks)
     if sides is None:
@@ -171,7 +174,7 @@ def likely_misreading(
     if not len(together):
         words = f"no frame in common: labels in frames {_span(true)}, tracks in frames {_span(est)}"
     if best is not None:
-        return f"{words}; {_words(best)}, {best.share:.0%} would. {_remedy(best, usual, size, own)}"
+        return f"{words}; {_words(best)}, {best.share:.0%} would. {_remedy(best, usual, size, given)}"
     tried = " No other columns, scale or shift of frames match better." if len(together) else ""
     return f"{words}.{tried} Check that these are tracks of this very sequence"
 
@@ -317,11 +320,13 @@ def _words(best: Reading) -> str:
     return f"{'with labels ' if best.labels else ''}{' and '.join(parts)}"
 
 
-def _remedy(best: Reading, usual: Reading, size: tuple[int, int] | None, own: bool) -> str:
+def _remedy(best: Reading, usual: Reading, size: tuple[int, int] | None, given: Given) -> str:
     """Returns what the user can do, as a sentence without a full stop."""
     if best.frames and best.frames != "id":
         return "Number the frames of both alike"
-    text = "the labels" if best.labels else "the text that was tracked" if own else "the tracks"
+    if given == "arrays":
+        return f"Give {'x,y in m' if usual.columns == 'x,y' else 'left, top, width, height in px'}, as of the truth"
+    text = "the labels" if best.labels else "the text that was tracked" if given == "run" else "the tracks"
     points, parts = usual.columns == "x,y", []
     unit = UNITS.get(best.scale[0]) if points else None
     columns = best.columns if unit is None else ",".join(f"{axis}_{unit}" for axis in best.columns.split(","))
@@ -331,9 +336,8 @@ def _remedy(best: Reading, usual: Reading, size: tuple[int, int] | None, own: bo
     if best.scale != (1.0, 1.0) and points and unit is None:
         parts.append(f"give the positions of {text} in m")
     elif best.scale != (1.0, 1.0) and not points:
-        parts.append(
-            f"add --box-scale {_factor(best.scale)}{' to `flockscope track`' if own else ''}{_made(best, size)}"
-        )
+        command = " to `flockscope track`" if given == "run" else ""
+        parts.append(f"add --box-scale {_factor(best.scale)}{command}{_made(best, size)}")
     words = " and ".join(parts)
     return words[0].upper() + words[1:]
 

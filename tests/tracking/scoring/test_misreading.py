@@ -5,6 +5,7 @@ import pytest
 
 from sim.types import Tracks, Truth
 from tracking.app.cli import run
+from tracking.scoring import score_arrays
 from tracking.scoring.misreading import BOX_ORDERS, likely_misreading
 
 SIZE = (1920, 1080)
@@ -125,7 +126,7 @@ def test_labels_in_corners():
 
 def test_runs_of_ours_are_tracked_again():
     rows = walk()
-    text = likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:] / 2), own=True)
+    text = likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:] / 2), given="run")
     assert "--box-scale 2 to `flockscope track`" in text
 
 
@@ -254,7 +255,15 @@ def test_the_scale_of_detections(tmp_path, capsys):
     assert json.loads((tmp_path / "b" / "run.json").read_text())["box_scale"] == [2, 2]
     high, told = score(capsys, folder, tmp_path / "b")
     assert high > 0.8
-    assert told == ""
+    assert "match labels" not in told
     capsys.readouterr()
     assert run(["score", str(folder), str(tmp_path / "b"), "--box-scale", "2"]) == 2
     assert "--box-scale: got runs of `flockscope track`" in capsys.readouterr().err
+
+
+def test_arrays():
+    rows = walk()
+    truth, found = ({"frame": rows[:, 0].astype(int), "id": rows[:, 1].astype(int), "box": b} for b in (
+        rows[:, 2:], corners(rows[:, 2:])))  # fmt: skip
+    with pytest.warns(UserWarning, match="read as x1,y1,x2,y2, 100% would. Give left, top, width, height in px"):
+        assert score_arrays(truth, found, fps=25)["HOTA"] < 0.05

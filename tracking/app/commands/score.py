@@ -130,7 +130,7 @@ def _warn_misread(sequence: Sequence, runs: list[TrackingRun]) -> None:
     """Warns about tracks that hardly match any label, with what would."""
     for run in runs:
         if sequence.truth is not None:
-            text = likely_misreading(sequence.truth, run, size=sequence.image_size, own=bool(run.info))
+            text = likely_misreading(sequence.truth, run, size=sequence.image_size, given="run" if run.info else "text")
             if text:
                 warnings.warn(f"{sequence.name}: {text}", stacklevel=2)
 
