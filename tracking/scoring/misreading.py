@@ -148,8 +148,9 @@ def likely_misreading(
 ) -> str:
     """Returns a warning if hardly any tracked person matches a label though both sides have people, else "".
 
-    size: width and height of the pictures in px, None if unknown. given: what the tracks are, for the remedy. Returns ""
-    for trackers of groups, and if the two sides have neither boxes nor positions on the ground in common.
+    size: width and height of the pictures in px, None if unknown. given: what the tracks are, for the remedy. Returns
+    "" for
+    trackers of groups, and if the two sides have neither boxes nor positions on the ground in common.
     """
     sides = _comparable(truth, tracks)
     if sides is None:
