@@ -50,10 +50,13 @@ def people_as_tracks(truth: Truth) -> list[Tracks]:
     """Returns the labelled people of every frame as tracks of persons without groups, one `Tracks` per frame from 1.
 
     The tracks lie on the ground in m, or at box centres in the image in px if the truth has no positions. Ids and boxes
-    are the labelled ones, scores 1. Velocities are nan if the truth has none; covariances are 0. A frame without people
-    has no rows. Fails an assertion if the truth has neither positions nor boxes.
+    are the labelled ones, scores 1. With positions there are no boxes if one is unknown, as of people behind the
+    camera. Velocities are nan if the truth has none; covariances are 0. A frame without people has no rows. Fails an
+    assertion if the truth has neither positions nor boxes.
     """
     plane: Plane = "image" if truth.pos is None else "ground"
+    if truth.pos is not None and truth.box is not None and not np.isfinite(truth.box).all():
+        truth = truth.replace(box=None)
     return [_tracks(truth.at(index), plane) for index in range(1, truth.length + 1)]
 
 
