@@ -39,7 +39,7 @@ def required(px_per_m: float) -> float:
         place="context.px_per_m",
         got=f"{px_per_m:g}",
         expected="px per m at people, above 0, to track in the image",
-        remedy="give --px-per-m, for instance the median height of boxes / 1.7 m, or a camera",
+        remedy="give --px-per-m: the height in px of a person in the picture / 1.7 m",
     )
 
 

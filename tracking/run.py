@@ -22,6 +22,7 @@ from tracking.grouping.grouping_choice import Grouping, default_grouping, groupi
 from tracking.prepare import Params, prepare
 from tracking.run_info import Speed, known_people_info, run_info
 from tracking.time_limit import TimeLimited
+from tracking.weak_detections import weak_detections
 
 if TYPE_CHECKING:
     from tracking.grouping.pair_probabilities import PairProbabilities
@@ -90,8 +91,9 @@ def track(
     perfect. seed: for the tracker's and the sensor's random numbers. grouping: "belief", "rule", a TOML file of
     either, or the grouping itself, for a tracker that names no groups; None: the belief. If the tracker names groups,
     it has no effect, with a UserWarning. Another one says that the tracker's velocities are too far from its motion to
-    derive groups. If the tracker's first answer with people names no groups, later ones are replaced by derived ones,
-    with a UserWarning. progress: called with each frame's number, from 1, when the frame is done.
+    derive groups, or that most detections score too low to start a track. If the tracker's first answer with people
+    names no groups, later ones are replaced by derived ones, with a UserWarning. progress: called with each frame's
+    number, from 1, when the frame is done.
 
     Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit; later for a
     frame whose detections are not finite or whose picture cannot be read; after the last frame if tracks in the image
@@ -104,6 +106,9 @@ def track(
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
+    weak = weak_detections(prepared)
+    if weak is not None:
+        warnings.warn(weak, UserWarning, stacklevel=2)
     prepared.reset(seed)
     reported, spent, begun = [], 0.0, time.perf_counter()
     for frame in prepared.frames():

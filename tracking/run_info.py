@@ -49,7 +49,8 @@ def run_info(
     plane (of the first tracks, None without); boxes ("measured", "projected" or "none"); fps; px_per_m;
     px_per_m_frames (number of first frames whose boxes gave the scale, 0 for none); background (text on the sample,
     None without); causal (True if there is a frame from which on no later frame is used); causal_from (the first such
-    frame, from 1, or None); frames (number); frames_per_second (the tracker's steps alone);
+    frame, from 1, or None); frames (number); frames_per_second (the tracker's steps alone); box_scale
+    (factors of x and y of the boxes, lacking without);
     whole_frames_per_second (with reading); versions (of packages, by name); diagnostics (what the tracker tells of
     itself after the last frame, its attribute of this name; lacking if it has none).
     """
@@ -105,6 +106,7 @@ def _facts(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, be
         "causal": begins is not None,
         "causal_from": begins,
         "frames": len(tracks),
+        **({"box_scale": list(sequence.source["box_scale"])} if "box_scale" in sequence.source else {}),
         "versions": _versions(),
     }
 

@@ -159,7 +159,8 @@ def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None)
         return np.asarray(np.stack([centre[:, 0], -centre[:, 1]], axis=1) / truth.px_per_m)
     raise InputError(
         file=source.source.get("path", source.name), got="labels in the image alone",
-        expected="places on the ground", remedy="give its calibration: --calibration FILE",
+        expected="places on the ground",
+        remedy="give its calibration with --calibration FILE; without one it cannot be replayed",
     )  # fmt: skip
 
 

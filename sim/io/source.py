@@ -17,6 +17,7 @@ from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.regular_file import is_present, require_regular
 from sim.io.files.side_files import is_hidden
 from sim.io.formats import biwi, caviar, mot_folder, video
+from sim.io.formats.box_columns import BoxScale, parse_box_scale
 from sim.io.formats.calibration import read_calibration
 from sim.io.pictures.background_sample import BackgroundChoice, parse_choice
 from sim.io.store import sequence_folder
@@ -37,6 +38,7 @@ def open_source(
     images: bool = True,
     background: str | None = None,
     person_class: int | None = None,
+    box_scale: str | None = None,
 ) -> list[Sequence]:
     """Return the Sequences at a path: those of a folder sorted by path, subfolders before files; one for a single
     recording.
@@ -47,7 +49,8 @@ def open_source(
     a recording lacks or states; None: as the recording states, else unknown. images False leaves out the pictures of
     MOTChallenge folders; other formats ignore it. background: frames for background models, "first:N" or "spread:N";
     None: spread:50, or the stored empty frames of a generated sequence. person_class: class of people in MOTChallenge
-    texts that have classes; None: 1, with a warning about others.
+    texts that have classes; None: 1, with a warning about others. box_scale: factor of the boxes of a MOTChallenge text
+    or det/det.txt, "X" or "X,Y", if they are not in pixels of the pictures; None: 1.
 
     Raises InputError if the path does not exist or holds no known format, a file is invalid, or an option is wrong or
     has no effect on the format. Generated sequences reject fps, px_per_m and camera. Warns about recordings without a
@@ -61,8 +64,9 @@ def open_source(
     if isinstance(camera, str | Path):
         camera = read_calibration(Path(camera))
     options = RecordingOptions(
-        fps, px_per_m, camera, images, None if background is None else parse_choice(background), person_class
-    )
+        fps, px_per_m, camera, images, None if background is None else parse_choice(background), person_class,
+        None if box_scale is None else parse_box_scale(box_scale),
+    )  # fmt: skip
     if not os.path.exists(path):
         raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
     if not os.path.isdir(path):
@@ -134,7 +138,7 @@ class RecordingOptions:
 
     fps: frames per second. px_per_m: image scale. camera: its calibration. images: False leaves out the pictures of
     MOTChallenge folders, True is the default. background: which frames are the sample for background models.
-    person_class: the class of people in MOTChallenge texts.
+    person_class: the class of people in MOTChallenge texts. box_scale: factors of x and y of the boxes of these.
     """
 
     fps: float | None
@@ -143,6 +147,7 @@ class RecordingOptions:
     images: bool
     background: BackgroundChoice | None
     person_class: int | None = None
+    box_scale: BoxScale | None = None
 
     def reject(self, path: Path, kind: str, why: str, *names: str) -> None:
         """Raise InputError if any of the options `names` (fields of this class but `images`) is given, else do nothing.
@@ -168,18 +173,21 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
             "camera",
             "background",
             "person_class",
+            "box_scale",
         )
         return caviar.open_file(path, fps=o.fps, px_per_m=o.px_per_m)
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, o)
     if suffix in video.SUFFIXES:
-        o.reject(path, "a video", "it has no classes", "person_class")
+        o.reject(path, "a video", "it has no text", "person_class", "box_scale")
         return video.open_video(
             path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, background=o.background or video.ANY
         )
     if suffix in (".txt", ".csv"):
         o.reject(path, "a text", "it has no pictures", "background")
-        return mot_folder.open_text(path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, person_class=o.person_class)
+        return mot_folder.open_text(
+            path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, person_class=o.person_class, box_scale=o.box_scale
+        )
     raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy="check the path")
 
 
@@ -219,7 +227,16 @@ def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
         return _open_file(path, o)
     match _kind(path):
         case "generated":
-            o.reject(path, "a generated sequence", "it knows its own", "fps", "px_per_m", "camera", "person_class")
+            o.reject(
+                path,
+                "a generated sequence",
+                "it knows its own",
+                "fps",
+                "px_per_m",
+                "camera",
+                "person_class",
+                "box_scale",
+            )
             return sequence_folder.open_sequence(path, background=o.background)
         case "biwi":
             o.reject(
@@ -230,10 +247,11 @@ def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
                 "camera",
                 "background",
                 "person_class",
+                "box_scale",
             )
             return biwi.open_folder(path, fps=o.fps)
         case _:
             return mot_folder.open_folder(
                 path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, images=o.images, background=o.background,
-                person_class=o.person_class,
+                person_class=o.person_class, box_scale=o.box_scale,
             )  # fmt: skip

@@ -362,3 +362,26 @@ def test_groups_named_from_the_first_frame_are_kept(recwarn):
 
 def test_events_of_declared_kinds_are_not_derived():
     assert [(e.kind, e.emitted) for t in track(NamingDeclared, standing(90)) for e in t.events] == [("merge", 60)]
+
+
+def scored(score):
+    """The source with detections of this score."""
+
+    def weak():
+        for frame in frames():
+            yield frame.replace(detections=frame.detections.replace(score=np.full(2, score)))
+
+    return Sequence("made", FPS, LENGTH, weak, has_detections=True, image_size=(1000, 600))
+
+
+def test_detections_that_start_no_track() -> None:
+    with pytest.warns(UserWarning, match="60 of 60 detections score below score_start = 0.5") as told:
+        assert not any(len(t.id) for t in track("blob", scored(0.2)))
+    assert "--set score_start=0.2" in str(told[0].message)
+    assert any(len(t.id) for t in track("blob", scored(0.2), params={"score_start": 0.2}))
+
+
+@pytest.mark.parametrize("tracker", ["blob", "group-pda"])
+def test_detections_that_start_tracks(tracker) -> None:
+    """Also of a tracker that does not use scores."""
+    track(tracker, scored(0.2 if tracker == "group-pda" else 0.5))

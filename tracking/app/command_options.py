@@ -14,6 +14,7 @@ import typer
 
 from tracking.app.shared_options import (
     Background,
+    BoxFactor,
     Calibration,
     Cluster,
     Detections,
@@ -85,7 +86,7 @@ class TrackOptions:
     numbers. fps: frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file;
     None if not given. background: "first:N" or "spread:N", the frames that a background model is trained on; None if
     not given. step_timeout: seconds that each reset and step of the tracker may take; None: no limit.
-    person_class: class of people in MOT texts; None: 1.
+    person_class: class of people in MOT texts; None: 1. box_scale: factor of the boxes in MOT texts; None: 1.
     """
 
     tracker: Tracker
@@ -103,6 +104,7 @@ class TrackOptions:
     background: Background = None
     step_timeout: StepTimeout = None
     person_class: PersonClass = None
+    box_scale: BoxFactor = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +114,7 @@ class GroupOptions:
     source: path of labelled people, a text with ids, or stored tracks. out: folder to write. grouping: file of the
     parameters that decide who belongs together; None: the defaults. probabilities: store those of all pairs. fps:
     frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration; None if not given.
-    person_class: class of people in MOT texts; None: 1.
+    person_class: class of people in MOT texts; None: 1. box_scale: factor of the boxes in MOT texts; None: 1.
     """
 
     source: People
@@ -123,6 +125,7 @@ class GroupOptions:
     px_per_m: Scale = None
     camera: Calibration = None
     person_class: PersonClass = None
+    box_scale: BoxFactor = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +136,7 @@ class ScoreOptions:
     have. group_match: how groups are compared, by "hull" or "members". against: other tracks whose scores are
     subtracted; None: none. blocks: number of draws of blocks of frames for the intervals of a single recording; 0: no
     such intervals. fps: frames per second; None: the recording's own. px_per_m: pixels per metre; None if not given.
-    person_class: class of people in MOT texts; None: 1.
+    person_class: class of people in MOT texts; None: 1. box_scale: factor of the boxes in MOT texts; None: 1.
     """
 
     truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")]
@@ -157,6 +160,7 @@ class ScoreOptions:
     fps: Fps = None
     px_per_m: Scale = None
     person_class: PersonClass = None
+    box_scale: BoxFactor = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,6 +35,14 @@ PersonClass = Annotated[
     int | None,
     typer.Option("--class", min=0, metavar="N", help="Class of people (column 8) in MOT texts. Default: 1."),
 ]
+BoxFactor = Annotated[
+    str | None,
+    typer.Option(
+        "--box-scale",
+        metavar="X|X,Y",
+        help="Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.",
+    ),
+]
 Calibration = Annotated[
     Path | None,
     typer.Option("--camera", metavar="FILE", help="Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair."),

@@ -9,6 +9,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim.io.files.side_files import is_hidden
+from sim.io.formats.box_columns import BoxScale
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
@@ -46,8 +47,10 @@ class StoredTracks:
         if folder is not None:
             check_run(folder)
 
-    def read(self, sequence: Sequence) -> TrackingRun:
+    def read(self, sequence: Sequence, box_scale: BoxScale | None = None) -> TrackingRun:
         """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`.
+
+        box_scale: factors of x and y of the boxes of a text of another program; None: 1. It has no effect on a run.
 
         Whether a run is whole is left to `check`. Raises InputError if run.json states another frame rate or other
         labels than the sequence's, or there are no tracks. Also if a MOTChallenge text has a frame beyond the
@@ -57,7 +60,8 @@ class StoredTracks:
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             raise InputError(
                 file=seal, place="fps", got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",
-                remedy=f"read the sequence with --fps {fps:g}, as `track` did",
+                remedy=f"track it again with --fps {sequence.fps:g}, or, if {fps:g} is the true rate, read the "
+                f"sequence with --fps {fps:g}, as `track` did",
             )  # fmt: skip
         tracked = self.info.get("truth_hash")
         if tracked is not None and tracked_hash(sequence) not in (None, tracked):
@@ -67,8 +71,9 @@ class StoredTracks:
                 remedy=f"{AGAIN}: its labels, scenario or settings are others",
             )  # fmt: skip
         tracks = read_checked_tracks(
-            self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class")
-        )
+            self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class"),
+            box_scale=box_scale,
+        )  # fmt: skip
         return TrackingRun(tuple(tracks), self.info)
 
 
@@ -123,7 +128,7 @@ def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[
         matched = [(sequences[0], stored[0])]
     else:
         by_name = _by_name(stored)
-        matched = [(sequence, _named(sequence.name, by_name, stored)) for sequence in sequences]
+        matched = [(sequence, _named(sequence, by_name, stored)) for sequence in sequences]
     for _, each in matched:
         each.check()
     _refuse_mixture([each for _, each in matched])
@@ -144,18 +149,25 @@ def _by_name(stored: list[StoredTracks]) -> dict[str, StoredTracks]:
     return found
 
 
-def _named(name: str, by_name: dict[str, StoredTracks], stored: list[StoredTracks]) -> StoredTracks:
-    """Returns the tracks of the sequence `name`. Raises InputError if there are none; of an unfinished run among
-    `stored`, which cannot tell what it tracked, that it is unfinished."""
-    if name in by_name:
-        return by_name[name]
+def _named(sequence: Sequence, by_name: dict[str, StoredTracks], stored: list[StoredTracks]) -> StoredTracks:
+    """Returns the tracks of the sequence. Raises InputError if there are none; of an unfinished run among
+    `stored`, which cannot tell what it tracked, that it is unfinished.
+
+    If tracks have the name of the sequence's folder, the error names the seqinfo.ini that calls it otherwise.
+    """
+    if sequence.name in by_name:
+        return by_name[sequence.name]
     for each in stored:
         if not each.info:
             each.check()
+    folder, remedy = Path(sequence.source.get("path", "")), "track it first, or give the right folder"
+    if folder.name in by_name and (folder / "seqinfo.ini").is_file():
+        remedy = (
+            f"name={sequence.name} in {folder / 'seqinfo.ini'} is another than its folder's, {folder.name}: correct it"
+        )
     raise InputError(
         file=stored[0].path.parent if len(stored) > 1 else stored[0].path,
-        got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {name}",
-        remedy="track it first, or give the right folder",
+        got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {sequence.name}", remedy=remedy,
     )  # fmt: skip
 
 

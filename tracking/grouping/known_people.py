@@ -32,7 +32,9 @@ def known_people(sequence: Sequence) -> list[Tracks]:
             file=file, got="no people with ids", expected="labelled people, or tracks",
             remedy="track the people first (flockscope track), or give each row an id",
         )  # fmt: skip
+    remedy = "complete the row, or leave it out"
     if truth.pos is None and sequence.camera is not None:
+        remedy = "its box stands at or above the camera's horizon: correct the calibration, or leave --camera out"
         truth = truth.replace(pos=on_ground(truth, sequence))
     elif sequence.source.get("kind") in LOOK_AHEAD:
         truth = truth.replace(vel=None)
@@ -40,8 +42,9 @@ def known_people(sequence: Sequence) -> list[Tracks]:
     if unknown.any():
         row = int(np.argmax(unknown))
         raise InputError(
-            file=file, place=f"frame {truth.frame[row]}, id {truth.id[row]}", got="no position on the ground",
-            expected="one of every person, or of nobody", remedy="complete the row, or leave it out",
+            file=file, place=f"frame {truth.frame[row]}, id {truth.id[row]}",
+            got=f"no position on the ground, as in {unknown.sum()} of {len(unknown)} rows",
+            expected="one of every person, or of nobody", remedy=remedy,
         )  # fmt: skip
     return people_as_tracks(truth)
 
@@ -50,10 +53,13 @@ def people_as_tracks(truth: Truth) -> list[Tracks]:
     """Returns the labelled people of every frame as tracks of persons without groups, one `Tracks` per frame from 1.
 
     The tracks lie on the ground in m, or at box centres in the image in px if the truth has no positions. Ids and boxes
-    are the labelled ones, scores 1. Velocities are nan if the truth has none; covariances are 0. A frame without people
-    has no rows. Fails an assertion if the truth has neither positions nor boxes.
+    are the labelled ones, scores 1. With positions there are no boxes if one is unknown, as of people behind the
+    camera. Velocities are nan if the truth has none; covariances are 0. A frame without people has no rows. Fails an
+    assertion if the truth has neither positions nor boxes.
     """
     plane: Plane = "image" if truth.pos is None else "ground"
+    if truth.pos is not None and truth.box is not None and not np.isfinite(truth.box).all():
+        truth = truth.replace(box=None)
     return [_tracks(truth.at(index), plane) for index in range(1, truth.length + 1)]
 
 

@@ -34,12 +34,23 @@ def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float
         )
     if not present:
         return
-    frame = np.repeat([t.index for t in present], [len(t.id) for t in present])
-    id, pos = np.concatenate([t.id for t in present]), np.concatenate([t.pos[:, :2] for t in present])
     in_image = present[0].plane == "image"
     scale = px_per_m if in_image else 1.0
-    speed = np.hypot(*chords(frame, id, pos, fps).T) / scale
-    median = float(np.median(speed[np.isfinite(speed)])) if np.isfinite(speed).any() else 0.0
+    median = median_speed(people, fps, scale)
     if median > FAST:
         unit = "that positions are in metres" if not in_image else f"--px-per-m, here {scale:.4g}"
         yield f"{name}: half of the people are faster than {median:.3g} m/s. Check --fps, here {fps:g}, and {unit}"
+
+
+def median_speed(people: Sequence[Tracks], fps: float, px_per_m: float) -> float:
+    """Return the median speed of the motion over the last 0.5 s, m/s; nan if nobody moves for so long.
+
+    people, fps, px_per_m: as of `implausible`.
+    """
+    present = [t for t in people if len(t.id)]
+    if not present:
+        return math.nan
+    frame = np.repeat([t.index for t in present], [len(t.id) for t in present])
+    id, pos = np.concatenate([t.id for t in present]), np.concatenate([t.pos[:, :2] for t in present])
+    speed = np.hypot(*chords(frame, id, pos, fps).T) / (px_per_m if present[0].plane == "image" else 1.0)
+    return float(np.median(speed[np.isfinite(speed)])) if np.isfinite(speed).any() else math.nan

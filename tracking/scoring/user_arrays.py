@@ -6,6 +6,7 @@ those.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -18,6 +19,7 @@ from sim.types import Bools, Groups, Ints, Plane, Tracks, Truth
 from tracking.grouping.grouped_tracks import derive
 from tracking.scoring.evaluation import Scores, evaluate
 from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.misreading import likely_misreading
 from tracking.scoring.people_comparison import Similarity
 
 COLUMNS = {"frame": (), "id": (), "pos": (2,), "box": (4,), "group": ()}  # name: shape of one row
@@ -49,7 +51,8 @@ def score_arrays(
 
     Without a group column in the truth only people are scored. Without one in the tracks they get groups by the
     default grouping. Events of both sides (merges, splits, crossings, queues …) are derived from groups and positions.
-    A score that cannot be computed is nan.
+    A score that cannot be computed is nan. Warns if hardly any tracked person
+    matches a true one (tracking.scoring.misreading).
 
     fps: frames per second. px_per_m: pixels per metre, for boxes only; None takes the median height of the true boxes
     for 1.7 m. similarity: compares people by "boxes", "ground" or "image"; None: by boxes if both have them, else by
@@ -75,6 +78,9 @@ def score_arrays(
     length = max((int(table["frame"][-1]) for table in filled), default=0)
     scale = _scale(true["box"]) if px_per_m is None else px_per_m
     made, tracks_of_frames = _truth(true, length, fps, scale, plane), _tracks(est, length, fps, scale, plane)
+    doubt = likely_misreading(made, tracks_of_frames, given="arrays")
+    if doubt:
+        warnings.warn(doubt, stacklevel=2)
     return evaluate(made, tracks_of_frames, similarity=similarity, group_match=group_match)
 
 

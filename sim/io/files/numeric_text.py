@@ -27,22 +27,27 @@ class NumericTable:
     """The N rows of a numeric text file with C columns.
 
     file: its path, for errors. values (N, C): the numbers, float64. line (N,): line number of each row in the file,
-    from 1.
+    from 1. layout: what the columns must be, for the remedy of errors that most rows have.
     """
 
     file: Path
     values: Array
     line: Ints
+    layout: str = ""
 
-    def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str) -> None:
+    def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str, most: str | None = None) -> None:
         """Raise InputError about the first row where `wrong` is True; do nothing if there is none.
 
         wrong: flags (N,), one per row; a single True means the first row. expected, remedy: texts of the error: what
-        should be there, and what to do. The error also names the file, the row's line and its numbers.
+        should be there, and what to do. most: the remedy if most rows are wrong, which is no fault of the lines; None:
+        to check the columns. The error also names the file, the row's line and its numbers.
         """
         if np.any(wrong):
-            k = int(np.argmax(wrong))
+            k, count, total = int(np.argmax(wrong)), int(np.sum(wrong)), len(self.values)
             got = ",".join(f"{v:g}" for v in self.values[k])
+            if total > 1 and 2 * count > total:
+                got += f" (like {count} of {total} lines)"
+                remedy = most or f"check the columns, which are {self.layout or 'the same in each line'}"
             raise InputError(file=self.file, place=f"line {self.line[k]}", got=got, expected=expected, remedy=remedy)
 
     def integers(self, column: int, name: str) -> Ints:
@@ -90,13 +95,13 @@ def whole_number(text: str) -> int:
 
 
 def read_numbers(
-    path: Path, columns: tuple[int, int], also: int | None = None, *, header: bool = False
+    path: Path, columns: tuple[int, int], also: int | None = None, *, header: bool = False, layout: str = ""
 ) -> NumericTable:
     """Read all non-empty lines of a text file as rows of numbers, separated by commas if the first has one, else by
     blanks.
 
     columns: (least, greatest) number of columns. also: another number that is allowed; None: none. header: True
-    skips the first line. A file without lines
+    skips the first line. layout: of the table, for errors. A file without lines
     gives a table of shape (0, columns[0]). Comments and headers are not allowed.
 
     Raises InputError if the file is unreadable or not UTF-8. Raises InputError with the line if a cell is not a finite
@@ -104,7 +109,7 @@ def read_numbers(
     """
     numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()][header:]
     if not numbered:
-        return NumericTable(path, np.zeros((0, columns[0])), np.zeros(0, np.int64))
+        return NumericTable(path, np.zeros((0, columns[0])), np.zeros(0, np.int64), layout)
     lines = np.array([k for k, _ in numbered], np.int64)
     separator = "," if "," in numbered[0][1] else None
     try:
@@ -112,11 +117,12 @@ def read_numbers(
         values = np.loadtxt(text, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
     except ValueError:
         raise _first_bad_line(path, numbered, separator) from None
-    rows = NumericTable(path, values, lines)
+    rows = NumericTable(path, values, lines, layout)
     low, high = columns
     if not low <= values.shape[1] <= high and values.shape[1] != also:
         span = (str(low) if low == high else f"{low} to {high}") + ("" if also is None else f" or {also}")
-        rows.reject(np.ones(len(lines), bool), f"{span} columns", NAME_THEM)
+        remedy = layout and f"the columns are {layout}"
+        rows.reject(np.ones(len(lines), bool), f"{span} columns", remedy, remedy)
     rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", "remove or correct the line")
     return rows
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +115,7 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     20,000,000 frames times people.
     """
     path = folder / "obsmat.txt"
-    rows = read_numbers(path, (8, 8))
+    rows = read_numbers(path, (8, 8), layout="frame id x z y vx vz vy")
     if not len(rows.line):
         raise InputError(file=path, got="no line", expected="people: frame id x z y vx vz vy", remedy="restore it")
     raw, id = rows.integers(0, "frame"), rows.integers(1, "id")
@@ -127,7 +128,7 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     expected = "each id once in a frame, also where two frames are nearer than a step"
     rows.reject(repeated_ids(frame, id), expected, CORRECT)
     order = np.lexsort((id, frame))
-    return NumericTable(rows.file, rows.values[order], rows.line[order]), frame[order], id[order]
+    return replace(rows, values=rows.values[order], line=rows.line[order]), frame[order], id[order]
 
 
 def read_truth(folder: Path, fps: float = FPS) -> Truth:

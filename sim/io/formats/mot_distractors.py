@@ -21,6 +21,9 @@ MOT20 = "MOT20"
 
 MOT20_DISTRACTORS = (*DISTRACTORS, 6)
 
+LABEL_COLUMNS = 3
+"""Columns after the box in labels of MOTChallenge: flag, class, visibility. More columns have other classes."""
+
 CLASSES = range(1, 14)
 """Classes of MOTChallenge. A text with another class has classes of its own, and no distractors."""
 
@@ -32,7 +35,12 @@ def unscored_rows(table: MotTable, people: Bools, name: str, person_class: int |
     None if none; classes in which a person is not 1 are not those of MOTChallenge and have no distractors.
     """
     found = classes_of(table, person_class is not None)
-    if found is None or person_class not in (None, PEDESTRIAN) or not np.isin(found, CLASSES).all():
+    if (
+        found is None
+        or table.rest.shape[1] > LABEL_COLUMNS
+        or person_class not in (None, PEDESTRIAN)
+        or not np.isin(found, CLASSES).all()
+    ):
         return None
     mot20 = any(each.startswith(MOT20) for each in (name, table.rows.file.resolve().parent.parent.name))
     distractor = np.isin(found, MOT20_DISTRACTORS if mot20 else DISTRACTORS)

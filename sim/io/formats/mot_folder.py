@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,9 @@ from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, i
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.regular_file import is_present
 from sim.io.files.numeric_text import is_number_text, read_text
+from sim.io.files.side_files import is_hidden
 from sim.io.formats import mot_text
+from sim.io.formats.box_columns import BoxScale, size_doubt
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.mot_table import read_table
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
@@ -81,10 +84,11 @@ def read_seqinfo(path: Path) -> SeqInfo:
     )
 
 
-def frame_rate(given: float | None, found: float | None) -> float:
+def frame_rate(given: float | None, found: float | None, path: Path | None = None) -> float:
     """Return the frames per second: `given` by the user (--fps), else `found` in the recording, else 25 with a warning.
 
-    given, found: None if unknown. Raises InputError if `given` is not from 0.01 to 1000.
+    given, found: None if unknown. path: the recording; if there is a video beside it, the warning names its rate.
+    Raises InputError if `given` is not from 0.01 to 1000.
     """
     if given is not None:
         low, high = FRAME_RATES
@@ -93,11 +97,41 @@ def frame_rate(given: float | None, found: float | None) -> float:
             raise InputError(place="fps", got=given, expected=expected, remedy="correct --fps")
         return given
     if found is None:
+        video = None if path is None else _video_beside(path)
         # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
+        if video is not None and video[1] != DEFAULT_FPS:
+            text = f"{path}: without a frame rate; taken at {DEFAULT_FPS:g} fps, but {video[0].name} beside it has "
+            text += f"{video[1]:g}: give --fps {video[1]:g}"
         warnings.warn(text, stacklevel=3)
         return DEFAULT_FPS
     return found
+
+
+def _is_video(path: Path) -> bool:
+    from sim.io.formats import video
+
+    return path.suffix.lower() in video.SUFFIXES and not is_hidden(path) and path.is_file()
+
+
+def _video_beside(path: Path) -> tuple[Path, float] | None:
+    """Return the video beside a text or folder that has its name, else the only one there, and its frames per second.
+
+    None if there is none, or its rate cannot be told.
+    """
+    from sim.io.formats import video
+
+    around = [path.parent, path] if path.is_dir() else [path.parent]
+    found = [p for folder in around for p in sorted(folder.iterdir()) if _is_video(p)]
+    own = [p for p in found if p.stem == path.stem or p.parent == path] or (found if not path.is_dir() else [])
+    if len(own) != 1:
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return own[0], float(f"{video.open_video(own[0]).fps:.5g}")
+    except InputError:
+        return None
 
 
 def open_folder(
@@ -109,6 +143,7 @@ def open_folder(
     images: bool = True,
     background: BackgroundChoice | None = None,
     person_class: int | None = None,
+    box_scale: BoxScale | None = None,
 ) -> Sequence:
     """Return the MOTChallenge folder `path` (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
@@ -118,7 +153,8 @@ def open_folder(
     None: unknown (nan; the truth then takes the boxes' median height / 1.7 m). camera: its calibration, scaled to the
     picture size; None: unknown. images False leaves the pictures out; otherwise they are decoded one by one while
     iterating. A frame without a readable picture has none, with a warning. background: sample of frames for background
-    models; None for 50 frames spread over the recording, fewer if it is shorter. The length is that of seqinfo.ini,
+    models; None for 50 frames spread over the recording, fewer if it is shorter. box_scale: factors of x and y of the
+    boxes of det.txt; None: 1. The length is that of seqinfo.ini,
     else the last frame of gt.txt, det.txt and the pictures.
 
     Raises InputError if seqinfo.ini, det.txt or an option is invalid, two pictures are the same frame, nothing tells
@@ -129,10 +165,15 @@ def open_folder(
     """
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
-    rate = frame_rate(fps, info.fps)
+    rate = frame_rate(fps, info.fps, path)
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    found = mot_text.read_detections(det, info.length, person_class) if is_present(det) else None
+    found = mot_text.read_detections(det, info.length, person_class, box_scale) if is_present(det) else None
+    if box_scale is not None and found is None:
+        remedy = "leave it out: labels are not scaled"
+        raise InputError(
+            file=path, got="--box-scale", expected="none for a recording without det/det.txt", remedy=remedy
+        )
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)
@@ -142,6 +183,9 @@ def open_folder(
     _refuse_beyond(path, pictures, length)
     seen = pictures.first_size() if images else None
     size = _picture_size(ini, info.image_size, seen)
+    doubt = "" if found is None or found.box is None or size is None else size_doubt(found.box, size)
+    if doubt:
+        warnings.warn(f"{det}: {doubt}", stacklevel=2)
     if background is not None and not pictures.files:
         got, remedy = "--background", "leave it out: it has none"
         raise InputError(file=path, got=got, expected="none for a recording without pictures", remedy=remedy)
@@ -174,7 +218,7 @@ def open_folder(
         px_per_m=scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **_class_named(person_class), **shown},
+        source={"kind": "mot", "path": str(path), **_named(person_class, box_scale), **shown},
     )  # fmt: skip
 
 
@@ -226,24 +270,25 @@ def open_text(
     px_per_m: float | None = None,
     camera: Camera | None = None,
     person_class: int | None = None,
+    box_scale: BoxScale | None = None,
 ) -> Sequence:
     """Return the MOT text file `path` as Sequence without pictures: its rows are detections if every id is -1, else
     truth.
 
     fps: frames per second; None: 25 with a warning. px_per_m: image scale; None: unknown (nan; the truth then takes the
     boxes' median height / 1.7 m). camera: calibration, None if unknown; it is not scaled. person_class: the class of
-    people; None: 1, with a warning about rows of others. The length is the last frame
-    in the file; the name is the file's, without suffix.
+    people; None: 1, with a warning about rows of others. box_scale: factors of x and y of the boxes; None: 1. The
+    length is the last frame in the file; the name is the file's, without suffix.
 
     Raises InputError if `fps` is not above 0, or if the file is unreadable, invalid or has no row, or a row has neither
     box nor ground position. Reading the truth raises InputError for an id twice in a frame, or an invalid visibility.
     """
-    rate = frame_rate(fps, None)
+    rate = frame_rate(fps, None, path)
     scale = float("nan") if px_per_m is None else px_per_m
     table = read_table(path, boxless=True)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
-    found = mot_text.read_detections(path, None, person_class)
+    found = mot_text.read_detections(path, None, person_class, box_scale)
     length = int(table.frame.max(initial=0))
     only_detections = bool((table.id == -1).all())
 
@@ -253,13 +298,13 @@ def open_text(
             yield Frame(index, (index - 1) / rate, detections=here)
 
     def truth() -> Truth:
-        return mot_text.read_truth(path, path.stem, rate, length, scale, person_class)
+        return mot_text.read_truth(path, path.stem, rate, length, scale, person_class, box_scale)
 
     return Sequence(
         name=path.stem, fps=rate, length=length, frames=frames,
         load_truth=None if only_detections else truth,
         camera=camera, px_per_m=scale, has_detections=only_detections,
-        source={"kind": "mot text", "path": str(path), **_class_named(person_class)},
+        source={"kind": "mot text", "path": str(path), **_named(person_class, box_scale)},
     )  # fmt: skip
 
 
@@ -273,5 +318,6 @@ def _labelled_frames(path: Path) -> Ints:
     return np.unique(np.concatenate([np.zeros(0, np.int64), *frames]))
 
 
-def _class_named(person_class: int | None) -> dict[str, int]:
-    return {} if person_class is None else {"class": person_class}
+def _named(person_class: int | None, box_scale: BoxScale | None) -> dict[str, Any]:
+    given = {"class": person_class, "box_scale": box_scale}
+    return {key: value for key, value in given.items() if value is not None}

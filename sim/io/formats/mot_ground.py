@@ -9,6 +9,7 @@ import warnings
 
 import numpy as np
 
+from scenarios.errors import InputError
 from scenarios.regular_file import is_present
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable
 from sim.types import Array, Bools, Ints
@@ -29,6 +30,10 @@ VOUCHERS = ("manifest.json", "camera.json", "run.json")
 """Files beside a text, or in the folder above it, that vouch for positions in m."""
 
 
+FAST = 12.0
+"""m/s that nobody keeps up. Half of the steps above it are centimetres, or a wrong frame rate."""
+
+
 def ground_positions(table: MotTable) -> Array | None:
     """Return the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1); None if there are none.
 
@@ -36,22 +41,52 @@ def ground_positions(table: MotTable) -> Array | None:
     all rows have the same whole numbers, or the same position though a frame has several rows. There are also none,
     with a warning that says why, if people cannot move so and no manifest or camera file vouches for metres.
     """
+    known, doubt = _known(table)
+    if doubt:
+        text = f"{table.rows.file}: columns 8 to 10 are not taken as metres: {doubt}; the boxes are used"
+        warnings.warn(text, stacklevel=3)
+    return None if known is None else np.where(known[:, None], table.rest[:, 1:4], np.nan)
+
+
+def has_ground(table: MotTable) -> bool:
+    """Return True if `ground_positions` gives positions, without its warning."""
+    return _known(table)[0] is not None
+
+
+def _known(table: MotTable) -> tuple[Bools | None, str]:
+    """Return which rows (N,) have a position in m, None if there are no positions; and why people cannot move so, ""
+    if that is not the reason."""
     if table.rest.shape[1] < 4:
-        return None
+        return None, ""
     xyz, known = table.rest[:, 1:4], np.asarray(table.rest[:, 3] != -1)
     if not known.any():
-        return None
+        return None, ""
     if table.rows.values.shape[1] != GROUND_COLUMNS and not _vouched(table):
         alone = len(known) == len(np.unique(table.frame))
         same = len(known) > 1 and bool((xyz == xyz[0]).all())
         if same and (not alone or bool((xyz == np.round(xyz)).all())):
-            return None
+            return None, ""
         doubt = _doubt(table, known)
         if doubt:
-            text = f"{table.rows.file}: columns 8 to 10 are not taken as metres: {doubt}; the boxes are used"
-            warnings.warn(text, stacklevel=3)
-            return None
-    return np.where(known[:, None], xyz, np.nan)
+            return None, doubt
+    return known, ""
+
+
+def require_metres(table: MotTable, fps: float) -> None:
+    """Raise InputError if a text of positions alone cannot be in metres at this frame rate (frames/s); else do nothing.
+
+    It cannot if half of at least 10 steps are faster than 12 m/s. Such a text has no boxes that could be used instead.
+    """
+    if table.rows.values.shape[1] != GROUND_COLUMNS or _vouched(table):
+        return
+    first, second = _steps(table.frame, table.id)
+    speed = _pace(table.rest[:, 1:3], table.frame, first, second) * fps
+    if len(speed) >= ENOUGH and np.median(speed) > FAST:
+        raise InputError(
+            file=table.rows.file, place="columns x, y", got=f"half of the steps faster than {np.median(speed):.3g} m/s",
+            expected="positions in m", remedy="if they are in cm or mm, name them x_cm,y_cm or x_mm,y_mm in the first "
+            f"line, as frame,id,x_cm,y_cm; else correct --fps, here {fps:g}",
+        )  # fmt: skip
 
 
 def _vouched(table: MotTable) -> bool:
@@ -71,19 +106,28 @@ def _doubt(table: MotTable, known: Bools) -> str:
     inside = ((xy >= table.box[rows, :2]) & (xy <= table.box[rows, :2] + table.box[rows, 2:])).all(axis=1)
     if len(rows) >= ENOUGH and inside.mean() > 0.5:
         return "most lie inside their own boxes, as pixels do"
-    order = np.lexsort((frame, id))
-    order = order[id[order] >= 0]
-    pairs = np.flatnonzero(np.diff(id[order]) == 0)
-    first, second = order[pairs], order[pairs + 1]
+    first, second = _steps(frame, id)
     if not len(first):
         return ""
-    step, gap = np.hypot(*(xy[second] - xy[first]).T), frame[second] - frame[first]
-    if _stand_while_boxes_move(table.box[rows], id, first, second, step):
+    if _stand_while_boxes_move(table.box[rows], id, first, second, np.hypot(*(xy[second] - xy[first]).T)):
         return "they stay the same while the boxes move"
-    pace = step / np.maximum(gap, 1)
+    pace = _pace(xy, frame, first, second)
     if len(pace) >= ENOUGH and np.quantile(pace, 0.75) > LONGEST:
         return f"a quarter of the steps are longer than {LONGEST:g} m per frame"
     return ""
+
+
+def _steps(frame: Ints, id: Ints) -> tuple[Ints, Ints]:
+    """Return the rows before and after each step of a person with an id from 0, (S,) each."""
+    order = np.lexsort((frame, id))
+    order = order[id[order] >= 0]
+    pairs = np.flatnonzero(np.diff(id[order]) == 0)
+    return order[pairs], order[pairs + 1]
+
+
+def _pace(xy: Array, frame: Ints, first: Ints, second: Ints) -> Array:
+    """Return the length of each step in m per frame, (S,)."""
+    return np.asarray(np.hypot(*(xy[second] - xy[first]).T) / np.maximum(frame[second] - frame[first], 1))
 
 
 def _stand_while_boxes_move(box: Array, id: Ints, first: Ints, second: Ints, step: Array) -> bool:

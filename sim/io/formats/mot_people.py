@@ -7,6 +7,7 @@ import warnings
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.io.formats.mot_ground import has_ground
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable
 from sim.types import Array, Bools
 
@@ -15,6 +16,9 @@ PEDESTRIAN = 1
 
 LABELS = "gt.txt"
 """Name of a text of labels. Its column 7 is a flag; that of another text may be a confidence."""
+
+LAST_CLASS = 100
+"""Greatest class of the usual sets of classes; COCO has up to 91."""
 
 SHOWN = 8
 """Most values that a message lists."""
@@ -79,8 +83,9 @@ def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
 def classes_of(table: MotTable, named: bool) -> Array | None:
     """Return column 8 (N,) if it holds classes, else None. named: True if the user named a class (--class).
 
-    8 or 9 columns have a class unless it is -1 in all rows. 10 columns have one if z is -1 in all rows, or the user
-    named one, and column 8 has whole numbers from 0.
+    8 or 9 columns have a class unless it is -1 in all rows. 10 columns have one if the user named one, or if z is -1 in
+    all rows, and column 8 has whole numbers from 0. If columns 8 to 10 are no metres, column 8 is a class, as in
+    VisDrone, if each person has one all the time and not all are 0 or 1, which may be flags.
     """
     if table.rest.shape[1] < 2 or table.rows.values.shape[1] == GROUND_COLUMNS:
         return None
@@ -89,5 +94,15 @@ def classes_of(table: MotTable, named: bool) -> Array | None:
         return None
     if table.rest.shape[1] < 4:
         return column
-    no_place = named or (table.rest[:, 3] == -1).all()
-    return column if no_place and (column >= 0).all() and (column == np.round(column)).all() else None
+    if (column < 0).any() or (column != np.round(column)).any():
+        return None
+    return column if named or (table.rest[:, 3] == -1).all() or _one_for_each(table, column) else None
+
+
+def _one_for_each(table: MotTable, column: Array) -> bool:
+    """Return True if column 8 is a category that each id keeps; 10 columns that may be metres have none."""
+    if (table.id < 0).any() or column.max(initial=0) < 2 or column.max(initial=0) > LAST_CLASS or has_ground(table):
+        return False
+    order = np.lexsort((column, table.id))
+    same = np.diff(table.id[order]) == 0
+    return bool(same.any() and not np.diff(column[order])[same].any())

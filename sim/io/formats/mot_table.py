@@ -6,18 +6,22 @@ Lines of 4 columns are frame, id and the ground position x, y in m.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from sim.io.files.numeric_text import NumericTable, crowded, read_numbers
+from sim.io.formats.box_columns import BoxScale, reject_missing_ids
 from sim.io.formats.named_columns import column_names, read_named
 from sim.types import Array, Bools, Ints
 
 GROUND_COLUMNS = 4
 """Columns of a text of ground positions alone: frame, id, x, y."""
+
+LAYOUT = "frame,id,left,top,width,height,…: name the columns in the first line, if they are others"
+"""What the columns of a text without names must be, and what to do."""
 
 
 @dataclass(frozen=True)
@@ -35,35 +39,46 @@ class MotTable:
     box: Array
     rest: Array
 
+    def boxes(self) -> Array:
+        """Return the boxes of the rows that have one, (B, 4). Raises nothing."""
+        return self.box[~self.without_box()]
+
     def without_box(self) -> Bools:
         """Return flags (N,), True for rows whose box is -1,-1,-1,-1, which means that the row has no box. Raises
         nothing."""
         return np.asarray((self.box == -1).all(axis=1))
 
 
-def read_table(path: Path, *, length: int | None = None, boxless: bool = False) -> MotTable:
+def read_table(
+    path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None
+) -> MotTable:
     """Read the MOTChallenge text file `path` of 6 to 10 columns: frame, id, left, top, width, height, and up to four
     more; or of 4 columns: frame, id, x, y in m, which are read as rows without box, of confidence 1 and z = 0.
 
-    length: the last frame allowed; None: 1,000,000. boxless: True allows -1,-1,-1,-1 for "no box". A file without
+    length: the last frame allowed; None: 1,000,000. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors
+    of x and y that make the boxes pixels; None: 1. A file without
     lines gives a table without rows. Rows stay in the order of the file. Raises InputError if the file is unreadable,
     and, with the line, if a cell is no finite number, the number of columns is wrong, a frame is outside 1 to `length`,
     a frame or id is no integer, a number is beyond 1e6, a frame has more than 5000 lines, or a box has no area.
     """
     named = column_names(path)
-    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS) if named is None else read_named(path, named)
+    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS, layout=LAYOUT) if named is None else read_named(path, named)
     frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] == GROUND_COLUMNS:
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
     table = MotTable(rows, frame, id, box, rest)
     last = FRAMES if length is None else length
-    rows.reject((frame < 1) | (frame > last), f"frames from 1 to {last}", "correct the frame, or seqLength")
+    rows.reject(frame == 0, f"frames from 1 to {last}", "add 1 to all frames, if the file counts them from 0")
+    remedy = "check that this text belongs to this recording, and its seqLength"
+    rows.reject((frame < 1) | (frame > last), f"frames from 1 to {last}", "correct the frame, or seqLength", remedy)
     rows.reject(crowded(frame), f"at most {DETECTIONS} lines of one frame", "check that this is the right file")
     far = (np.abs(rows.values[:, 2:]) > COORDINATE).any(axis=1)
     rows.reject(far, f"numbers within {COORDINATE:g}", "remove or correct the line")
-    flat = (table.box[:, 2:] <= 0).any(axis=1)
-    if boxless:
-        flat &= ~table.without_box()
-    rows.reject(flat, "boxes with width and height above 0", "remove or correct the line")
+    if named is None:
+        reject_missing_ids(rows, frame, id)
+    flat, boxed = (table.box[:, 2:] <= 0).any(axis=1), ~table.without_box()
+    rows.reject(flat & boxed if boxless else flat, "boxes with width and height above 0", "remove or correct the line")
+    if box_scale is not None:
+        table = replace(table, box=np.where(boxed[:, None], box * np.tile(box_scale, 2), box))
     return table

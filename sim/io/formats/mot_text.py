@@ -16,14 +16,18 @@ from pathlib import Path
 import numpy as np
 
 from sim.arrays import repeated_ids
+from sim.io.formats.box_columns import BoxScale, corner_doubt, require_pixels
 from sim.io.formats.mot_distractors import unscored_rows
-from sim.io.formats.mot_ground import ground_positions
+from sim.io.formats.mot_ground import ground_positions, require_metres
 from sim.io.formats.mot_people import labelled_people, of_class
 from sim.io.formats.mot_table import MotTable, read_table
 from sim.io.formats.unit_scores import unit_scores
 from sim.io.formats.velocity import differentiate
 from sim.scene.box_scale import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
+
+NO_ID = "check that column 2 is the id: name the columns in the first line, as frame,left,top,width,height,score"
+"""Remedy if most rows have the id of another row of their frame."""
 
 
 def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
@@ -34,7 +38,7 @@ def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
     counted = np.flatnonzero(keep & (table.id >= 0))
     again = np.zeros(len(table.frame), bool)
     again[counted] = repeated_ids(table.frame[counted], table.id[counted])
-    table.rows.reject(again, "each id once in a frame", "remove one of the two lines")
+    table.rows.reject(again, "each id once in a frame", "remove one of the two lines", NO_ID)
 
 
 @dataclass(frozen=True)
@@ -62,18 +66,24 @@ class DetectionTable:
         return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
 
 
-def read_detections(path: Path, length: int | None, person_class: int | None = None) -> DetectionTable:
+def read_detections(
+    path: Path, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None
+) -> DetectionTable:
     """Read a det.txt: points on the ground (m) if every row has one, else the centres of the boxes in the image (px).
 
     path: the file. length: the last frame allowed; None: 1,000,000. person_class: the class of people, if the file has
-    classes; None: 1, with a warning about rows of other classes, which are left out.
+    classes; None: 1, with a warning about rows of other classes, which are left out. box_scale: as of `read_table`.
     The boxes are None if any row lacks one. Scores are
     1 if the file has none; scores outside [0, 1] are mapped into it as `unit_scores` does, with a
     warning. A file without lines gives no rows.
 
     Raises InputError as read_table, and for a row without box (-1,-1,-1,-1) if any row lacks a ground point.
     """
-    table = read_table(path, length=length, boxless=True)
+    table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+    require_pixels(table.rows, table.boxes())
+    doubt = corner_doubt(table.boxes())
+    if doubt:
+        warnings.warn(f"{path}: {doubt}", stacklevel=2)
     ground = ground_positions(table)
     boxless = _reject_placeless(table, ground)
     score, told = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
@@ -107,7 +117,7 @@ def ground_cells(xyz: Sequence[float]) -> str:
 
 def read_truth(
     path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
-    person_class: int | None = None,
+    person_class: int | None = None, box_scale: BoxScale | None = None,
 ) -> Truth:  # fmt: skip
     """Read a gt.txt as truth of people, without group labels: everybody is alone (-1), and no frame counts as labelled.
 
@@ -115,14 +125,18 @@ def read_truth(
     ids. They must be valid all the same. person_class: the class of people; None: 1, with a warning about
     others. The rest is sorted by (frame, id). name, fps (frames/s): of the
     sequence. length: number of frames; None: up to the last frame kept. px_per_m: image scale; nan: the median height
-    of the boxes / 1.7 m, nan without boxes. Boxes are None if a row has none (-1,-1,-1,-1). Positions and velocities
+    of the boxes / 1.7 m, nan without boxes. box_scale: as of `read_table`.
+    Boxes are None if a row has none (-1,-1,-1,-1). Positions and velocities
     are None without ground positions, nan in rows where they are unknown; velocities are differences over 0.5 s.
     Visibility is 1 where the file has none or -1.
 
     Raises InputError as read_table (unreadable file, invalid line, frame beyond `length`), for a row without box if any
-    row lacks a ground position, for an id twice in a frame, and for a visibility outside [0, 1] other than -1.
+    row lacks a ground position, for an id twice in a frame, and for a visibility outside [0, 1] other than -1. Also
+    for positions without boxes that cannot be in metres.
     """
-    table = read_table(path, length=length, boxless=True)
+    table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+    require_pixels(table.rows, table.boxes())
+    require_metres(table, fps)
     ground = ground_positions(table)
     boxed = not _reject_placeless(table, ground).any()
     keep = labelled_people(table, person_class)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
@@ -11,11 +13,16 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.files.numeric_text import NumericTable, is_number_text, read_numbers, read_text
 
+Column = np.ndarray[tuple[int], np.dtype[np.float64]]
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
+"""Units that may end the names of positions, as x_cm,y_cm, in m."""
+
 NAMES = {
     "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_index"),
     "id": ("id", "track_id", "trackid", "person_id", "ped_id", "target_id"),
     "score": ("score", "conf", "confidence"),
-    "class": ("class", "class_id", "category_id"),
+    "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
     "left": ("left", "bb_left", "xmin", "x1"),
     "top": ("top", "bb_top", "ymin", "y1"),
     "right": ("right", "xmax", "x2"),
@@ -24,12 +31,14 @@ NAMES = {
     "height": ("height", "h", "bb_height"),
     "cx": ("cx", "xc", "x_center", "center_x"),
     "cy": ("cy", "yc", "y_center", "center_y"),
-    "x": ("x",),
-    "y": ("y",),
+    "x": ("x", *(f"x_{unit}" for unit in UNITS)),
+    "y": ("y", *(f"y_{unit}" for unit in UNITS)),
 }
 """Meaning of a column, and the names it may have."""
 
-EXPECTED = "frame and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), or frame,id,x,y in m"
+EXPECTED = (
+    "frame and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), or frame,id,x,y in m (x_cm,y_cm in cm)"
+)
 
 
 def column_names(path: Path) -> list[str] | None:
@@ -43,9 +52,11 @@ def read_named(path: Path, names: list[str]) -> NumericTable:
     """Read a text with named columns as rows of 8 columns of a MOTChallenge text, or of 4: frame, id, x, y in m.
 
     Ids are -1 if no column is an id. Scores are 1 and classes -1 if the text has none. Columns of other names are not
-    used. Raises InputError if names are missing or double, and as `read_numbers`.
+    used, with a warning. Frames that begin with 0 are counted from 1, with a warning.
+
+    Raises InputError if names are missing or double, and as `read_numbers`.
     """
-    rows = read_numbers(path, (len(names), len(names)), header=True)
+    rows = read_numbers(path, (len(names), len(names)), header=True, layout="those that line 1 names")
     found: dict[str, int] = {}
     for k, name in enumerate(names):
         meaning = next((key for key, some in NAMES.items() if name in some), None)
@@ -56,25 +67,38 @@ def read_named(path: Path, names: list[str]) -> NumericTable:
     if not len(rows.line):
         return replace(rows, values=np.zeros((0, 6)))
 
-    def column(name: str, default: float = -1.0) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def column(name: str, default: float = -1.0) -> Column:
         return rows.values[:, found[name]] if name in found else np.full(len(rows.line), default)
 
-    have, frame, id = found.keys(), column("frame"), column("id")
-    if have >= {"frame", "id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
-        return replace(rows, values=np.stack([frame, id, column("x"), column("y")], axis=1))
-    w, h = column("width"), column("height")
-    if have >= {"frame", "left", "top", "width", "height"}:
-        left, top = column("left"), column("top")
-    elif have >= {"frame", "left", "top", "right", "bottom"}:
-        left, top = column("left"), column("top")
-        w, h = column("right") - left, column("bottom") - top
-    elif have >= {"frame", "cx", "cy", "width", "height"}:
-        left, top = column("cx") - w / 2, column("cy") - h / 2
-    elif have >= {"frame", "x", "y", "width", "height"}:
-        left, top = column("x"), column("y")
-    else:
+    have, id = found.keys(), column("id")
+    if "frame" not in have:
         _refuse(path, names)
-    return replace(rows, values=np.stack([frame, id, left, top, w, h, column("score", 1.0), column("class")], axis=1))
+    frame = column("frame")
+    if have >= {"id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
+        x, y = (column(axis) * UNITS.get(names[found[axis]].partition("_")[2], 1.0) for axis in ("x", "y"))
+        columns = [frame, id, x, y]
+    else:
+        left, top, w, h = _box(column, have) or _refuse(path, names)
+        columns = [frame, id, left, top, w, h, column("score", 1.0), column("class")]
+    unused = [name for k, name in enumerate(names) if k not in found.values()]
+    if unused:
+        warnings.warn(f"{path}: line 1: columns that are not used: {', '.join(unused)}", stacklevel=4)
+    if frame.min() == 0:
+        columns[0] = frame + 1
+        warnings.warn(f"{path}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
+    return replace(rows, values=np.stack(columns, axis=1))
+
+
+def _box(column: Callable[[str], Column], have: Set[str]) -> tuple[Column, Column, Column, Column] | None:
+    """Return left, top, width, height from the columns that there are; None if they make no box."""
+    w, h = column("width"), column("height")
+    if have >= {"left", "top", "width", "height"}:
+        return column("left"), column("top"), w, h
+    if have >= {"left", "top", "right", "bottom"}:
+        return column("left"), column("top"), column("right") - column("left"), column("bottom") - column("top")
+    if have >= {"cx", "cy", "width", "height"}:
+        return column("cx") - w / 2, column("cy") - h / 2, w, h
+    return (column("x"), column("y"), w, h) if have >= {"x", "y", "width", "height"} else None
 
 
 def _refuse(path: Path, names: list[str]) -> NoReturn:

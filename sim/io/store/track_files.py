@@ -16,6 +16,7 @@ from scenarios.errors import InputError
 from sim.io.files import tables
 from sim.io.files.atomic import replace_sealed
 from sim.io.files.lock import hold_lock
+from sim.io.formats.box_columns import BoxScale
 from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import event_dict, read_events
 from sim.io.store.group_files import groups_bytes, groups_csv
@@ -143,11 +144,13 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
 
 def read_checked_tracks(
-    path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: int | None = None
-) -> list[Tracks]:
+    path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: int | None = None,
+    box_scale: BoxScale | None = None,
+) -> list[Tracks]:  # fmt: skip
     """Read tracks as `read_tracks` does, but of a run that `check_run` found whole: no hash is compared again.
 
-    person_class: the class of people in a text of another program; None: 1.
+    person_class: the class of people in a text of another program; None: 1. box_scale: factors of x and y of its boxes;
+    None: 1.
     """
     path = Path(path)
     folder = path if path.is_dir() else path.parent
@@ -160,7 +163,7 @@ def read_checked_tracks(
             file=path, got="no tracks", expected="tracks.parquet, tracks.txt or a MOTChallenge text",
             remedy="give the folder that `flockscope track` made",
         )  # fmt: skip
-    found = read_track_text(text, 25.0 if fps is None else fps, length, person_class)
+    found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale)
     if not whole:
         return found
     groups = folder / "groups.csv"

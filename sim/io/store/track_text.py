@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.mot_ground import ground_positions
+from sim.io.formats.box_columns import BoxScale, require_pixels
+from sim.io.formats.mot_ground import ground_positions, require_metres
 from sim.io.formats.mot_people import of_class
 from sim.io.formats.mot_table import MotTable, read_table
 from sim.io.formats.mot_text import reject_duplicate_ids
@@ -23,12 +24,14 @@ from sim.io.store.group_files import read_groups_csv
 from sim.types import Array, Ints, Plane, Tracks
 
 
-def read_track_text(path: Path, fps: float, length: int | None, person_class: int | None = None) -> list[Tracks]:
+def read_track_text(
+    path: Path, fps: float, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None
+) -> list[Tracks]:
     """Return the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`; frames without rows are empty.
 
     length: None: to the last frame in the file. fps: frames/s. person_class: the class of people, if the file has
     classes; None: 1, with a warning about rows of other classes, which are left
-    out. Tracks of a frame are sorted by id. Positions are on the
+    out. box_scale: factors of x and y of the boxes; None: 1. Tracks of a frame are sorted by id. Positions are on the
     ground (m) if the file has them, else box centres in the image (px). Velocities are differences over 0.5 s,
     covariances nan, and everybody is alone (group -1). Boxes are None if a row lacks one. Scores are 1 if the file has
     none; scores outside [0, 1] are mapped into it as `unit_scores` does.
@@ -37,14 +40,18 @@ def read_track_text(path: Path, fps: float, length: int | None, person_class: in
     stands twice in a frame, only some lines have a ground position, a line has neither box nor ground position, or the
     file has no row and `length` is None. Warns about a file without rows otherwise.
     """
-    table = read_table(path, length=length, boxless=True)
+    table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+    require_pixels(table.rows, table.boxes())
     _reject_empty(table, length)
-    table.rows.reject(table.id < 0, "ids from 0", "give each track an id")
+    table.rows.reject(
+        table.id < 0, "ids from 0", "give each track an id", "these are detections: `flockscope track` them first"
+    )
     people = of_class(table, np.ones(len(table.id), bool), person_class)
     reject_duplicate_ids(table, people)
     order = np.lexsort((table.id, table.frame))
     order = order[people[order]]
     frame, id = table.frame[order], table.id[order]
+    require_metres(table, fps)
     ground = ground_positions(table)
     if ground is not None:
         remedy = "complete the line, or write z = -1 in all"

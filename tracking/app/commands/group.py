@@ -78,10 +78,16 @@ def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | 
 
 
 def _open(path: Path, options: GroupOptions) -> list[Sequence]:
-    return open_source(
+    sequences = open_source(
         path, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=False,
-        person_class=options.person_class,
+        person_class=options.person_class, box_scale=options.box_scale,
     )  # fmt: skip
+    if options.box_scale is not None and any(s.source["kind"] != TEXT for s in sequences):
+        raise InputError(
+            file=path, place="--box-scale", got="a recording, whose labels are not scaled", expected="a text with ids",
+            remedy="leave it out, or give the text itself",
+        )  # fmt: skip
+    return sequences
 
 
 def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
@@ -92,9 +98,10 @@ def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
     """
     tracks.check()
     info, folder = tracks.info, tracks.path if tracks.path.is_dir() else tracks.path.parent
-    recording = RecordingOptions(options.fps, options.px_per_m, options.camera, True, None, options.person_class)  # type: ignore[arg-type]
+    o = options
+    given = RecordingOptions(o.fps, o.px_per_m, o.camera, True, None, o.person_class, o.box_scale)  # type: ignore[arg-type]
     stated = [name for name, known in (("fps", "fps" in info), ("px_per_m", info.get("plane") != "image")) if known]
-    recording.reject(folder, "a run", "run.json states it", "camera", "person_class", *stated)
+    given.reject(folder, "a run", "run.json states it", "camera", "person_class", "box_scale", *stated)
     scale, frames = info.get("px_per_m"), int(info.get("px_per_m_frames") or 0)
     if options.px_per_m is not None:
         scale, frames = options.px_per_m, 0

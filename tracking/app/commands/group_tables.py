@@ -12,6 +12,7 @@ import numpy as np
 from scenarios.printable import counted, printable, shortened
 from sim.types import EVENT_KINDS
 from tracking.app.commands.score_tables import empty_table, with_title
+from tracking.grouping.plausibility import median_speed
 from tracking.run import TrackingRun
 
 LISTED = 20
@@ -26,10 +27,10 @@ Row = dict[str, Any]
 def group_row(run: TrackingRun, folder: Path) -> Row:
     """Returns what the command tells of one run, as a dictionary.
 
-    Keys: sequence, plane, px_per_m (None if unknown), px_per_m_frames, fps, frames; people (number of ids),
-    people_in_groups (number of those ever in a group); groups, a list in order of first frames of "id", "members" (all
-    ids ever in it), "size" (most people at a time), "start", "end" (frames, from 1), "seconds" (from the start of the
-    first to the end of the last frame); events, the number of each kind; folder.
+    Keys: sequence, plane, px_per_m (None if unknown), px_per_m_frames, fps, frames; median_speed (m/s, None if
+    unknown); people (number of ids), people_in_groups (number of those ever in a group); groups, a list in order of
+    first frames of "id", "members" (all ids ever in it), "size" (most people at a time), "start", "end" (frames, from
+    1), "seconds" (from the start of the first to the end of the last frame); events, the number of each kind; folder.
     """
     count = [len(t.id) for t in run]
     frame = np.repeat(np.array([t.index for t in run], np.int64), count)
@@ -44,8 +45,10 @@ def group_row(run: TrackingRun, folder: Path) -> Row:
         members, seconds = np.unique(who).tolist(), (end - start + 1) / fps
         found.append({"id": name, "members": members, "size": size, "start": start, "end": end, "seconds": seconds})
     events = Counter(e.kind for t in run for e in t.events)
+    speed = median_speed(run, fps, run.info["px_per_m"] or 1.0)
     return {
         **{key: run.info[key] for key in ("sequence", "plane", "px_per_m", "px_per_m_frames", "fps", "frames")},
+        "median_speed": None if np.isnan(speed) else speed,
         "people": len(np.unique(id)), "people_in_groups": len(np.unique(id[inside])),
         "groups": sorted(found, key=lambda g: (g["start"], g["id"])),
         "events": {kind: events[kind] for kind in EVENT_KINDS}, "folder": folder,
@@ -115,7 +118,10 @@ def _longest(row: Row) -> list[Any]:
 def _place(row: Row) -> str:
     """Returns a line that says where the positions of a run are, and of the image its scale and where it comes from."""
     if row["plane"] != "image":
-        return "positions in metres"
+        speed = row["median_speed"]
+        return "positions in metres" + (
+            "" if speed is None else f"; half of the people walk at {speed:.2g} m/s or less"
+        )
     if row["px_per_m"] is None:
         return "nobody is there"
     origin = f"from the boxes of the first {counted(row['px_per_m_frames'], 'frame')}; --px-per-m gives another"

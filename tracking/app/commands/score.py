@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.io.formats.box_columns import BoxScale, parse_box_scale
 from sim.io.source import open_source
 from sim.types import Array, Sequence
 from tracking.app.command_options import ScoreOptions
@@ -24,6 +26,7 @@ from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.scoring.evaluation import Scorer
 from tracking.scoring.frame_weights import weighted_scorers
 from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.misreading import likely_misreading
 from tracking.scoring.people_comparison import IncomparableError, Similarity
 from tracking.stats import SURE, mean_interval, paired
 
@@ -68,7 +71,8 @@ def score(options: ScoreOptions) -> CommandResult:
             place="--blocks", got=f"{len(sequences)} sequences", expected="a single recording",
             remedy="leave it out: the interval over sequences is shown anyway",
         )  # fmt: skip
-    scored = _score_all(sequences, paths, method)
+    box_scale = None if options.box_scale is None else parse_box_scale(options.box_scale)
+    scored = _score_all(sequences, paths, method, box_scale)
     rows, *others = ([each[k].row for each in scored] for k in range(len(paths)))
     notes = list(dict.fromkeys(each[0].note for each in scored if each[0].note))
     if options.blocks:
@@ -95,22 +99,40 @@ class ScoredRun:
     note: str = ""
 
 
-def _score_all(sequences: list[Sequence], paths: list[Path], method: ComparisonMethod) -> list[list[ScoredRun]]:
+def _score_all(
+    sequences: list[Sequence], paths: list[Path], method: ComparisonMethod, box_scale: BoxScale | None
+) -> list[list[ScoredRun]]:
     """Returns for each sequence, in order, its run at or below each of the one or two paths, scored.
 
-    Two runs of a sequence are compared with the truth in one plane and by one similarity. Raises InputError if a
+    box_scale: factors of x and y of the boxes of texts among the tracks. Two runs of a sequence are compared with the
+    truth in one plane and by one similarity. Warns about tracks that hardly match any label. Raises InputError if a
     sequence has no tracks or no labels, a file is wrong, or the tracks cannot be compared as asked. Shows progress on
     stderr.
     """
     matched = [match_tracks(sequences, find_tracks(path)) for path in paths]
+    if box_scale is not None and all(stored.info for pairs in matched for _, stored in pairs):
+        raise InputError(
+            place="--box-scale", got="runs of `flockscope track`", expected="a text of another program",
+            remedy="give --box-scale to `flockscope track`",
+        )  # fmt: skip
     found = []
     with ProgressMeter("score", len(sequences)) as meter:
         for pairs in zip(*matched, strict=True):
             sequence = pairs[0][0]
-            runs = [stored.read(sequence) for _, stored in pairs]
+            runs = [stored.read(sequence, box_scale) for _, stored in pairs]
+            _warn_misread(sequence, runs)
             found.append(_scored_alike(sequence, runs, method))
             meter.step(sequence.name)
     return found
+
+
+def _warn_misread(sequence: Sequence, runs: list[TrackingRun]) -> None:
+    """Warns about tracks that hardly match any label, with what would."""
+    for run in runs:
+        if sequence.truth is not None:
+            text = likely_misreading(sequence.truth, run, size=sequence.image_size, given="run" if run.info else "text")
+            if text:
+                warnings.warn(f"{sequence.name}: {text}", stacklevel=2)
 
 
 def _scored_alike(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMethod) -> list[ScoredRun]:

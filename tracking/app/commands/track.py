@@ -87,7 +87,7 @@ def track(options: TrackOptions) -> CommandResult:
     pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
     sequences = open_source(
         options.source, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=pictures,
-        background=options.background, person_class=options.person_class,
+        background=options.background, person_class=options.person_class, box_scale=options.box_scale,
     )  # fmt: skip
     folders = run_folders(sequences, options.source, options.out)
     rows = []

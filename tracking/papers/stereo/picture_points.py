@@ -82,7 +82,7 @@ def stereo_camera(camera: Camera | None) -> Camera:
     if camera is not None and camera.kind == "pinhole" and camera.baseline > 0 and not camera.radial:
         return camera
     got = "no camera" if camera is None else f"{camera.kind}, baseline {camera.baseline:g}, radial {camera.radial:g}"
-    remedy = "give --camera FILE of a rectified pair, with its baseline"
+    remedy = "give --camera FILE of a rectified pair, with its baseline; without one take another tracker, as blob"
     expected = "a pinhole camera with a baseline, without lens distortion"
     raise InputError(place="context.camera", got=got, expected=expected, remedy=remedy)
 

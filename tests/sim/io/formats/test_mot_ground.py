@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.io.store.track_files import read_tracks
 
@@ -25,6 +26,7 @@ NOT_METRES = {
 }
 
 
+@pytest.mark.filterwarnings("always")
 @pytest.mark.parametrize("kind", NOT_METRES)
 def test_columns_that_cannot_be_metres(tmp_path, kind):
     place, why = NOT_METRES[kind]
@@ -53,3 +55,52 @@ def test_a_camera_file_beside_it_vouches_for_metres(tmp_path):
     path = text(tmp_path, lambda f, k: (k, 0, 0), name="S/gt/gt.txt")
     (tmp_path / "S" / "camera.json").write_text("{}")
     assert open_source(path, fps=25)[0].truth.pos[0].tolist() == [1, 0]
+
+
+def visdrone(tmp_path, category):
+    """frame,id,left,top,w,h,score,category,truncation,occlusion"""
+    return text(tmp_path, lambda f, k: (category(k), 0, (f + k) % 3), people=5)
+
+
+@pytest.mark.filterwarnings("always")
+def test_categories_of_people_and_cars(tmp_path):
+    path = visdrone(tmp_path, lambda k: 4 if k > 2 else 1)
+    with pytest.warns(UserWarning, match="36 rows of class 4 are left out; people are class 1"):
+        truth = open_source(path, fps=25)[0].truth
+    assert set(truth.id) == {1, 2}
+    with pytest.warns(UserWarning, match="36 rows of class 4 are left out"):
+        assert {k for t in read_tracks(path, fps=25) for k in t.id.tolist()} == {1, 2}
+    assert set(open_source(path, fps=25, person_class=4)[0].truth.id) == {3, 4, 5}
+
+
+@pytest.mark.filterwarnings("always")
+def test_categories_without_people(tmp_path):
+    with pytest.raises(InputError, match="60 rows of class 4; expected people, of class 1"):
+        _ = open_source(visdrone(tmp_path, lambda k: 4), fps=25)[0].truth
+
+
+@pytest.mark.filterwarnings("always")
+def test_categories_have_no_distractors(tmp_path):
+    """Class 2 of VisDrone is a person who sits, no distractor of MOTChallenge."""
+    assert open_source(visdrone(tmp_path, lambda k: 1 + k % 2), fps=25)[0].truth.unscored is None
+
+
+@pytest.mark.filterwarnings("always")
+@pytest.mark.parametrize("flag", [lambda f, k: (f + k) % 3, lambda f, k: k % 2])
+def test_flags_are_no_categories(tmp_path, flag):
+    path = text(tmp_path, lambda f, k: (flag(f, k), f % 2, 0), people=5)
+    assert set(open_source(path, fps=25)[0].truth.id) == {1, 2, 3, 4, 5}
+
+
+@pytest.mark.parametrize("unit", [1, 100, 1000])
+@pytest.mark.parametrize("header", ["", "frame,id,x,y\n"])
+def test_positions_alone_are_in_metres_or_refused(tmp_path, unit, header):
+    path = tmp_path / "walk.csv"
+    rows = [f"{f},{k},{unit * (k + 1.3 * f / 25):g},{unit * k}" for f in range(1, 12) for k in (1, 2)]
+    path.write_text(header + "\n".join(rows))
+    if unit == 1:
+        assert open_source(path, fps=25)[0].truth.pos.max() < 3
+        return
+    for read in (lambda: open_source(path, fps=25)[0].truth, lambda: read_tracks(path, fps=25)):
+        with pytest.raises(InputError, match=r"half of the steps faster than 1.*m/s; expected positions"):
+            read()

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from scenarios.errors import InputError
@@ -6,7 +7,7 @@ from sim.io.source import open_source
 BOXES = {
     "frame,id,x,y,w,h": "{f},7,10,20,30,40",
     "Frame,ID,Left,Top,Width,Height": "{f},7,10,20,30,40",
-    "id,frame,x1,y1,x2,y2,extra": "7,{f},10,20,40,60,5",
+    "id,frame,x1,y1,x2,y2": "7,{f},10,20,40,60",
     "frame,id,cx,cy,w,h": "{f},7,25,40,30,40",
 }
 
@@ -23,8 +24,35 @@ def test_named_boxes(tmp_path, header):
 
 def test_named_positions(tmp_path):
     path = tmp_path / "five.csv"
-    path.write_text("frame,id,x,y,group\n1,1,0.5,1,1\n2,1,0.6,1,1\n")
+    path.write_text("frame,id,x,y\n1,1,0.5,1\n2,1,0.6,1\n")
     assert open_source(path, fps=25)[0].truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("m", 1), ("cm", 100), ("mm", 1000)])
+def test_units_of_positions(tmp_path, unit, factor):
+    path = tmp_path / "walk.csv"
+    path.write_text(f"frame,id,x_{unit},y_{unit}\n1,1,{0.5 * factor},{factor}\n2,1,{0.6 * factor},{factor}\n")
+    assert open_source(path, fps=25)[0].truth.pos == pytest.approx(np.array([[0.5, 1], [0.6, 1]]))
+
+
+@pytest.mark.filterwarnings("always")
+def test_columns_without_a_meaning_are_named(tmp_path):
+    path = tmp_path / "five.csv"
+    path.write_text("frame,id,x,y,group,mood\n1,1,0.5,1,1,3\n2,1,0.6,1,1,3\n")
+    with pytest.warns(UserWarning, match="line 1: columns that are not used: group, mood"):
+        truth = open_source(path, fps=25)[0].truth
+    assert truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
+
+
+@pytest.mark.filterwarnings("always")
+def test_frames_from_zero(tmp_path):
+    """As PeTrack writes them: id first, frames from 0, positions in cm."""
+    path = tmp_path / "petrack.txt"
+    path.write_text("id frame x_cm y_cm z\n1 0 50 100 170\n1 1 60 100 170\n")
+    with pytest.warns(UserWarning, match="frames are counted from 0; they are read as frames from 1"):
+        truth = open_source(path, fps=16)[0].truth
+    assert truth.frame.tolist() == [1, 2]
+    assert truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
 
 
 def test_named_boxes_without_ids_are_detections(tmp_path):

@@ -12,6 +12,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
+from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.io.source import open_source
 from sim.io.store.event_files import event_dict
@@ -399,3 +400,26 @@ def test_recorded_people(shared_data, tmp_path, capsys):
     (row,) = done(capsys, "score", folder, tmp_path / "g")["sequences"]
     assert row["pairwise_F1"] > 0.6
     assert open_source(folder)[0].name == row["name"]
+
+
+LOW_CAMERA = [f"camera.{setting}" for setting in ("tilt_deg=0", "height=2.5", "position=[12,12]", "crop=true")]
+"""Settings of a camera among the people, with the horizon in the middle of the picture of 640 × 480."""
+
+
+def test_people_behind_the_camera(tmp_path, capsys):
+    """Their boxes are unknown, their positions are not."""
+    sequence = simulate(load("merge", LOW_CAMERA), 90001)
+    assert not np.isfinite(sequence.truth.box).all()
+    made = group(sequence)
+    assert sum(len(t.id) for t in made) == len(sequence.truth.id)
+    made.write(tmp_path / "g", sequence)
+    assert run(["group", str(tmp_path / "g"), "--out", str(tmp_path / "again")]) == 0
+
+
+def test_boxes_above_the_horizon_of_a_camera(tmp_path, capsys):
+    camera = simulate(load("merge", LOW_CAMERA), 90001).camera
+    (tmp_path / "walk.txt").write_text("1,1,10,10,20,50\n2,1,11,10,20,50\n1,2,10,350,20,50\n2,2,11,350,20,50\n")
+    (walk,) = open_source(tmp_path / "walk.txt", fps=10, camera=camera)
+    with pytest.raises(InputError, match="no position on the ground, as in 2 of 4 rows") as error:
+        group(walk)
+    assert "leave --camera out" in error.value.remedy

@@ -1,0 +1,177 @@
+"""Texts whose columns 3 to 6 are no left, top, width and height in pixels."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.formats.box_columns import parse_box_scale
+from sim.io.formats.mot_text import read_detections
+from sim.io.source import open_source
+from sim.io.store.track_text import read_track_text
+
+FRAMES, PEOPLE = 12, 4
+
+
+def people(ids=True):
+    """Rows frame, id, left, top, width, height of people who walk, as from a street camera."""
+    rows = [
+        (f, k if ids else -1, 150 + 200 * k + 7 * f, 40 * k + 2 * f, 40 + 5 * k, 100 + 12 * k)
+        for f in range(1, FRAMES + 1)
+        for k in range(1, PEOPLE + 1)
+    ]
+    return np.array(rows, float)
+
+
+def written(tmp_path, rows, name="a.txt"):
+    path = tmp_path / name
+    np.savetxt(path, rows, fmt="%.6g", delimiter=",")
+    return path
+
+
+def without_ids(score):
+    rows = people()
+    return np.c_[rows[:, 0], rows[:, 2:], np.resize(score, len(rows))]
+
+
+@pytest.mark.parametrize("score", [(0.3, 0.9), (1,), (0, 1), (55.5, 90.5, 20)])
+def test_rows_without_ids_are_no_guess(tmp_path, score):
+    with pytest.raises(InputError, match="frame,left,top,width,height,score without an id") as error:
+        open_source(written(tmp_path, without_ids(score)), fps=10)
+    assert "as the first line" in error.value.remedy
+
+
+def test_rows_without_ids_and_with_classes(tmp_path):
+    rows = np.c_[without_ids((0.3, 0.9)), np.ones(FRAMES * PEOPLE)]
+    with pytest.raises(InputError, match="without an id"):
+        open_source(written(tmp_path, rows), fps=10)
+
+
+def test_a_left_edge_with_decimals_is_no_id(tmp_path):
+    rows = without_ids((0.5,))
+    rows[:, 1] += 0.25
+    with pytest.raises(InputError, match=r"like 48 of 48 lines\)") as error:
+        open_source(written(tmp_path, rows), fps=10)
+    assert "name the columns in the first line" in error.value.remedy
+
+
+@pytest.mark.parametrize("ids", [True, False])
+def test_rows_with_ids_are_read(tmp_path, ids):
+    assert open_source(written(tmp_path, people(ids)), fps=10)[0].length == FRAMES
+
+
+def test_numbered_detections_are_read(tmp_path):
+    rows = people()
+    rows[:, 1] = np.arange(len(rows))
+    assert open_source(written(tmp_path, rows), fps=10)[0].length == FRAMES
+
+
+def test_shares_of_the_picture_are_refused_and_scaled(tmp_path):
+    rows = people(ids=False)
+    scaled = written(tmp_path, np.c_[rows[:, :2], rows[:, 2:] / (1920, 1080, 1920, 1080)])
+    with pytest.raises(InputError, match=r"numbers up to .* expected pixels; .*--box-scale WIDTH,HEIGHT"):
+        open_source(scaled, fps=10)
+    box = read_detections(scaled, None, None, parse_box_scale("1920,1080")).box
+    assert box == pytest.approx(rows[:, 2:], rel=1e-5)
+
+
+def test_tracks_are_scaled(tmp_path):
+    path = written(tmp_path, people())
+    plain, doubled = (read_track_text(path, 10, None, None, scale) for scale in (None, (2, 3)))
+    assert doubled[3].box.tolist() == (plain[3].box * (2, 3, 2, 3)).tolist()
+    assert doubled[3].pos.tolist() == (plain[3].pos * (2, 3)).tolist()
+
+
+def test_boxless_rows_are_not_scaled(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("1,-1,-1,-1,-1,-1,1,3,4,0\n")
+    assert read_detections(path, None, None, (2, 2)).pos.tolist() == [[3, 4]]
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "a", "1,2,3", "", "1,", "nan", "1e9", "1_0"])
+def test_wrong_scales(text):
+    with pytest.raises(InputError, match="--box-scale: got"):
+        parse_box_scale(text)
+
+
+def test_labels_are_not_scaled(tmp_path):
+    (tmp_path / "gt").mkdir()
+    written(tmp_path / "gt", people(), "gt.txt")
+    with pytest.raises(InputError, match="none for a recording without det"):
+        open_source(tmp_path, fps=10, box_scale="2")
+
+
+@pytest.mark.filterwarnings("always")
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (0.5, "all 160 boxes lie in the upper left 500 × 500 px of the pictures of 1000 × 1000"),
+        (2, "[67].% of the boxes lie beyond the pictures of 1000 × 1000"), (1, ""),
+    ],
+)  # fmt: skip
+def test_boxes_of_pictures_of_another_size(tmp_path, factor, words):
+    """The warning is gone with the right --box-scale."""
+    (tmp_path / "det").mkdir()
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\nseqLength=9\nimWidth=1000\nimHeight=1000\n")
+    spread = np.linspace(0, 950, 160)
+    box = np.c_[spread, np.random.default_rng(1).permutation(spread), np.full((160, 2), 50)]
+    written(tmp_path / "det", np.c_[1 + np.arange(160) % 9, np.full(160, -1), box * factor], "det.txt")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        open_source(tmp_path)
+    assert len(told) == bool(words)
+    assert re.search(words, str(told[0].message) if told else "")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        open_source(tmp_path, box_scale=str(1 / factor))
+    assert not told
+
+
+@pytest.mark.filterwarnings("always")
+def test_corners_among_detections(tmp_path):
+    rows = people(ids=False)
+    rows[:, 4:] += rows[:, 2:4]
+    with pytest.warns(UserWarning, match="all 48 boxes look like x1,y1,x2,y2, but are read as left,top,width,height"):
+        open_source(written(tmp_path, rows), fps=10)
+
+
+def test_people_at_the_left_edge_are_no_corners(tmp_path):
+    """Widths above the left edge that do not vary with it."""
+    rows = people(ids=False)
+    rows[:, 2] = np.resize((3, 20, 9, 15, 6), len(rows))
+    rows[:, 3] = 5
+    open_source(written(tmp_path, rows), fps=10)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "remedy"),
+    [
+        (5, -5, "check the columns, which are frame,id,left,top,width,height"),
+        (0, 5000, "check that this text belongs to this recording"),
+    ],
+)
+def test_a_fault_of_every_line_is_no_fault_of_a_line(tmp_path, column, value, remedy):
+    rows = people()
+    rows[:, column] = value
+    with pytest.raises(InputError, match=f"like {len(rows)} of {len(rows)} lines") as error:
+        read_track_text(written(tmp_path, rows), 10, FRAMES)
+    assert remedy in error.value.remedy
+    rows = people()
+    rows[7, column] = value
+    with pytest.raises(InputError, match="line 8: ") as error:
+        read_track_text(written(tmp_path, rows), 10, FRAMES)
+    assert "correct the" in error.value.remedy or "correct" in error.value.remedy
+
+
+def test_detections_are_no_tracks(tmp_path):
+    with pytest.raises(InputError, match="these are detections: `flockscope track` them first"):
+        read_track_text(written(tmp_path, people(ids=False)), 10, FRAMES)
+
+
+def test_frames_from_zero(tmp_path):
+    rows = people()
+    rows[:, 0] -= 1
+    with pytest.raises(InputError, match="add 1 to all frames, if the file counts them from 0"):
+        read_track_text(written(tmp_path, rows), 10, FRAMES)

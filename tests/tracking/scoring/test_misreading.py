@@ -1,0 +1,269 @@
+"""Tracks that hardly match because they are read wrongly: the warning names the right reading, and its remedy helps."""
+
+import numpy as np
+import pytest
+
+from sim.types import Tracks, Truth
+from tracking.app.cli import run
+from tracking.scoring import score_arrays
+from tracking.scoring.misreading import BOX_ORDERS, likely_misreading
+
+SIZE = (1920, 1080)
+FRAMES, PEOPLE = 40, 7
+
+
+def walk(seed=0):
+    """Rows frame, id, left, top, width, height of people who walk in a picture of 1920 × 1080."""
+    rng = np.random.default_rng(seed)
+    start, step = rng.uniform((100, 300), (1700, 800), (PEOPLE, 2)), rng.uniform(-6, 6, (PEOPLE, 2))
+    frame, who = (a.ravel() for a in np.meshgrid(np.arange(1, FRAMES + 1), np.arange(PEOPLE), indexing="ij"))
+    foot = start[who] + step[who] * frame[:, None]
+    height = foot[:, 1] * 0.3
+    return np.c_[frame, who + 1, foot[:, 0] - height * 0.2, foot[:, 1] - height, height * 0.4, height]
+
+
+def truth_of(rows, pos=None):
+    frame, id = rows[:, 0].astype(int), rows[:, 1].astype(int)
+    return Truth(
+        "x", 25.0, int(frame.max()), 100.0, frame, id, np.full(len(rows), -1), pos, None,
+        None if pos is not None else rows[:, 2:6], np.ones(len(rows)),
+    )  # fmt: skip
+
+
+def tracks_of(frame, id, box=None, pos=None):
+    found = []
+    for k in range(1, int(frame.max()) + 1):
+        r = frame == k
+        n, here = int(r.sum()), box[r, :2] + box[r, 2:] / 2 if pos is None else pos[r]
+        found.append(
+            Tracks(
+                k,
+                k / 25,
+                "image" if pos is None else "ground",
+                "person",
+                id[r].astype(int),
+                np.full(n, -1),
+                here,
+                np.full((n, 2), np.nan),
+                np.full((n, 4, 4), np.nan),
+                None if box is None else box[r],
+                np.ones(n),
+            )
+        )
+    return found
+
+
+def seen(rows):
+    """The walk with the errors of a detector, and without one person."""
+    rows = rows[rows[:, 1] > 1]
+    return np.c_[rows[:, :2], rows[:, 2:] + np.random.default_rng(5).normal(0, 2, (len(rows), 4))]
+
+
+def corners(box):
+    return np.c_[box[:, :2], box[:, :2] + box[:, 2:]]
+
+
+def centres(box):
+    return np.c_[box[:, :2] + box[:, 2:] / 2, box[:, 2:]]
+
+
+WRITTEN = {
+    "x1,y1,x2,y2": corners,
+    "cx,cy,width,height": centres,
+    "y1,x1,y2,x2": lambda box: corners(box)[:, [1, 0, 3, 2]],
+    "x1,x2,y1,y2": lambda box: corners(box)[:, [0, 2, 1, 3]],
+    "top,left,height,width": lambda box: box[:, [1, 0, 3, 2]],
+    "left,top,width,height": lambda box: box,
+}
+SCALES = {(1.0, 1.0): "", (2.0, 2.0): "2", (1.5, 1.5): "1.5", (0.5, 0.5): "0.5", (3.0, 1.6875): "3,1.6875"}
+"""Factors that make the boxes pixels again, and the value of --box-scale."""
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("columns", WRITTEN)
+def test_columns_and_scales(columns, scale):
+    rows = walk()
+    found = seen(rows)
+    wrong = WRITTEN[columns](found[:, 2:] / np.tile(scale, 2))
+    text = likely_misreading(truth_of(rows), tracks_of(found[:, 0], found[:, 1], wrong), size=SIZE)
+    usual = columns == "left,top,width,height"
+    assert bool(text) == (not usual or scale != (1.0, 1.0))
+    assert (f"read as {columns}" in text) == (not usual)
+    assert (f"frame,id,{columns}," in text) == (not usual)
+    assert (f"--box-scale {SCALES[scale]}" in text) == (scale != (1.0, 1.0))
+
+
+def test_every_order_is_tested():
+    assert WRITTEN.keys() == BOX_ORDERS.keys()
+    box = walk()[:, 2:]
+    for columns, order in BOX_ORDERS.items():
+        assert order(WRITTEN[columns](box)) == pytest.approx(box)
+
+
+def test_shares_of_the_picture():
+    rows = walk()
+    found = seen(rows)
+    text = likely_misreading(
+        truth_of(rows), tracks_of(found[:, 0], found[:, 1], centres(found[:, 2:]) / np.tile(SIZE, 2)), size=SIZE
+    )
+    assert "read as cx,cy,width,height and multiplied by 1920,1080, 100% would" in text
+    assert "--box-scale 1920,1080 (shares of the picture)" in text
+
+
+def test_scales_of_pictures_of_unknown_size():
+    rows = walk()
+    text = likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:] / 2))
+    assert text.endswith("Add --box-scale 2")
+
+
+def test_labels_in_corners():
+    rows = walk()
+    labels = np.c_[rows[:, :2], corners(rows[:, 2:])]
+    text = likely_misreading(truth_of(labels), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:]))
+    assert "with labels read as x1,y1,x2,y2" in text
+    assert "a first line of the labels" in text
+
+
+def test_runs_of_ours_are_tracked_again():
+    rows = walk()
+    text = likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:] / 2), given="run")
+    assert "--box-scale 2 to `flockscope track`" in text
+
+
+@pytest.mark.parametrize(("shift", "words"), [(1, "-1"), (-1, "+1"), (-20, "+20")])
+def test_shifted_frames(shift, words):
+    rows = walk()
+    rows[:, 2:4] += rows[:, :1] * (60, 0)  # fast enough for a frame to matter
+    moved = rows[(rows[:, 0] + shift >= 1) & (rows[:, 0] + shift <= FRAMES)]
+    text = likely_misreading(truth_of(rows), tracks_of(moved[:, 0] + shift, moved[:, 1], moved[:, 2:]))
+    assert f"with {words} on frame numbers, 100% would" in text
+
+
+def test_frames_at_another_rate():
+    rows = walk()
+    rows[:, 2:4] += rows[:, :1] * (60, 0)
+    some = rows[rows[:, 0] % 5 == 1]
+    text = likely_misreading(truth_of(rows), tracks_of((some[:, 0] - 1) // 5 + 1, some[:, 1], some[:, 2:]))
+    assert "with frames numbered 1, 6, 11, …" in text
+
+
+def test_frames_in_the_column_of_ids():
+    rows = walk()
+    order = np.argsort(rows[:, 1], kind="stable")
+    swapped = rows[order][:, [1, 0, 2, 3, 4, 5]]
+    text = likely_misreading(truth_of(rows), tracks_of(swapped[:, 0], swapped[:, 1], swapped[:, 2:]))
+    assert "with ids in column 1 and frames in column 2, 100% would" in text
+    assert "id,frame,left,top,width,height," in text
+
+
+def test_no_frame_in_common():
+    rows = walk()
+    late = rows.copy()
+    late[:, 0] += 100
+    text = likely_misreading(truth_of(late), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:]))
+    assert text.startswith("no frame in common: labels in frames 101 to 140, tracks in frames 1 to 40; with +100")
+
+
+def test_another_sequence():
+    text = likely_misreading(truth_of(walk()), tracks_of(*walk(9)[:, :2].T, walk(9)[:, 2:] * (1, 0.2, 0.2, 0.2)))
+    assert text.startswith("0% of the tracked boxes match labels (IoU 0.5). No other columns")
+    assert "tracks of this very sequence" in text
+
+
+@pytest.mark.parametrize("share", [1, 0.3])
+def test_no_warning_for_weak_trackers(share):
+    """False alarms and misses alone are no misreading."""
+    rows = walk()
+    rng = np.random.default_rng(3)
+    box = np.where(rng.random((len(rows), 1)) < share, rows[:, 2:], rows[:, 2:] + (200, 0, 0, 0))
+    assert likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], box), size=SIZE) == ""
+
+
+def test_no_warning_without_people():
+    rows = walk()
+    nobody = np.zeros((0, 6))
+    assert likely_misreading(truth_of(rows), []) == ""
+    empty = Truth("x", 25.0, 5, 1.0, *(np.zeros(0, int),) * 3, None, None, nobody[:, 2:], np.zeros(0))
+    assert likely_misreading(empty, tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:])) == ""
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda p: p * 100, "frame,id,x_cm,y_cm,"), (lambda p: p * 1000, "frame,id,x_mm,y_mm,"),
+        (lambda p: p[:, ::-1], "read as y,x"), (lambda p: p * 40, "give the positions of the tracks in m"),
+    ],
+)  # fmt: skip
+def test_positions(wrong, words):
+    rows = walk()
+    pos = np.c_[rows[:, 2] / 50, rows[:, 3] / 30]
+    text = likely_misreading(truth_of(rows, pos), tracks_of(rows[:, 0], rows[:, 1], None, wrong(pos)))
+    assert "of the tracked positions match labels (1 m)" in text
+    assert words in text.replace("Give", "give")
+
+
+def recording(tmp_path, rows):
+    folder = tmp_path / "cam"
+    (folder / "gt").mkdir(parents=True)
+    (folder / "seqinfo.ini").write_text(
+        f"[Sequence]\nname=cam\nframeRate=25\nseqLength={FRAMES}\nimWidth=1920\nimHeight=1080\n"
+    )
+    np.savetxt(folder / "gt" / "gt.txt", np.c_[rows, np.ones((len(rows), 3))], fmt="%.6g", delimiter=",")
+    return folder
+
+
+def score(capsys, *words):
+    import json
+
+    capsys.readouterr()
+    assert run([*map(str, ("score", *words)), "--json"]) == 0
+    printed = capsys.readouterr()
+    return json.loads(printed.out)["mean"]["HOTA"]["mean"], printed.err
+
+
+def test_the_warning_of_score_and_its_remedy(tmp_path, capsys):
+    rows = walk()
+    folder, text = recording(tmp_path, rows), tmp_path / "res.txt"
+    wrong = np.c_[rows[:, :2], corners(rows[:, 2:]) / 2, np.ones(len(rows))]
+    np.savetxt(text, wrong, fmt="%.6g", delimiter=",")
+    low, told = score(capsys, folder, text)
+    assert low < 0.05
+    assert told.count("warning:") == 1
+    assert (
+        "name all columns in a first line of the tracks: frame,id,x1,y1,x2,y2,… and add --box-scale 2" in told.lower()
+    )
+    text.write_text("frame,id,x1,y1,x2,y2,score\n" + text.read_text())
+    high, told = score(capsys, folder, text, "--box-scale", "2")
+    assert (high, told) == (pytest.approx(1, abs=1e-3), "")
+
+
+def test_the_scale_of_detections(tmp_path, capsys):
+    """A detector that ran on pictures of half the size: `track` and its run.json know the factor."""
+    import json
+
+    rows = walk()
+    folder = recording(tmp_path, rows)
+    (folder / "det").mkdir()
+    wrong = np.c_[rows[:, :1], np.full(len(rows), -1), rows[:, 2:] / 2, np.ones(len(rows))]
+    np.savetxt(folder / "det" / "det.txt", wrong, fmt="%.6g", delimiter=",")
+    words = ["track", "blob", str(folder), "--detections", "file", "--out"]
+    assert run([*words, str(tmp_path / "a")]) == 0
+    low, told = score(capsys, folder, tmp_path / "a")
+    assert low < 0.05
+    assert "Add --box-scale 2 to `flockscope track`" in told
+    assert run([*words, str(tmp_path / "b"), "--box-scale", "2"]) == 0
+    assert json.loads((tmp_path / "b" / "run.json").read_text())["box_scale"] == [2, 2]
+    high, told = score(capsys, folder, tmp_path / "b")
+    assert high > 0.8
+    assert "match labels" not in told
+    capsys.readouterr()
+    assert run(["score", str(folder), str(tmp_path / "b"), "--box-scale", "2"]) == 2
+    assert "--box-scale: got runs of `flockscope track`" in capsys.readouterr().err
+
+
+def test_arrays():
+    rows = walk()
+    truth, found = ({"frame": rows[:, 0].astype(int), "id": rows[:, 1].astype(int), "box": b} for b in (
+        rows[:, 2:], corners(rows[:, 2:])))  # fmt: skip
+    with pytest.warns(UserWarning, match="read as x1,y1,x2,y2, 100% would. Give left, top, width, height in px"):
+        assert score_arrays(truth, found, fps=25)["HOTA"] < 0.05
