@@ -184,7 +184,10 @@ def test_cvml_of_every_fifth_frame(tmp_path):
     """Groups and events are those of the frames in the file: people are not absent in between."""
     pair = [GROUP.format(4, "1,2")]
     near = [max(30, 200 - 20 * k) for k in range(40)]
-    frames = [([OBJECT.format(1, 20), OBJECT.format(2, x), OBJECT.format(3, 300)], pair) for x in near]
+    frames = [
+        ([OBJECT.format(1, 20), OBJECT.format(2, x), OBJECT.format(3, 300)], pair if k > 12 else [])
+        for k, x in enumerate(near)
+    ]
     every = open_source(xml(tmp_path, *frames), fps=5)[0].truth
     text = (tmp_path / "clip.xml").read_text()
     for k in reversed(range(40)):
