@@ -22,7 +22,7 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
 from scenarios.regular_file import read_regular
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import whole_number
+from sim.io.files.numeric_text import read_number, whole_number
 from sim.io.formats.group_labels import labelled_truth_fields, require_size
 from sim.io.formats.velocity import differentiate
 from sim.scene.box_scale import scale_of_all_boxes, scale_of_first_boxes
@@ -123,7 +123,7 @@ def _root(path: Path) -> ET.Element:
 def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
     text = element.get(key)
     try:
-        value = float(text or "")
+        value = read_number(text or "")
     except ValueError:
         value = float("nan")
     if not abs(value) <= COORDINATE:

@@ -26,8 +26,8 @@ def generate(options: GenerateOptions) -> CommandResult:
 
     option_parsing.output_folder(options.out)
     seeds = option_parsing.seeds(options.seeds)
-    texts = [*option_parsing.sensor_settings(options.sensor), *options.settings]
-    settings = option_parsing.scenario_settings(texts)
+    sensor = option_parsing.sensor_settings(options.sensor)
+    settings = [*sensor, *option_parsing.scenario_settings(options.settings)]
     streams, images = option_parsing.pictures(options.streams, options.images)
     with ProgressMeter("generate") as meter:
         folders = make(
