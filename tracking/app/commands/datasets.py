@@ -32,7 +32,7 @@ def generate(options: GenerateOptions) -> CommandResult:
     with ProgressMeter("generate") as meter:
         folders = make(
             options.names, seeds, options.out, set=settings, workers=WorkerOptions(options.workers, options.cluster),
-            progress=meter.update, streams=streams, images=images,
+            progress=meter.update, streams=streams, images=images, stride=options.stride,
         )  # fmt: skip
     lines = [f"{counted(len(folders), 'sequence')} in {folders[0].parent}"]
     left_out = {name: reason.line() for name, reason in folders.left_out.items()}
