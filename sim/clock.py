@@ -7,11 +7,13 @@ script; an onset belongs to the frame nearest to it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.types import Array, Bools, Ints
+from scenarios.errors import InputError
+from scenarios.limits import FRAME_RATES
+from sim.types import Array, Bools, Ints, Motion
 
 PHYSICS_RATE = 50.0  # Hz
 SCRIPT_RATE = 10.0  # Hz: people come and go, orders and errands are looked at, fluctuations change
@@ -95,3 +97,27 @@ class FrameTicks:
     def last(self, tick: int) -> int:
         """Returns the last frame that shows this tick or an earlier one; -1 if there is none."""
         return int(np.searchsorted(self.tick, tick, side="right")) - 1
+
+
+def check_stride(stride: object, fps: float) -> None:
+    """Raises InputError if `stride` is no whole number from 1, or leaves a camera of fps frames/s less than 0.01."""
+    most = int(fps / FRAME_RATES[0])
+    if not isinstance(stride, int) or not 1 <= stride <= most:
+        raise InputError(
+            place="--stride", got=stride, expected=f"a whole number from 1 to {most} at {fps:g} frames/s",
+            remedy="correct it",
+        )  # fmt: skip
+
+
+def every_nth(motion: Motion, n: int) -> Motion:
+    """Returns the motion in frames 1, 1 + n, … of a camera, numbered from 1. It is still measured at the same ticks."""
+    if n == 1:
+        return motion
+    kept = {name: getattr(motion, name)[::n] for name in ("pos", "vel", "heading", "present", "intent")}
+    times = FrameTimes.of(len(kept["present"]), motion.fps / n)
+
+    def fired(time: float | None) -> int | None:
+        return None if time is None else times.frame_of(round(time * SCRIPT_RATE))
+
+    orders = tuple(replace(order, fired=fired(order.time)) for order in motion.orders)
+    return motion.replace(fps=times.fps, orders=orders, measured=motion.states(), **kept)

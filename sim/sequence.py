@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.clock import check_stride, every_nth
 from sim.render.renderer import RenderedFrame, Renderer, make_renderer
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
@@ -39,7 +40,9 @@ if TYPE_CHECKING:
 STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
 
 
-def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[str] = ("left",)) -> Sequence:
+def simulate(
+    scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[str] = ("left",), stride: int = 1
+) -> Sequence:
     """Return the Sequence that a scenario and a seed define: frames, detections of its sensor, and truth for its
     camera.
 
@@ -47,16 +50,18 @@ def simulate(scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[s
     number of the suite entry's copy, 0 without copies. streams: some of "left", "right", "disparity", "ids",
     "background". "left" and "right" give frames with pictures, drawn while iterating. Any stream gives `background()`
     and exact pixels (`load_pixels`), whose disparity is None unless "disparity" is among the streams. () draws nothing.
+    stride: 1 or more; of the camera's frames only 1, 1 + stride, … are in the sequence, as they are without it.
 
-    Raises InputError if the scenario is impossible (no room for its people, people out of view), if "right" or
-    "disparity" is wanted without a baseline, or if a stream is unknown. Raises ValueError for a negative seed or a
-    distribution without a draw in its clip, WorkError if a position becomes infinite or nan. Later, reading detections
-    raises InputError if `sensor.hide` names an unknown group. Drawing raises InputError for impossible values of light
-    and picture. Reading the truth raises WorkError if an order of the script was not fulfilled.
+    Raises InputError if the stride leaves less than 0.01 frames/s, if the scenario is impossible (no room for its
+    people, people out of view), if "right" or "disparity" is wanted without a baseline, or if a stream is unknown.
+    Raises ValueError for a negative seed or a distribution without a draw in its clip, WorkError if a position becomes
+    infinite or nan. Later, reading detections raises InputError if `sensor.hide` names an unknown group. Drawing raises
+    InputError for impossible values of light and picture. Reading the truth raises WorkError if an order of the script
+    was not fulfilled.
     """
     from sim.crowd.world import run
 
-    return observe(scenario, run(scenario, seed, repeat), streams=streams)
+    return observe(scenario, run(scenario, seed, repeat), streams=streams, stride=stride)
 
 
 def observe(
@@ -66,6 +71,7 @@ def observe(
     people: Mapping[str, tuple[int, ...]] | None = None,
     check: bool = True,
     streams: Iterable[str] = (),
+    stride: int = 1,
 ) -> Sequence:
     """Return the Sequence that a scenario's camera and sensor make of a Motion, the motion of a whole crowd.
 
@@ -74,14 +80,16 @@ def observe(
     scenario, which must then be the Scenario that the motion was simulated from; else reading detections with such a
     `sensor.hide`, or load_people(), raises AssertionError. check: reading the truth raises WorkError if an order of the
     script was not fulfilled. streams: some of "left", "right", "disparity", "ids", "background": pictures to draw; by
-    default none.
+    default none. stride: as in `simulate`.
 
-    Raises InputError if people leave the view, a stream is unknown, or the camera has no baseline for "right" or
-    "disparity". Reading detections raises InputError if `sensor.hide` names a group without ids. Drawing raises
-    InputError for impossible values of light and picture.
+    Raises InputError if the stride leaves less than 0.01 frames/s, people leave the view, a stream is unknown, or the
+    camera has no baseline for "right" or "disparity". Reading detections raises InputError if `sensor.hide` names a
+    group without ids. Drawing raises InputError for impossible values of light and picture.
     """
+    check_stride(stride, motion.fps)
     camera = place_camera(scenario.camera, motion)
-    drawn = _pictures(streams, scenario, motion, camera)
+    drawn = _pictures(streams, scenario, motion, camera, stride)
+    kept = every_nth(motion, stride)
 
     @cache
     def named() -> Mapping[str, tuple[int, ...]]:
@@ -98,7 +106,8 @@ def observe(
 
         hidden = named() if any(hide.group is not None for hide in scenario.sensor.hide) else {}
         seen = bodies(motion, camera)
-        return sense(seen, scenario.sensor, motion.seed, camera, camera.image, motion.repeat, hidden)
+        found = sense(seen, scenario.sensor, motion.seed, camera, camera.image, motion.repeat, hidden)
+        return [d.replace(index=k + 1, t=k / kept.fps) for k, d in enumerate(found[::stride])]
 
     def bare() -> Iterator[Frame]:
         return (Frame(d.index, d.t, detections=d) for d in detections())
@@ -109,15 +118,15 @@ def observe(
             yield Frame(d.index, d.t, made.image, made.right, d)
 
     def truth() -> Truth:
-        found = label(motion, camera)
+        found = label(kept, camera)
         if check:
-            check_orders(motion, found)
+            check_orders(kept, found)
         return found
 
     return Sequence(
         name=motion.name,
-        fps=motion.fps,
-        length=len(motion.present),
+        fps=kept.fps,
+        length=len(kept.present),
         frames=frames,
         load_truth=truth,
         image_size=camera.image,
@@ -130,6 +139,7 @@ def observe(
             "kind": "simulated",
             "seed": motion.seed,
             "repeat": motion.repeat,
+            **({} if stride == 1 else {"stride": stride}),
             **({} if drawn is None else {"background": OWN_BACKGROUND}),
         },
         has_images=drawn is not None and drawn.has_image,
@@ -143,13 +153,14 @@ def observe(
 class _Pictures:
     """Draws the requested streams of a simulated sequence.
 
-    renderer: draws the frames. streams: some of "left", "right", "disparity", "ids", "background". State: index (from
-    1) and exact pixels of the frame that was drawn last, because its pixels are usually read next; 0 and None before,
-    pixels None if they were not drawn.
+    renderer: draws the camera's frames. streams: some of "left", "right", "disparity", "ids", "background". stride:
+    number of the camera's frames from one frame of the sequence to the next. State: index (from 1) and exact pixels of
+    the frame that was drawn last, because its pixels are usually read next; 0 and None before, pixels None if they were
+    not drawn.
     """
 
-    def __init__(self, renderer: Renderer, streams: frozenset[str]) -> None:
-        self.renderer, self.streams = renderer, streams
+    def __init__(self, renderer: Renderer, streams: frozenset[str], stride: int) -> None:
+        self.renderer, self.streams, self.stride = renderer, streams, stride
         self.has_image, self.has_right = "left" in streams, "right" in streams
         self._last: tuple[int, PixelTruth | None] = (0, None)
 
@@ -160,10 +171,11 @@ class _Pictures:
         else None. Raises InputError for impossible values of light and picture, or if there is no right camera for
         "right" or "disparity"; IndexError for a frame that does not exist.
         """
+        shot = self._shot(index)
         if not self.has_image:
-            return RenderedFrame(right=self.renderer.right(index) if self.has_right else None)
+            return RenderedFrame(right=self.renderer.right(shot) if self.has_right else None)
         labels = not self.streams.isdisjoint({"ids", "disparity"})
-        made = self.renderer.draw(index, right=self.has_right, pixels=labels, disparity="disparity" in self.streams)
+        made = self.renderer.draw(shot, right=self.has_right, pixels=labels, disparity="disparity" in self.streams)
         self._last = index, made.pixels
         return made
 
@@ -177,7 +189,10 @@ class _Pictures:
         last, known = self._last
         if known is not None and last == index:
             return known
-        return self.renderer.pixels(index, disparity="disparity" in self.streams)
+        return self.renderer.pixels(self._shot(index), disparity="disparity" in self.streams)
+
+    def _shot(self, index: int) -> int:
+        return 1 + (index - 1) * self.stride
 
     def background(self) -> Image:
         """Return pictures of the empty scene before frame 1, (50, H, W, 3) BGR uint8, in the order of time, 1 / fps
@@ -189,7 +204,7 @@ class _Pictures:
 
 
 def _pictures(
-    streams: Iterable[str], scenario: Scenario | ObservationSpec, motion: Motion, camera: Camera
+    streams: Iterable[str], scenario: Scenario | ObservationSpec, motion: Motion, camera: Camera, stride: int
 ) -> _Pictures | None:
     wanted = frozenset(streams)
     if not wanted <= STREAMS:
@@ -202,7 +217,7 @@ def _pictures(
     made = make_renderer(motion, camera, scenario.light, scenario.picture)
     if not wanted.isdisjoint({"right", "disparity"}):
         made.check_pair()
-    return _Pictures(made, wanted)
+    return _Pictures(made, wanted, stride)
 
 
 def named_people(

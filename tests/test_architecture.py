@@ -400,3 +400,12 @@ def test_nothing_that_decides_the_truth_depends_on_the_processor(name: str) -> N
 )  # fmt: skip
 def test_such_code_is_found(code: str) -> None:
     assert any(by_processor(node) for node in ast.walk(ast.parse(code)))
+
+
+@pytest.mark.parametrize("name", modules())
+def test_digits_of_texts_are_0_to_9(name: str) -> None:
+    r"""`\d` in a pattern and `str.isdigit` also take the digits of other scripts."""
+    words = [node.value for node in ast.walk(tree(name)) if isinstance(node, ast.Constant)]
+    methods = {node.attr for node in ast.walk(tree(name)) if isinstance(node, ast.Attribute)}
+    assert [word for word in words if isinstance(word, str) and "\\d" in word] == []
+    assert methods.isdisjoint({"isdigit", "isnumeric", "isdecimal"})

@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import closest
+from sim.io.files.numeric_text import read_number
 from tracking.parameter_files import file_of, first_defaults, preset_file, presets, read, toml_text
 from tracking.user_code import tracker_failed, user_code
 
@@ -90,7 +91,7 @@ class Param:
             if text == str(choice) or (isinstance(choice, bool) and text.lower() == str(choice).lower()):
                 return choice
         try:
-            return self.check(float(text))
+            return self.check(read_number(text))
         except ValueError:
             return self.check(text)
 

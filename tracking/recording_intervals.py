@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sim.types import Array, Ints, Truth
+from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.catalogue import ALL
 from tracking.scoring.catalogue_entries import Score
 from tracking.scoring.rows import numbered
@@ -40,7 +41,7 @@ def recording_intervals(
     truth: of the recording. score: from weights (D, length) of its frames to all scores (D, K), nan where unknown, as
     `weighted_scorer` gives it. draws: number of draws of weights.
     """
-    return block_intervals(score, truth.length, truth.fps, presence(truth.id), draws, SCALES)
+    return block_intervals(score, truth.length, truth.fps, _presence(truth), draws, SCALES)
 
 
 def recording_differences(
@@ -55,7 +56,12 @@ def recording_differences(
     def difference(weights: Array) -> Array:
         return first(weights) - second(weights)
 
-    return block_intervals(difference, truth.length, truth.fps, presence(truth.id), draws)
+    return block_intervals(difference, truth.length, truth.fps, _presence(truth), draws)
+
+
+def _presence(truth: Truth) -> float:
+    """Returns the mean number of frames for which a person is present, also in frames between sparse labels."""
+    return presence(truth.id) * truth.length / max(annotated_frames(truth).count, 1)
 
 
 def presence(id: Ints) -> float:

@@ -13,6 +13,7 @@ from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from scenarios.loading.resolve import Entry
+from sim.clock import check_stride
 from sim.dataset.sequence_job import SequenceJob, lost_job, plan_jobs, run_job, stored_manifest
 from sim.dataset.splits import split_of
 from sim.io.files.atomic import PARTIAL, remove_partials, write_file
@@ -48,6 +49,7 @@ def generate(
     progress: Progress | None = None,
     streams: Iterable[str] = ("left",),
     images: str = "jpg",
+    stride: int = 1,
 ) -> Folders:
     """Write OUT/flockscope-<split>/<name>-s<seed>/ for every entry and seed, and OUT/seqmaps; returns the sequence
     folders.
@@ -60,7 +62,8 @@ def generate(
     40,000). workers: by default this process. The workers of a cluster must share the folder `out` under the same path.
     progress: called as progress(sequences done, sequences in all, name of the last one) after each, failed ones
     included. streams: pictures to store ("left", "right", "disparity", "ids", "background"; () for none). images: their
-    file type, "jpg", "png" or "mp4".
+    file type, "jpg", "png" or "mp4". stride: N stores every N-th frame of the camera only: 1, 1 + N, …, as they are
+    without it, and numbered from 1.
 
     A sequence is left out if an order of its script did not come true; the result's `left_out` holds the reasons. If
     that happens to more than 5 % of the sequences, it is an error.
@@ -77,7 +80,10 @@ def generate(
     split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
     folder = root / f"flockscope-{split}"
     pictures = check_streams(streams, images)
-    jobs = [replace(job, streams=pictures, images=images) for job in plan_jobs(_resolved(entries, set), seeds, folder)]
+    planned = plan_jobs(_resolved(entries, set), seeds, folder)
+    jobs = [replace(job, streams=pictures, images=images, stride=stride) for job in planned]
+    for job in jobs:
+        check_stride(stride, job.entry.scenario.camera.fps)
     with lock_folder(root):
         remove_partials(root, folder, root / "seqmaps")
         for job in jobs:

@@ -31,8 +31,8 @@ class SequenceJob:
 
     folder: where it is stored; its last part is the sequence's name. entry: the scenario to simulate. seed: the random
     seed. streams: pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none. images:
-    their file type, "jpg", "png" or "mp4". marker: a file that a worker must see before it starts, because it would
-    otherwise write to another file system; None for local workers.
+    their file type, "jpg", "png" or "mp4". stride: N stores every N-th frame of the camera. marker: a file that a
+    worker must see before it starts, because it would otherwise write to another file system; None for local workers.
     """
 
     folder: Path
@@ -40,6 +40,7 @@ class SequenceJob:
     seed: int
     streams: tuple[str, ...] = ()
     images: str = "jpg"
+    stride: int = 1
     marker: Path | None = None
 
     @property
@@ -75,8 +76,8 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
 
     The files are not compared with the manifest. Raises InputError for an invalid manifest, which does not tell what
     the folder holds, and if the folder holds another sequence, that is, if the manifest differs in scenario, seed,
-    repeat, schema, engine, streams or file type; the error names what differs. Also raises InputError if the folder is
-    a file or holds something else than a sequence, or a stream or the file type of the job is unknown.
+    repeat, schema, engine, streams, file type or stride; the error names what differs. Also raises InputError if the
+    folder is a file or holds something else than a sequence, or a stream or the file type of the job is unknown.
     """
     from scenarios.loading.resolve import dump
 
@@ -97,7 +98,8 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
         remedy = "delete that folder, or choose another --out"
         raise InputError(**{**error.as_dict(), "remedy": remedy}) from None
     scenario = dump(job.entry.scenario)
-    wanted = identity(scenario, job.seed, job.entry.repeat, job.streams, job.images)
+    wanted = {**identity(scenario, job.seed, job.entry.repeat, job.streams, job.images), "stride": job.stride}
+    manifest = {"stride": 1, **manifest}
     different = {key: value for key, value in wanted.items() if manifest.get(key) != value}
     if different:
         expected = "the same scenario, version, streams and images, or an empty place"
@@ -157,7 +159,7 @@ def simulate_and_store(job: SequenceJob) -> None:
 
     entry = job.entry
     try:
-        sequence = replace(simulate(entry.scenario, job.seed, entry.repeat, job.streams), name=job.name)
+        sequence = replace(simulate(entry.scenario, job.seed, entry.repeat, job.streams, job.stride), name=job.name)
         sequence_folder.write_sequence(
             job.folder, sequence, scenario=dump(entry.scenario), seed=job.seed, repeat=entry.repeat,
             streams=job.streams, images=job.images, keep=lambda: is_stored(job),

@@ -29,7 +29,7 @@ from sim.versions import runtime
 from sim.workers.process import WorkResult, run_pickled
 from sim.workers.protocol import THREAD_VARIABLES, R, RunItems, T, worker_loss
 
-ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):\d+/?"
+ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]+/?"
 SAME = "install the same on all (pip install -c constraints.txt) and restart the workers"
 CONNECT_TIMEOUT = 10.0  # s to reach a scheduler
 COUNT_INTERVAL = 1.0  # s between two counts of the cluster's workers

@@ -29,17 +29,18 @@ from tracking.app.commands.tune import tune
 from tracking.app.fit_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.options_from_dataclass import options_from
 from tracking.app.shared_options import Json, Out
+from tracking.app.strict_command import StrictTyper
 
-app = typer.Typer(
+app = StrictTyper(
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     help="Group tracking under test: simulate labelled crowds, track people and groups, score.",
 )
-export = typer.Typer(rich_markup_mode=None, help="Convert a dataset to another format.")
+export = StrictTyper(rich_markup_mode=None, help="Convert a dataset to another format.")
 app.add_typer(export, name="export")
-fit = typer.Typer(rich_markup_mode=None, help="Fit a model to recordings.")
+fit = StrictTyper(rich_markup_mode=None, help="Fit a model to recordings.")
 app.add_typer(fit, name="fit")
 
 

@@ -60,8 +60,8 @@ class GenerateOptions:
 
     names: scenarios, *.toml files or suites. seeds: "A:B" (A to B - 1) or one number. out: folder to write. settings:
     texts "key=value". sensor: file of a detector profile; None: the scenario's own. streams: names of the pictures to
-    store, or "none". images: format of pictures; None: jpg. workers: number of processes. cluster: address of a dask
-    scheduler; None: this machine.
+    store, or "none". images: format of pictures; None: jpg. stride: N stores every N-th frame. workers: number of
+    processes. cluster: address of a dask scheduler; None: this machine.
     """
 
     names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
@@ -71,6 +71,9 @@ class GenerateOptions:
     sensor: Detector = None
     streams: Streams = "left"
     images: Images = None
+    stride: Annotated[
+        int, typer.Option("--stride", min=1, metavar="N", help="Store every N-th frame of the camera only.")
+    ] = 1
     workers: Workers = 1
     cluster: Cluster = None
 

@@ -19,10 +19,13 @@ def seeds(text: str, option: str = "--seeds") -> range:
     option: the option's name for the error message. Raises InputError for any other text, as a negative number or one
     of more than 18 digits.
     """
-    found = re.fullmatch(r"(\d{1,18})(?::(\d{1,18}))?", text.strip())
+    found = re.fullmatch(r"([0-9]{1,18})(?::([0-9]{1,18}))?", text.strip())
     if found is None:
         raise InputError(
-            place=option, got=repr(text), expected="a:b (from a to b - 1) or one seed", remedy="write 0:10 or 7"
+            place=option,
+            got=repr(text),
+            expected="a:b (from a to b - 1) or one seed, in digits 0 to 9",
+            remedy="write 0:10 or 7",
         )
     first = int(found[1])
     return range(first, first + 1 if found[2] is None else int(found[2]))
@@ -33,9 +36,26 @@ def settings(texts: Iterable[str], default: str, subjects: Iterable[str]) -> lis
 
     A key may start with "tracker.", "sensor." or "scenario."; that word is the subject and is removed. Any other key
     belongs to the subject `default` and stays whole. subjects: those that the command allows. Raises InputError for a
-    text without "=" or without a key, and for a subject that is not in `subjects`. Values are not checked.
+    text without "=" or without a key, for a subject that is not in `subjects`, and for a key that is given twice.
+    Values are not checked.
     """
-    return [_setting(text, default, tuple(subjects)) for text in texts]
+    found = [_setting(text, default, tuple(subjects)) for text in texts]
+    _refuse_repeated(found, default)
+    return found
+
+
+def _refuse_repeated(settings: list[tuple[str, str]], default: str) -> None:
+    """Raises InputError if two settings (subject, "key=value") have the same subject and key."""
+    earlier: dict[tuple[str, str], str] = {}
+    for subject, text in settings:
+        key, _, value = text.partition("=")
+        name = key if subject == default else f"{subject}.{key}"
+        if (subject, key) in earlier:
+            raise InputError(
+                place=f"--set {name}", got=f"it twice: {earlier[subject, key]} and {value}", expected="one value",
+                remedy="leave one out",
+            )  # fmt: skip
+        earlier[subject, key] = value
 
 
 def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, str]:
@@ -65,8 +85,8 @@ def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, s
 def scenario_settings(texts: Iterable[str]) -> list[str]:
     """Returns `--set` texts of a command on scenarios as "key=value", in the order given.
 
-    The prefix "scenario." is removed, "sensor." is kept. Raises InputError for a text without "=" or without a key, and
-    for a key that starts with "tracker.". Values are not checked.
+    The prefix "scenario." is removed, "sensor." is kept. Raises InputError for a text without "=" or without a key, for
+    a key that starts with "tracker.", and for a key that is given twice. Values are not checked.
     """
     found = settings(texts, "scenario", ("scenario", "sensor"))
     return [f"sensor.{text}" if subject == "sensor" else text for subject, text in found]

@@ -19,7 +19,7 @@ from tracking.grouping.grouped_tracks import with_groups
 from tracking.objective.derived_outlines import derived_outlines
 from tracking.objective.hull_overlaps import GroupOutlines, count_inside, found_pairs
 from tracking.scoring.candidate_pairs import FOUND
-from tracking.scoring.evaluation import Scorer, chosen_frames, objective_of
+from tracking.scoring.evaluation import Scorer, objective_of
 from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
 from tracking.scoring.group_scores import f1, matched_groups
 from tracking.scoring.hota import hota
@@ -68,14 +68,15 @@ class ObjectiveScorer:
         return ObjectiveScorer(self.scorer.of_feet.truth, self.similarity)
 
     def _compared(self, tracks: Sequence[Tracks], similarity: Similarity, px_per_m: float) -> dict[str, float]:
-        truth, last = self.scorer.truth, tracks[-1].index if tracks else 0
-        sides = self.scorer.sides(tracks, chosen_frames(last, truth.length))
+        last = tracks[-1].index if tracks else 0
+        inside = self.scorer.scored(last)
+        sides = self.scorer.sides([t for t in tracks if inside[t.index]], inside)
         found = {"HOTA": float("nan"), "group_F1_hull": float("nan")}
         if not sides.groups_only:
             found["HOTA"] = hota(people_pairs(sides, similarity))["HOTA"]
         true = self._true_outlines(sides.surface) if sides.frames.any() else None
         if true is not None:
-            true, est = true.until(last), _tracked_outlines(sides, px_per_m)
+            true, est = true.until(last), _tracked_outlines(sides, tracks, px_per_m)
             matched = matched_groups(true.pos, est.pos, found_pairs(true, est), FOUND)
             found["group_F1_hull"] = f1(len(matched.i), len(true), len(est))
         return {**found, "objective": objective_of(found)}
@@ -89,15 +90,15 @@ class ObjectiveScorer:
         return self._outlines[surface]
 
 
-def _tracked_outlines(sides: ComparedSides, px_per_m: float) -> GroupOutlines:
+def _tracked_outlines(sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: float) -> GroupOutlines:
     """Returns the outlines of the tracker's groups that are scored, in labelled frames; groups are derived if the
     tracker reports none.
 
-    sides: the truth's and the tracker's data in the scored frames. px_per_m: scale for deriving groups in the image; if
-    not finite the truth's is taken. Derived groups have two or more people. Raises InputError if groups must be derived
-    in the image and the scale is 0 or less.
+    sides: the truth's and the tracker's data in the scored frames. tracks: of all frames up to the last. px_per_m:
+    scale for deriving groups in the image; if not finite the truth's is taken. Derived groups have two or more people.
+    Raises InputError if groups must be derived in the image and the scale is 0 or less.
     """
-    tracks, fps = sides.tracks, sides.truth.fps
+    fps = sides.truth.fps
     px_per_m = px_per_m if np.isfinite(px_per_m) else sides.truth.px_per_m
     if not tracks:
         return GroupOutlines.of(tracked_groups(sides).counted)

@@ -15,6 +15,7 @@ import numpy as np
 
 from sim.types import Bools, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups
+from tracking.scoring.annotated_frames import annotated_frames, seen_in
 from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.clear import clear
@@ -50,14 +51,12 @@ __all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity"
 class MatchedSides:
     """One truth and one tracker's tracks, compared but not counted yet.
 
-    - sides: both sides in the scored frames, people mapped. inside (length + 1,): bool by frame number, which are
-      scored.
+    - sides: both sides in the scored frames, people mapped.
     - similarity: how people are compared. people: their candidate pairs, None for a tracker of whole groups.
     - groups: the true groups in the scored frames, None if none of these frames is labelled.
     """
 
     sides: ComparedSides
-    inside: Bools
     similarity: Similarity
     people: Pairs | None
     groups: TrueGroups | None
@@ -71,12 +70,17 @@ class Scores(Mapping[str, float]):
     - similarity: how people were compared, by "boxes" (IoU) or by positions on the "ground" or in the "image".
     - surface: where groups were compared, "ground" or "image".
     - group_match: how groups were matched, by "hull" or by "members".
+    - frames: number of scored frames. length: number of frames of the sequence. step: from one annotated frame to the
+      next, 1 unless the labels are sparse; None if they are not evenly spaced.
     """
 
     by_key: Mapping[str, float]
     similarity: Similarity
     surface: Surface
     group_match: GroupMatch
+    frames: int
+    length: int
+    step: int | None
 
     def __getitem__(self, key: str) -> float:
         return self.by_key[key]
@@ -109,7 +113,8 @@ def evaluate(
     compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"), d being their distance. None follows
     the data, as tracking.scoring.one_plane says. group_match: matches groups by IoU of their hulls ("hull") or
     Jaccard index of their members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None
-    all frames. A frame without tracks counts as empty.
+    all frames. A frame without tracks counts as empty. If the labels are clearly sparse, only annotated frames are
+    scored (`annotated_frames`).
 
     Groups and events that the tracks lack come from the default grouping, in the image only if `truth.px_per_m` is
     known. Scores of people are nan for a tracker of whole groups, scores of groups and events if no scored frame has
@@ -124,14 +129,15 @@ def evaluate(
 class Scorer:
     """Scores any number of trackers against one truth.
 
-    State: truth, on the ground if its boxes can be; labelled (length + 1,), bool by frame number: the frame has
-    labelled groups; the true people and groups as rows of arrays, built at first use and kept. The truth must not
-    change meanwhile.
+    State: truth, on the ground if its boxes can be; annotated, its frames that can be scored; labelled (length + 1,),
+    bool by frame number: the frame is annotated with groups; the true people and groups as rows of arrays, built at
+    first use and kept. The truth must not change meanwhile.
     """
 
     def __init__(self, truth: Truth) -> None:
-        self.truth = grounded(truth)
-        self.labelled = labelled_frames(self.truth)
+        self.truth = truth = grounded(truth)
+        self.annotated = annotated_frames(truth)
+        self.labelled = labelled_frames(truth) & self.annotated.frames
         self._groups: dict[Surface, TrueGroups] = {}
 
     @cached_property
@@ -143,6 +149,13 @@ class Scorer:
     def people(self) -> PersonRows:
         """The true people of all frames as `PersonRows`, one row per person and frame, sorted by frame."""
         return true_people(self.truth, chosen_frames(None, self.truth.length))
+
+    def scored(self, frames: int | range | None) -> Bools:
+        """Returns which of the frame numbers 0 … length are scored, (length + 1,) bool: chosen and annotated ones.
+
+        frames: n for frames 1 … n, a range, or None for all.
+        """
+        return chosen_frames(frames, self.truth.length) & self.annotated.frames
 
     def groups(self, surface: Surface) -> TrueGroups:
         """Returns the true groups of two or more people in all labelled frames; members are row indices of `people`.
@@ -167,7 +180,7 @@ class Scorer:
         if self.truth.unscored is not None:
             est = without_distractors(self.truth, self.truth.unscored, est)
         nobody = np.full(len(est.rows), -1, np.int64)
-        return ComparedSides(self.truth, tracks, self.labelled & frames, true, est, nobody, plane)
+        return ComparedSides(self.truth, tracks, frames, self.labelled & frames, true, est, nobody, plane)
 
     def evaluate(
         self,
@@ -193,22 +206,20 @@ class Scorer:
 
         Raises what `evaluate` raises, and IncomparableError if the runs fit no common plane.
         """
-        return [
-            _scores(one, group_match)
-            for one in self.compare(runs, similarity, chosen_frames(frames, self.truth.length))
-        ]
+        return [_scores(one, group_match, self.annotated.step) for one in self.compare(runs, similarity, frames)]
 
     def compare(
-        self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None, inside: Bools
+        self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None, frames: int | range | None
     ) -> list[MatchedSides]:
         """Returns this truth and the tracks of each run with people mapped, ready to be counted.
 
-        runs: `Tracks` in any order, at most one per frame counts. similarity: as in `evaluate`. inside (length + 1,):
-        bool by frame number, the frames to score.
+        runs: `Tracks` in any order, at most one per frame counts. similarity: as in `evaluate`. frames: those to score,
+        as in `evaluate`.
 
         Raises IncomparableError if boxes or positions are missing or the runs fit no common plane, and InputError if
         groups must be derived in the image and `truth.px_per_m` is 0 or less.
         """
+        inside = self.scored(frames)
         ordered = [_in_order(run, inside) for run in runs]
         moved, chosen = in_one_plane(self.truth, ordered, [from_pixels(run) for run in runs], similarity)
         judges = [self.judge(given, run) for given, run in zip(ordered, moved, strict=True)]
@@ -223,25 +234,26 @@ class Scorer:
         labelled = bool((self.labelled & inside).any())
         if labelled and (truth.events is not None or any(t.groups is None for t in given)):
             given = with_groups(given, truth.fps, truth.px_per_m)
-        sides, pairs = self.sides([t for t in given if inside[t.index]], inside), None
+        sides, pairs = self.sides(seen_in(given, inside), inside), None
         if not sides.groups_only:
             pairs = people_pairs(sides, similarity)
             sides = replace(sides, mapping=mapped_people(pairs))
         groups = self.groups(sides.surface).in_frames(inside, inside[self.people.rows.frame]) if labelled else None
-        return MatchedSides(sides, inside, similarity, pairs, groups)
+        return MatchedSides(sides, similarity, pairs, groups)
 
 
-def _scores(compared: MatchedSides, group_match: GroupMatch) -> Scores:
+def _scores(compared: MatchedSides, group_match: GroupMatch, step: int | None) -> Scores:
     sides, found = compared.sides, dict.fromkeys(CATALOGUE, float("nan"))
+    frames_scored = int(sides.inside.sum())
     if compared.people is not None:
         found |= people_scores(compared.people)
-        where, frames_scored = (sides.surface, sides.plane, sides.scale), int(compared.inside.sum())
+        where = (sides.surface, sides.plane, sides.scale)
         found |= position_scores(sides.true, sides.est, sides.mapping, *where, frames_scored)
     if compared.groups is not None:
         scores = weighted_groups_and_events(sides, compared.groups, group_match)
         found |= unweighted(scores, len(sides.frames))
     found["objective"] = objective_of(found)
-    return Scores(found, compared.similarity, sides.surface, group_match)
+    return Scores(found, compared.similarity, sides.surface, group_match, frames_scored, sides.truth.length, step)
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from sim.types import Array, Bools, GroupEvent, Ints, Tracks
-from tracking.scoring.events import COUNTS_AS, HEADLINE, KINDS, LATE, ComparableEvent, EventMembers
+from tracking.scoring.events import COUNTS_AS, HEADLINE, KINDS, ComparableEvent, EventMembers
 from tracking.scoring.people_and_groups import GroupRows, PersonRows
 from tracking.scoring.rows import FrameRows, RowLookup
 
@@ -22,7 +22,7 @@ CHANGES = frozenset(HEADLINE) | {kind for kind, counts_as in COUNTS_AS.items() i
 
 
 def true_events(
-    events: Iterable[GroupEvent], people: PersonRows, positions: Array | None, frames: Bools
+    events: Iterable[GroupEvent], people: PersonRows, positions: Array | None, frames: Bools, step: int
 ) -> list[ComparableEvent]:
     """Returns the truth's events of known kinds that start in a frame f where frames[f] is true, in the order given.
 
@@ -31,14 +31,15 @@ def true_events(
     None if `GroupEvent.pos` is on it already. With positions, an event lies at the mean of its members at its start
     (nan if none is present).
 
-    Parents are the groups of the members one frame before the start, children are the groups at the start; a member
-    alone or absent is a part of its own. If both are equal, form and dissolve take parents and children from the kind.
+    Parents are the groups of the members before the start, each in the last frame, of the `step` frames before it, in
+    which the member is. Children are the groups at the start. A member alone or absent is a part of its own. If both
+    are equal, form and dissolve take parents and children from the kind.
     Both are None if they are still equal, or if the kind is none of merge, split, form, dissolve. `emitted` is None.
     """
     lookup, group = RowLookup(people.rows), _group_by_row(people.group)
 
     def comparable(event: GroupEvent) -> ComparableEvent:
-        before = _by_group(event.members, lambda m: group[lookup.last(m, event.start - 1, 0)])
+        before = _by_group(event.members, lambda m: group[lookup.last(m, event.start - 1, step - 1)])
         after = _by_group(event.members, lambda m: group[lookup.next(m, event.start, 0)])
         pos = event.pos if positions is None else _mean_position(event, lookup, positions)
         members = EventMembers(frozenset(event.members))
@@ -105,21 +106,20 @@ def _mean_position(event: GroupEvent, lookup: RowLookup, positions: Array) -> tu
 
 
 def tracked_events(
-    tracks: Sequence[Tracks], people: PersonRows, mapping: Ints, true: FrameRows, frames: Bools, fps: float
+    tracks: Sequence[Tracks], people: PersonRows, mapping: Ints, true: FrameRows, frames: Bools, reach: int
 ) -> list[ComparableEvent]:
     """Returns a tracker's events with members, of known kinds, that start in a frame f where frames[f] is true.
 
     Known kinds are merge, split, cross, queue, enter, leave, form and dissolve. tracks: of the scored frames. people:
     the R tracked people in frames. mapping (R,): the row of `true` that each is mapped to, -1 none. true: rows of the
-    true people. frames (length + 1,): bool by frame number. fps: frames per second.
+    true people. frames (length + 1,): bool by frame number. reach: number of frames.
 
-    A member becomes the person it is mapped to at the event's start, or in the nearest frame within 1 s of it. A member
-    that is never mapped in this time, or to a person already listed, is unmatched. Parents are the groups of the
-    members in the frame before the report, children those in the frame of the report, each within 1 s if a member is
+    A member becomes the person it is mapped to at the event's start, or in the nearest frame within reach of it. A
+    member that is never mapped there, or to a person already listed, is unmatched. Parents are the groups of the
+    members in the frame before the report, children those in the frame of the report, each within reach if a member is
     absent. If both are equal, parents are those of the frame before the event's start. If both are still equal, form
     and dissolve take them from the kind. `emitted` is the frame of the `Tracks` that hold the event.
     """
-    reach = round(LATE * fps)
     mapped, lookup, group = RowLookup(people.rows, mapping >= 0), RowLookup(people.rows), _group_by_row(people.group)
     person = np.append(true.id, -1)[mapping].tolist()
 
@@ -151,21 +151,21 @@ def _true_members(members: Sequence[int], known: Mapping[int, int]) -> EventMemb
 
 
 def events_of_hulls(
-    tracks: Sequence[Tracks], groups: GroupRows, true: FrameRows, frames: Bools, fps: float, without_members: bool
+    tracks: Sequence[Tracks], groups: GroupRows, true: FrameRows, frames: Bools, span: int, without_members: bool
 ) -> list[ComparableEvent]:
     """Returns a tracker's events of known kinds that start in a frame f where frames[f] is true; `members` is None.
 
     Known kinds are merge, split, cross, queue, enter, leave, form and dissolve. without_members: if True, only events
     that name no members; else all. tracks: of the scored frames. groups: the tracker's groups, whose members are rows
-    of `true` (from `people_inside`). true: rows of the true people. frames (length + 1,): bool by frame number. fps:
-    frames per second. `emitted` is the frame of the `Tracks` that hold the event.
+    of `true` (from `people_inside`). true: rows of the true people. frames (length + 1,): bool by frame number. span:
+    number of frames. `emitted` is the frame of the `Tracks` that hold the event.
 
     Parents are the people inside the hulls of the groups in `event.before`, children those inside the groups in
-    `event.after`. Children are judged in the 2 s from the report on. Parents are judged in the 2 s before the event's
-    start, or before the report if a parent group appears only at the start or later. A group counts a person who is
-    inside it longer than inside other groups, and in more than half of its frames.
+    `event.after`. Children are judged in `span` frames from the report on. Parents are judged in `span` frames before
+    the event's start, or before the report if a parent group appears only at the start or later. A group counts a
+    person who is inside it longer than inside other groups, and in more than half of its frames.
     """
-    span, person = round(HULL_TIME * fps), true.id[groups.member]
+    person = true.id[groups.member]
 
     def comparable(event: GroupEvent, reported: int) -> ComparableEvent:
         end = event.start if _last_appearance(groups.rows, event.before) < event.start else reported

@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.types import Array, Tracks, Truth
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import MatchedSides, Scorer, chosen_frames
+from tracking.scoring.evaluation import MatchedSides, Scorer
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import Similarity
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
@@ -50,14 +50,14 @@ def weighted_scorers(
     Raises IncomparableError if boxes or positions to compare are missing, ValueError if an id occurs twice in one
     frame, and InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
     """
-    found = Scorer(truth).compare(runs, similarity, chosen_frames(frames, truth.length))
+    found = Scorer(truth).compare(runs, similarity, frames)
     return [_weighted(one, truth.length + 1, group_match) for one in found]
 
 
 def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Callable[[Array], Array]:
     parts: list[WeightedScores] = []
     if compared.people is not None:
-        parts += [weighted_people(compared.people, size), weighted_positions(compared.sides, compared.inside)]
+        parts += [weighted_people(compared.people, size), weighted_positions(compared.sides)]
     if compared.groups is not None:
         parts.append(weighted_groups_and_events(compared.sides, compared.groups, group_match))
     place = {key: k for k, key in enumerate(CATALOGUE)}

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.types import Bools, Groups, Ints, Tracks, Truth
-from tracking.scoring.events import COUNTS_AS, HEADLINE, MatchedEvents, match_events
-from tracking.scoring.events_by_true_people import events_of_hulls, tracked_events, true_events
+from tracking.scoring.annotated_frames import first_seen, widest_step
+from tracking.scoring.events import COUNTS_AS, HEADLINE, LATE, MatchedEvents, match_events
+from tracking.scoring.events_by_true_people import HULL_TIME, events_of_hulls, tracked_events, true_events
 from tracking.scoring.group_scores import (
     GroupComparison,
     GroupMatch,
@@ -39,7 +40,7 @@ class ComparedSides:
     - truth: all of it.
     - tracks: one `Tracks` per scored frame, labelled or not (an event may be reported in an unlabelled one), sorted by
       frame.
-    - frames (length + 1,): bool by frame number: scored, and with labelled groups.
+    - inside (length + 1,): bool by frame number: scored. frames (length + 1,): scored, and with labelled groups.
     - true, est: the R true and S tracked people in the scored frames.
     - mapping (S,): row of `true` that each row of `est` is mapped to, -1 none.
     - plane: of the tracks' positions: "ground", "space" or "image".
@@ -47,6 +48,7 @@ class ComparedSides:
 
     truth: Truth
     tracks: Sequence[Tracks]
+    inside: Bools
     frames: Bools
     true: PersonRows
     est: PersonRows
@@ -149,18 +151,19 @@ def near_changes(truth: Truth) -> Bools:
 
 def compared_events(sides: ComparedSides, tracked: TrackedGroups) -> list[MatchedEvents]:
     """Returns the events of both sides that start in labelled frames, matched, one entry per kind. Fails an assertion
-    if the truth has no events.
+    if the truth has no events. If frames between are not scored, an event starts in the next scored one.
 
     sides: both sides' people; tracked: the tracker's groups.
     """
     truth, rows, frames, fps = sides.truth, sides.true.rows, sides.frames, sides.truth.fps
     assert truth.events is not None
+    step, happened = widest_step(sides.inside), first_seen(truth.events, sides.inside)
     positions = sides.true.positions_on("image", "ground") if sides.surface == "image" else None
-    true = true_events(truth.events, sides.true, positions, frames)
+    true = true_events(happened, sides.true, positions, frames, step)
     names_members = not sides.groups_only
-    est = events_of_hulls(sides.tracks, tracked.every, rows, frames, fps, names_members)
+    est = events_of_hulls(sides.tracks, tracked.every, rows, frames, max(round(HULL_TIME * fps), step), names_members)
     if names_members:
-        est += tracked_events(sides.tracks, sides.est, sides.mapping, rows, frames, fps)
+        est += tracked_events(sides.tracks, sides.est, sides.mapping, rows, frames, max(round(LATE * fps), step))
     return match_events(true, est, fps, sides.scale)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from sim.types import EVENT_KINDS, Context, DetectionMode, Detections, Frame, Groups, Ints, Sequence, Tracks, Truth
 from tracking.prepare import prepare
 from tracking.run import TrackingRun
-from tracking.scoring.evaluation import Scorer, chosen_frames
+from tracking.scoring.evaluation import Scorer
 from tracking.scoring.one_plane import groups_of_people
 from tracking.scoring.people_comparison import Similarity
 
@@ -58,7 +58,7 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
     prepared = prepare(_Detections(), sequence, detections=mode, sensor=given.get("sensor"), seed=seed)
     prepared.reset(seed)
     reported = [prepared.tracker.step(f, f.detections) for f in prepared.frames() if f.index <= truth.length]
-    (compared,) = Scorer(truth).compare([reported], similarity, chosen_frames(None, truth.length))
+    (compared,) = Scorer(truth).compare([reported], similarity, None)
     sides, true = compared.sides, compared.sides.true
     cuts = np.cumsum([0, *(len(t.id) for t in sides.tracks)]).tolist()
     rows = [sides.mapping[a:b] for a, b in pairwise(cuts)]

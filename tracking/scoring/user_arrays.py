@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scenarios.limits import COORDINATE, DETECTIONS, FRAME_RATES, FRAMES, is_number
-from sim.types import Bools, Groups, Ints, Plane, Tracks, Truth
-from tracking.grouping.grouped_tracks import derive
+from sim.types import Bools, GroupEvent, Groups, Ints, Plane, Tracks, Truth
+from tracking.grouping.grouped_tracks import derive, with_groups
+from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.evaluation import Scores, evaluate
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.misreading import likely_misreading
@@ -51,8 +52,8 @@ def score_arrays(
 
     Without a group column in the truth only people are scored. Without one in the tracks they get groups by the
     default grouping. Events of both sides (merges, splits, crossings, queues …) are derived from groups and positions.
-    A score that cannot be computed is nan. Warns if hardly any tracked person
-    matches a true one (tracking.scoring.misreading).
+    A score that cannot be computed is nan. If the truth's labels are clearly sparse, as in every 10th frame, only these
+    frames are scored. Warns if hardly any tracked person matches a true one (tracking.scoring.misreading).
 
     fps: frames per second. px_per_m: pixels per metre, for boxes only; None takes the median height of the true boxes
     for 1.7 m. similarity: compares people by "boxes", "ground" or "image"; None: by boxes if both have them, else by
@@ -77,11 +78,14 @@ def score_arrays(
         raise ValueError("got pos on one side and box on the other, expected one of them on both")
     length = max((int(table["frame"][-1]) for table in filled), default=0)
     scale = _scale(true["box"]) if px_per_m is None else px_per_m
-    made, tracks_of_frames = _truth(true, length, fps, scale, plane), _tracks(est, length, fps, scale, plane)
-    doubt = likely_misreading(made, tracks_of_frames, given="arrays")
+    made = _truth(true, length, fps, scale, plane)
+    annotated = annotated_frames(made).frames
+    known = np.flatnonzero(annotated) if annotated[est["frame"]].all() else np.arange(1, length + 1)
+    given = _tracks(est, known, fps, scale, plane, true["group"] is not None)
+    doubt = likely_misreading(made, given, given="arrays")
     if doubt:
         warnings.warn(doubt, stacklevel=2)
-    return evaluate(made, tracks_of_frames, similarity=similarity, group_match=group_match)
+    return evaluate(made, given, similarity=similarity, group_match=group_match)
 
 
 def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
@@ -156,31 +160,50 @@ def _scale(box: Any) -> float:
     return float("nan") if box is None or not len(box) else float(np.median(box[:, 3])) / PERSON_HEIGHT
 
 
-def _tracks(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> list[Tracks]:
-    """Returns `Tracks` of people, with velocities and covariances nan and scores 1; [] if length is 0. Of the frames
-    1 … length those are left out in which nothing is and nothing can change (`_live_frames`).
+def _tracks(table: Table, known: Ints, fps: float, px_per_m: float, plane: Plane, grouped: bool) -> list[Tracks]:
+    """Returns `Tracks` of people, with velocities and covariances nan and scores 1; [] without known frames. Of the
+    known frames those are left out in which nothing is and nothing can change (`_live_frames`).
 
-    table: checked columns, sorted by frame; fps: frames per second; plane: "ground" takes pos, "image" the centres of
-    the boxes. With a group column groups and events are derived from it, and px_per_m (px per metre) scales image
-    positions. Then InputError is raised if the plane is "image", there are rows and px_per_m is not a finite number
-    above 0.
+    table: checked columns, sorted by frame. known (K,): the frames that are tracked or annotated, ascending, all of the
+    table's among them; they count as evenly spaced in time. fps: frames per second. plane: "ground" takes pos, "image"
+    the centres of the boxes. grouped: derive groups without a group column, too. With such a column groups and events
+    are derived from it, and px_per_m (px per metre) scales image positions. Then InputError is raised if the plane is
+    "image", there are rows and px_per_m is not a finite number above 0.
     """
     box, group, rows = table["box"], table["group"], len(table["frame"])
     pos = table["pos"] if plane == "ground" else box[:, :2] + box[:, 2:] / 2
     label = np.full(rows, -1, np.int64) if group is None else group
-    live = _live_frames(table["frame"], length, fps)
-    first, after = (np.searchsorted(table["frame"], live, side).tolist() for side in ("left", "right"))
+    rate = fps / float(np.diff(known).mean()) if len(known) > 1 else fps
+    frame: Ints = table["frame"]
+    turns = np.searchsorted(known, frame) + 1
+    live = _live_frames(turns, len(known), rate)
+    first, after = (np.searchsorted(turns, live, side).tolist() for side in ("left", "right"))
 
     def at(index: int, low: int, high: int) -> Tracks:
         r, n = slice(low, high), high - low
         return Tracks(
-            index, (index - 1) / fps, plane, "person", table["id"][r], label[r], pos[r], np.full((n, 2), np.nan),
+            index, (index - 1) / rate, plane, "person", table["id"][r], label[r], pos[r], np.full((n, 2), np.nan),
             np.full((n, 4, 4), np.nan), None if box is None else box[r], np.ones(n),
             Groups.none() if group is not None and (label[r] < 0).all() else None,
         )  # fmt: skip
 
     found = [at(*each) for each in zip(live.tolist(), first, after, strict=True)]
-    return found if group is None or not rows else derive(found, fps, px_per_m)
+    if group is not None and rows:
+        found = derive(found, rate, px_per_m)
+    elif grouped:
+        found = list(with_groups(found, rate, px_per_m))
+    return [_in_frames(t, known, fps) for t in found]
+
+
+def _in_frames(tracks: Tracks, known: Ints, fps: float) -> Tracks:
+    """Returns tracks whose frame numbers count the known frames with the numbers of these frames."""
+    index = int(known[tracks.index - 1])
+
+    def moved(event: GroupEvent) -> GroupEvent:
+        start, end = (int(known[frame - 1]) for frame in (event.start, event.end))
+        return replace(event, start=start, end=end, emitted=event.emitted and int(known[event.emitted - 1]))
+
+    return tracks.replace(index=index, t=(index - 1) / fps, events=tuple(map(moved, tracks.events)))
 
 
 def _live_frames(frame: Ints, length: int, fps: float) -> Ints:
@@ -201,8 +224,8 @@ def _live_frames(frame: Ints, length: int, fps: float) -> Ints:
 
 
 def _truth(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> Truth:
-    """Returns the rows of the table as a truth of frames 1 … length; all frames are labelled if there is a group
-    column, else none.
+    """Returns the rows of the table as a truth of frames 1 … length; all annotated frames are labelled if there is a
+    group column, else none.
 
     table: checked columns, sorted by frame; fps: frames per second; px_per_m: px per metre. With a group column groups
     (on the ground or in the image, by `plane`) and events are derived from it. Then InputError is raised if the plane
@@ -211,13 +234,16 @@ def _truth(table: Table, length: int, fps: float, px_per_m: float, plane: Plane)
     frame, group, rows = table["frame"], table["group"], len(table["frame"])
     truth = Truth(
         "arrays", fps, length, px_per_m, frame, table["id"], np.full(rows, -1) if group is None else group,
-        table["pos"], None, table["box"], np.ones(rows), labelled=np.full(length, group is not None),
+        table["pos"], None, table["box"], np.ones(rows), labelled=np.zeros(length, bool),
     )  # fmt: skip
     if group is None:
         return truth
-    derived = _tracks(table, length, fps, px_per_m, plane)
+    annotated = annotated_frames(truth).frames
+    derived = _tracks(table, np.flatnonzero(annotated), fps, px_per_m, plane, True)
     nobody = Groups.none()
     by_frame = {t.index: t.groups or nobody for t in derived}
     groups = tuple(by_frame.get(index, nobody) for index in range(1, length + 1))
     events = tuple(replace(e, emitted=None) for t in derived for e in t.events)
-    return truth.replace(events=events, **{"groups" if plane == "ground" else "groups_px": groups})
+    return truth.replace(
+        labelled=annotated[1:], events=events, **{"groups" if plane == "ground" else "groups_px": groups}
+    )

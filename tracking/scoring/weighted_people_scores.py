@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools
+from sim.types import Array
 from tracking.scoring.candidate_pairs import FOUND, Pairs, point_pairs
 from tracking.scoring.clear import LOST, MOSTLY, clear_matches
 from tracking.scoring.gospa import POWER, gospa_parts
@@ -135,18 +135,18 @@ def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
     return score
 
 
-def weighted_positions(sides: ComparedSides, inside: Bools) -> WeightedScores:
+def weighted_positions(sides: ComparedSides) -> WeightedScores:
     """Returns a function from weights (D, size) to RMSE_pos, RMSE_vel, GOSPA and its parts, (D,) by key.
 
-    sides: both sides, people mapped. inside (size,): bool by frame number, which are scored. The function returns {} if
-    a side has no positions on the surface, or if the scale is not finite and above 0.
+    sides: both sides, people mapped. The function returns {} if a side has no positions on the surface, or if the scale
+    is not finite and above 0.
     """
     true, est = sides.true, sides.est
     compared = compared_positions(true, est, sides.surface, sides.plane, sides.scale)
     if compared is None:
         return lambda weights: {}
     true_pos, est_pos, true_vel, est_vel = compared
-    sums, reach = FrameSums(len(inside)), REACH * sides.scale
+    sums, reach = FrameSums(len(sides.inside)), REACH * sides.scale
     j = np.flatnonzero(sides.mapping >= 0)
     i = sides.mapping[j]
     sums.add_mean("RMSE_pos", true.rows.frame[i], np.square(est_pos[j] - true_pos[i]).sum(axis=1))
@@ -155,7 +155,7 @@ def weighted_positions(sides: ComparedSides, inside: Bools) -> WeightedScores:
     parts = gospa_parts(point_pairs(true.rows, est.rows, true_pos, est_pos, reach), reach)
     for name, values in zip(("localisation", "missed", "false"), parts.T, strict=True):
         sums.add(name, np.arange(len(parts)), values)
-    sums.add("frames", np.flatnonzero(inside))
+    sums.add("frames", np.flatnonzero(sides.inside))
 
     def score(weights: Array) -> dict[str, Array]:
         s = sums.of(weights)

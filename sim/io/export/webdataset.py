@@ -81,7 +81,7 @@ def size_of(text: str) -> int:
     Units are B, kB, MB and GB, spelt so; blanks around are ignored. Fractions of a byte are rounded. Raises InputError
     if the text is no such size (as `500M` or `3 KB`) or rounds to 0.
     """
-    found = re.fullmatch(r"(\d{1,12}(?:\.\d{1,6})?)\s*(?:([kMG])?B)?", text.strip())
+    found = re.fullmatch(r"([0-9]{1,12}(?:\.[0-9]{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
     if size < 1:
         raise InputError(

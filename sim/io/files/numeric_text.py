@@ -149,9 +149,18 @@ def _first_bad_line(path: Path, numbered: list[tuple[int, str]], separator: str 
 
 
 def is_number_text(cell: str) -> bool:
-    """Return True if numpy reads the cell as a number: unlike float(), it takes no underscore and ASCII digits only."""
+    """Return True if `read_number` reads the cell."""
     try:
-        float(cell)
+        read_number(cell)
     except ValueError:
         return False
-    return "_" not in cell and cell.strip().isascii()
+    return True
+
+
+def read_number(text: str) -> float:
+    """Return the number that a text stands for, as numpy reads it: unlike float(), it takes no underscore and ASCII
+    digits only. Raises ValueError for any other text.
+    """
+    if "_" in text or not text.strip().isascii():
+        raise ValueError(f"{text!r} is no number")
+    return float(text)

@@ -17,7 +17,7 @@ from scenarios.printable import is_control
 
 LONGEST = 200  # bytes of a file name made from a label: 255 less temporary prefixes and our suffixes
 FORBIDDEN = frozenset('/\\:*?"<>|')  # by Windows, or on network drives
-RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # devices of Windows
+RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)  # devices of Windows
 
 
 def file_name(label: str) -> str:

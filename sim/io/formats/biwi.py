@@ -19,7 +19,7 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from scenarios.regular_file import is_present
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import NumericTable, crowded, read_numbers, read_text
+from sim.io.files.numeric_text import NumericTable, crowded, read_number, read_numbers, read_text
 from sim.io.formats.group_labels import labelled_truth_fields, require_size
 from sim.types import Frame, Ints, Sequence, Truth
 
@@ -95,7 +95,7 @@ def read_groups(path: Path) -> dict[int, int]:
 
 def _ids(path: Path, number: int, line: str) -> list[int]:
     try:
-        values = [float(word) for word in line.replace(",", " ").split()]
+        values = [read_number(word) for word in line.replace(",", " ").split()]
         if all(0 <= v <= LAST_ID and v == round(v) for v in values):
             return [int(v) for v in values]
     except (ValueError, OverflowError):

@@ -12,8 +12,9 @@ import re
 import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
 from scenarios.regular_file import read_regular
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import whole_number
+from sim.io.files.numeric_text import read_number, whole_number
 from sim.io.formats.group_labels import labelled_truth_fields, require_size
 from sim.io.formats.velocity import differentiate
 from sim.scene.box_scale import scale_of_all_boxes, scale_of_first_boxes
@@ -38,15 +39,16 @@ CHORD = 1.0  # s, for velocities: labels rest for some frames and then jump by p
 class CaviarRecording:
     """The content of a CAVIAR file: R boxes sorted by (frame, id), and `length` frames.
 
-    name: that in the file, else the file's name without suffix. length: the last frame in the file, 0 without frames.
-    frame (R,): from 1. id (R,): the person's id. label (R,): the id of the person's group, -1 for alone. centre (R, 2):
-    x, y of the box's centre, px. size (R, 2): width, height, px. labelled: True if the file has a list of groups,
-    perhaps empty, in any frame. caviar: True if it is one of CAVIAR's own recordings: people have hypotheses about what
-    they do, and all boxes lie in CAVIAR's pictures.
+    name: that in the file, else the file's name without suffix. length: the last frame in the file. listed (L,): the
+    frames in the file, ascending, each once. frame (R,): from 1. id (R,): the person's id. label (R,): the id of the
+    person's group, -1 for alone. centre (R, 2): x, y of the box's centre, px. size (R, 2): width, height, px. labelled:
+    True if the file has a list of groups, perhaps empty, in any frame. caviar: True if it is one of CAVIAR's own
+    recordings: people have hypotheses about what they do, and all boxes lie in CAVIAR's pictures.
     """
 
     name: str
     length: int
+    listed: Ints
     frame: Ints
     id: Ints
     label: Ints
@@ -67,14 +69,15 @@ def read_xml(path: Path) -> CaviarRecording:
     """
     root = _root(path)
     rows: list[tuple[float, ...]] = []
-    last, labelled, hypotheses = 0, False, root.find("frame/objectlist/object/hypothesislist") is not None
+    listed, labelled, hypotheses = set[int](), False, root.find("frame/objectlist/object/hypothesislist") is not None
     for element in root.iterfind("frame"):
         index = _whole(path, "frame", element, "number", FRAMES - 1) + 1
-        last, labelled = max(last, index), labelled or element.find("grouplist") is not None
+        listed.add(index)
+        labelled = labelled or element.find("grouplist") is not None
         label = _labels(path, index, element)
         for person in element.iterfind("objectlist/object"):
             rows.append(_row(path, index, person, label))
-    if not last:
+    if not listed:
         raise InputError(
             file=path, got="no <frame> in <dataset>", expected="a CAVIAR file (CVML) with frames",
             remedy="give another file",
@@ -88,11 +91,14 @@ def read_xml(path: Path) -> CaviarRecording:
             file=path, place=f"frame {frame[k] - 1}", got=f"object {id[k]} twice", expected="each id once in a frame",
             remedy="remove one of the two",
         )  # fmt: skip
+    last = max(listed)
     require_size(path, last, id)
     name = root.get("name", path.stem)
     centre, size = table[:, 3:5], table[:, 5:7]
     inside = bool(((centre >= 0) & (centre <= IMAGE_SIZE)).all())
-    return CaviarRecording(name, last, frame, id, label_, centre, size, labelled, hypotheses and inside)
+    return CaviarRecording(
+        name, last, np.array(sorted(listed)), frame, id, label_, centre, size, labelled, hypotheses and inside
+    )
 
 
 def _root(path: Path) -> ET.Element:
@@ -117,7 +123,7 @@ def _root(path: Path) -> ET.Element:
 def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
     text = element.get(key)
     try:
-        value = float(text or "")
+        value = read_number(text or "")
     except ValueError:
         value = float("nan")
     if not abs(value) <= COORDINATE:
@@ -192,10 +198,10 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
     ground.
 
     Groups are those of the file, one hull around their members' boxes (groups_px; `groups` stays None), and every frame
-    counts as labelled. Events are measured from the motion of the boxes' centres, differences over 1 s; velocities are
-    not kept (None). If the file has no group lists or no boxes, no frame
-    counts as labelled, and groups and events are None. Visibility is 1. fps: frames per second, default 25. px_per_m:
-    image scale; None: the median of the boxes' longer sides / 1.7 m.
+    in the file counts as labelled. Events are measured in these frames from the motion of the boxes' centres,
+    differences over 1 s; velocities are not kept (None). If the file has no group lists or no boxes, no frame counts as
+    labelled, and groups and events are None. Visibility is 1. fps: frames per second, default 25. px_per_m: image
+    scale; None: the median of the boxes' longer sides / 1.7 m.
 
     Raises InputError if the file is unreadable, no CVML or invalid (see read_xml). Warns about a person in two groups.
     """
@@ -210,12 +216,26 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
     if not found.labelled or not len(box):
         return truth
     vel = differentiate(found.frame, found.id, found.centre, fps, CHORD)
-    known = labelled_truth_fields(
-        found.frame, found.id, found.label, found.centre, vel, fps=fps, length=found.length, px_per_m=scale
-    )
-    del known["groups"]  # hulls of footprints, which the image does not show
+    known = _measured(found, vel, fps, scale)
     shapes = box_groups(found.frame, found.id, found.label, found.centre, vel, box, 1, found.length)
     return truth.replace(groups_px=tuple(shapes), **known)
+
+
+def _measured(found: CaviarRecording, vel: Array, fps: float, px_per_m: float) -> dict[str, Any]:
+    """Return the fields events, near and labelled of a Truth by name, measured in the frames that the file lists.
+
+    vel (R, 2): px/s. These frames count as evenly spaced in time.
+    """
+    listed = found.listed
+    rate = fps / float(np.diff(listed).mean()) if len(listed) > 1 else fps
+    turn = np.searchsorted(listed, found.frame) + 1
+    known = labelled_truth_fields(
+        turn, found.id, found.label, found.centre, vel, fps=rate, length=len(listed), px_per_m=px_per_m
+    )
+    events = (replace(e, start=int(listed[e.start - 1]), end=int(listed[e.end - 1])) for e in known["events"])
+    near = known["near"]
+    near = near.replace(start=listed[near.start - 1], end=listed[near.end - 1])
+    return {"events": tuple(events), "near": near, "labelled": np.isin(np.arange(1, found.length + 1), listed)}
 
 
 def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:

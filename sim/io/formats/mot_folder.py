@@ -16,7 +16,7 @@ from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, is_number
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.regular_file import is_present
-from sim.io.files.numeric_text import is_number_text, read_text
+from sim.io.files.numeric_text import read_number, read_text
 from sim.io.files.side_files import is_hidden
 from sim.io.formats import mot_text
 from sim.io.formats.box_columns import BoxScale, size_doubt
@@ -63,7 +63,7 @@ def read_seqinfo(path: Path) -> SeqInfo:
     def number(key: str, low: float, high: float, whole: bool = True) -> float | None:
         text = section.get(key.lower())
         try:
-            value = None if text is None else float(text) if is_number_text(text) else float("nan")
+            value = None if text is None else read_number(text)
         except ValueError:
             value = float("nan")
         if value is not None and not (low <= value <= high and (not whole or value == round(value))):

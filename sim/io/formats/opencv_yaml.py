@@ -25,10 +25,10 @@ SAME = 1e-6
 """Relative difference allowed between P1 and the left part of P2."""
 KEYS = ("image_width", "image_height", "P1", "P2", "rotation", "position")
 KEY = re.compile(r"([A-Za-z_]\w*)\s*:\s*(.*)")
-NUMBER = re.compile(r"[-+]?(\d{1,30}\.?\d{0,30}|\.\d{1,30})([eE][-+]?\d{1,3})?")
+NUMBER = re.compile(r"[-+]?([0-9]{1,30}\.?[0-9]{0,30}|\.[0-9]{1,30})([eE][-+]?[0-9]{1,3})?")
 LIST = re.compile(r"\[([^\[\]]*)\]")
 MATRIX = re.compile(
-    r"!!opencv-(?:nd-)?matrix\s+(?:rows:\s*(\d{1,2})\s+cols:\s*(\d{1,2})|sizes:\s*\[([\d,\s]{0,20})\])\s+"
+    r"!!opencv-(?:nd-)?matrix\s+(?:rows:\s*([0-9]{1,2})\s+cols:\s*([0-9]{1,2})|sizes:\s*\[([0-9,\s]{0,20})\])\s+"
     r"dt:\s*\w+\s+data:\s*(\[[^\[\]]*\])\s*"
 )
 """A matrix of two or of any number of dimensions, as FileStorage writes it."""
@@ -101,7 +101,7 @@ def _value(block: str) -> Array | None:
     values = np.array([float(item) for item in numbers])
     if matrix is None:
         return values
-    sizes = re.findall(r"\d+", matrix[3]) if matrix[1] is None else (matrix[1], matrix[2])
+    sizes = re.findall(r"[0-9]+", matrix[3]) if matrix[1] is None else (matrix[1], matrix[2])
     shape = tuple(int(size) for size in sizes)
     return values.reshape(shape) if int(np.prod(shape)) == len(values) else None
 

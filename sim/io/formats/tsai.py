@@ -16,7 +16,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import XML_BYTES
-from sim.io.files.numeric_text import read_text
+from sim.io.files.numeric_text import read_number, read_text
 from sim.scene.camera_check import require_camera
 from sim.types import Array, Camera
 
@@ -65,7 +65,7 @@ def _values(path: Path) -> dict[str, float]:
         for name in names:
             text = None if element is None else element.get(name)
             try:
-                value = float(text if text is not None else "nan")
+                value = read_number(text if text is not None else "nan")
             except ValueError:
                 value = float("nan")
             if not abs(value) <= LARGEST or (name in POSITIVE and value <= 0):

@@ -164,7 +164,7 @@ def _seconds(stream: Any) -> float:
     """
     if stream.duration is not None:
         return float(stream.duration * stream.time_base)
-    found = re.fullmatch(r"(\d+):(\d\d):(\d\d(?:\.\d+)?)", stream.metadata.get("DURATION", ""))
+    found = re.fullmatch(r"([0-9]+):([0-9][0-9]):([0-9][0-9](?:\.[0-9]+)?)", stream.metadata.get("DURATION", ""))
     return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3]) if found else 0.0
 
 

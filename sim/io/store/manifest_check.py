@@ -33,6 +33,7 @@ TOP: Rules = {
     "scenario_hash": TEXT,
     "streams": list_of(one_of(*STREAMS)),
     "images": or_none(one_of(*IMAGES)),
+    "stride": whole(1, FRAMES),
 }
 """What other values must be; keys that a manifest may lack are checked if they are there."""
 

@@ -129,10 +129,9 @@ def _manifest(
     pictures: WrittenPictures,
 ) -> dict[str, Any]:
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
-    origin = {"origin": sequence.source["origin"]} if "origin" in sequence.source else {}
     return {
         **identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
-        **origin,
+        **{key: sequence.source[key] for key in ("origin", "stride") if key in sequence.source},
         "pixels": pictures.pixels,
         "truth_hash": truth,
         "content_hash": hashing.content_hash(truth, found, pictures.pixels),
@@ -172,8 +171,8 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     """Return the stored sequence in a folder, equal to the one that was written, except for its `source`.
 
     background: sample of frames for background models, instead of the stored empty frames; None takes those. `source`
-    has kind "generated", path, seed, repeat, truth_hash, streams, images, and, if known, background and origin (of a
-    replay).
+    has kind "generated", path, seed, repeat, truth_hash, streams, images, and, if known, background, origin (of a
+    replay) and stride.
 
     Raises InputError if the manifest is invalid, a file is missing or altered, `background` is given for a sequence
     without left pictures, or it asks for more frames than there are or fit into 2 GB. Of pictures only the size in
@@ -186,7 +185,9 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     size, length, fps = about["image_size"], about["length"], about["fps"]
     left, right = "left" in pictures.streams, "right" in pictures.streams
     load_background, words = _background(pictures, background, length)
-    origin = {"origin": manifest["origin"]} if "origin" in manifest else {}
+    special: dict[str, Any] = {key: manifest[key] for key in ("origin", "stride") if key in manifest}
+
+    scripted = "gt/script.json" in has and "origin" not in special
 
     @lru_cache(maxsize=1)
     def detections() -> list[Detections]:
@@ -218,11 +219,11 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
         px_per_m=tables.none_to_nan(about["px_per_m"]),
         has_images=left, has_right=right, has_detections="det/det.parquet" in has, load_background=load_background,
-        load_people=(lambda: _people(folder, manifest)) if "gt/script.json" in has and not origin else None,
+        load_people=(lambda: _people(folder, manifest)) if scripted else None,
         source={
             "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
             "truth_hash": manifest["truth_hash"], "streams": list(pictures.streams), "images": manifest.get("images"),
-            **words, **origin,
+            **words, **special,
         },
         bare=bare if left or right else None,
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,

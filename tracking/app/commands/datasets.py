@@ -26,13 +26,13 @@ def generate(options: GenerateOptions) -> CommandResult:
 
     option_parsing.output_folder(options.out)
     seeds = option_parsing.seeds(options.seeds)
-    texts = [*option_parsing.sensor_settings(options.sensor), *options.settings]
-    settings = option_parsing.scenario_settings(texts)
+    sensor = option_parsing.sensor_settings(options.sensor)
+    settings = [*sensor, *option_parsing.scenario_settings(options.settings)]
     streams, images = option_parsing.pictures(options.streams, options.images)
     with ProgressMeter("generate") as meter:
         folders = make(
             options.names, seeds, options.out, set=settings, workers=WorkerOptions(options.workers, options.cluster),
-            progress=meter.update, streams=streams, images=images,
+            progress=meter.update, streams=streams, images=images, stride=options.stride,
         )  # fmt: skip
     lines = [f"{counted(len(folders), 'sequence')} in {folders[0].parent}"]
     left_out = {name: reason.line() for name, reason in folders.left_out.items()}

@@ -29,7 +29,8 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     streams, images = option_parsing.pictures(options.streams, options.images)
     if options.duration is not None and options.duration <= 0:
         raise InputError(place="--duration", got=options.duration, expected="seconds above 0", remedy="correct it")
-    view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *options.settings])
+    settings = option_parsing.scenario_settings(options.settings)
+    view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *settings])
     recordings = open_source(options.source, fps=options.fps, images=False)
     replays = ReplayOptions(view, Cut(options.start, options.duration), options.calibration, streams, images)
     with ProgressMeter("replay") as meter:

@@ -74,7 +74,7 @@ def score(options: ScoreOptions) -> CommandResult:
     box_scale = None if options.box_scale is None else parse_box_scale(options.box_scale)
     scored = _score_all(sequences, paths, method, box_scale)
     rows, *others = ([each[k].row for each in scored] for k in range(len(paths)))
-    notes = list(dict.fromkeys(each[0].note for each in scored if each[0].note))
+    notes = [*_sparse_notes(rows), *dict.fromkeys(each[0].note for each in scored if each[0].note)]
     if options.blocks:
         means, differences = _block_intervals(sequences[0], scored[0], options.blocks)
         result = _result([(rows, means)], [*notes, *_short_notes(sequences[0])])
@@ -201,6 +201,17 @@ def score_runs(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMe
     ]
 
 
+def _sparse_notes(rows: list[SequenceScores]) -> list[str]:
+    """Returns a list with one note if only some frames are scored, because the labels of a sequence are sparse."""
+    sparse = [row.scores for row in rows if row.scores.step != 1]
+    if not sparse:
+        return []
+    steps = " and ".join(dict.fromkeys("some frames" if s.step is None else f"1 frame in {s.step}" for s in sparse))
+    where = "" if len(rows) == 1 else f" of {len(sparse)} of {len(rows)} sequences"
+    scored, length = (sum(getattr(s, name) for s in sparse) for name in ("frames", "length"))
+    return [f"labels{where} are sparse ({steps}): only annotated frames are scored, {scored} of {length}"]
+
+
 def _short_notes(sequence: Sequence) -> list[str]:
     """Returns a list with one note if the recording lasts less than 60 s, so that its intervals are only indicative;
     else [].
@@ -249,7 +260,7 @@ def _result(parts: list[tuple[list[SequenceScores], Means]], notes: list[str] | 
 def _row_data(row: SequenceScores) -> dict[str, Any]:
     s = row.scores
     chosen = {"similarity": s.similarity, "surface": s.surface, "group_match": s.group_match, "given": row.given}
-    return {"name": row.sequence, **chosen, **s}
+    return {"name": row.sequence, **chosen, "frames_scored": s.frames, "label_step": s.step, **s}
 
 
 def _with_differences(

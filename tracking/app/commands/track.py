@@ -110,8 +110,10 @@ def _setup(options: TrackOptions) -> TrackerSetup:
     Raises InputError if the tracker is unknown or a file is wrong, or for a setting that is wrong or belongs to a
     scenario. Values of the sensor are checked later.
     """
-    texts = [*option_parsing.sensor_settings(options.sensor), *options.settings]
-    found = option_parsing.settings(texts, "tracker", ("tracker", "sensor"))
+    found = [
+        *option_parsing.settings(option_parsing.sensor_settings(options.sensor), "tracker", ("sensor",)),
+        *option_parsing.settings(options.settings, "tracker", ("tracker", "sensor")),
+    ]
     own = [text for subject, text in found if subject == "tracker"]
     sensor = option_parsing.toml_values(text for subject, text in found if subject == "sensor")
     rule = None if options.grouping is None else grouping_of(options.grouping)

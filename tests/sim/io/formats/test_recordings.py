@@ -4,6 +4,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.formats import biwi, caviar
 from sim.io.source import open_source
+from tracking.scoring.annotated_frames import annotated_frames
 
 ROW = "{} {} {} 0 {} 1.0 0 0.0\n"
 
@@ -177,6 +178,26 @@ def test_cvml_without_frames_is_refused(tmp_path):
         (tmp_path / "clip.xml").write_text(f"<dataset>{body}</dataset>")
         with pytest.raises(InputError, match="no <frame> in <dataset>"):
             open_source(tmp_path / "clip.xml", fps=25)
+
+
+def test_cvml_of_every_fifth_frame(tmp_path):
+    """Groups and events are those of the frames in the file: people are not absent in between."""
+    pair = [GROUP.format(4, "1,2")]
+    near = [max(30, 200 - 20 * k) for k in range(40)]
+    frames = [
+        ([OBJECT.format(1, 20), OBJECT.format(2, x), OBJECT.format(3, 300)], pair if k > 12 else [])
+        for k, x in enumerate(near)
+    ]
+    every = open_source(xml(tmp_path, *frames), fps=5)[0].truth
+    text = (tmp_path / "clip.xml").read_text()
+    for k in reversed(range(40)):
+        text = text.replace(f'number="{k}"', f'number="{5 * k}"')
+    (tmp_path / "clip.xml").write_text(text)
+    fifth = open_source(tmp_path / "clip.xml", fps=25)[0].truth
+    assert np.flatnonzero(fifth.labelled).tolist() == list(range(0, 196, 5))
+    assert [e.kind for e in every.events] == [e.kind for e in fifth.events] == ["form"]
+    assert [(e.start - 1) * 5 + 1 for e in every.events] == [e.start for e in fifth.events]
+    assert annotated_frames(fifth).step == 5
 
 
 def test_a_caviar_of_nobody(tmp_path):

@@ -1,0 +1,119 @@
+"""What click accepts in silence is an error: an option given twice, a key given twice, numbers in other digits."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from tests.short_scene import write_short_scene
+from tracking.app.cli import app, run
+
+ARABIC = str.maketrans("0123456789", "٠١٢٣٤٥٦٧٨٩")
+
+
+def commands(group: Any, above: tuple[str, ...] = ()) -> list[tuple[tuple[str, ...], Any]]:
+    """All commands with the words that call them."""
+    found = []
+    for name, command in group.commands.items():
+        words = (*above, name)
+        found += commands(command, words) if hasattr(command, "commands") else [(words, command)]
+    return found
+
+
+OPTIONS = [
+    (words, param.opts[0], param.is_flag, param.multiple)
+    for words, command in commands(typer.main.get_command(app))
+    for param in command.params
+    if param.param_type_name == "option"
+]
+ONCE = [(*words, option, flag) for *words, option, flag, several in OPTIONS if not several]
+
+
+@pytest.mark.parametrize(("words", "option", "flag"), ONCE, ids=lambda value: str(value).replace(" ", ""))
+def test_an_option_given_twice_is_refused(words: tuple[str, ...], option: str, flag: bool, capsys) -> None:
+    given = [option] if flag else [option, "3"]
+    assert run([*words, *given, *given]) == 2
+    shown = capsys.readouterr()
+    place = json.loads(shown.out)["error"]["place"] if option == "--json" else shown.err.split(": ")[1]
+    assert place == option
+
+
+def test_every_command_with_its_options_is_tested() -> None:
+    assert {option for _, option, _, several in OPTIONS if several} == {"--set", "--suite", "--objective"}
+    assert {words[0] for words, *_ in OPTIONS} >= {"generate", "track", "score", "export", "fit", "tune", "demo"}
+
+
+def test_an_error_names_the_option_and_its_last_value(capsys) -> None:
+    assert run(["generate", "cross", "--seeds", "1:3", "--seeds=4:6", "--out", "x"]) == 2
+    assert capsys.readouterr().err == (
+        "error: --seeds: got it 2 times, the last time 4:6; expected it once; leave one --seeds only\n"
+    )
+
+
+TWICE = {
+    "generate cross --seeds 1 --out x --set camera.fps=5 --set camera.fps=7": ("camera.fps", "5 and 7"),
+    "generate cross --seeds 1 --out x --set camera.fps=5 --set scenario.camera.fps=5": ("camera.fps", "5 and 5"),
+    "generate cross --seeds 1 --out x --set sensor.clutter_rate=1 --set sensor.clutter_rate=2": (
+        "sensor.clutter_rate", "1 and 2",
+    ),
+    "scenarios cross --set camera.fps=5 --set camera.fps=7": ("camera.fps", "5 and 7"),
+    "track blob x --out y --set gate=0.9 --set tracker.gate=0.99": ("gate", "0.9 and 0.99"),
+    "tune blob --trials 3 --out x --suite quick --set gate=0.9 --set gate=0.8": ("gate", "0.9 and 0.8"),
+    "replay x --seeds 1 --out y --set camera.fps=5 --set camera.fps=7": ("camera.fps", "5 and 7"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("line", TWICE)
+def test_a_key_given_twice_is_refused(line: str, tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    key, values = TWICE[line]
+    assert run(line.split()) == 2
+    assert f"error: --set {key}: got it twice: {values};" in capsys.readouterr().err
+
+
+def test_a_setting_may_replace_one_of_the_profile(tmp_path: Path, capsys) -> None:
+    """--sensor is a file of keys; --set is stronger."""
+    write_short_scene(tmp_path, "0:1")
+    profile = tmp_path / "sensor.toml"
+    profile.write_text("[sensor]\nclutter_rate = 1.5\nnoise_px = 3\n")
+    options = ["--sensor", str(profile), "--set", "sensor.clutter_rate=0.5", "--streams", "none"]
+    line = ["generate", str(tmp_path / "scene.toml"), "--seeds", "7", "--out", str(tmp_path / "data"), *options]
+    assert run(line) == 0
+    text = next((tmp_path / "data").glob("*/*-s00007/scenario.toml"))
+    assert "clutter_rate = 0.5" in text.read_text()
+    assert "noise_px = 3" in text.read_text()
+    tracked = ["track", "blob", str(tmp_path / "data"), "--out", str(tmp_path / "run"), "--detections", "truth"]
+    assert run([*tracked, *options[:4]]) == 0, capsys.readouterr().err
+
+
+NUMBERS = {
+    "generate cross --out x --seeds {}": ("--seeds", "1_0", "1:3"),
+    "generate cross --out x --seeds 1 --workers {}": ("--workers", "1_0"),
+    "track blob x --out y --seed {}": ("--seed", "1_0", "7"),
+    "track blob x --out y --fps {}": ("--fps", "1_0", "2_5.5", "25"),
+    "track blob x --out y --background {}": ("--background", "first:1_0", "first:10"),
+    "export webdataset x --out y --shard-size {}": ("--shard-size", "1_0MB", "10MB"),
+    "tune blob --out x --suite quick --trials {}": ("--trials", "1_0"),
+}
+
+
+@pytest.mark.parametrize(("line", "text"), [(line, text) for line, (_, *texts) in NUMBERS.items() for text in texts])
+def test_a_number_is_written_in_digits_0_to_9(line: str, text: str, tmp_path: Path, capsys, monkeypatch) -> None:
+    """Underscores, and Arabic digits in numbers without one, are refused before the source is looked for."""
+    monkeypatch.chdir(tmp_path)
+    given = text if "_" in text else text.translate(ARABIC)
+    assert run(line.format(given).split()) == 2
+    shown = capsys.readouterr().err
+    assert NUMBERS[line][0] in shown
+    assert "expected no exception" not in shown
+    assert shown.count("\n") == 1
+
+
+@pytest.mark.parametrize("text", ["1_0", "٣"])
+def test_a_number_of_a_setting_is_written_in_digits_0_to_9(text: str, capsys) -> None:
+    assert run(["track", "blob", "x", "--out", "y", "--set", f"gate={text}"]) == 2
+    assert f"got '{text}'" in capsys.readouterr().err

@@ -1,0 +1,124 @@
+"""Which frames of a truth are annotated: all of them, unless its labels are clearly sparse.
+
+Recordings are often labelled in some frames only, as in every 25th frame of a video or in keyframes. The other frames
+then say nothing of a tracker. Labels are sparse if nearly all labelled frames stand alone, without a label in the frame
+before or after, and
+
+- people are labelled in successive labelled frames, so that they were there in between, too, or
+- the labelled frames are evenly spaced, and many.
+
+In frames without people nobody is labelled either. That is told apart: people stay for several frames, so that their
+labelled frames do not stand alone.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim.types import Bools, GroupEvent, Ints, Tracks, Truth
+
+FEWEST = 5
+"""Labelled frames below which nothing is clear."""
+MANY = 8
+"""Labelled frames that are evenly spaced by chance next to never."""
+APART = 0.75
+"""Least share of labelled frames after which a frame without labels follows."""
+MOST = 0.5
+"""Least share of the steps between labelled frames that people outlast, or that are the usual one."""
+
+
+@dataclass(frozen=True, eq=False)
+class AnnotatedFrames:
+    """frames (length + 1,): bool by frame number, which are annotated; frame 0 never is. step: from one annotated frame
+    to the next, 1 if all are, None if they are not evenly spaced."""
+
+    frames: Bools
+    step: int | None = 1
+
+    @property
+    def count(self) -> int:
+        """The number of annotated frames."""
+        return int(self.frames.sum())
+
+
+def annotated_frames(truth: Truth) -> AnnotatedFrames:
+    """Returns the annotated frames of a truth: all, or if its labels are clearly sparse those with labels.
+
+    Rows that are not scored (`Truth.unscored`) and frames with group labels (`Truth.labelled`) are labels, too. Of
+    evenly spaced labels with a step, all frames at this step are annotated, also those in which nobody is.
+    """
+    every = np.ones(truth.length + 1, bool)
+    every[0] = False
+    labelled = _labelled_frames(truth)
+    steps = np.diff(labelled)
+    if len(labelled) < FEWEST or (steps > 1).mean() < APART:
+        return AnnotatedFrames(every)
+    step = int(np.gcd.reduce(steps))
+    even = step > 1 and (steps == step).mean() >= MOST
+    if not (even and len(labelled) >= MANY) and _outlasted(truth, labelled).mean() < MOST:
+        return AnnotatedFrames(every)
+    if even:
+        return AnnotatedFrames(every & (np.arange(truth.length + 1) % step == labelled[0] % step), step)
+    return AnnotatedFrames(every & np.isin(np.arange(truth.length + 1), labelled), None)
+
+
+def _labelled_frames(truth: Truth) -> Ints:
+    """Returns the frames with a label, ascending, each once."""
+    beside = [] if truth.unscored is None else [truth.unscored.frame]
+    grouped = [] if truth.labelled is None else [np.flatnonzero(truth.labelled) + 1]
+    return np.unique(np.concatenate([truth.frame, *beside, *grouped]))
+
+
+def _outlasted(truth: Truth, labelled: Ints) -> Bools:
+    """Returns for each step between two labelled frames whether a person is labelled in both."""
+    order = np.lexsort((truth.frame, truth.id))
+    id, turn = truth.id[order], np.searchsorted(labelled, truth.frame[order])
+    stays = (id[1:] == id[:-1]) & (turn[1:] == turn[:-1] + 1)
+    out = np.zeros(len(labelled) - 1, bool)
+    out[turn[:-1][stays]] = True
+    return out
+
+
+def widest_step(inside: Bools) -> int:
+    """Returns the greatest number of frames from one scored frame to the next, 1 if there are not two.
+
+    inside (length + 1,): bool by frame number, which are scored.
+    """
+    return int(np.diff(np.flatnonzero(inside)).max(initial=1))
+
+
+def first_seen(events: Iterable[GroupEvent], inside: Bools) -> list[GroupEvent]:
+    """Returns the events, each with the first scored frame from its start on as start.
+
+    Events before the first scored frame and after the last one stay. inside (length + 1,): bool by frame number, which
+    are scored.
+    """
+    frames = np.flatnonzero(inside).tolist()
+
+    def moved(event: GroupEvent) -> GroupEvent:
+        at = bisect_left(frames, event.start)
+        return event if at in (0, len(frames)) else replace(event, start=frames[at])
+
+    return [moved(event) for event in events]
+
+
+def seen_in(tracks: Sequence[Tracks], inside: Bools) -> list[Tracks]:
+    """Returns the tracks of the scored frames, each with the events reported since the scored frame before.
+
+    tracks: sorted by frame. inside (length + 1,): bool by frame number, which are scored. An event starts in the first
+    scored frame from its start on (`first_seen`). Reports before the first scored frame are left out.
+    """
+    first = int(np.argmax(inside))
+    if inside[first:].all():
+        return [t for t in tracks if inside[t.index]]
+    kept, events = [], list[GroupEvent]()
+    for t in tracks:
+        events += t.events if t.index >= first else ()
+        if inside[t.index]:
+            kept.append(t.replace(events=tuple(first_seen(events, inside))))
+            events = []
+    return kept
