@@ -135,18 +135,23 @@ class GroupOptions:
 class ScoreOptions:
     """Options of the command `score`, which compares tracks with the truth.
 
-    truth, tracks: paths. similarity: how people are compared, "boxes", "ground" or "image"; None: by what both sides
-    have. group_match: how groups are compared, by "hull" or "members". against: other tracks whose scores are
+    truth: path. tracks: paths of runs or texts, or names of tracker classes; several are ranked. similarity: how people are compared, "boxes", "ground" or "image"; None: by the data. group_match: how groups are compared, by "hull" or "members". against: other tracks whose scores are
     subtracted; None: none. blocks: number of draws of blocks of frames for the intervals of a single recording; 0: no
     such intervals. fps: frames per second; None: the recording's own. px_per_m: pixels per metre; None if not given.
     person_class: class of people in MOT texts; None: 1. box_scale: factor of the boxes in MOT texts; None: 1.
     """
 
     truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")]
-    tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="Output of `track`, or MOT text.")]
+    tracks: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="TRACKS…",
+            help="Output of `track`, MOT text, or a tracker class (file.py:Class); several are ranked.",
+        ),
+    ]
     similarity: Annotated[
         Literal["boxes", "ground", "image"] | None,
-        typer.Option(help="How true and tracked people are compared. Default: by what both sides have."),
+        typer.Option(help="How true and tracked people are compared. Default: by the data."),
     ] = None
     group_match: Annotated[
         Literal["hull", "members"], typer.Option("--group-match", help="How true and estimated groups are compared.")
@@ -160,6 +165,11 @@ class ScoreOptions:
             "--blocks", min=0, metavar="N", help="Intervals for a single recording, by N draws of blocks of frames."
         ),
     ] = 0
+    by: Annotated[str, typer.Option("--by", metavar="SCORE", help="The score that ranks several runs.")] = "objective"
+    all: Annotated[bool, typer.Option("--all", help="Show each sequence of a ranking, too.")] = False
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write all scores of a ranking into this file.")
+    ] = None
     fps: Fps = None
     px_per_m: Scale = None
     person_class: PersonClass = None

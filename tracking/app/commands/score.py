@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from sim.types import Array, Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.run_differences import Differences, differences_words, run_differences
+from tracking.app.commands.score_ranking import is_class, ranking, sparse_notes, warn_misread
 from tracking.app.commands.score_tables import Means, SequenceScores, detections_words, difference_table, tables
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import find_tracks, match_tracks
@@ -26,7 +26,6 @@ from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.scoring.evaluation import Scorer
 from tracking.scoring.frame_weights import weighted_scorers
 from tracking.scoring.group_scores import GroupMatch
-from tracking.scoring.misreading import likely_misreading
 from tracking.scoring.people_comparison import IncomparableError, Similarity
 from tracking.stats import SURE, mean_interval, paired
 
@@ -52,7 +51,7 @@ DEFAULT = ComparisonMethod()
 
 def score(options: ScoreOptions) -> CommandResult:
     """Scores every sequence of the truth with its tracks; with --against also the differences, these minus the other
-    tracks.
+    tracks. Several tracks, or a tracker class, are ranked (`score_ranking.ranking`).
 
     The result's data: "sequences" (scores of each); "means" (of each set of equal detections: "given", "sequences",
     "mean"); "mean" (the only one of them, else None); "notes". With --against also "difference" by key, "against" (the
@@ -64,8 +63,10 @@ def score(options: ScoreOptions) -> CommandResult:
     sequences = open_source(
         options.truth, fps=options.fps, px_per_m=options.px_per_m, images=False, person_class=options.person_class
     )
+    if len(options.tracks) > 1 or is_class(options.tracks[0]):
+        return ranking(options, sequences)
     method = ComparisonMethod(options.similarity, options.group_match)
-    paths = [options.tracks] if options.against is None else [options.tracks, options.against]
+    paths = [Path(options.tracks[0]), *([] if options.against is None else [options.against])]
     if options.blocks and len(sequences) > 1:
         raise InputError(
             place="--blocks", got=f"{len(sequences)} sequences", expected="a single recording",
@@ -74,7 +75,10 @@ def score(options: ScoreOptions) -> CommandResult:
     box_scale = None if options.box_scale is None else parse_box_scale(options.box_scale)
     scored = _score_all(sequences, paths, method, box_scale)
     rows, *others = ([each[k].row for each in scored] for k in range(len(paths)))
-    notes = [*_sparse_notes(rows), *dict.fromkeys(each[0].note for each in scored if each[0].note)]
+    notes = [
+        *sparse_notes([row.scores for row in rows]),
+        *dict.fromkeys(each[0].note for each in scored if each[0].note),
+    ]
     if options.blocks:
         means, differences = _block_intervals(sequences[0], scored[0], options.blocks)
         result = _result([(rows, means)], [*notes, *_short_notes(sequences[0])])
@@ -120,19 +124,10 @@ def _score_all(
         for pairs in zip(*matched, strict=True):
             sequence = pairs[0][0]
             runs = [stored.read(sequence, box_scale) for _, stored in pairs]
-            _warn_misread(sequence, runs)
+            warn_misread(sequence, runs)
             found.append(_scored_alike(sequence, runs, method))
             meter.step(sequence.name)
     return found
-
-
-def _warn_misread(sequence: Sequence, runs: list[TrackingRun]) -> None:
-    """Warns about tracks that hardly match any label, with what would."""
-    for run in runs:
-        if sequence.truth is not None:
-            text = likely_misreading(sequence.truth, run, size=sequence.image_size, given="run" if run.info else "text")
-            if text:
-                warnings.warn(f"{sequence.name}: {text}", stacklevel=2)
 
 
 def _scored_alike(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMethod) -> list[ScoredRun]:
@@ -199,17 +194,6 @@ def score_runs(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMe
     return [
         SequenceScores(sequence.name, found, input_summary(run.info)) for found, run in zip(scores, runs, strict=True)
     ]
-
-
-def _sparse_notes(rows: list[SequenceScores]) -> list[str]:
-    """Returns a list with one note if only some frames are scored, because the labels of a sequence are sparse."""
-    sparse = [row.scores for row in rows if row.scores.step != 1]
-    if not sparse:
-        return []
-    steps = " and ".join(dict.fromkeys("some frames" if s.step is None else f"1 frame in {s.step}" for s in sparse))
-    where = "" if len(rows) == 1 else f" of {len(sparse)} of {len(rows)} sequences"
-    scored, length = (sum(getattr(s, name) for s in sparse) for name in ("frames", "length"))
-    return [f"labels{where} are sparse ({steps}): only annotated frames are scored, {scored} of {length}"]
 
 
 def _short_notes(sequence: Sequence) -> list[str]:
