@@ -23,6 +23,8 @@ SCORING = (
     "sim.truth.crossing_events",
     "sim.truth.queue_detection",
     "sim.geometry.polygons",
+    "sim.scene.camera",
+    "sim.scene.terrain",
 )
 """What scoring may import of ours: people use it alone, on their own arrays."""
 

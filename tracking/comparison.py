@@ -1,4 +1,4 @@
-"""Lays the scores of any number of runs side by side: `compare` scores them alike, and `Comparison` ranks them.
+"""Lays the scores of any number of runs side by side: `compare` scores them alike, and `ComparedRuns` ranks them.
 
 People are compared in one way on all sequences and for all runs. The oracle stands beside them: what the best tracker
 could report from the same detections.
@@ -15,11 +15,11 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Array, Sequence, Tracks
+from tracking.oracle import oracle
 from tracking.run import TrackingRun
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer, Scores
 from tracking.scoring.group_scores import GroupMatch
-from tracking.scoring.oracle import oracle
 from tracking.scoring.people_comparison import IncomparableError, Similarity
 from tracking.scoring.ranking import Ranking, rank
 
@@ -30,7 +30,7 @@ ORACLE = "oracle"
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class ComparedRuns:
     """The scores of R runs on S sequences.
 
     runs: names, in the order given. sequences: names. scores: for each run a list of `Scores`, one per sequence.
@@ -93,7 +93,7 @@ def compare(
     *,
     similarity: Similarity | None = None,
     group_match: GroupMatch = "hull",
-) -> Comparison:
+) -> ComparedRuns:
     """Returns the scores of several runs on the same labelled sequences, all compared alike, and those of the oracle.
 
     runs: by name, the tracks of each sequence in the order of `sequences`, as `track` returns them. similarity: of
@@ -118,7 +118,7 @@ def compare(
     return joined(list(tracks), [sequence.name for sequence in given], found)
 
 
-def joined(names: SequenceOf[str], sequences: SequenceOf[str], found: SequenceOf[list[Scores]]) -> Comparison:
+def joined(names: SequenceOf[str], sequences: SequenceOf[str], found: SequenceOf[list[Scores]]) -> ComparedRuns:
     """Returns the comparison of runs with these names; found: for each sequence, the result of `compare_one`.
 
     Raises InputError if people were not compared in one way on all sequences.
@@ -134,7 +134,7 @@ def joined(names: SequenceOf[str], sequences: SequenceOf[str], found: SequenceOf
         )  # fmt: skip
     oracles, *rest = ([row[k] for row in found] for k in range(len(names) + 1))
     scores = dict(zip(names, rest, strict=True))
-    return Comparison(tuple(names), tuple(sequences), scores, oracles, next(iter(ways), "ground"))
+    return ComparedRuns(tuple(names), tuple(sequences), scores, oracles, next(iter(ways), "ground"))
 
 
 def compare_one(

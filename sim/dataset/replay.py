@@ -151,7 +151,7 @@ def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None)
     assert truth.box is not None, "labels have positions or boxes"
     camera = calibration or source.camera
     if camera is not None:
-        from sim.detector.box_noise import foot_points
+        from sim.scene.camera import foot_points
 
         return foot_points(truth.box, np.zeros(len(truth.box)), camera)
     if source.source.get("kind") in FLAT:

@@ -2,8 +2,8 @@
 
 The four errors of a box are, in order: middle to the right, foot (lower edge) downwards, top edge downwards, all three
 divided by the box height; and the logarithm of the width over the true width. `perturb_boxes` applies them,
-`box_errors` measures them. `move_edges` adds errors in px instead; `foot_points` gives the ground points on which boxes
-stand, `seen_shift` the error of such a point if a part of the person is hidden.
+`box_errors` measures them. `move_edges` adds errors in px instead; `seen_shift` gives the error of a foot point if a
+part of the person is hidden.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from sim.detector.visible_ground import furthest_row
 from sim.elementary import cos, exp, log, power
+from sim.scene.camera import foot_points
 from sim.types import Array, Camera
 
 if TYPE_CHECKING:
@@ -115,22 +116,6 @@ def box_errors(box: Array, true: Array) -> Array:
     return np.stack([across, low, high, log(box[:, 2] / true[:, 2])], axis=1)
 
 
-def foot_points(box: Array, z: Array, camera: Camera) -> Array:
-    """Return the ground points (R, 2), x and y in m, of people with boxes (R, 4), left, top, width, height in px.
-
-    A person stands where the middle of the box's lower edge is seen; for a camera of kind "top", where the box's middle
-    is seen. z (R,) m: height of the ground at each person. A row is nan where the line of sight meets no ground of that
-    height in front of the camera, as above the horizon, and for a nan box or z.
-    """
-    from sim.scene.camera import rays
-
-    origin, direction = rays(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = (z - origin[:, 2]) / direction[:, 2]
-    s = np.where(np.isfinite(s) & (s > 0), s, np.nan)
-    return np.asarray(origin[:, :2] + s[:, None] * direction[:, :2])
-
-
 def seen_shift(box: Array, whole: Array, z: Array, camera: Camera) -> Array:
     """Return by how many m (R, 2), along x and y, a person's foot point is displaced by what hides the person.
 
@@ -146,8 +131,3 @@ def seen_shift(box: Array, whole: Array, z: Array, camera: Camera) -> Array:
     lowered[:, 3] += np.maximum(np.minimum(true_foot, lowest) - foot, 0.0)
     shift = foot_points(lowered, z, camera) - foot_points(whole, z, camera)
     return np.where(np.isfinite(shift), shift, 0.0)
-
-
-def standing_share(camera: Camera | None) -> float:
-    """Return the share of a box's height, from its top, at which a person stands: 0.5 for kind "top", else 1."""
-    return 0.5 if camera is not None and camera.kind == "top" else 1.0

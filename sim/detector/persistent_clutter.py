@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.detector.box_noise import move_edges, standing_share
+from sim.detector.box_noise import move_edges
 from sim.detector.correlated_noise import CLOCK, ticks
 from sim.detector.draws import false_scores
 from sim.detector.readings import Readings
@@ -24,6 +24,7 @@ from sim.detector.visible_ground import VisibleGround, clip_boxes
 from sim.elementary import exp, log
 from sim.rng import normals, poisson_quantiles, rng, uniforms
 from sim.scene.body import PERSON_HEIGHT
+from sim.scene.camera import standing_share
 from sim.types import Array, Bools, Camera, Ints, Truth
 
 if TYPE_CHECKING:

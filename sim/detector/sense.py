@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.detector.box_noise import foot_points, move_edges, perturb_boxes, seen_shift
+from sim.detector.box_noise import move_edges, perturb_boxes, seen_shift
 from sim.detector.clutter import false_alarms
 from sim.detector.correlated_noise import CLOCK, correlated_normals, ticks
 from sim.detector.draws import frame_uniforms, interpolated_quantiles, true_scores
@@ -27,6 +27,7 @@ from sim.detector.readings import Readings, detections_by_frame
 from sim.elementary import normal_quantile, power
 from sim.rng import normals, rng, uniforms
 from sim.scene.body import SHOULDER_SHARE
+from sim.scene.camera import foot_points
 from sim.types import Array, Bools, Camera, Detections, Ints, Truth
 
 if TYPE_CHECKING:

@@ -79,6 +79,25 @@ def to_ground(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     return origin[:, :2] + s[:, None] * direction[:, :2]
 
 
+def foot_points(box: Array, z: Array, camera: Camera) -> Array:
+    """Return the ground points (R, 2), x and y in m, of people with boxes (R, 4), left, top, width, height in px.
+
+    A person stands where the middle of the box's lower edge is seen; for a camera of kind "top", where the box's middle
+    is seen. z (R,) m: height of the ground at each person. A row is nan where the line of sight meets no ground of that
+    height in front of the camera, as above the horizon, and for a nan box or z.
+    """
+    origin, direction = rays(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = (z - origin[:, 2]) / direction[:, 2]
+    s = np.where(np.isfinite(s) & (s > 0), s, np.nan)
+    return np.asarray(origin[:, :2] + s[:, None] * direction[:, :2])
+
+
+def standing_share(camera: Camera | None) -> float:
+    """Return the share of a box's height, from its top, at which a person stands: 0.5 for kind "top", else 1."""
+    return 0.5 if camera is not None and camera.kind == "top" else 1.0
+
+
 def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     """Return the derivative of `to_ground` at image points uv (N, 2) px, d(x, y)/d(u, v), as (N, 2, 2) in m/px.
 

@@ -135,9 +135,12 @@ class GroupOptions:
 class ScoreOptions:
     """Options of the command `score`, which compares tracks with the truth.
 
-    truth: path. tracks: paths of runs or texts, or names of tracker classes; several are ranked. similarity: how people are compared, "boxes", "ground" or "image"; None: by the data. group_match: how groups are compared, by "hull" or "members". against: other tracks whose scores are
-    subtracted; None: none. blocks: number of draws of blocks of frames for the intervals of a single recording; 0: no
-    such intervals. fps: frames per second; None: the recording's own. px_per_m: pixels per metre; None if not given.
+    truth: path. tracks: paths of runs or texts, or names of tracker classes; several are ranked. similarity: how people
+    are compared, "boxes", "ground" or "image"; None: by the data. group_match: how groups are compared, by "hull" or
+    "members". against: other tracks whose scores are subtracted; None: none. blocks: number of draws of blocks of
+    frames for the intervals of a single recording; 0: no such intervals. by: the score that ranks several runs; None:
+    objective, or the part of it that all have. all: show each sequence of a ranking. csv: file for all scores of a
+    ranking. fps: frames per second; None: the recording's own. px_per_m: pixels per metre; None if not given.
     person_class: class of people in MOT texts; None: 1. box_scale: factor of the boxes in MOT texts; None: 1.
     """
 
@@ -165,7 +168,12 @@ class ScoreOptions:
             "--blocks", min=0, metavar="N", help="Intervals for a single recording, by N draws of blocks of frames."
         ),
     ] = 0
-    by: Annotated[str, typer.Option("--by", metavar="SCORE", help="The score that ranks several runs.")] = "objective"
+    by: Annotated[
+        str | None,
+        typer.Option(
+            "--by", metavar="SCORE", help="The score that ranks. Default: objective, or what all runs have of it."
+        ),
+    ] = None
     all: Annotated[bool, typer.Option("--all", help="Show each sequence of a ranking, too.")] = False
     csv: Annotated[
         Path | None, typer.Option("--csv", metavar="FILE", help="Write all scores of a ranking into this file.")

@@ -15,7 +15,8 @@ from typing import Literal
 import numpy as np
 
 from scenarios.schema.sensor import BoxNoise
-from sim.detector.box_noise import box_errors, foot_points, seen_shift
+from sim.detector.box_noise import box_errors, seen_shift
+from sim.scene.camera import foot_points
 from sim.types import Array
 from tracking.fitting.detection_matching import MatchedRecording
 from tracking.fitting.error_correlation import correlations, fit_memory

@@ -38,7 +38,8 @@ def known_people(sequence: Sequence) -> list[Tracks]:
         truth = truth.replace(pos=on_ground(truth, sequence))
     elif sequence.source.get("kind") in LOOK_AHEAD:
         truth = truth.replace(vel=None)
-    unknown = np.zeros(0, bool) if truth.pos is None else ~np.isfinite(truth.pos).all(axis=1)
+    pos = np.zeros((0, 2)) if truth.pos is None else truth.pos
+    unknown = ~np.asarray(np.isfinite(pos).all(axis=1))
     if unknown.any():
         row = int(np.argmax(unknown))
         raise InputError(

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.detector.box_noise import foot_points
+from sim.scene.camera import foot_points
 from sim.scene.terrain import height_at
 from sim.truth.group_hulls import box_groups, frame_groups, groups_over_time
 from sim.types import Array, Bools, GroupEvent, Groups, Tracks, Truth

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from scenarios.schema.sensor import BoxNoise
-from sim.detector.box_noise import box_errors, foot_points, perturb_boxes
-from sim.scene.camera import project
+from sim.detector.box_noise import box_errors, perturb_boxes
+from sim.scene.camera import foot_points, project
 from tests.reference_sense import above, pinhole
 
 NOISE = BoxNoise(across=(0.02, 0.05), foot=(-0.03, 0.04), top=(0.01, 0.06), width=(0.2, 0.1), occluded=2.0)

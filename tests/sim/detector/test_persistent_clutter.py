@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from scenarios.schema.sensor import FalseAlarms, Sensor
-from sim.detector.box_noise import foot_points
 from sim.detector.sense import sense
-from sim.scene.camera import project
+from sim.scene.camera import foot_points, project
 from sim.truth.label import bodies
 from sim.types import Detections, Truth
 from tests.reference_sense import above, crowd, pinhole

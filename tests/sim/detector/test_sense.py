@@ -5,9 +5,9 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.schema.sensor import Hide, Sensor
-from sim.detector.box_noise import foot_points
 from sim.detector.clutter import false_alarm_counts
 from sim.detector.sense import detection_probability, sense
+from sim.scene.camera import foot_points
 from sim.truth.label import bodies
 from sim.types import Detections, Truth
 from tests.reference_sense import above, crowd, pinhole

@@ -39,7 +39,9 @@ MISTAKES = {
     ),
     "generate crossing --seeds 0": ("flockscope generate: got missing option '--out'; expected --out DIR: ",),
     "track blob": ("flockscope track: got missing argument 'SOURCE'; expected SOURCE: ",),
-    "score a b c": ("flockscope score: got unexpected extra argument",),
+    "score {0}/data {0}/run {0}/run": ("TRACKS: got", "twice; expected each run once",),
+    "score {0}/data {0}/run {0}/run/scene-s00000 --by HOTAA": ("--by: got HOTAA", "such as HOTA"),
+    "score {0}/data {0}/run none.py:Mine": ("none.py",),
 }  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from tracking.app.commands.score_tables import GROUP_MATCH, SHOWN, SIMILARITY, e
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
-from tracking.comparison import ORACLE, Comparison, compare_one, joined
+from tracking.comparison import ORACLE, ComparedRuns, compare_one, joined
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
 from tracking.scoring.catalogue import CATALOGUE
@@ -41,7 +41,7 @@ class RankedRuns:
     by run, the detections that it got, in words.
     """
 
-    comparison: Comparison
+    comparison: ComparedRuns
     key: str
     scenarios: Mapping[str, list[int]]
     given: Mapping[str, list[str]]
@@ -64,7 +64,7 @@ def ranking(options: ScoreOptions, sequences: list[Sequence]) -> CommandResult:
                 place=option, got=counted(len(options.tracks), "run"), expected="one run, or one text",
                 remedy="leave it out",
             )  # fmt: skip
-    if options.by not in CATALOGUE or CATALOGUE[options.by].better == "neither":
+    if options.by is not None and (options.by not in CATALOGUE or CATALOGUE[options.by].better == "neither"):
         raise InputError(
             place="--by", got=options.by, expected="a score with a better direction, such as HOTA",
             remedy="docs/reference/metrics.md lists them",
@@ -83,7 +83,7 @@ def ranking(options: ScoreOptions, sequences: list[Sequence]) -> CommandResult:
     scenarios: dict[str, list[int]] = {}
     for k, sequence in enumerate(sequences):
         scenarios.setdefault(_scenario(sequence), []).append(k)
-    every = RankedRuns(comparison, options.by, scenarios, given)
+    every = RankedRuns(comparison, options.by or _usual_key(comparison), scenarios, given)
     if options.csv is not None:
         _write_csv(options.csv, every)
     return CommandResult(_data(every), _text(every, options.all))
@@ -107,6 +107,12 @@ def sparse_notes(scores: list[Scores]) -> list[str]:
     where = "" if len(scores) == 1 else f" of {len(sparse)} of {len(scores)} sequences"
     scored, length = (sum(getattr(s, name) for s in sparse) for name in ("frames", "length"))
     return [f"labels{where} are sparse ({steps}): only annotated frames are scored, {scored} of {length}"]
+
+
+def _usual_key(comparison: ComparedRuns) -> str:
+    """Returns "objective"; "group_F1_hull" if it would mean something else for some runs, which track whole groups."""
+    people = [np.isfinite(comparison.values("HOTA")).any(axis=1)]
+    return "group_F1_hull" if len(np.unique(people)) > 1 else "objective"
 
 
 Source = str | list[tuple[Sequence, StoredTracks]]
@@ -142,7 +148,7 @@ def _tracks(source: Source, sequence: Sequence, k: int) -> TrackingRun:
 def _scenario(sequence: Sequence) -> str:
     """Returns the name of a sequence without its seed: the scenario, or the name of a recording."""
     name, dash, seed = sequence.name.rpartition("-s")
-    return name if dash and seed.replace("-", "").isalnum() and seed[:1].isdigit() else sequence.name
+    return name if dash and set(seed) <= set("0123456789-r") else sequence.name
 
 
 def _entries(every: RankedRuns) -> list[dict[str, Any]]:

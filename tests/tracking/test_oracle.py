@@ -8,9 +8,9 @@ import pytest
 import tracking
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
+from tracking.oracle import oracle
 from tracking.run import track
 from tracking.scoring import evaluate
-from tracking.scoring.oracle import oracle
 
 
 @pytest.fixture(scope="module", params=["merge", "stairs", "queue"])
