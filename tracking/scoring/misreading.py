@@ -177,7 +177,7 @@ def likely_misreading(
     if best is not None:
         return f"{words}; {_words(best)}, {best.share:.0%} would. {_remedy(best, usual, size, given)}"
     tried = " No other columns, scale or shift of frames match better." if len(together) else ""
-    return f"{words}.{tried} Check that these are tracks of this very sequence"
+    return f"{words}.{tried} Check the columns, and that these are tracks of this very sequence"
 
 
 def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] | None:
