@@ -44,7 +44,7 @@ def die_once(name):
         return
     os.kill(os.getpid(), signal.SIGKILL)
 
-def simulate(scenario, seed, repeat, streams=()):
+def simulate(scenario, seed, repeat, streams=(), stride=1):
     if seed == 1 and (FOLDER / "deadly").exists():
         die_once("made")
     return fakes.sequence(seed + 100 * repeat)
