@@ -24,7 +24,9 @@ class FakeSimulator(types.ModuleType):
     def made(self) -> list[int]:
         return [seed for seed, _ in self.asked]
 
-    def simulate(self, scenario: Scenario, seed: int, repeat: int, streams: tuple[str, ...] = ()) -> Any:
+    def simulate(
+        self, scenario: Scenario, seed: int, repeat: int, streams: tuple[str, ...] = (), stride: int = 1
+    ) -> Any:
         self.asked.append((seed, streams))
         if seed in self.wrong:
             raise self.wrong[seed]

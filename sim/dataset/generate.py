@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import TypedDict, Unpack
 from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
@@ -30,6 +31,19 @@ Progress = Callable[[int, int, str], None]
 """Called as progress(sequences done, sequences in all, name of the last one)."""
 
 
+class Stored(TypedDict, total=False):
+    """What is stored of each sequence.
+
+    streams: pictures ("left", "right", "disparity", "ids", "background"; () for none). images: their file type, "jpg",
+    "png" or "mp4". stride: N stores every N-th frame of the camera only: 1, 1 + N, …, as they are without it, and
+    numbered from 1.
+    """
+
+    streams: Iterable[str]
+    images: str
+    stride: int
+
+
 class Folders(list[Path]):
     """The folders of the sequences made. left_out: by name, the error of each sequence whose script did not come
     true."""
@@ -47,9 +61,7 @@ def generate(
     set: Iterable[str] = (),
     workers: WorkerOptions = ONE_WORKER,
     progress: Progress | None = None,
-    streams: Iterable[str] = ("left",),
-    images: str = "jpg",
-    stride: int = 1,
+    **stored: Unpack[Stored],
 ) -> Folders:
     """Write OUT/flockscope-<split>/<name>-s<seed>/ for every entry and seed, and OUT/seqmaps; returns the sequence
     folders.
@@ -61,9 +73,7 @@ def generate(
     by name. seeds: inside one split (train from 0, val from 10,000, test from 20,000, fit from 30,000, demo from
     40,000). workers: by default this process. The workers of a cluster must share the folder `out` under the same path.
     progress: called as progress(sequences done, sequences in all, name of the last one) after each, failed ones
-    included. streams: pictures to store ("left", "right", "disparity", "ids", "background"; () for none). images: their
-    file type, "jpg", "png" or "mp4". stride: N stores every N-th frame of the camera only: 1, 1 + N, …, as they are
-    without it, and numbered from 1.
+    included. stored: streams, images, stride (`Stored`); left jpg pictures of all frames by default.
 
     A sequence is left out if an order of its script did not come true; the result's `left_out` holds the reasons. If
     that happens to more than 5 % of the sequences, it is an error.
@@ -79,11 +89,7 @@ def generate(
         raise InputError(place="workers", got=workers.count, expected="1 or more", remedy="correct --workers")
     split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
     folder = root / f"flockscope-{split}"
-    pictures = check_streams(streams, images)
-    planned = plan_jobs(_resolved(entries, set), seeds, folder)
-    jobs = [replace(job, streams=pictures, images=images, stride=stride) for job in planned]
-    for job in jobs:
-        check_stride(stride, job.entry.scenario.camera.fps)
+    jobs = _storing(plan_jobs(_resolved(entries, set), seeds, folder), **stored)
     with lock_folder(root):
         remove_partials(root, folder, root / "seqmaps")
         for job in jobs:
@@ -106,6 +112,16 @@ def generate(
     if errors:
         raise _summary(errors, len(jobs))
     return Folders((job.folder for job in made), unfulfilled)
+
+
+def _storing(
+    jobs: list[SequenceJob], streams: Iterable[str] = ("left",), images: str = "jpg", stride: int = 1
+) -> list[SequenceJob]:
+    """Return the jobs with what they store (`Stored`). Raises InputError for wrong values."""
+    pictures = check_streams(streams, images)
+    for job in jobs:
+        check_stride(stride, job.entry.scenario.camera.fps)
+    return [replace(job, streams=pictures, images=images, stride=stride) for job in jobs]
 
 
 def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]:

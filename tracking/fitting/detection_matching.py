@@ -23,6 +23,7 @@ from sim.io.store.truth_files import scores_or_ones
 from sim.scene.box_visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth
 from tracking.filters.assignment import optimal
+from tracking.scoring.annotated_frames import annotated_frames
 
 GATE = 0.3  # least overlap of a match
 IGNORED = 0.5  # least overlap of an unmatched detection with an unscored box for the detection to be dropped
@@ -75,6 +76,7 @@ def match_sequence(sequence: Sequence) -> MatchedRecording:
 
     A match needs an IoU (intersection over union) of at least 0.3. Rows of a MOT folder's gt/gt.txt that MOTChallenge
     does not score are no labels. An unmatched detection that overlaps such a row by an IoU of at least 0.5 is dropped.
+    If the labels are sparse, the recording consists of its annotated frames, numbered from 1.
 
     Raises InputError if there are no labelled people, labels without boxes, no detections, or detections without boxes.
     Reading raises InputError if a file is invalid, and WorkError if an order of a simulated script was not fulfilled.
@@ -94,7 +96,25 @@ def match_sequence(sequence: Sequence) -> MatchedRecording:
         got = "detections without boxes" if any(len(d.pos) for d in found) else "no detection in any frame"
         raise InputError(file=file, got=got, expected="a detector's boxes", remedy="give its boxes in det/det.txt")
     assert truth is not None
-    return match_detections(truth, found, sequence.image_size, sequence.camera, _left_out(sequence))
+    truth, found, left_out = _annotated(truth, found, _left_out(sequence))
+    return match_detections(truth, found, sequence.image_size, sequence.camera, left_out)
+
+
+def _annotated(
+    truth: Truth, found: list[Detections], left_out: tuple[Ints, Array] | None
+) -> tuple[Truth, list[Detections], tuple[Ints, Array] | None]:
+    """Returns labels, detections and unscored rows of the annotated frames, numbered from 1."""
+    annotated = annotated_frames(truth)
+    if annotated.step == 1:
+        return truth, found, left_out
+    known = np.flatnonzero(annotated.frames)
+    turn = np.searchsorted(known, np.arange(truth.length + 1)) + 1
+    truth = truth.replace(frame=turn[truth.frame], fps=truth.fps / float(np.diff(known).mean()), length=len(known))
+    found = [d.replace(index=int(turn[d.index])) for d in found if annotated.frames[d.index]]
+    if left_out is not None:
+        kept = annotated.frames[left_out[0]]
+        left_out = turn[left_out[0][kept]], left_out[1][kept]
+    return truth, found, left_out
 
 
 def match_detections(

@@ -44,7 +44,7 @@ def known_people(sequence: Sequence) -> list[Tracks]:
         row = int(np.argmax(unknown))
         raise InputError(
             file=file, place=f"frame {truth.frame[row]}, id {truth.id[row]}",
-            got=f"no position on the ground, as in {unknown.sum()} of {len(unknown)} rows",
+            got=f"no position on the ground, as in {unknown.sum()} of {unknown.size} rows",
             expected="one of every person, or of nobody", remedy=remedy,
         )  # fmt: skip
     return people_as_tracks(truth)

@@ -148,9 +148,8 @@ def likely_misreading(
 ) -> str:
     """Returns a warning if hardly any tracked person matches a label though both sides have people, else "".
 
-    size: width and height of the pictures in px, None if unknown. given: what the tracks are, for the remedy. Returns
-    "" for
-    trackers of groups, and if the two sides have neither boxes nor positions on the ground in common.
+    size: width and height of the pictures in px, None if unknown. given: what the tracks are, for the remedy. There is
+    no warning for trackers of groups, and if the two sides have neither boxes nor positions on the ground in common.
     """
     sides = _comparable(truth, tracks)
     if sides is None:
@@ -177,7 +176,8 @@ def likely_misreading(
     if best is not None:
         return f"{words}; {_words(best)}, {best.share:.0%} would. {_remedy(best, usual, size, given)}"
     tried = " No other columns, scale or shift of frames match better." if len(together) else ""
-    return f"{words}.{tried} Check that these are tracks of this very sequence"
+    check = "the detections that were tracked" if given == "run" else "the columns"
+    return f"{words}.{tried} Check {check}, and that these are tracks of this very sequence"
 
 
 def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] | None:
@@ -190,10 +190,13 @@ def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] |
     boxes = [t.box for t in some if t.box is not None]
     labels, rows = FrameRows(truth.frame, truth.id), FrameRows(frame, id)
     if truth.box is not None and len(boxes) == len(some):
-        return Side(labels, truth.box), Side(rows, np.concatenate(boxes))
-    if truth.pos is None or some[0].plane == "image":
+        sides = Side(labels, truth.box), Side(rows, np.concatenate(boxes))
+    elif truth.pos is not None and some[0].plane != "image":
+        sides = Side(labels, truth.pos), Side(rows, np.concatenate([t.pos[:, :2] for t in some]))
+    else:
         return None
-    return Side(labels, truth.pos), Side(rows, np.concatenate([t.pos[:, :2] for t in some]))
+    true, est = (side.keep(np.asarray(np.isfinite(side.values).all(axis=1))) for side in sides)
+    return (true, est) if len(true.rows) and len(est.rows) else None
 
 
 def _some(frames: Ints, true: Side, est: Side) -> tuple[Side, Side]:

@@ -85,7 +85,7 @@ def require_metres(table: MotTable, fps: float) -> None:
         raise InputError(
             file=table.rows.file, place="columns x, y", got=f"half of the steps faster than {np.median(speed):.3g} m/s",
             expected="positions in m", remedy="if they are in cm or mm, name them x_cm,y_cm or x_mm,y_mm in the first "
-            f"line, as frame,id,x_cm,y_cm; else correct --fps, here {fps:g}",
+            f"line, as frame,id,x_cm,y_cm; pixels need boxes; else correct --fps, here {fps:g}",
         )  # fmt: skip
 
 

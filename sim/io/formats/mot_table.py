@@ -20,7 +20,7 @@ from sim.types import Array, Bools, Ints
 GROUND_COLUMNS = 4
 """Columns of a text of ground positions alone: frame, id, x, y."""
 
-LAYOUT = "frame,id,left,top,width,height,…: name the columns in the first line, if they are others"
+LAYOUT = "frame,id,left,top,width,height,… or frame,id,x,y: name the columns in the first line, if they are others"
 """What the columns of a text without names must be, and what to do."""
 
 

@@ -80,10 +80,7 @@ def read_detections(
     Raises InputError as read_table, and for a row without box (-1,-1,-1,-1) if any row lacks a ground point.
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
-    require_pixels(table.rows, table.boxes())
-    doubt = corner_doubt(table.boxes())
-    if doubt:
-        warnings.warn(f"{path}: {doubt}", stacklevel=2)
+    _check_boxes(table)
     ground = ground_positions(table)
     boxless = _reject_placeless(table, ground)
     score, told = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
@@ -95,6 +92,14 @@ def read_detections(
     order = order[of_class(table, np.ones(len(order), bool), person_class)[order]]
     box = None if boxless.any() else table.box[order]
     return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
+
+
+def _check_boxes(table: MotTable) -> None:
+    """Raise InputError for boxes in shares of the picture; warn about boxes that look like corners."""
+    require_pixels(table.rows, table.boxes())
+    doubt = corner_doubt(table.boxes())
+    if doubt:
+        warnings.warn(f"{table.rows.file}: {doubt}", stacklevel=3)
 
 
 def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
@@ -135,7 +140,7 @@ def read_truth(
     for positions without boxes that cannot be in metres.
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
-    require_pixels(table.rows, table.boxes())
+    _check_boxes(table)
     require_metres(table, fps)
     ground = ground_positions(table)
     boxed = not _reject_placeless(table, ground).any()

@@ -27,7 +27,7 @@ PROGRAM = """
 import os, signal, sys, types
 from tests import fake_simulator as fakes
 
-def simulate(scenario, seed, repeat, streams=()):
+def simulate(scenario, seed, repeat, streams=(), stride=1):
     deaths = {-2: 1, -3: 99}.get(int(sys.argv[3]), 0)
     if seed == 1 and repeat == 0 and deaths:
         with open(sys.argv[1] + "-deaths", "a") as told:

@@ -44,7 +44,7 @@ def die_once(name):
         return
     os.kill(os.getpid(), signal.SIGKILL)
 
-def simulate(scenario, seed, repeat, streams=()):
+def simulate(scenario, seed, repeat, streams=(), stride=1):
     if seed == 1 and (FOLDER / "deadly").exists():
         die_once("made")
     return fakes.sequence(seed + 100 * repeat)
@@ -78,7 +78,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
     spec = importlib.util.spec_from_file_location("fakes", FAKES)
     fakes = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(fakes)
-    fake = types.SimpleNamespace(simulate=lambda s, seed, repeat, streams=(): fakes.sequence(seed + 100 * repeat))
+    fake = types.SimpleNamespace(simulate=lambda s, seed, repeat, *_: fakes.sequence(seed + 100 * repeat))
     monkeypatch.setitem(sys.modules, "sim.sequence", fake)
     generate(ENTRIES, range(6), tmp_path / "here", streams=())
     return content(tmp_path / "here")

@@ -35,7 +35,7 @@ def tick():
     if count == kill_after:
         os.kill(os.getpid(), signal.SIGKILL)
 
-def simulate(scenario, seed, repeat, streams):
+def simulate(scenario, seed, repeat, streams, stride):
     live = fakes.pictured(seed + 100 * repeat, streams)
     def frames():
         for frame in live:

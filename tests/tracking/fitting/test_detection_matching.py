@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from scenarios.loading.resolve import load
 from sim.io.source import open_source
+from sim.sequence import simulate
 from sim.types import Detections, Truth
 from tracking.fitting.detection_matching import (
     MatchedRecording,
@@ -103,3 +106,24 @@ def test_statistics_by_hand() -> None:
     assert said["overlap, 50% quantile"] == pytest.approx(1.0)
     assert said["error foot: sd"] == pytest.approx(0.0)
     assert np.isnan(said["missed, visibility 0-0.25"])
+
+
+def test_detections_in_frames_without_labels_are_no_false_alarms() -> None:
+    """Labels in every 5th frame of 10 frames/s: the profile is that of these frames, 2 a second."""
+    scene = simulate(load("street", set=["sensor.clutter_rate=1"]), 30_000, streams=())
+    dense, found = scene.truth, [f.detections for f in scene.without_pictures() if f.detections is not None]
+    assert dense is not None
+    kept = (dense.frame - 1) % 5 == 0
+    rows = {
+        name: getattr(dense, name)[kept]
+        for name in ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
+    }
+    sparse = dense.replace(**rows, visible_box=None, labelled=np.zeros(dense.length, bool))
+    got = match_sequence(replace(scene, load_truth=lambda: sparse))
+    anew = sparse.replace(frame=(sparse.frame - 1) // 5 + 1, fps=2.0, length=dense.length // 5)
+    told = [d.replace(index=k) for k, d in enumerate(found[::5], 1)]
+    expected = match_detections(anew, told, scene.image_size, scene.camera)
+    assert (got.truth.fps, got.truth.length) == (2.0, dense.length // 5)
+    assert got.match.tolist() == expected.match.tolist()
+    assert got.owner.tolist() == expected.owner.tolist()
+    assert 0.5 < got.false.sum() / got.truth.length < 1.5

@@ -267,3 +267,14 @@ def test_arrays():
         rows[:, 2:], corners(rows[:, 2:])))  # fmt: skip
     with pytest.warns(UserWarning, match="read as x1,y1,x2,y2, 100% would. Give left, top, width, height in px"):
         assert score_arrays(truth, found, fps=25)["HOTA"] < 0.05
+
+
+def test_unknown_boxes_are_left_out():
+    """As of people behind the camera."""
+    rows = walk()
+    labels = np.where(rows[:, 1:2] == 2, np.nan, rows)
+    labels[:, :2] = rows[:, :2]
+    text = likely_misreading(truth_of(labels), tracks_of(rows[:, 0], rows[:, 1], corners(rows[:, 2:])))
+    assert "read as x1,y1,x2,y2, 100% would" in text
+    nobody = np.c_[rows[:, :2], np.full((len(rows), 4), np.nan)]
+    assert likely_misreading(truth_of(nobody), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:])) == ""

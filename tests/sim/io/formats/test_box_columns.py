@@ -130,11 +130,17 @@ def test_boxes_of_pictures_of_another_size(tmp_path, factor, words):
 
 
 @pytest.mark.filterwarnings("always")
-def test_corners_among_detections(tmp_path):
-    rows = people(ids=False)
+@pytest.mark.parametrize("ids", [True, False])
+def test_corners(tmp_path, ids):
+    rows = people(ids)
     rows[:, 4:] += rows[:, 2:4]
     with pytest.warns(UserWarning, match="all 48 boxes look like x1,y1,x2,y2, but are read as left,top,width,height"):
         open_source(written(tmp_path, rows), fps=10)
+    if ids:
+        (tmp_path / "gt").mkdir()
+        written(tmp_path / "gt", rows, "gt.txt")
+        with pytest.warns(UserWarning, match="look like x1,y1,x2,y2"):
+            _ = open_source(tmp_path, fps=10)[0].truth
 
 
 def test_people_at_the_left_edge_are_no_corners(tmp_path):

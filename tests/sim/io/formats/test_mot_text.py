@@ -56,6 +56,7 @@ def test_tud_without_seqinfo_is_taken_at_25_fps_with_one_warning(shared_data):
     assert again.fps == 30
 
 
+@pytest.mark.filterwarnings("ignore:.*scores from .* are mapped into 0 to 1")
 def test_a_folder_of_folders_is_a_dataset(shared_data):
     folders = sorted(folder.name for folder in (shared_data / "mot").iterdir() if folder.is_dir())
     assert len(folders) >= 2
