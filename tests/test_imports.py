@@ -71,7 +71,7 @@ def test_data_types_need_numpy_only():
     [
         ("sim", ["replay", "simulate"]),
         ("scenarios", ["load", "sensor_settings"]),
-        ("tracking", ["evaluate", "group", "track", "tune"]),
+        ("tracking", ["compare", "evaluate", "group", "track", "tune"]),
     ],
 )
 def test_lazy_names(package, names):

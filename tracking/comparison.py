@@ -16,12 +16,12 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import Array, Sequence, Tracks
 from tracking.oracle import oracle
+from tracking.ranking import Ranking, rank
 from tracking.run import TrackingRun
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer, Scores
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import IncomparableError, Similarity
-from tracking.scoring.ranking import Ranking, rank
 
 if TYPE_CHECKING:
     import pyarrow

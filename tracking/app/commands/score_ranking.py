@@ -23,12 +23,12 @@ from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.comparison import ORACLE, ComparedRuns, compare_one, joined
+from tracking.ranking import Ranking, rank
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scores
 from tracking.scoring.misreading import likely_misreading
-from tracking.scoring.ranking import Ranking, rank
 from tracking.stats import FEWEST
 
 COLUMNS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")

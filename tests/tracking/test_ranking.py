@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.scoring.ranking import rank
+from tracking.ranking import rank
 from tracking.stats import paired
 
 
