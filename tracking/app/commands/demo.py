@@ -5,20 +5,23 @@ from __future__ import annotations
 import math
 import os
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from scenarios.printable import printable
 from sim.io.files.output_paths import output_path
-from sim.types import DetectionMode, Sequence
+from sim.types import Sequence
 from tracking import tracker_registry
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.demo_page import PixelScene, ResultSection, demo_page
-from tracking.app.commands.score import score_run, summary
+from tracking.app.commands.demo_page import PixelScene, RankingTable, ResultSection, demo_page
+from tracking.app.commands.score import summary
+from tracking.app.commands.score_ranking import usual_key
 from tracking.app.commands.score_tables import SHOWN, SequenceScores, number
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.replay_page.video import PageVideo
+from tracking.comparison import compare
 from tracking.run import TrackingRun
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
@@ -29,8 +32,6 @@ PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)
 
 QUICK_PIXEL_SETTINGS = ("camera.fps=5",)
 """What --quick changes in that scene."""
-
-MODES: tuple[DetectionMode, ...] = ("image", "file")
 
 
 def demo(out: Path, *, quick: bool) -> CommandResult:
@@ -63,9 +64,13 @@ def demo(out: Path, *, quick: bool) -> CommandResult:
     trackers = tracker_registry.names()
     with ProgressMeter("track, score, draw", len(sequences) * len(trackers)) as meter:
         scene = _pixel_scene(open_source(rendered)[0], out)
-        sections = [_section(tracker, sequences, out, meter) for tracker in trackers]
+        runs = {name: _tracked(name, sequences, out, meter) for name in trackers}
+    inputs = {name: _input_word(name) for name in trackers}
+    words = sorted({*inputs.values()}, reverse=True)
+    tables = [_table(word, sequences, {n: runs[n] for n in trackers if inputs[n] == word}) for word in words]
+    sections = [_section(name, table, sequences, runs, out) for table in tables for name in table.compared.runs]
     page = out / "index.html"
-    write_file(page, demo_page(out, scene, sections).encode())
+    write_file(page, demo_page(out, scene, tables, sections).encode())
     text = [f"{len(sequences)} sequences in {folders[0].parent}", *(_line(s.title, s.rows) for s in sections)]
     alone = zip(scene.section.names, scene.section.rows, strict=True)
     text += [f"one sequence with pictures, {rendered}", *(_line(name, [row]) for name, row in alone)]
@@ -74,57 +79,61 @@ def demo(out: Path, *, quick: bool) -> CommandResult:
     return CommandResult({"sequences": len(sequences), "scores": data, "page": page}, "\n".join(text))
 
 
-def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
-    """Tracks one sequence from its pictures and from its stored detections; returns scores, pages and videos.
+def _table(word: str, sequences: list[Sequence], runs: Mapping[str, list[TrackingRun]]) -> RankingTable:
+    compared = compare(sequences, runs)
+    return RankingTable(f"Trackers from {word}", compared, usual_key(compared))
 
-    Every tracker that takes pixels runs in both ways. Tracks, replay pages and overlay videos of the tracks from
-    pictures are written into `out`. All replays share one video file. Raises InputError if a file cannot be read or
-    written, WorkError if the disk is full.
+
+def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
+    """Tracks one sequence from its pictures with every tracker that takes them; returns scores, pages and videos.
+
+    Tracks, replay pages and overlay videos are written into `out`. All replays share one video file. Raises InputError
+    if a file cannot be read or written, WorkError if the disk is full.
     """
     from tracking.app.pictures.overlay import write_overlay
     from tracking.app.replay_page.video import page_video
 
     folder = out / "pages" / "pictures"
     video = page_video(sequence, output_path(folder, sequence.name, ".html"), "beside")
+    names = [name for name in tracker_registry.names() if "pixels" in tracker_registry.find(name).needs]
+    runs = {name: TrackerSetup(name, detections="image").run(sequence) for name in names}
+    compared = compare([sequence], {name: [run] for name, run in runs.items()})
     section, overlays = ResultSection(f"{sequence.name}, from its pictures"), {}
-    for tracker in [name for name in tracker_registry.names() if "pixels" in tracker_registry.find(name).needs]:
-        for mode in MODES:
-            run = TrackerSetup(tracker, detections=mode).run(sequence)
-            row, name = score_run(sequence, run), f"{tracker} from {_input_word(tracker, mode)}"
-            page = folder / f"{tracker}-{mode}.html"
-            run.write(output_path(out / "tracks" / f"{tracker}-{mode}", sequence.name), sequence)
-            _write_page(name, sequence, run, row, page, video)
-            section.add(row, page, name)
-            if mode == "image":
-                overlays[tracker] = write_overlay(sequence, run, folder / f"{tracker}.mp4", "over")
+    for tracker, run in runs.items():
+        row, page = SequenceScores(sequence.name, compared.scores[tracker][0]), folder / f"{tracker}-image.html"
+        run.write(output_path(out / "tracks" / f"{tracker}-image", sequence.name), sequence)
+        _write_page(f"{tracker} from pixels", sequence, run, row, page, video)
+        section.add(row, page, tracker)
+        overlays[tracker] = write_overlay(sequence, run, folder / f"{tracker}.mp4", "over")
     frames = sequence.length or 0
     return PixelScene(section, overlays, frames, frames / sequence.fps)
 
 
-def _input_word(tracker: str, mode: DetectionMode) -> str:
-    """Returns what the tracker gets in this mode: "pixels" in mode "image", else "boxes" if it takes boxes, else
-    "points".
-
-    tracker: name; InputError if unknown.
-    """
-    return "pixels" if mode == "image" else "boxes" if "boxes" in tracker_registry.find(tracker).needs else "points"
+def _input_word(tracker: str) -> str:
+    """Returns what of stored detections the tracker takes: "boxes" or "points". InputError if it is unknown."""
+    return "boxes" if "boxes" in tracker_registry.find(tracker).needs else "points"
 
 
-def _section(tracker: str, sequences: list[Sequence], out: Path, meter: ProgressMeter) -> ResultSection:
-    """Tracks all sequences with one tracker from the detections that it takes by default; returns scores and pages.
-
-    Writes tracks and replay pages into `out`. meter: advanced by one for each sequence. The title names stored
-    detections. Raises InputError if a file cannot be read or written, WorkError if the disk is full.
-    """
-    section = ResultSection(f"{tracker}, from {_input_word(tracker, 'file')}")
+def _tracked(tracker: str, sequences: list[Sequence], out: Path, meter: ProgressMeter) -> list[TrackingRun]:
+    """Tracks all sequences from their stored detections, and stores the tracks. meter: advanced by each sequence."""
+    runs = []
     for sequence in sequences:
-        run = TrackerSetup(tracker).run(sequence)
-        row = score_run(sequence, run)
-        page = output_path(out / "pages" / tracker, sequence.name, ".html")
+        run = TrackerSetup(tracker, detections="file").run(sequence)
         run.write(output_path(out / "tracks" / tracker, sequence.name), sequence)
+        runs.append(run)
+        meter.step(f"{tracker} on {sequence.name}")
+    return runs
+
+
+def _section(
+    tracker: str, table: RankingTable, sequences: list[Sequence], runs: Mapping[str, list[TrackingRun]], out: Path
+) -> ResultSection:
+    """Writes the replay pages of one tracker, and returns them with their scores."""
+    section = ResultSection(f"{tracker}, from {_input_word(tracker)}")
+    for sequence, run, scores in zip(sequences, runs[tracker], table.compared.scores[tracker], strict=True):
+        row, page = SequenceScores(sequence.name, scores), output_path(out / "pages" / tracker, sequence.name, ".html")
         _write_page(tracker, sequence, run, row, page, None)
         section.add(row, page, sequence.name)
-        meter.step(f"{tracker} on {sequence.name}")
     return section
 
 

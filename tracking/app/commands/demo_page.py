@@ -9,7 +9,8 @@ from pathlib import Path
 
 from sim.io.files.own_files import GENERATOR
 from tracking.app.commands.score import summary
-from tracking.app.commands.score_tables import SHOWN, SequenceScores, number
+from tracking.app.commands.score_tables import SHOWN, SIMILARITY, SequenceScores, number
+from tracking.comparison import ComparedRuns
 from tracking.scoring.catalogue import CATALOGUE
 
 STYLE = """
@@ -21,17 +22,21 @@ tfoot td { border-top: 1px solid #8a8f98; font-weight: 600 }
 small { color: #57606a; font-weight: 400 }
 .films { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); gap: 1rem }
 .wide { overflow-x: auto } figure { margin: 0 0 1rem; max-width: 640px } figcaption { color: #57606a; font-size: .9em }
+summary { cursor: pointer; font-weight: 600; padding: .3rem 0 }
 video { display: block; width: 100%; border-radius: 8px }
 """
 INTRO = """<h1>flockscope demo</h1>
-<p>Scenes in which groups merge, split, cross and queue were simulated, tracked and scored. Each name below opens a
-replay: the tracks beside the truth, with a timeline of events. The scores are those of
-<code>flockscope score</code>; point at a heading to read what it means.</p>
+<p>Scenes in which groups merge, split, cross and queue were simulated, tracked and scored. Trackers that got the same
+input are ranked: those that no interval parts share a rank, and the oracle shows what the best tracker could report
+from these detections. Point at a heading to read what it means; a dash means that there is nothing to score, for example
+people where a tracker reports only groups.</p>
 """
 FROM_PIXELS = """<h2>One scene, from its pictures</h2>
-<p>The same {frames} frames were tracked twice: from pixels, by background subtraction, and from the detections of a
-simulated detector. The videos show the tracks from pixels: trails, groups, events; thin white boxes are the truth. A
-dash in a table means that there is nothing to score, for example people where a tracker reports only groups.</p>
+<p>The same {frames} frames were tracked by background subtraction. The videos show trails, groups and events; thin white
+boxes are the truth. Each name opens a replay: the tracks beside the truth, with a timeline of events.</p>
+"""
+EXTREMES = """<p>Best and worst scene of <code>{run}</code>: <a href="{best}">{best_name}</a> ({key} {most}) and
+<a href="{worst}">{worst_name}</a> ({least}).</p>
 """
 VIDEO = """<figure><video src="{address}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
 <figcaption>{caption}</figcaption></figure>"""
@@ -77,17 +82,60 @@ class PixelScene:
     seconds: float
 
 
-def demo_page(root: Path, scene: PixelScene, sections: list[ResultSection]) -> str:
-    """Returns the page as HTML: videos and scores of the scene with pictures, then a table for each section.
+@dataclass(frozen=True)
+class RankingTable:
+    """A ranking of trackers that got the same input. key: the score that ranks."""
+
+    title: str
+    compared: ComparedRuns
+    key: str
+
+
+def demo_page(root: Path, scene: PixelScene, tables: list[RankingTable], sections: list[ResultSection]) -> str:
+    """Returns the page as HTML: rankings, videos and scores of the scene with pictures, then, folded, each section.
 
     root: the folder that will hold the page and holds everything it links to; links are relative to it. Raises
     ValueError for a page or video outside it.
     """
     generator = f'<meta charset="utf-8"><meta name="generator" content="{GENERATOR}">'
     head = f'<!doctype html><html lang="en">{generator}<title>flockscope demo</title><style>{STYLE}</style>'
-    first = FROM_PIXELS.format(frames=scene.frames) + _videos(root, scene) + _table(scene.section, root)
+    first = "\n".join(_ranking(table, sections, root) for table in tables)
+    pixels = FROM_PIXELS.format(frames=scene.frames) + _videos(root, scene) + _table(scene.section, root)
     rest = "\n".join(_section(section, root) for section in sections)
-    return f"{head}{INTRO}{first}{rest}</html>\n"
+    return f"{head}{INTRO}{first}{pixels}<h2>Every scene</h2>{rest}</html>\n"
+
+
+def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> str:
+    """Returns a ranking as HTML, the oracle first, with links to the best and worst scene of the best tracker."""
+    entries = table.compared.to_arrow(table.key).to_pylist()
+    keys = [k for k in SHOWN if k != table.key and any(math.isfinite(e.get(k, math.nan)) for e in entries)]
+    rows = []
+    for e in entries:
+        own = {"mean": e["mean"], "low": e["low"], "high": e["high"]}
+        rank = "" if e["first"] is None else str(e["first"]) if e["first"] == e["last"] else f"{e['first']}–{e['last']}"
+        cells = [escape(e["run"]), rank, _interval(table.key, own)]
+        rows.append(_cells("td", [*cells, *(number(k, e[k], mean=True) for k in keys)]))
+    head = "<tr><th>tracker</th><th>rank</th>" + "".join(map(_heading, [table.key, *keys])) + "</tr>"
+    body = f'<div class="wide"><table><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'
+    compared = table.compared
+    note = f"{len(compared.sequences)} scenes, people compared by {SIMILARITY[compared.similarity]}"
+    return f"<h2>{escape(table.title)}</h2><p>{note}.</p>{body}{_extremes(table, entries[1]['run'], sections, root)}"
+
+
+def _extremes(table: RankingTable, run: str, sections: list[ResultSection], root: Path) -> str:
+    """Returns a line with links to the replays of the best and the worst scene of one run."""
+    section = next(s for s in sections if s.title.startswith(f"{run},"))
+    known = [k for k, row in enumerate(section.rows) if math.isfinite(row.scores[table.key])]
+    if len(known) < 2:
+        return ""
+    best, worst = (pick(known, key=lambda k: section.rows[k].scores[table.key]) for pick in (max, min))
+    most, least = (number(table.key, section.rows[k].scores[table.key]) for k in (best, worst))
+    links = {
+        f"{name}{part}": escape(text)
+        for name, k in (("best", best), ("worst", worst))
+        for part, text in (("", _link(section.pages[k], root)), ("_name", section.names[k]))
+    }
+    return EXTREMES.format(run=escape(run), key=escape(table.key), most=most, least=least, **links)
 
 
 def _videos(root: Path, scene: PixelScene) -> str:
@@ -107,7 +155,7 @@ def _videos(root: Path, scene: PixelScene) -> str:
 
 def _section(section: ResultSection, root: Path) -> str:
     note = "" if any(map(_has_people, section.rows)) else WITHOUT_PEOPLE
-    return f"<h2>{escape(section.title)}</h2>{note}{_table(section, root)}"
+    return f"<details><summary>{escape(section.title)}</summary>{note}{_table(section, root)}</details>"
 
 
 def _has_people(row: SequenceScores) -> bool:

@@ -83,7 +83,7 @@ def ranking(options: ScoreOptions, sequences: list[Sequence]) -> CommandResult:
     scenarios: dict[str, list[int]] = {}
     for k, sequence in enumerate(sequences):
         scenarios.setdefault(_scenario(sequence), []).append(k)
-    every = RankedRuns(comparison, options.by or _usual_key(comparison), scenarios, given)
+    every = RankedRuns(comparison, options.by or usual_key(comparison), scenarios, given)
     if options.csv is not None:
         _write_csv(options.csv, every)
     return CommandResult(_data(every), _text(every, options.all))
@@ -109,7 +109,7 @@ def sparse_notes(scores: list[Scores]) -> list[str]:
     return [f"labels{where} are sparse ({steps}): only annotated frames are scored, {scored} of {length}"]
 
 
-def _usual_key(comparison: ComparedRuns) -> str:
+def usual_key(comparison: ComparedRuns) -> str:
     """Returns "objective"; "group_F1_hull" if it would mean something else for some runs, which track whole groups."""
     people = [np.isfinite(comparison.values("HOTA")).any(axis=1)]
     return "group_F1_hull" if len(np.unique(people)) > 1 else "objective"

@@ -40,7 +40,7 @@ def test_what_is_not_known_of_any_row_has_no_column(rows: dict[str, SequenceScor
         ResultSection(f"{name} alone", [rows[name]], [tmp_path / f"{name}.html"], [name])
         for name in ("people", "groups")
     ]
-    text = demo_page(tmp_path, PixelScene(both, films, 160, 16.0), alone)
+    text = demo_page(tmp_path, PixelScene(both, films, 160, 16.0), [], alone)
     first, people, groups = tables(text)
     assert first[0] == people[0]
     assert [cell for cell in people[0] if cell not in groups[0]] == ["HOTA", "MOTA", "IDF1"]
