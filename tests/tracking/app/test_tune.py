@@ -18,6 +18,14 @@ def line(tmp_path) -> list[str]:
     return ["tune", TOY, "--suite", one, "--check", two, *seeds, *goal, "--out", str(tmp_path / "new" / "toy.toml")]
 
 
+def changed(line: list[str], option: str, value: str) -> list[str]:
+    """The line with another value of an option, or with one more of an option that is not in it or can be repeated."""
+    if option not in line or option in ("--set", "--suite", "--objective"):
+        return [*line, option, value]
+    at = line.index(option) + 1
+    return [*line[:at], value, *line[at + 1 :]]
+
+
 def test_it_says_what_was_gained(line, tmp_path, capsys):
     assert run(line) == 0
     printed = capsys.readouterr()
@@ -49,7 +57,7 @@ def test_the_same_again_as_one_object_with_more_trials(line, tmp_path, capsys):
 def test_settings_of_scenes_detector_and_tracker(line, tmp_path, capsys):
     (tmp_path / "sensor.toml").write_text("[sensor]\ndetect_prob = 0.9\n")
     more = ["--set", "scenario.duration=3", "--set", "skip=1", "--sensor", str(tmp_path / "sensor.toml")]
-    assert run([*line, *more, "--json", "--check", "none"]) == 0
+    assert run([*changed(line, "--check", "none"), *more, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert set(told["settings"]["set"]) == {"sensor.detect_prob=0.9", "duration=3"}
     assert told["params"]["skip"] == 1
@@ -77,7 +85,7 @@ def test_settings_of_scenes_detector_and_tracker(line, tmp_path, capsys):
     ],
 )
 def test_wrong_options_are_one_line(line, more, words, capsys):
-    assert run([*line, *more]) == 2
+    assert run(changed(line, *more)) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert len(printed.err.splitlines()) == 1
