@@ -74,6 +74,15 @@ def test_a_ghost_that_a_track_protects_goes_too():
     assert not len(watch(pipeline, [], 3.0, protected=np.ones(pipeline.shape, bool)))
 
 
+def test_a_queue_that_stands_for_a_minute_beside_a_ghost_is_kept():
+    queue = [(200.0 + 26 * k, 180.0 + k, TALL) for k in range(4)]
+    pipeline = made([PERSON], fps=2.5)
+    found = watch(pipeline, queue, 60.0, protected=np.ones(pipeline.shape, bool))
+    people = np.any([painted.shape(person) for person in queue], axis=0)
+    assert (found.label[people] > 0).mean() > 0.95
+    assert not found.label[painted.shape(PERSON) & ~people].any()
+
+
 def test_a_ghost_waits_until_its_edge_is_free():
     """Somebody stands in front of the ghost: its edge is theirs."""
     x, foot, h = PERSON
