@@ -10,19 +10,19 @@ above: seen from straight above at 20 px per m, and the friends-meet scenes at 4
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 import tracking
+from benchmarks.support.in_memory import people_in_view
 from benchmarks.support.mog2 import MOG2, background_model
 from benchmarks.support.tables import head, row
 from scenarios.loading.resolve import load
 from sim.io.source import open_source
 from sim.sequence import simulate
-from sim.types import Frame
 from sim.types import Sequence as Recording
 from tracking.papers.blob.config import BlobConfig
 from tracking.run import track
@@ -94,30 +94,15 @@ def rendered(seeds: range) -> None:
 
 
 def rendered_scene(name: str, tilt: int, seed: int, bare: bool) -> Recording:
-    """Returns a rendered scene with its pictures in memory; bare: without camera, background spread over the video.
-
-    People more than half outside the image are left out of the truth.
-    """
+    """Returns a rendered scene with its pictures in memory; bare: without camera, background spread over the video."""
     settings = [f"camera.{s}" for s in (f"tilt_deg={tilt}", *VIEW)]
     live = simulate(load(name, set=[*settings, "picture.jpeg=80"]), seed)
-    frames = [f for f in live.frames() if f.index <= LONGEST]
-    truth = live.truth
-    assert truth is not None
-    assert truth.truncation is not None
-    keep = (truth.frame <= LONGEST) & (truth.truncation < 0.5)
-    columns = ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
-    cut = {k: getattr(truth, k)[keep] for k in (*columns, "visible_box") if getattr(truth, k) is not None}
-    none = {"groups": None, "groups_px": None, "labelled": None, "events": None, "near": None, "orders": ()}
-    in_view = truth.replace(length=len(frames), **cut, **none)
-    spread = [frames[k].image for k in np.linspace(0, len(frames) - 1, 50).astype(int)]
-
-    def again() -> Iterator[Frame]:
-        return iter(frames)
-
-    video = replace(live, length=len(frames), frames=again, load_truth=lambda: in_view, bare=None, load_pixels=None)
+    video = people_in_view(live, LONGEST)
     if not bare:
         return video
-    return replace(video, camera=None, scene=None, px_per_m=float("nan"), load_background=lambda: np.stack(spread))
+    frames = list(video.frames())
+    spread = np.stack([frames[k].image for k in np.linspace(0, len(frames) - 1, 50).astype(int)])
+    return replace(video, camera=None, scene=None, px_per_m=float("nan"), load_background=lambda: spread)
 
 
 def above(seeds: range) -> None:

@@ -4,7 +4,7 @@
     python -m benchmarks.foreground rendered [--seeds 20000:20002] [--size 640x480] [--dark]
     python -m benchmarks.foreground adaptation [--seed 40000] [--out adaptation.svg]
     python -m benchmarks.foreground opening [--seeds 0:8]
-    python -m benchmarks.foreground ghosts [--seeds 0:1]
+    python -m benchmarks.foreground ghosts [--seeds 20000:20002] [--data FOLDER]
 
 highway: CDnet 2014, FOLDER/cdnet-highway. All frames without a mask train the models, the others are scored, each as it
 is and after cleaning (majority, opening, closing at 20 px per m). Masks: 255 foreground; 0 and 50 not; 50 shadow; 85
@@ -29,11 +29,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from benchmarks.foreground import ghosts
 from benchmarks.foreground.adaptation import adaptation
+from benchmarks.foreground.ghosts import ghosts
 from benchmarks.foreground.opening import opening
 from benchmarks.support.mog2 import Mog2
-from benchmarks.support.options import add_data, add_seeds, new_parser, seeds_text
+from benchmarks.support.options import PETS, add_data, add_seeds, new_parser, seeds_text
 from scenarios import load
 from sim import simulate
 from sim.types import Sequence
@@ -198,7 +198,7 @@ def main() -> None:
     elif args.mode == "opening":
         opening(args.seeds)
     elif args.mode == "ghosts":
-        ghosts.compare(args.seeds)
+        ghosts(args.seeds, args.data / PETS)
     else:
         adaptation(args.seed, args.out or Path("adaptation.svg"))
 

@@ -21,5 +21,25 @@ def in_memory(sequence: Recording, *, with_background: bool = True) -> Recording
     return replace(kept, load_background=lambda: sample)
 
 
+def people_in_view(live: Recording, length: int) -> Recording:
+    """Returns the first `length` frames of a simulated sequence with their pictures in memory.
+
+    People more than half outside the image are left out of its truth; groups and events are, too.
+    """
+    frames = tuple(frame for frame in live.frames() if frame.index <= length)
+    truth = live.truth
+    assert truth is not None
+    assert truth.truncation is not None
+    keep = (truth.frame <= length) & (truth.truncation < 0.5)
+    columns = ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
+    cut = {k: getattr(truth, k)[keep] for k in (*columns, "visible_box") if getattr(truth, k) is not None}
+    none = {"groups": None, "groups_px": None, "labelled": None, "events": None, "near": None, "orders": ()}
+    in_view = truth.replace(length=len(frames), **cut, **none)
+    return replace(
+        live, length=len(frames), frames=partial(_again, frames), load_truth=lambda: in_view, bare=None,
+        load_pixels=None,
+    )  # fmt: skip
+
+
 def _again(frames: Sequence[Frame]) -> Iterator[Frame]:
     return iter(frames)

@@ -34,9 +34,11 @@ BAND_M, LEAST_BAND = 0.1, 2
 """m and px: half width of the window in which colours on both sides of an edge are averaged. People and pictures of
 them in a background model have soft edges, as people sway."""
 OPEN = 0.5
-"""Least share of the edge that borders on background."""
+"""Least share of the edge that borders on background. Without it, parts of people are mended away: 1 in 20 of the
+pixels mended in 12 videos were of people."""
 STEPS = 2.0
-"""Least ratio of the model's steps to the picture's."""
+"""Least ratio of the model's steps to the picture's. At 1 the scores are the same, but people who stand are mended
+away: 3200 px of them instead of 150 in 72 still pictures."""
 
 
 class Ghosts:
