@@ -124,8 +124,13 @@ def associate(mean: Array, cov: Array, points: Array, noise: float, gate: float)
     if not len(mean) or not len(points):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     S = cov + noise**2 * np.eye(2)
-    error = points[None] - mean[:, None]
-    d2 = np.einsum("kmi,kmi->km", error, np.linalg.solve(S[:, None], error[..., None])[..., 0])
+    # d^2 is at least |error|^2 over the trace of S: most pairs need no more than that
+    square = np.square(points[:, 0] - mean[:, :1]) + np.square(points[:, 1] - mean[:, 1:])
+    k, m = np.nonzero(square <= gate * (1 + 1e-9) * np.trace(S, axis1=1, axis2=2)[:, None])
+    error = points[m] - mean[k]
+    d2 = np.einsum("ri,ri->r", error, np.linalg.solve(S[k], error[..., None])[..., 0])
     log_det = np.linalg.slogdet(S)[1]
     log_det = log_det - log_det.min()
-    return optimal(np.where(d2 <= gate, d2 + log_det[:, None], np.inf), gate + float(log_det.max()) + 1e-9)
+    cost = np.full(square.shape, np.inf)
+    cost[k, m] = np.where(d2 <= gate, d2 + log_det[k], np.inf)
+    return optimal(cost, gate + float(log_det.max()) + 1e-9)

@@ -8,7 +8,7 @@ from tracking.papers.joint import dirichlet_process_kernels
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import newest
-from tracking.papers.joint.division_kernels import place_newcomer
+from tracking.papers.joint.division_kernels import place_newcomers
 
 
 def place(nested: Nested, new: int, config: JointConfig, lag: float, draws: np.random.Generator) -> None:
@@ -23,6 +23,5 @@ def place(nested: Nested, new: int, config: JointConfig, lag: float, draws: np.r
         uniforms = draws.random((*n.z.shape, 2))
         dirichlet_process_kernels.propose(newest(n.x), n.z, chance, uniforms, c.mixture)
         return
-    state = newest(n.x)
-    for person in range(people - new, people):
-        place_newcomer(state, n.z, person, draws.random(n.log_q.shape), c.validity_rate * lag, c.scales)
+    state, uniforms = newest(n.x), np.ascontiguousarray(np.moveaxis(draws.random((new, *n.log_q.shape)), 0, 2))
+    place_newcomers(state, n.z, uniforms, c.validity_rate * lag, c.scales)

@@ -156,8 +156,8 @@ def placed(pos, label, count=4000):
     """The partitions after the last person, alone so far, was placed."""
     points = np.concatenate([np.asarray(pos, float), np.zeros((len(pos), 2))], axis=1)[None]
     labels = np.tile(np.asarray(label, np.int64), (1, count, 1))
-    uniforms = np.random.default_rng(0).random((1, count))
-    division_kernels.place_newcomer(points, labels, len(pos) - 1, uniforms, 8.0, SCALES)
+    uniforms = np.random.default_rng(0).random((1, count, 1))
+    division_kernels.place_newcomers(points, labels, uniforms, 8.0, SCALES)
     return labels[0]
 
 
