@@ -21,8 +21,9 @@ class ParticleSet:
 
     count: P. one_weight: whether a particle has one weight. weights (P, K): of the particles, sum 1 for each slot; with
     one weight all columns are equal. pos (P, K, 2): m. vel (P, K, 2): m/s. exist (P, K): probability that the person
-    exists, given the particle's path (ours: it is computed, not drawn). related (P, K, K) bool, symmetric: which pairs
-    walk together. ancestor (P, K): the particle from which each slot's state descends, since `ancestor` was last set to
+    exists, given the particle's path (ours: it is computed, not drawn). pairs (N, 2): people i < j of whom a relation is
+    kept, in order of j, then i; all others do not walk together. related (N, P) bool: in which particles each pair walks
+    together. ancestor (P, K): the particle from which each slot's state descends, since `ancestor` was last set to
     the particles' own numbers.
     """
 
@@ -32,6 +33,7 @@ class ParticleSet:
     pos: Array
     vel: Array
     exist: Array
+    pairs: Ints
     related: Bools
     ancestor: Ints
 
@@ -40,8 +42,8 @@ class ParticleSet:
         """Return `count` particles without people."""
         flat, two = np.zeros((count, 0)), np.zeros((count, 0, 2))
         none = np.zeros((count, 0), np.int64)
-        related = np.zeros((count, 0, 0), bool)
-        return cls(count, False, flat, two, two.copy(), flat.copy(), related, none)
+        pairs, related = np.zeros((0, 2), np.int64), np.zeros((0, count), bool)
+        return cls(count, False, flat, two, two.copy(), flat.copy(), pairs, related, none)
 
     @property
     def people(self) -> int:
@@ -65,7 +67,7 @@ class ParticleSet:
     def labels(self) -> Ints:
         """Return the group of each person in each particle, (P, K): the least slot in it."""
         label = np.empty(self.exist.shape, np.int64)
-        particle_set_kernels.group_labels(self.related, label)
+        particle_set_kernels.group_labels(self.pairs, self.related, label)
         return label
 
     def share_weights(self, one_weight: bool) -> None:
@@ -108,12 +110,13 @@ class ParticleSet:
             else:
                 chosen[:, column] = systematic_resample(weights, float(draws.random()))
         if self.one_weight:
-            for values in (self.pos, self.vel, self.exist, self.related, self.ancestor):
+            for values in (self.pos, self.vel, self.exist, self.ancestor):
                 values[:] = values[chosen[:, 0]]
+            self.related = np.ascontiguousarray(self.related[:, chosen[:, 0]])
         else:
             for values in (self.pos, self.vel, self.exist, self.ancestor):
                 values[:, few] = values[chosen, few]
-            particle_set_kernels.redraw_relations(self.related, few, chosen)
+            particle_set_kernels.redraw_relations(self.pairs, self.related, few, chosen)
         self.weights[:, few] = 1 / self.count
         if width > 0:
             self._spread(few, width, draws)
@@ -139,7 +142,8 @@ class ParticleSet:
         """Remove all slots but those where `slots` (K,) is True."""
         self.weights, self.exist = self.weights[:, slots], self.exist[:, slots]
         self.pos, self.vel = self.pos[:, slots], self.vel[:, slots]
-        self.related = self.related[:, slots][:, :, slots]
+        rows, number = slots[self.pairs].all(axis=1), np.cumsum(slots) - 1
+        self.pairs, self.related = number[self.pairs[rows]], self.related[rows]
         self.ancestor = self.ancestor[:, slots]
 
     def add(self, pos: Array, vel: Array, exist: float) -> None:
@@ -151,8 +155,28 @@ class ParticleSet:
         self.pos = np.concatenate([self.pos, np.ascontiguousarray(pos)], axis=1)
         self.vel = np.concatenate([self.vel, np.ascontiguousarray(vel)], axis=1)
         self.exist = np.concatenate([self.exist, np.full((count, new), exist)], axis=1)
-        grown = np.zeros((count, k + new, k + new), bool)
-        grown[:, :k, :k] = self.related
-        self.related = grown
         own = np.repeat(np.arange(count)[:, None], new, axis=1)
         self.ancestor = np.concatenate([self.ancestor, own], axis=1)
+
+    def hold(self, pairs: Ints) -> None:
+        """Keep relations of further pairs i < j (N', 2), in any order; pairs that were not kept do not walk together."""
+        kept, further = _order_key(self.pairs), _order_key(pairs)
+        key = np.union1d(kept, further)
+        related = np.zeros((len(key), self.count), bool)
+        related[np.searchsorted(key, kept)] = self.related
+        self.pairs, self.related = np.stack([key % LARGEST, key // LARGEST], axis=1), related
+
+    def drop_strangers(self) -> None:
+        """Keep no relation of pairs that walk together in no particle."""
+        rows = self.related.any(axis=1)
+        if not rows.all():
+            self.pairs, self.related = self.pairs[rows], self.related[rows]
+
+
+LARGEST = 2**31
+"""Numbers of slots are below this."""
+
+
+def _order_key(pairs: Ints) -> Ints:
+    """Returns numbers (N,) by which pairs (N, 2) are in order of j, then i."""
+    return np.asarray(pairs[:, 1] * LARGEST + pairs[:, 0])

@@ -82,7 +82,7 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
     else:
         logs, free = np.empty(particles.exist.shape), _free(particles, pairs, density, count, detect, config)
         sensor_kernels.person_sums(*given, free, logs, marginals)
-        sensor_kernels.partner_factors(particles.related, particles.weights, sight.missed, logs)
+        sensor_kernels.partner_factors(particles.pairs, particles.related, particles.weights, sight.missed, logs)
     particles.weigh(logs)
     measured = sensor_kernels.measured(marginals, pairs, people)
     if not certain:

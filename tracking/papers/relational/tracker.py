@@ -43,7 +43,7 @@ from typing import ClassVar
 import numpy as np
 
 from sim.rng import rng
-from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
+from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
 from tracking.image_scale import required
@@ -151,10 +151,10 @@ class Particle:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        shared, coupling, alike, pairs, spread = self._coupling()
+        shared, coupling, alike, spread = self._coupling()
         table = c.speed_table(self.dt)
         transition_kernels.move(
-            p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, pairs, spread, self.dt
+            p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, coupling, alike, spread, self.dt
         )
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
@@ -168,12 +168,10 @@ class Particle:
         camera = self.context.camera if self.plane == "ground" else None
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
-    def _coupling(self) -> tuple[Array, Array, Array, Ints, Array]:
+    def _coupling(self) -> tuple[Array, Array, Array, Array]:
         """Returns the normals that groups have in common (P, K, 2), and the coupling (2,), the rules (4,) by which
-        partners count, the related pairs (N, 2) and their spread (N, 2) of transition_kernels; people of `particle`
-        have none."""
-        pairs = np.zeros((0, 2), np.int64)
-        return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4), pairs, np.zeros(pairs.shape)
+        partners count, and the spread (N, 2) of the pairs of transition_kernels; people of `particle` have none."""
+        return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4), np.zeros((0, 2))
 
     def _relate(self) -> None:
         """Draw new relations; people of `particle` have none."""
