@@ -23,7 +23,6 @@ from tracking.grouping.pair_evidence import (
     instant_evidence,
 )
 
-
 PAIR = 2**31
 """Numbers of people are below this."""
 

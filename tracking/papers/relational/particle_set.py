@@ -21,8 +21,8 @@ class ParticleSet:
 
     count: P. one_weight: whether a particle has one weight. weights (P, K): of the particles, sum 1 for each slot; with
     one weight all columns are equal. pos (P, K, 2): m. vel (P, K, 2): m/s. exist (P, K): probability that the person
-    exists, given the particle's path (ours: it is computed, not drawn). pairs (N, 2): people i < j of whom a relation is
-    kept, in order of j, then i; all others do not walk together. related (N, P) bool: in which particles each pair walks
+    exists, given the particle's path (ours: it is computed, not drawn). pairs (N, 2): people i < j whose relation is
+    kept, in order of j, then i; all others do not walk together. related (N, P) bool: in which particles a pair walks
     together. ancestor (P, K): the particle from which each slot's state descends, since `ancestor` was last set to
     the particles' own numbers.
     """
@@ -159,7 +159,7 @@ class ParticleSet:
         self.ancestor = np.concatenate([self.ancestor, own], axis=1)
 
     def hold(self, pairs: Ints) -> None:
-        """Keep relations of further pairs i < j (N', 2), in any order; pairs that were not kept do not walk together."""
+        """Keep relations of further pairs i < j (N', 2), in any order; others do not walk together."""
         kept, further = _order_key(self.pairs), _order_key(pairs)
         key = np.union1d(kept, further)
         related = np.zeros((len(key), self.count), bool)

@@ -286,7 +286,7 @@ def _neighbours(box, points, rules):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _relations(found, new, people, particles):  # type: ignore[no-untyped-def]
+def _relations(found: Ints, new: int, people: int, particles: int) -> tuple[Ints, Bools]:
     """Returns pairs (N, 2) and relations (N, P) of R rows (R, 3): number of a new person, partner, particle."""
     ends = np.zeros(new + 1, np.int64)
     for r in range(len(found)):

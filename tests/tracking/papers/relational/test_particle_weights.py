@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim.types import Context, Detections, Frame
-from tests.reference_relational import relate, relations
+from tests.reference_relational import relate
 from tracking.papers.relational import sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
