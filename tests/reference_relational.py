@@ -45,3 +45,12 @@ def relate(particles, i, j, where=True):
     particles.hold(np.array([sorted((i, j))]))
     row = np.flatnonzero((particles.pairs == sorted((i, j))).all(axis=1))[0]
     particles.related[row] = where
+
+
+def drawn(particles, rng):
+    """Random numbers for `resample`, from one generator."""
+
+    def draws(people):
+        return rng.random((len(people), particles.count)), rng.standard_normal((len(people), 4, particles.count))
+
+    return draws

@@ -5,11 +5,56 @@ Arrays are over P particles and K people, as in `transition_kernels`.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Bools, Ints
 from tracking.papers.relational.transition_kernels import pairs_of_people
+
+
+@njit(cache=True)
+def column_sums(a: Array, b: Array) -> Array:
+    """Return the sums over particles of the products of a and b (P, K), (K,).
+
+    Each column is summed in the order of the particles. In numpy the order depends on the number of columns, so that
+    the last bits of a person's sum would depend on who else is there.
+    """
+    out = np.zeros(a.shape[1])
+    for p in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            out[k] += a[p, k] * b[p, k]
+    return out
+
+
+@njit(cache=True)
+def pair_sums(a: Array, exist: Array, person: Ints, b: Array) -> Array:
+    """Return the sums over particles of a exist b of each pair, (N,); a, exist (P, K), b (P, N); person (N,): of each
+    pair."""
+    out = np.zeros(len(person))
+    for p in range(len(b)):
+        for n in range(len(person)):
+            out[n] += a[p, person[n]] * exist[p, person[n]] * b[p, n]
+    return out
+
+
+@njit(cache=True)
+def weigh(weights: Array, logs: Array) -> None:
+    """Multiply weights (P, K) by exp(logs), and divide them by their sums over the particles; logs (P, K) or (P, 1)."""
+    particles, n = weights.shape
+    top, total = np.full(n, -np.inf), np.zeros(n)
+    own = np.arange(n) if logs.shape[1] == n else np.zeros(n, np.int64)
+    for p in range(particles):
+        for k in range(n):
+            top[k] = max(top[k], logs[p, own[k]])
+    for p in range(particles):
+        for k in range(n):
+            weights[p, k] *= math.exp(logs[p, own[k]] - top[k])
+            total[k] += weights[p, k]
+    for p in range(particles):
+        for k in range(n):
+            weights[p, k] /= total[k]
 
 
 @njit(cache=True)

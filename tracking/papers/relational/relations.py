@@ -47,7 +47,7 @@ class Relational(Particle):
         p, time = self.particles, self.config.coupling_time
         follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
         coupling = np.array([follow, self.config.common_noise])
-        shared = self.draws[COUPLING].standard_normal(p.pos.shape)
+        shared = self.streams.normals(COUPLING, self.slots.key, p.count, 2)
         p.drop_strangers()
         if self.belief is None:
             return shared, coupling, ALWAYS, np.zeros(p.pairs.shape)
@@ -65,7 +65,7 @@ class Relational(Particle):
             p.hold(np.argwhere(np.triu(np.isfinite(log_odds), 1)))
             odds = np.where(seen[p.pairs].all(axis=1), log_odds[p.pairs[:, 0], p.pairs[:, 1]], np.nan)
             rules = np.where(np.isin(range(4), (DISTANCE, VELOCITY)), 0.0, rules)
-        uniforms = self.draws[RELATIONS].random((p.count, p.people, 2))
+        uniforms = self.streams.uniforms(RELATIONS, self.slots.key, p.count, 2)
         transition_kernels.relate(p.pos, p.vel, p.pairs, p.related, odds, uniforms, rules)
 
     def _follow(self, state: Array) -> None:
@@ -83,7 +83,7 @@ class Relational(Particle):
         p, new = self.particles, len(points)
         label = np.empty(p.exist.shape, np.int64)
         particle_set_kernels.group_labels(p.pairs, p.related, label)
-        uniforms = self.draws[JOINING].random((new, p.count))
+        uniforms = self.streams.uniforms(JOINING, self.slots.key[-new:], 1, p.count)[0]
         share = self.config.newcomer_share
         pairs, related = transition_kernels.join(p.pos, p.exist, label, points, share, uniforms, self._rules)
         p.pairs, p.related = np.concatenate([p.pairs, pairs]), np.concatenate([p.related, related])

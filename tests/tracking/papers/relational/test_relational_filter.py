@@ -12,7 +12,8 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
-from tests.reference_relational import relate, relations
+from tests.reference_relational import drawn, relate, relations
+from tracking.filters.person_streams import birth_keys
 from tracking.grouping.belief import UNSEEN, default_belief
 from tracking.grouping.pair_evidence import frames_per_step
 from tracking.grouping.pair_probabilities import pair_probabilities
@@ -68,6 +69,13 @@ def placed(count, pos, vel=None, exist=1.0):
     for place, velocity in zip(pos, vel, strict=True):
         made.add(np.tile(place, (count, 1))[:, None], np.tile(velocity, (count, 1))[:, None], exist)
     return made
+
+
+def seat(tracker, particles):
+    """Gives the tracker these people, who have not been measured in the last frame."""
+    tracker.particles = particles
+    people = particles.people
+    tracker.slots.add(np.full((people, 2), np.nan), birth_keys(np.zeros((people, 2)), 1))
 
 
 def sight(detect, missed=None):
@@ -178,7 +186,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         particles.pos[:, 1] = 1e6  # never near the detection
         if seen:
             sensor.weigh(particles, points, sight([0.9, 0.0], [False, True]), r, config)
-            particles.resample(1.0, "residual", 0.0, rng)
+            particles.resample(1.0, "residual", 0.0, drawn(particles, rng))
         out.append(particles.vel[:, 1].var(axis=0).mean())
     return np.array(out)
 
@@ -265,7 +273,7 @@ def test_new_relations_depend_on_new_attributes_alone(monkeypatch):
     for seed in (0, 1):
         tracker = Relational(RelationalConfig(relation_evidence="state", particles=300))
         tracker.reset(Context(10.0, float("nan")), 7)
-        tracker.particles = placed(300, np.random.default_rng(seed).normal(0, 3, (4, 2)))
+        seat(tracker, placed(300, np.random.default_rng(seed).normal(0, 3, (4, 2))))
         relate(tracker.particles, 0, 1)
         tracker._forecast()
         found.append(relations(tracker.particles))
@@ -438,7 +446,7 @@ def test_the_squares_of_partners_who_move_alike_are_those_of_their_errors():
 def test_presets_couple_velocities_as_the_paper(name):
     tracker = Relational(RelationalConfig.preset(name))
     tracker.reset(Context(25.0, float("nan")), 0)
-    tracker.particles = placed(50, np.random.default_rng(0).normal(0, 3, (4, 2)))
+    seat(tracker, placed(50, np.random.default_rng(0).normal(0, 3, (4, 2))))
     relate(tracker.particles, 0, 1, np.arange(tracker.particles.count) < 25)
     _, coupling, alike, spread = tracker._coupling()
     assert coupling.tolist() == AT_ONCE.tolist()
@@ -452,13 +460,14 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
     tracker = Relational(RelationalConfig(particles=20_000, relation_rate=2.0))
     tracker.reset(Context(10.0, float("nan")), 3)
     place = np.array([[0, 0], [0.5, 0], [0, 0.5], [30, 0]])
-    tracker.particles = placed(20_000, place, np.array([[0, 0], [1, 0], [0, 0], [0, 0]]))
+    seat(tracker, placed(20_000, place, np.array([[0, 0], [1, 0], [0, 0], [0, 0]])))
     relate(tracker.particles, 0, 3)
     tracker._follow(np.concatenate([place, np.zeros((4, 2))], axis=1))
     assert tracker.belief is not None
     assert (tracker.belief.log_odds[3, :3] == UNSEEN).all()
     tracker.belief.log_odds[:3, :3] = odds = np.array([[0, 1.0, -2.0], [1.0, 0, 0.5], [-2.0, 0.5, 0]])
     for _ in range(60):
+        tracker.streams.frame += 1
         tracker._relate()
     found = relations(tracker.particles).mean(axis=0)
     apart = ~np.eye(3, dtype=bool)
@@ -470,6 +479,7 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
         tracker._follow(gone)
     before = relations(tracker.particles)[:, 1]
     for _ in range(60):
+        tracker.streams.frame += 1
         tracker._relate()
     assert np.array_equal(relations(tracker.particles)[:, 1], before)  # who is not seen stays with the partners
 
