@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, binder_gain, label_of, validity
+from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint import partition_kernels
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.distributions import FrameModel, stam_cumulated
@@ -67,7 +68,9 @@ def test_the_example_of_two_pairs():
 def test_the_data_of_the_validity_are_the_states():
     """Eq. 4: d_cl(Z, X) with X in m and m/s, so that people who pass each other are no cluster."""
     config = JointConfig(belief_rate=0.0, validity_rate=3.0)
-    model = FrameModel(config, 0.1, 0.1, np.full((4, 2), np.nan), np.zeros((4, 4)), *np.random.default_rng(0).spawn(3))
+    model = FrameModel(
+        config, 0.1, 0.1, np.full((4, 2), np.nan), np.zeros((4, 4)), PersonStreams(0), np.zeros(4, np.uint64)
+    )
     state = np.array([[0, 0, 1, 0], [0, 0.7, 1, 0], [5, 0, 1, 0], [5, 0.7, -1, 0]])
     parts = list(all_partitions(4))
     found = model.energy(state[None], np.array([[label_of(p) for p in parts]]))[0]
