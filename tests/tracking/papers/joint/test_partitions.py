@@ -44,6 +44,17 @@ def test_the_validity_is_that_of_the_definition():
     np.testing.assert_allclose(validities(points, [label_of(p) for p in parts]), expected)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_validity_of_many_clusters_is_that_of_the_definition(seed):
+    """Some of them are wide, so that they matter far away, and one person is far from all."""
+    rng = np.random.default_rng(seed)
+    points = np.concatenate([rng.uniform(0, 25, (90, 4)), [[400, -300, 0, 0]]])
+    order = rng.permutation(90)
+    parts = [sorted(order[a:b].tolist()) for a, b in ((0, 9), (9, 12), *((k, k + 1) for k in range(12, 90)))] + [[90]]
+    found = validities(points, [label_of(parts)])
+    np.testing.assert_allclose(found, validity(points, parts, *SCALES), rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     "points",
     [PAIRS, [[0, 0], [0.7, 0], [1.4, 0]], [[0, 0], [0.7, 0], [5, 5]]],
