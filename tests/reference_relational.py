@@ -30,3 +30,27 @@ def sum_over_mappings(W, miss, spare):
             if j >= 0:
                 shares[i, j] += weight
     return total, shares / total if total else shares
+
+
+def relations(particles):
+    """The relations of all pairs, (P, K, K), symmetric."""
+    made = np.zeros((particles.count, particles.people, particles.people), bool)
+    for (i, j), row in zip(particles.pairs.tolist(), particles.related, strict=True):
+        made[:, i, j] = made[:, j, i] = row
+    return made
+
+
+def relate(particles, i, j, where=True):
+    """Sets in which particles people i and j walk together; where (P,) bool, or one bool for all."""
+    particles.hold(np.array([sorted((i, j))]))
+    row = np.flatnonzero((particles.pairs == sorted((i, j))).all(axis=1))[0]
+    particles.related[row] = where
+
+
+def drawn(particles, rng):
+    """Random numbers for `resample`, from one generator."""
+
+    def draws(people):
+        return rng.random((len(people), particles.count)), rng.standard_normal((len(people), 4, particles.count))
+
+    return draws

@@ -30,14 +30,12 @@ DEPARTURES = (
 
 
 def _pair_by_pair(
-    pos: Array, vel: Array, related: Bools, pairs: Ints, odds: Array, uniforms: Array, rules: Array
+    pos: Array, vel: Array, pairs: Ints, related: Bools, odds: Array, uniforms: Array, rules: Array
 ) -> None:  # fmt: skip
     """Draws the relations of each pair by themselves, with the hazards of `transition_kernels.relate`."""
     rng = np.random.default_rng(int(uniforms.sum()))
-    i, j = pairs.T
-    old, g = related[:, i, j], 1 / (1 + np.exp(-odds))
-    new = np.where(rng.random(old.shape) < rules[transition_kernels.RATE], rng.random(old.shape) < g, old)
-    related[:, i, j] = related[:, j, i] = new
+    change = (rng.random(related.shape) < rules[transition_kernels.RATE]) & np.isfinite(odds)[:, None]
+    related[:] = np.where(change, rng.random(related.shape) < 1 / (1 + np.exp(-odds))[:, None], related)
 
 
 SWITCHES: dict[str, Any] = {

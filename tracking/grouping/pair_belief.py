@@ -7,7 +7,6 @@ for a whole sequence.
 from __future__ import annotations
 
 from collections import deque
-from typing import Any
 
 import numpy as np
 
@@ -24,6 +23,9 @@ from tracking.grouping.pair_evidence import (
     instant_evidence,
 )
 
+PAIR = 2**31
+"""Numbers of people are below this."""
+
 
 class PairBelief:
     """The log-odds that each pair of K people belongs together.
@@ -32,8 +34,10 @@ class PairBelief:
     apart or more, or of whom one was not seen in the last step. total (K, 3): sums of x, y, m, and of time, s, over the
     frames of the current step in which each was seen; count (K,): of these frames. past: means of `total` in the last
     steps, (K, 3), nan where there are none. first (K,): step in which each person was seen first, nan before its end.
-    first_distance (K, K): m, in the first step of both, or when the later one was added, nan if unknown. means: of the
-    evidence, for K x K pairs. frames, steps: how many there were.
+    first_distance (K, K): m, in the first step of both, or when the later one was added, nan if unknown. number (K,):
+    of each person, in the order of coming, never given twice. means: of the evidence, of the R pairs that have been
+    near each other; pair (R,), ascending: PAIR times the number of the one plus that of the other. frames, steps: how
+    many there were.
     """
 
     def __init__(self, fps: float) -> None:
@@ -43,6 +47,7 @@ class PairBelief:
         self.past: deque[Array] = deque(maxlen=1 + max(1, round(CHORD / self.seconds)))
         self.log_odds, self.first_distance = np.zeros((0, 0)), np.zeros((0, 0))
         self.total, self.count, self.first = np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+        self.number, self.people, self.pair = np.zeros(0, np.int64), 0, np.zeros(0, np.int64)
         self.means = ExponentialMeans(0, len(QUANTITIES), self.seconds)
 
     def add(self, state: Array, ago: Array | None = None) -> None:
@@ -107,7 +112,7 @@ class PairBelief:
         i, j = self._pairs(pos)
         if len(i):
             distance, quantities = instant_evidence(pos, vel, i, j)
-            averaged = self.means.add(np.full(len(i), self.steps), i * n + j, quantities)
+            averaged = self.means.add(np.full(len(i), self.steps), self._rows(i, j), quantities)
             self._judge(i, j, averaged, distance, self.first, self.first_distance[i, j])
         self.steps += 1
 
@@ -140,16 +145,25 @@ class PairBelief:
         self.log_odds, self.first_distance = square(self.log_odds, 0.0), square(self.first_distance, np.nan)
         self.total, self.count, self.first = rows(self.total, 0.0), rows(self.count, 0.0), rows(self.first, np.nan)
         self.past = deque((rows(p, np.nan) for p in self.past), self.past.maxlen)
-        kept, means = np.flatnonzero(~new), self.means
+        count = int(new.sum())
+        number = np.append(self.number, self.people)[old]
+        number[new] = self.people + np.arange(count)
+        self.number, self.people = number, self.people + count
+        there = np.isin(self.pair // PAIR, number) & np.isin(self.pair % PAIR, number)
+        if not there.all():
+            self.pair = self.pair[there]
+            self.means.take(np.flatnonzero(there))
 
-        def of_pairs(table: Any) -> Any:
-            # Zeros that are not written take no memory, and most pairs are never near each other.
-            out = np.zeros((len(old), len(old), *table.shape[1:]), table.dtype)
-            if len(kept):
-                out[np.ix_(kept, kept)] = table.reshape(n, n, *table.shape[1:])[np.ix_(old[kept], old[kept])]
-            return out.reshape(-1, *table.shape[1:])
-
-        means.total, means.weight, means.last = (of_pairs(x) for x in (means.total, means.weight, means.last))
+    def _rows(self, i: Ints, j: Ints) -> Ints:
+        """Returns the rows (R,) of the pairs i < j in `means`; adds those that are not there."""
+        pair = self.number[i] * PAIR + self.number[j]
+        every = np.union1d(self.pair, pair)
+        if len(every) > len(self.pair):
+            rows = np.full(len(every), -1)
+            rows[np.searchsorted(every, self.pair)] = np.arange(len(self.pair))
+            self.pair = every
+            self.means.take(rows)
+        return np.searchsorted(self.pair, pair)
 
 
 def _distances(pos: Array) -> Array:

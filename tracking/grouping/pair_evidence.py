@@ -220,3 +220,12 @@ class ExponentialMeans:
         out = np.empty((*values.shape, len(self.times)))
         add_to_means(step, pair, values, self.times / self.seconds, self.total, self.weight, self.last, out)
         return out.reshape(len(step), values.shape[1] * len(self.times))
+
+    def take(self, rows: Ints) -> None:
+        """Makes the pairs those of the rows (K',), -1 for a new one."""
+        new = rows < 0
+        for name in ("total", "weight", "last"):
+            table = getattr(self, name)
+            taken = np.zeros((len(rows), *table.shape[1:]), table.dtype)
+            taken[~new] = table[rows[~new]]
+            setattr(self, name, taken)

@@ -28,8 +28,8 @@ video { display: block; width: 100%; border-radius: 8px }
 INTRO = """<h1>flockscope demo</h1>
 <p>Scenes in which groups merge, split, cross and queue were simulated, tracked and scored. Trackers that got the same
 input are ranked: those that no interval parts share a rank, and the oracle shows what the best tracker could report
-from these detections. Point at a heading to read what it means; a dash means that there is nothing to score, for example
-people where a tracker reports only groups.</p>
+from these detections. Point at a heading to read what it means; a dash means that there is nothing to score, for
+example people where a tracker reports only groups.</p>
 """
 FROM_PIXELS = """<h2>One scene, from its pictures</h2>
 <p>The same {frames} frames were tracked by background subtraction. The videos show trails, groups and events; thin white

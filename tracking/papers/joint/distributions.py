@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 
 from sim.types import Array, Ints
+from tracking.filters.person_streams import NOBODY, Keys, PersonStreams
 from tracking.papers.joint import (
     cluster_evidence_kernels,
     dirichlet_process_kernels,
@@ -22,6 +23,8 @@ from tracking.papers.joint.individuals_kernels import group_dynamics, own_dynami
 
 STATE = 4
 """Columns of a state: x, y, m, and vx, vy, m/s."""
+MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)
+"""What random numbers are drawn for."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +35,8 @@ class FrameModel:
     labels as partition_kernels has them.
 
     config; dt: s; noise: standard deviation of a measured place, m; z (K, 2): measured places, m, nan for a person who
-    was not measured; belief (K, K): log-odds that each pair belongs together; motion, choices, events: the random
-    streams of step 4 (normals and uniforms) and of step 7.
+    was not measured; belief (K, K): log-odds that each pair belongs together; streams: the random numbers; key
+    (K,): of each person's streams.
     """
 
     config: JointConfig
@@ -41,9 +44,8 @@ class FrameModel:
     noise: float
     z: Array
     belief: Array
-    motion: np.random.Generator
-    choices: np.random.Generator
-    events: np.random.Generator
+    streams: PersonStreams
+    key: Keys
 
     @property
     def sigma(self) -> Array:
@@ -54,7 +56,8 @@ class FrameModel:
         """Step 4: pi(X_{t+1} | X_{0:t}, y)."""
         c, old = self.config, newest(x)
         shape = x.shape[0], x.shape[1]
-        normals, uniforms = self.motion.standard_normal((*shape, STATE)), self.choices.random(shape)
+        normals = self.streams.normals(MOTION, self.key, shape[0], STATE)
+        uniforms = self.streams.uniforms(CHOICES, self.key, shape[0], 1)[..., 0]
         proposal = Proposal(self.sigma, self.noise, self.dt, c.alpha, c.proposal == "informed")
         new, log_w = proposal.draw(old, self.z, normals, uniforms)
         if c.individuals == "measured":
@@ -93,22 +96,27 @@ class FrameModel:
         out = z.copy()
         if c.variant in ("VAR2", "VAR3"):
             partition_kernels.uniform_partitions(
-                stam_cumulated(shape[2]), self.events.random((*shape[:2], shape[2] + 1)), out
+                stam_cumulated(shape[2]), self._of_partitions(shape, np.append(self.key, NOBODY), 1)[..., 0], out
             )  # fmt: skip
             return out
         if c.partition_dynamics == "dirichlet":
             chance = np.full(shape[2], -math.expm1(-c.redraw_rate * self.dt))
             dirichlet_process_kernels.propose(
-                newest(new), out, chance, self.events.random((*shape, 2)), c.mixture
+                newest(new), out, chance, self._of_partitions(shape, self.key, 2), c.mixture
             )  # fmt: skip
             return out
         late, early = newest(new), np.ascontiguousarray(x[..., -STATE:])
-        uniforms = self.events.random((*shape, 3))
+        uniforms = self._of_partitions(shape, self.key, 3)
         lag = x.shape[-1] // STATE * self.dt
         group_events_kernels.propose(
             early, late, out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
         )  # fmt: skip
         return out
+
+    def _of_partitions(self, shape: tuple[int, ...], key: Keys, columns: int) -> Array:
+        """Returns uniforms (N_x, N_z, K, columns) of people in partitions."""
+        drawn = self.streams.uniforms(EVENTS, key, shape[0] * shape[1], columns)
+        return drawn.reshape(shape[0], shape[1], len(key), columns)
 
     def energy(self, new: Array, z: Ints) -> Array:
         """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), or log p(Z_t, X_t) of the Dirichlet process mixture

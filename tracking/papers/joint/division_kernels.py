@@ -9,14 +9,13 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Ints
-from tracking.papers.joint.partition_kernels import clusters, same_row, validity_of
+from tracking.filters.cell_list_kernels import empty_list, grid_of, insert, nearest_place, remove
+from tracking.papers.joint.partition_kernels import APART, SCATTER, validity_of
 
 MOST_LISTED = 6
 """Largest group of which all divisions into two parts are tried."""
-ONE: Any
-TWO: Any
-ONE, TWO = np.int64(1), np.int64(2)
-"""Numbers of clusters, of the type for which validity_of is compiled anyway."""
+TWO: Any = np.int64(2)
+"""Number of parts, of the type for which validity_of is compiled anyway."""
 
 
 @njit(cache=True)
@@ -130,58 +129,130 @@ def candidates(points: Array) -> Ints:
 
 
 @njit(cache=True)
-def place_newcomer(points: Array, label: Ints, person: int, uniforms: Array, sharpness: float, scales: Array) -> None:
-    """Draw whether a person joins the nearest cluster, in all partitions in which the person is alone (ours).
+def place_newcomers(points: Array, label: Ints, uniforms: Array, sharpness: float, scales: Array) -> None:
+    """Draw whether each of M new people, the last ones, joins the nearest cluster, one after the other, in all
+    partitions in which the person is alone (ours).
 
-    points (N_x, K, D): as validity_of; label (N_x, N_z, K): changed in place; uniforms (N_x, N_z). The probabilities of
-    apart and together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one.
+    points (N_x, K, D): as validity_of; label (N_x, N_z, K): changed in place; uniforms (N_x, N_z, M). The probabilities
+    of apart and together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one. Clusters are in
+    a cell list, so that a person does not cost more the more others there are.
     """
     particles, partitions, n = label.shape
-    cluster, head = np.empty(n, np.int64), np.empty(n, np.int64)
-    before, join, other = np.empty(n, np.int64), 0.0, -1
+    centre, head = np.empty((n, 2)), np.empty(n, np.int64)
+    following, count = np.empty(n, np.int64), np.empty(n, np.int64)
+    own, other = np.empty(points.shape[2]), np.empty(points.shape[2])
     for i in range(particles):
+        state, grid = points[i], grid_of(points[i], n)
         for j in range(partitions):
-            if j == 0 or not same_row(label[i, j], before):
-                before[:] = label[i, j]
-                count = clusters(before, cluster, head)
-                other = _nearest_to(points[i], cluster, count, person) if before[person] == 0 else -1
-                if other >= 0:
-                    join = _join_probability(points[i], cluster, other, person, sharpness, scales)
-            if other < 0 or uniforms[i, j] >= join:
-                continue
-            name = 1 + min(person, head[other])
+            groups = label[i, j]
+            _list_clusters(state, groups, head, following, count, centre)
+            cells = empty_list(n, grid)
             for k in range(n):
-                if cluster[k] == other or k == person:
-                    label[i, j, k] = name
+                if head[k] == k:
+                    insert(k, centre[k, 0], centre[k, 1], cells)
+            for person in range(n - uniforms.shape[2], n):
+                if groups[person] > 0:
+                    continue
+                g = nearest_place(centre, person, cells)
+                if g < 0:
+                    continue
+                join = _join_probability(state, person, g, following, count[g], sharpness, scales, own, other)
+                if uniforms[i, j, person - n] >= join:
+                    continue
+                remove(person, centre[person, 0], centre[person, 1], cells)
+                remove(g, centre[g, 0], centre[g, 1], cells)
+                g = _united(person, g, following, count)
+                _centre_of(state, g, following, count[g], centre)
+                insert(g, centre[g, 0], centre[g, 1], cells)
+                k = g
+                while k >= 0:
+                    groups[k] = 1 + g
+                    k = following[k]
 
 
 @njit(cache=True)
-def _nearest_to(points: Array, cluster: Ints, count: int, person: int) -> int:
-    """Returns the cluster, not the own one, whose mean place is nearest to the person; -1 without another."""
-    n = len(cluster)
-    x, y, size = np.zeros(count), np.zeros(count), np.zeros(count)
-    for k in range(n):
-        x[cluster[k]] += points[k, 0]
-        y[cluster[k]] += points[k, 1]
-        size[cluster[k]] += 1
-    best, least = -1, np.inf
-    for g in range(count):
-        far = (x[g] / size[g] - points[person, 0]) ** 2 + (y[g] / size[g] - points[person, 1]) ** 2
-        if g != cluster[person] and far < least:
-            best, least = g, far
-    return best
+def _list_clusters(points, label, head, following, count, centre):  # type: ignore[no-untyped-def]
+    """Writes the head of each person's cluster (K,), the next member of it (K,), -1 for the last one, and by heads the
+    number of members (K,) and the mean place (K, 2)."""
+    last = np.empty(len(label), np.int64)
+    for k in range(len(label)):
+        g = k if label[k] == 0 else label[k] - 1
+        head[k], following[k] = g, -1
+        if g == k:
+            count[g] = 1
+        else:
+            count[g] += 1
+            following[last[g]] = k
+        last[g] = k
+    for k in range(len(label)):
+        if head[k] == k:
+            _centre_of(points, k, following, count[k], centre)
 
 
 @njit(cache=True)
-def _join_probability(points: Array, cluster: Ints, other: int, person: int, sharpness: float, scales: Array) -> float:
-    """Returns the probability that a person alone joins the cluster `other`."""
-    members = members_of(cluster, other)
-    n, dims = len(members) + 1, points.shape[1]
-    own, sides = np.empty((n, dims)), np.zeros((2, n), np.int64)
-    own[0] = points[person]
-    for k in range(1, n):
-        own[k], sides[0, k] = points[members[k - 1]], 1
-    centre, scatter = np.empty((n, dims)), np.empty(n)
-    apart = validity_of(own, sides[0], TWO, scales, centre, scatter)
-    together = validity_of(own, sides[1], ONE, scales, centre, scatter)
-    return 1 / (1 + math.exp(min(sharpness * (together - apart), 700.0)))
+def _centre_of(points, g, following, count, centre):  # type: ignore[no-untyped-def]
+    """Writes the mean place of the cluster with head g."""
+    x, y, k = 0.0, 0.0, g
+    while k >= 0:
+        x, y, k = x + points[k, 0], y + points[k, 1], following[k]
+    centre[g, 0], centre[g, 1] = x / count, y / count
+
+
+@njit(cache=True)
+def _united(person, g, following, count):  # type: ignore[no-untyped-def]
+    """Adds a person alone to the cluster with head g; returns the head of both."""
+    if person < g:
+        following[person], count[person] = g, count[g] + 1
+        return person
+    at = g
+    while 0 <= following[at] < person:
+        at = following[at]
+    following[person], following[at] = following[at], person
+    count[g] += 1
+    return g
+
+
+@njit(cache=True)
+def _join_probability(points, person, g, following, count, sharpness, scales, own, other):  # type: ignore[no-untyped-def]
+    """Returns the probability that a person alone joins the cluster with head g and `count` members; own, other (D,):
+    work space. It has validity_of of both apart and as one, in closed form."""
+    s0, apart = scales[SCATTER], scales[APART]
+    single, all_of_them = _scatter(points, person, g, following, count, s0, own, other)
+    away = 0.0
+    for d in range(len(own)):
+        away += (points[person, d] - other[d]) ** 2
+    ratio = (s0 / 2 + single) / max(math.sqrt(away), s0)
+    separate = (max(s0 / 2 / apart, ratio) + max(single / apart, ratio)) / 2
+    return 1 / (1 + math.exp(min(sharpness * (all_of_them / apart - separate), 700.0)))
+
+
+@njit(cache=True)
+def _scatter(points, person, g, following, count, s0, both, other):  # type: ignore[no-untyped-def]
+    """Returns the scatters of the cluster with head g without and with the person; writes the mean states (D,) of both
+    and of the cluster."""
+    dims = len(both)
+    for d in range(dims):
+        both[d], other[d] = points[person, d], 0.0
+    k = g
+    while k >= 0:
+        for d in range(dims):
+            both[d] += points[k, d]
+            other[d] += points[k, d]
+        k = following[k]
+    for d in range(dims):
+        both[d] /= count + 1
+        other[d] /= count
+    without, with_person, k = s0, s0 + _distance(points, person, both), g
+    while k >= 0:
+        without += _distance(points, k, other) if count > 1 else 0.0
+        with_person += _distance(points, k, both)
+        k = following[k]
+    return without / (count + 1), with_person / (count + 2)
+
+
+@njit(cache=True)
+def _distance(points, k, mean):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for d in range(len(mean)):
+        total += (points[k, d] - mean[d]) ** 2
+    return math.sqrt(total)

@@ -13,6 +13,7 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Ints
+from tracking.filters.cell_list_kernels import nearest_places
 from tracking.papers.joint.division_kernels import divide, rank
 from tracking.papers.joint.partition_kernels import clusters, same_row
 
@@ -76,17 +77,6 @@ def log_symmetric_kl(a: Array, b: Array) -> float:
 
 
 @njit(cache=True)
-def nearest_clusters(moments: Array, count: int, nearest: Ints) -> None:
-    """Write the cluster with the nearest mean place to each of `count` clusters, -1 without another one."""
-    for g in range(count):
-        nearest[g], least = -1, np.inf
-        for h in range(count):
-            far = (moments[g, X] - moments[h, X]) ** 2 + (moments[g, Y] - moments[h, Y]) ** 2
-            if h != g and far < least:
-                least, nearest[g] = far, h
-
-
-@njit(cache=True)
 def features_of(early: Array, late: Array, g: int, other: int, out: Array) -> None:
     """Write the six features of cluster g and its nearest cluster `other` (-1: none); early, late: moments
     (G, 9)."""
@@ -112,7 +102,7 @@ def partition_features(early: Array, late: Array, label: Ints, features: Array, 
     first, second = np.empty((n, 9)), np.empty((n, 9))
     moments_of(early, cluster, count, first)
     moments_of(late, cluster, count, second)
-    nearest_clusters(first, count, nearest)
+    nearest_places(first[:, X : Y + 1], count, nearest)
     for g in range(count):
         features_of(first, second, g, nearest[g], features[g])
     return count
@@ -185,7 +175,7 @@ def propose(
                 count = clusters(before, cluster, head)
                 moments_of(early[i], cluster, count, first)
                 moments_of(late[i], cluster, count, second)
-                nearest_clusters(first, count, nearest)
+                nearest_places(first[:, X : Y + 1], count, nearest)
                 for g in range(count):
                     h = nearest[g]
                     features_of(first, second, g, h, features)

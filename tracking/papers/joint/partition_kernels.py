@@ -13,6 +13,7 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Ints
+from tracking.filters.cell_list_kernels import FEW, cell_list, listed_near
 
 SCATTER, APART = range(2)
 """Slots of `scales` (2,): prior scatter s_0, virtual distance D_0; m."""
@@ -33,17 +34,17 @@ def canonical(label: Ints) -> None:
 
     Negative labels count as alone, and so does a label that one person carries.
     """
-    n = len(label)
-    old = label.copy()
+    n, most = len(label), 0
     for k in range(n):
+        most = max(most, label[k])
+    head = np.full(most + 1, -1)
+    for k in range(n):
+        name = label[k]
         label[k] = 0
-    for k in range(n):
-        if old[k] <= 0 or label[k] > 0:
-            continue
-        for other in range(k + 1, n):
-            if old[other] == old[k]:
-                label[k] = k + 1
-                label[other] = k + 1
+        if name > 0 and head[name] < 0:
+            head[name] = k
+        elif name > 0:
+            label[k] = label[head[name]] = head[name] + 1
 
 
 @njit(cache=True)
@@ -107,15 +108,44 @@ def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre:
     worst = np.empty(count)
     for g in range(count):
         worst[g] = scatter[g] / apart
+    if count > FEW:
+        _worst_near(centre, scatter[:count], scales, worst)
+        return float(worst.mean())
     for g in range(count):
         for h in range(g):
-            total = 0.0
-            for d in range(dims):
-                total += (centre[g, d] - centre[h, d]) ** 2
-            ratio = (scatter[g] + scatter[h]) / max(math.sqrt(total), s0)
+            ratio = _ratio(centre, scatter, g, h, s0)
             worst[g] = max(worst[g], ratio)
             worst[h] = max(worst[h], ratio)
     return float(worst.mean())
+
+
+@njit(cache=True)
+def _ratio(centre, scatter, g, h, s0):  # type: ignore[no-untyped-def]
+    """Returns (S_g + S_h) / max(|c_g - c_h|, s_0)."""
+    total = 0.0
+    for d in range(centre.shape[1]):
+        total += (centre[g, d] - centre[h, d]) ** 2
+    return (scatter[g] + scatter[h]) / max(math.sqrt(total), s0)
+
+
+@njit(cache=True)
+def _worst_near(centre, scatter, scales, worst):  # type: ignore[no-untyped-def]
+    """Raises the worst ratios (G,), which are those to the virtual cluster, by the clusters that are near enough.
+
+    A ratio R of two clusters can be above the worst one so far only if they are nearer than (S_g + S_h) / R, so that
+    the neighbours, which come first, bound how far one has to look.
+    """
+    count, widest = len(scatter), scatter.max()
+    cells, near = cell_list(centre, count), np.empty(count, np.int64)
+    for g in range(count):
+        x, y = centre[g, 0], centre[g, 1]
+        for narrow in (True, False):
+            reach = cells[2][2] / 2 if narrow else (scatter[g] + widest) / worst[g] * (1 + 1e-9)
+            for h in near[: listed_near(x, y, max(reach, 0.0), cells, near)]:
+                away = (x - centre[h, 0]) ** 2 + (y - centre[h, 1]) ** 2
+                most = (scatter[g] + scatter[h]) * (1 + 1e-9)
+                if h != g and away * worst[g] ** 2 < most * most:
+                    worst[g] = max(worst[g], _ratio(centre, scatter, g, h, scales[SCATTER]))
 
 
 @njit(cache=True)
@@ -137,21 +167,44 @@ def validities(points: Array, label: Ints, scales: Array, out: Array) -> None:
 
 
 @njit(cache=True)
+def next_member(k: int, label: Ints, last: Ints, following: Ints) -> int:
+    """Return the first member of person k's group who is before k, -1 without one, and add k to the members.
+
+    To be called for k = 0, 1, ... of a label (K,). following (K,): the next member of the group, up to k; last (K,):
+    the last one so far, by heads. A loop over members costs no more the more other people there are.
+    """
+    g = label[k] - 1
+    following[k] = -1
+    if g >= 0 and g < k:
+        following[last[g]] = k
+    if g >= 0:
+        last[g] = k
+    return g if 0 <= g < k else -1
+
+
+@njit(cache=True)
+def _pair_sum(worth, label, last, following):  # type: ignore[no-untyped-def]
+    """Returns the sum of worth (K, K) over the pairs in one group of a label (K,)."""
+    total = 0.0
+    for k in range(len(label)):
+        other = next_member(k, label, last, following)
+        while 0 <= other < k:
+            total += worth[k, other]
+            other = following[other]
+    return total
+
+
+@njit(cache=True)
 def pair_sums(worth: Array, label: Ints, out: Array) -> None:
     """Write the sum of worth (K, K) over the pairs in one group of each partition, (N_x, N_z); label (N_x, N_z, K)."""
     particles, partitions, n = label.shape
+    last, following = np.empty(n, np.int64), np.empty(n, np.int64)
     for i in range(particles):
         for j in range(partitions):
             if j > 0 and same_row(label[i, j], label[i, j - 1]):
                 out[i, j] = out[i, j - 1]
                 continue
-            total = 0.0
-            for k in range(n):
-                if label[i, j, k] > 0:
-                    for other in range(k):
-                        if label[i, j, other] == label[i, j, k]:
-                            total += worth[k, other]
-            out[i, j] = total
+            out[i, j] = _pair_sum(worth, label[i, j], last, following)
 
 
 @njit(cache=True)
@@ -177,6 +230,7 @@ def co_membership(label: Ints, weights: Array, out: Array) -> None:
     label (N_x, N_z, K); weights (N_x, N_z): sum 1.
     """
     particles, partitions, n = label.shape
+    end, following = np.empty(n, np.int64), np.empty(n, np.int64)
     out[:] = 0.0
     for i in range(particles):
         j = 0
@@ -186,10 +240,10 @@ def co_membership(label: Ints, weights: Array, out: Array) -> None:
                 last += 1
                 weight += weights[i, last]
             for k in range(n):
-                if label[i, j, k] > 0:
-                    for other in range(k):
-                        if label[i, j, other] == label[i, j, k]:
-                            out[k, other] += weight
+                other = next_member(k, label[i, j], end, following)
+                while 0 <= other < k:
+                    out[k, other] += weight
+                    other = following[other]
             j = last + 1
     for k in range(n):
         out[k, k] = 1.0
@@ -247,19 +301,15 @@ def binder_moves(gain: Array, label: Ints) -> float:
 def best_sampled(gain: Array, label: Ints, out: Ints) -> None:
     """Write the partition (K,) of largest gain among label (N_x, N_z, K), as clusters numbered from 1; gain (K, K)."""
     particles, partitions, n = label.shape
-    head = np.empty(n, np.int64)
-    cluster = np.empty(n, np.int64)
+    cluster, head = np.empty(n, np.int64), np.empty(n, np.int64)
+    last, following = np.empty(n, np.int64), np.empty(n, np.int64)
     best = -np.inf
     for i in range(particles):
         for j in range(partitions):
             if j > 0 and same_row(label[i, j], label[i, j - 1]):
                 continue
-            clusters(label[i, j], cluster, head)
-            total = 0.0
-            for k in range(n):
-                for other in range(k):
-                    if cluster[k] == cluster[other]:
-                        total += gain[k, other]
+            total = _pair_sum(gain, label[i, j], last, following)
             if total > best:
                 best = total
+                clusters(label[i, j], cluster, head)
                 out[:] = cluster + 1

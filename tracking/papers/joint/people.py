@@ -15,6 +15,7 @@ from sim.types import Array, Bools, Ints
 from tracking.detect.point_detections import followed_sizes
 from tracking.filters import kalman
 from tracking.filters.assignment import optimal
+from tracking.filters.person_streams import Keys, birth_keys
 
 NEWCOMER_NOISE = 1.0
 """Standard deviation of the acceleration of a person who is not confirmed, m/s^2."""
@@ -25,25 +26,27 @@ class People:
     """The K tracked people: one row each.
 
     id (K,): of the track. missed (K,): s since the last measurement. size (K, 2): width, height of the box, px, nan if
-    unknown. next_id: the next new id.
+    unknown. key (K,): of the person's random streams. next_id: the next new id.
     """
 
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     missed: Array = field(default_factory=lambda: np.zeros(0))
     size: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
     next_id: int = 1
 
-    def add(self, size: Array) -> None:
-        """Add people; size (M, 2): of their boxes, px, nan if unknown."""
+    def add(self, size: Array, key: Keys) -> None:
+        """Add people; size (M, 2): of their boxes, px, nan if unknown; key (M,)."""
         new = len(size)
         self.id = np.append(self.id, self.next_id + np.arange(new))
         self.missed = np.append(self.missed, np.zeros(new))
-        self.size = np.concatenate([self.size, size])
+        self.size, self.key = np.concatenate([self.size, size]), np.concatenate([self.key, key])
         self.next_id += new
 
     def keep(self, rows: Bools) -> None:
         """Remove all people but those where `rows` (K,) is True."""
         self.id, self.missed, self.size = self.id[rows], self.missed[rows], self.size[rows]
+        self.key = self.key[rows]
 
     def record(self, rows: Ints, sizes: Array | None, dt: float) -> None:
         """Note that the people `rows` (R,) were measured, with boxes of `sizes` (R, 2), px, or None; others missed."""
@@ -68,13 +71,15 @@ class Newcomers:
     """People who are not confirmed yet, a Kalman filter for each.
 
     bank (5, M, 2): filters of x, y, m. age (M,): s since the first measurement. missed (M,): s since the last one,
-    without frames that have no detector. size (M, 2): width, height of the last box, px, nan if unknown.
+    without frames that have no detector. size (M, 2): width, height of the last box, px, nan if unknown. key (M,): of
+    the random streams, made of the first measurement.
     """
 
     bank: Array = field(default_factory=lambda: np.zeros((5, 0, 2)))
     age: Array = field(default_factory=lambda: np.zeros(0))
     missed: Array = field(default_factory=lambda: np.zeros(0))
     size: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
 
     def predict(self, dt: float) -> None:
         """Predict to dt s later."""
@@ -93,17 +98,19 @@ class Newcomers:
         free[columns] = False
         return free
 
-    def start(self, points: Array, sizes: Array | None, noise: float, speed: float) -> None:
-        """Add a person at each of the points (M, 2), m; speed: standard deviation of the velocity per axis, m/s."""
+    def start(self, points: Array, sizes: Array | None, noise: float, speed: float, frame: int) -> None:
+        """Add a person at each of the points (M, 2), m; speed: standard deviation of the velocity per axis, m/s; frame:
+        number of this frame."""
         new = len(points)
         self.bank = np.concatenate([self.bank, kalman.born(points, noise**2, speed**2)], axis=1)
         self.age, self.missed = np.append(self.age, np.zeros(new)), np.append(self.missed, np.zeros(new))
         self.size = np.concatenate([self.size, np.full((new, 2), np.nan) if sizes is None else sizes])
+        self.key = np.concatenate([self.key, birth_keys(points, frame)])
 
     def keep(self, rows: Bools) -> None:
         """Remove all but those where `rows` (M,) is True."""
         self.bank, self.age = self.bank[:, rows], self.age[rows]
-        self.missed, self.size = self.missed[rows], self.size[rows]
+        self.missed, self.size, self.key = self.missed[rows], self.size[rows], self.key[rows]
 
     def draw(self, rows: Bools, normals: Array) -> Array:
         """Return states (N, R, 4) drawn from the posteriors of the R people `rows`; normals (N, R, 4)."""
@@ -124,8 +131,13 @@ def associate(mean: Array, cov: Array, points: Array, noise: float, gate: float)
     if not len(mean) or not len(points):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     S = cov + noise**2 * np.eye(2)
-    error = points[None] - mean[:, None]
-    d2 = np.einsum("kmi,kmi->km", error, np.linalg.solve(S[:, None], error[..., None])[..., 0])
+    # d^2 is at least |error|^2 over the trace of S: most pairs need no more than that
+    square = np.square(points[:, 0] - mean[:, :1]) + np.square(points[:, 1] - mean[:, 1:])
+    k, m = np.nonzero(square <= gate * (1 + 1e-9) * np.trace(S, axis1=1, axis2=2)[:, None])
+    error = points[m] - mean[k]
+    d2 = np.einsum("ri,ri->r", error, np.linalg.solve(S[k], error[..., None])[..., 0])
     log_det = np.linalg.slogdet(S)[1]
     log_det = log_det - log_det.min()
-    return optimal(np.where(d2 <= gate, d2 + log_det[:, None], np.inf), gate + float(log_det.max()) + 1e-9)
+    cost = np.full(square.shape, np.inf)
+    cost[k, m] = np.where(d2 <= gate, d2 + log_det[k], np.inf)
+    return optimal(cost, gate + float(log_det.max()) + 1e-9)

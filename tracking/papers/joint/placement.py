@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.filters.person_streams import Keys, PersonStreams
 from tracking.papers.joint import dirichlet_process_kernels
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
-from tracking.papers.joint.distributions import newest
-from tracking.papers.joint.division_kernels import place_newcomer
+from tracking.papers.joint.distributions import PLACING, newest
+from tracking.papers.joint.division_kernels import place_newcomers
 
 
-def place(nested: Nested, new: int, config: JointConfig, lag: float, draws: np.random.Generator) -> None:
-    """Draw in all partitions whether each of the `new` last people, alone so far, joins a group or person; in place.
+def place(nested: Nested, config: JointConfig, lag: float, streams: PersonStreams, key: Keys) -> None:
+    """Draw in all partitions whether each of the M last people, alone so far, joins a group or person; in place.
 
     It is the nearest one, joined with the probability of the validity; with the Dirichlet process any one. lag: s, in
-    which an event happens.
+    which an event happens. key (M,): of the streams of the new people.
     """
     n, c, people = nested, config, nested.x.shape[1]
+    drawn = streams.uniforms(PLACING, key, n.log_q.size, 2).reshape(*n.log_q.shape, len(key), 2)
     if c.partition_dynamics == "dirichlet":
-        chance = (np.arange(people) >= people - new).astype(float)
-        uniforms = draws.random((*n.z.shape, 2))
+        chance = (np.arange(people) >= people - len(key)).astype(float)
+        uniforms = np.zeros((*n.z.shape, 2))
+        uniforms[:, :, people - len(key) :] = drawn
         dirichlet_process_kernels.propose(newest(n.x), n.z, chance, uniforms, c.mixture)
         return
-    state = newest(n.x)
-    for person in range(people - new, people):
-        place_newcomer(state, n.z, person, draws.random(n.log_q.shape), c.validity_rate * lag, c.scales)
+    uniforms = np.ascontiguousarray(drawn[..., 0])
+    place_newcomers(newest(n.x), n.z, uniforms, c.validity_rate * lag, c.scales)

@@ -45,11 +45,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from sim.rng import rng
 from sim.truth.identity import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
+from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping import reported_groups
 from tracking.grouping.pair_belief import PairBelief
 from tracking.image_scale import required
@@ -57,15 +57,12 @@ from tracking.papers.joint import decentralised_filter, estimate, partition_kern
 from tracking.papers.joint.belief_memory import remembered
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
-from tracking.papers.joint.distributions import STATE, FrameModel
+from tracking.papers.joint.distributions import BIRTHS, PARTITIONS, RESAMPLING, STATE, FrameModel
 from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
 from tracking.papers.joint.placement import place
 from tracking.papers.joint.reported_events import OWN_EVENTS, ReportedEvents
-
-MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)
-"""Keys of the random streams."""
 
 
 class Joint:
@@ -74,7 +71,7 @@ class Joint:
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
     particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; together (K, K):
     probability that each pair is in one group, and paired (K,), the ids of its rows; events: those of the reported
-    groups; belief: of pairs; health: how many particles the weights are worth; draws, the random streams;
+    groups; belief: of pairs; health: how many particles the weights are worth; streams, the random numbers;
     pixels: detector of blobs, None from points; shown (K, 4): boxes of the people reported last, px; plane, "ground" or
     "image"; context. All but config exist after `reset` only.
     """
@@ -105,7 +102,7 @@ class Joint:
         self.events = ReportedEvents(context.fps)
         self.belief = PairBelief(context.fps)
         self.health = ParticleHealth(c.particles, context.fps)
-        self.draws = [rng(seed, "tracker", key) for key in range(PLACING + 1)]
+        self.streams = PersonStreams(seed)
         flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
         self.plane: Plane = "image" if flat else "ground"
 
@@ -120,6 +117,7 @@ class Joint:
             if self.pixels.settings is not self.config:
                 self.pixels.follow(self.config, self.config.most_foreground)
             detections = self.pixels.detections(frame, self.shown)
+        self.streams.frame += 1
         points, sizes = self._points(detections)
         rows, columns = self._associate(points)
         z = np.full((len(self.people.id), 2), np.nan)
@@ -181,10 +179,10 @@ class Joint:
         """Steps 4 to 7, 1 and 3; z (K, 2): measured places, nan for none."""
         if not len(z):
             return
-        draws = self.draws
         beliefs = remembered(self.belief.log_odds, *self._before(), self.config.belief_memory)
-        model = FrameModel(self.config, self.dt, self.noise, z, beliefs, draws[MOTION], draws[CHOICES], draws[EVENTS])
-        self.nested = decentralised_filter.advance(self.nested, model, draws[PARTITIONS].random(self.config.particles))
+        model = FrameModel(self.config, self.dt, self.noise, z, beliefs, self.streams, self.people.key)
+        uniforms = self.streams.uniforms(PARTITIONS, NOBODY, 1, self.config.particles)[0, 0]
+        self.nested = decentralised_filter.advance(self.nested, model, uniforms)
 
     def _before(self) -> tuple[Ints, Array]:
         """Returns the group (K,) of each person in the last frame, -1 for alone, and 1.0 for people reported then, else
@@ -195,15 +193,16 @@ class Joint:
 
     def _resample(self) -> None:
         """Step 2."""
-        nested, draws, people = self.nested, self.draws[RESAMPLING], len(self.people.id)
+        nested, people = self.nested, len(self.people.id)
         if not people:
             return
+        uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
         self.health.weigh(nested, self.config.weights == "joint")
         if self.config.weights == "joint":
-            chosen = decentralised_filter.joint_indices(nested, float(draws.random()))
+            chosen = decentralised_filter.joint_indices(nested, float(uniforms[-1]))
             own = np.repeat(chosen[:, None], people, axis=1)
         else:
-            single, chosen = decentralised_filter.component_indices(nested, draws.random(people + 1))
+            single, chosen = decentralised_filter.component_indices(nested, uniforms)
             own = single[chosen]
         columns = np.arange(people)
         self.health.resample(own)
@@ -227,10 +226,10 @@ class Joint:
     def _newcomers(self, points: Array, sizes: Array | None) -> None:
         """Follow people who are not confirmed, predicted to this frame, with the points (M, 2) of nobody; add those who
         are confirmed."""
-        c, new = self.config, self.newcomers
+        c, new, frame = self.config, self.newcomers, self.streams.frame
         new.missed += self.dt
         free = new.measure(points, sizes, self.noise, c.largest_distance)
-        new.start(points[free], None if sizes is None else sizes[free], self.noise, c.speed_prior)
+        new.start(points[free], None if sizes is None else sizes[free], self.noise, c.speed_prior, frame)
         sure = (new.age >= c.confirm_time - 1e-9) & (new.missed == 0)
         if sure.any():
             self._add(sure)
@@ -239,8 +238,8 @@ class Joint:
     def _add(self, rows: Bools) -> None:
         """Draw the newcomers `rows` into the particles, with straight earlier states: alone in all partitions, or by
         the validity."""
-        n, c = self.nested, self.config
-        normals = self.draws[BIRTHS].standard_normal((c.particles, int(rows.sum()), STATE))
+        n, c, key = self.nested, self.config, self.newcomers.key[rows]
+        normals = self.streams.normals(BIRTHS, key, c.particles, STATE)
         if c.individuals == "measured":
             normals[:] = 0.0
         state = self.newcomers.draw(rows, normals)
@@ -250,11 +249,11 @@ class Joint:
             np.concatenate([n.x, past], axis=1), np.concatenate([n.z, alone], axis=2), n.log_q,
             np.concatenate([n.log_w, np.zeros(past.shape[:2])], axis=1), n.log_rest,
         )  # fmt: skip
-        self.people.add(self.newcomers.size[rows])
+        self.people.add(self.newcomers.size[rows], key)
         self.belief.add(self.nested.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
         self.health.add(past.shape[1])
         if c.newcomers == "validity":
-            place(self.nested, past.shape[1], c, self.frames * self.dt, self.draws[PLACING])
+            place(self.nested, c, self.frames * self.dt, self.streams, key)
 
     def _report(self, frame: Frame, seen: Bools) -> Tracks:
         """Returns the Tracks of the frame, on the ground in m, in the image in px; seen (K,): who was measured."""

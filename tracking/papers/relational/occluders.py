@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Camera, Scene
-from tracking.papers.relational import occluder_kernels
+from tracking.papers.relational import occluder_kernels, particle_set_kernels
 from tracking.papers.relational.particle_set import ParticleSet
 
 MIDDLE = 0.85
@@ -29,13 +29,14 @@ def hidden_share(pos: Array, weights: Array, camera: Camera | None, scene: Scene
         hidden |= _behind_pillar(pos, pillar, scene.pillar_height, camera.position)
     for wall in scene.walls:
         hidden |= _behind_wall(pos, wall, scene.wall_height, camera.position)
-    return np.asarray((weights * hidden).sum(axis=0))
+    return particle_set_kernels.column_sums(weights, hidden)
 
 
 def _behind_pillar(pos: Array, pillar: Array, top: float, eye: Array) -> Bools:
     """Returns (P, K) True where the line from eye (3,) to a person meets the pillar (3,) x, y, radius."""
     to_person, to_pillar = pos - eye[:2], pillar[:2] - eye[:2]
-    along = np.clip((to_person @ to_pillar) / np.maximum(np.square(to_person).sum(axis=2), 1e-12), 0.0, 1.0)
+    toward = to_person[..., 0] * to_pillar[0] + to_person[..., 1] * to_pillar[1]
+    along = np.clip(toward / np.maximum(np.square(to_person).sum(axis=2), 1e-12), 0.0, 1.0)
     apart = to_person * along[..., None] - to_pillar
     return np.asarray((np.square(apart).sum(axis=2) < pillar[2] ** 2) & (_height(along, eye) < top))
 
@@ -69,7 +70,7 @@ def covered_by_people(particles: ParticleSet, camera: Camera | None, radius: flo
     """
     p, hidden, cut = particles, np.zeros(particles.people), np.zeros(particles.people)
     if camera is not None and camera.kind == "pinhole" and radius > 0:
-        mean = np.einsum("pk,pkd->kd", p.weights, p.pos)
+        mean = np.stack([particle_set_kernels.column_sums(p.weights, p.pos[..., d]) for d in range(2)], axis=1)
         body = np.array([HEIGHT, radius, LEAST_VISIBLE])
         occluder_kernels.cover(p.pos, p.weights, mean, p.existence, camera.position, body, hidden, cut)
     return hidden, cut

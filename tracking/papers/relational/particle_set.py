@@ -6,6 +6,7 @@ one particle; the posterior is taken for a product over people (ours). In the pa
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,11 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.particles import residual_resample, systematic_resample
 from tracking.papers.relational import particle_set_kernels
 
+Draws = Callable[[Ints], tuple[Array, Array]]
+"""Returns uniforms (R, P) in [0, 1) and standard normals (R, 4, P) of the people (R,)."""
+LARGEST = 2**31
+"""Numbers of slots are below this."""
+
 
 @dataclass
 class ParticleSet:
@@ -21,8 +27,9 @@ class ParticleSet:
 
     count: P. one_weight: whether a particle has one weight. weights (P, K): of the particles, sum 1 for each slot; with
     one weight all columns are equal. pos (P, K, 2): m. vel (P, K, 2): m/s. exist (P, K): probability that the person
-    exists, given the particle's path (ours: it is computed, not drawn). related (P, K, K) bool, symmetric: which pairs
-    walk together. ancestor (P, K): the particle from which each slot's state descends, since `ancestor` was last set to
+    exists, given the particle's path (ours: it is computed, not drawn). pairs (N, 2): people i < j whose relation is
+    kept, in order of j, then i; all others do not walk together. related (N, P) bool: in which particles a pair walks
+    together. ancestor (P, K): the particle from which each slot's state descends, since `ancestor` was last set to
     the particles' own numbers.
     """
 
@@ -32,6 +39,7 @@ class ParticleSet:
     pos: Array
     vel: Array
     exist: Array
+    pairs: Ints
     related: Bools
     ancestor: Ints
 
@@ -40,8 +48,8 @@ class ParticleSet:
         """Return `count` particles without people."""
         flat, two = np.zeros((count, 0)), np.zeros((count, 0, 2))
         none = np.zeros((count, 0), np.int64)
-        related = np.zeros((count, 0, 0), bool)
-        return cls(count, False, flat, two, two.copy(), flat.copy(), related, none)
+        pairs, related = np.zeros((0, 2), np.int64), np.zeros((0, count), bool)
+        return cls(count, False, flat, two, two.copy(), flat.copy(), pairs, related, none)
 
     @property
     def people(self) -> int:
@@ -51,7 +59,7 @@ class ParticleSet:
     @property
     def existence(self) -> Array:
         """The probability (K,) that each person exists."""
-        return np.asarray((self.weights * self.exist).sum(axis=0))
+        return particle_set_kernels.column_sums(self.weights, self.exist)
 
     def estimates(self) -> tuple[Array, Array, Array]:
         """Return means (K, 4) and covariances (K, 4, 4) of x, y, m, vx, vy, m/s, and the existence (K,).
@@ -65,7 +73,7 @@ class ParticleSet:
     def labels(self) -> Ints:
         """Return the group of each person in each particle, (P, K): the least slot in it."""
         label = np.empty(self.exist.shape, np.int64)
-        particle_set_kernels.group_labels(self.related, label)
+        particle_set_kernels.group_labels(self.pairs, self.related, label)
         return label
 
     def share_weights(self, one_weight: bool) -> None:
@@ -83,63 +91,67 @@ class ParticleSet:
 
     def weigh(self, logs: Array) -> None:
         """Multiply the weights by likelihoods: logs (P, K), natural, of each person; (P, 1) with one weight."""
-        self.weights *= np.exp(logs - logs.max(axis=0))
-        self.weights /= self.weights.sum(axis=0)
+        particle_set_kernels.weigh(self.weights, logs)
 
     def effective(self) -> Array:
         """Return the effective number of particles of each slot, (K,)."""
-        return np.asarray(1 / np.einsum("pk,pk->k", self.weights, self.weights))
+        return np.asarray(1 / particle_set_kernels.column_sums(self.weights, self.weights))
 
-    def resample(self, share: float, scheme: str, width: float, draws: np.random.Generator) -> None:
+    def resample(self, share: float, scheme: str, width: float, draws: Draws) -> None:
         """Resample each person whose effective number is at most this share of the particles (sec. 2.1); with one
         weight all people together.
 
-        scheme: "residual" or "systematic". draws: of one person after the other. width: of the kernel from which equal
-        particles are drawn apart, in units of the optimal width; 0: none (the paper).
+        scheme: "residual" or "systematic". draws: random numbers of people; with one weight the uniforms are those of
+        the first one. width: of the kernel from which equal particles are drawn apart, in units of the optimal width;
+        0: none (the paper).
         """
         few = np.flatnonzero(self.effective() <= share * self.count * (1 + 1e-9))
         if not len(few):
             return
+        uniforms, normals = draws(few)
         chosen = np.empty((self.count, 1 if self.one_weight else len(few)), np.int64)
         for column, person in enumerate(few[: chosen.shape[1]].tolist()):
-            weights = self.weights[:, person]
+            weights = np.ascontiguousarray(self.weights[:, person])  # of one column numpy sums in another order
             if scheme == "residual":
-                chosen[:, column] = residual_resample(weights, draws.random(self.count))
+                chosen[:, column] = residual_resample(weights, uniforms[column])
             else:
-                chosen[:, column] = systematic_resample(weights, float(draws.random()))
+                chosen[:, column] = systematic_resample(weights, float(uniforms[column, 0]))
         if self.one_weight:
-            for values in (self.pos, self.vel, self.exist, self.related, self.ancestor):
+            for values in (self.pos, self.vel, self.exist, self.ancestor):
                 values[:] = values[chosen[:, 0]]
+            self.related = np.ascontiguousarray(self.related[:, chosen[:, 0]])
         else:
             for values in (self.pos, self.vel, self.exist, self.ancestor):
                 values[:, few] = values[chosen, few]
-            particle_set_kernels.redraw_relations(self.related, few, chosen)
+            particle_set_kernels.redraw_relations(self.pairs, self.related, few, chosen)
         self.weights[:, few] = 1 / self.count
         if width > 0:
-            self._spread(few, width, draws)
+            self._spread(few, width, normals)
 
-    def _spread(self, members: Ints, width: float, draws: np.random.Generator) -> None:
+    def _spread(self, members: Ints, width: float, normals: Array) -> None:
         """Draw the states of slots `members`, of equal weights, from kernels about the particles (regularised particle
-        filter, Musso et al. 2001; ours).
+        filter, Musso et al. 2001; ours); normals (R, 4, P).
 
         The kernel is normal with h^2 times the covariance of the person's state, of dimension d = 4, and h = width (4 /
         (P (d + 2)))^(1 / (d + 4)). States are drawn towards their mean before, so that the covariance stays (West
         1993).
         """
         h = min(width * (4 / (self.count * 6)) ** (1 / 8), 1.0)
-        state = np.concatenate([self.pos[:, members], self.vel[:, members]], axis=2).transpose(1, 2, 0)
+        state = np.concatenate([self.pos[:, members], self.vel[:, members]], axis=2)
+        state = np.ascontiguousarray(state.transpose(1, 2, 0))
         mean = state.mean(axis=2, keepdims=True)
-        apart = np.ascontiguousarray(state - mean)
+        apart = state - mean
         values, vectors = np.linalg.eigh(apart @ apart.transpose(0, 2, 1) / self.count)
         root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
-        new = (mean + np.sqrt(1 - h * h) * apart + h * (root @ draws.standard_normal(apart.shape))).transpose(2, 0, 1)
+        new = (mean + np.sqrt(1 - h * h) * apart + h * (root @ normals)).transpose(2, 0, 1)
         self.pos[:, members], self.vel[:, members] = new[..., :2], new[..., 2:]
 
     def keep(self, slots: Bools) -> None:
         """Remove all slots but those where `slots` (K,) is True."""
         self.weights, self.exist = self.weights[:, slots], self.exist[:, slots]
         self.pos, self.vel = self.pos[:, slots], self.vel[:, slots]
-        self.related = self.related[:, slots][:, :, slots]
+        rows, number = slots[self.pairs].all(axis=1), np.cumsum(slots) - 1
+        self.pairs, self.related = number[self.pairs[rows]], self.related[rows]
         self.ancestor = self.ancestor[:, slots]
 
     def add(self, pos: Array, vel: Array, exist: float) -> None:
@@ -151,8 +163,24 @@ class ParticleSet:
         self.pos = np.concatenate([self.pos, np.ascontiguousarray(pos)], axis=1)
         self.vel = np.concatenate([self.vel, np.ascontiguousarray(vel)], axis=1)
         self.exist = np.concatenate([self.exist, np.full((count, new), exist)], axis=1)
-        grown = np.zeros((count, k + new, k + new), bool)
-        grown[:, :k, :k] = self.related
-        self.related = grown
         own = np.repeat(np.arange(count)[:, None], new, axis=1)
         self.ancestor = np.concatenate([self.ancestor, own], axis=1)
+
+    def hold(self, pairs: Ints) -> None:
+        """Keep relations of further pairs i < j (N', 2), in any order; others do not walk together."""
+        kept, further = _order_key(self.pairs), _order_key(pairs)
+        key = np.union1d(kept, further)
+        related = np.zeros((len(key), self.count), bool)
+        related[np.searchsorted(key, kept)] = self.related
+        self.pairs, self.related = np.stack([key % LARGEST, key // LARGEST], axis=1), related
+
+    def drop_strangers(self) -> None:
+        """Keep no relation of pairs that walk together in no particle."""
+        rows = self.related.any(axis=1)
+        if not rows.all():
+            self.pairs, self.related = self.pairs[rows], self.related[rows]
+
+
+def _order_key(pairs: Ints) -> Ints:
+    """Returns numbers (N,) by which pairs (N, 2) are in order of j, then i."""
+    return np.asarray(pairs[:, 1] * LARGEST + pairs[:, 0])

@@ -5,58 +5,102 @@ Arrays are over P particles and K people, as in `transition_kernels`.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Bools, Ints
+from tracking.papers.relational.transition_kernels import pairs_of_people
 
 
 @njit(cache=True)
-def group_labels(related: Bools, label: Ints) -> None:
+def column_sums(a: Array, b: Array) -> Array:
+    """Return the sums over particles of the products of a and b (P, K), (K,).
+
+    Each column is summed in the order of the particles. In numpy the order depends on the number of columns, so that
+    the last bits of a person's sum would depend on who else is there.
+    """
+    out = np.zeros(a.shape[1])
+    for p in range(a.shape[0]):
+        for k in range(a.shape[1]):
+            out[k] += a[p, k] * b[p, k]
+    return out
+
+
+@njit(cache=True)
+def pair_sums(a: Array, exist: Array, person: Ints, b: Array) -> Array:
+    """Return the sums over particles of a exist b of each pair, (N,); a, exist (P, K), b (P, N); person (N,): of each
+    pair."""
+    out = np.zeros(len(person))
+    for p in range(len(b)):
+        for n in range(len(person)):
+            out[n] += a[p, person[n]] * exist[p, person[n]] * b[p, n]
+    return out
+
+
+@njit(cache=True)
+def weigh(weights: Array, logs: Array) -> None:
+    """Multiply weights (P, K) by exp(logs), and divide them by their sums over the particles; logs (P, K) or (P, 1)."""
+    particles, n = weights.shape
+    top, total = np.full(n, -np.inf), np.zeros(n)
+    own = np.arange(n) if logs.shape[1] == n else np.zeros(n, np.int64)
+    for p in range(particles):
+        for k in range(n):
+            top[k] = max(top[k], logs[p, own[k]])
+    for p in range(particles):
+        for k in range(n):
+            weights[p, k] *= math.exp(logs[p, own[k]] - top[k])
+            total[k] += weights[p, k]
+    for p in range(particles):
+        for k in range(n):
+            weights[p, k] /= total[k]
+
+
+@njit(cache=True)
+def group_labels(pairs: Ints, related: Bools, label: Ints) -> None:
     """Write the group of each person in each particle, (P, K): the least number of a person in it.
 
-    related (P, K, K): which pairs are related, of each particle. Groups are connected components; a person alone has
-    the own number.
+    pairs (N, 2), related (N, P): which pairs are related in each particle. Groups are connected components; a person
+    alone has the own number.
     """
-    particles, n, _ = related.shape
-    waiting = np.empty(n, np.int64)
+    particles, n = label.shape
     for p in range(particles):
-        label[p] = -1
-        for start in range(n):
-            if label[p, start] >= 0:
-                continue
-            label[p, start] = start
-            waiting[0], count, head = start, 1, 0
-            while head < count:
-                i = waiting[head]
-                head += 1
-                for j in range(start + 1, n):
-                    if label[p, j] < 0 and related[p, i, j]:
-                        label[p, j] = start
-                        waiting[count] = j
-                        count += 1
+        for i in range(n):
+            label[p, i] = i
+        for k in range(len(pairs)):
+            if related[k, p]:
+                a, b = _root(label, p, pairs[k, 0]), _root(label, p, pairs[k, 1])
+                label[p, max(a, b)] = min(a, b)
+        for i in range(n):
+            label[p, i] = label[p, label[p, i]]  # that of someone before, which is final
 
 
 @njit(cache=True)
-def redraw_relations(related: Bools, people: Ints, chosen: Ints) -> None:
-    """Replace the relations of resampled people, one after the other; related (P, K, K) is changed.
+def _root(label, p, i):  # type: ignore[no-untyped-def]
+    while label[p, i] != i:
+        label[p, i] = label[p, label[p, i]]
+        i = label[p, i]
+    return i
+
+
+@njit(cache=True)
+def redraw_relations(pairs: Ints, related: Bools, people: Ints, chosen: Ints) -> None:
+    """Replace the relations of resampled people, one after the other; related (N, P) is changed.
 
     What the partners' weights say of a relation is lost where the person alone is resampled: the particles of both are
     independent then.
 
     people (R,): who; chosen (P, R): the particle from which each takes the own relations.
     """
-    particles, n, _ = related.shape
-    some = np.empty(n, np.bool_)
+    if len(pairs) == 0:
+        return
+    start, rows = pairs_of_people(pairs, max(people.max(), pairs.max()) + 1)
     for column in range(len(people)):
-        k = people[column]
-        old = related[:, k].copy()
-        some[:] = False
-        for p in range(particles):
-            some |= old[p]
-        for j in np.flatnonzero(some):
-            for p in range(particles):
-                related[p, k, j] = related[p, j, k] = old[chosen[p, column], j]
+        for k in rows[start[people[column]] : start[people[column] + 1]]:
+            old = related[k].copy()
+            for p in range(len(old)):
+                related[k, p] = old[chosen[p, column]]
 
 
 @njit(cache=True)
@@ -92,31 +136,24 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
 
 
 @njit(cache=True)
-def pairs_together(related: Bools, exist: Array, weights: Array, one_weight: bool) -> Array:
+def pairs_together(pairs: Ints, related: Bools, exist: Array, weights: Array, one_weight: bool) -> Array:
     """Return the probability (K, K) that i and j walk together, given that both exist; 1 on the diagonal.
 
-    related (P, K, K): relations; exist (P, K): probabilities of existence; weights (P, K): of the particles;
+    pairs (N, 2), related (N, P): relations; exist (P, K): probabilities of existence; weights (P, K): of the particles;
     one_weight: whether all columns are one weight, else a pair has the product. 0 for a pair that does not exist.
     """
     particles, n = exist.shape
     out = np.eye(n)
-    for i in range(n):
-        for j in range(i):
-            some = False
-            for p in range(particles):
-                if related[p, i, j]:
-                    some = True
-                    break
-            if not some:
-                continue
-            both, same = 0.0, 0.0
-            for p in range(particles):
-                w = weights[p, i] * exist[p, i] * exist[p, j]
-                if not one_weight:
-                    w *= weights[p, j]
-                both += w
-                if related[p, i, j]:
-                    same += w
-            if both > 0:
-                out[i, j] = out[j, i] = same / both
+    for k in range(len(pairs)):
+        j, i = pairs[k]
+        both, same = 0.0, 0.0
+        for p in range(particles):
+            w = weights[p, i] * exist[p, i] * exist[p, j]
+            if not one_weight:
+                w *= weights[p, j]
+            both += w
+            if related[k, p]:
+                same += w
+        if both > 0:
+            out[i, j] = out[j, i] = same / both
     return out

@@ -43,31 +43,30 @@ class Relational(Particle):
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
 
-    def _coupling(self) -> tuple[Array, Array, Array, Ints, Array]:
+    def _coupling(self) -> tuple[Array, Array, Array, Array]:
         p, time = self.particles, self.config.coupling_time
         follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
         coupling = np.array([follow, self.config.common_noise])
-        shared = self.draws[COUPLING].standard_normal(p.pos.shape)
-        pairs = np.argwhere(np.triu(p.related.any(axis=0)))
+        shared = self.streams.normals(COUPLING, self.slots.key, p.count, 2)
+        p.drop_strangers()
         if self.belief is None:
-            return shared, coupling, ALWAYS, pairs, np.zeros(pairs.shape)
-        return shared, coupling, self._rules, pairs, transition_kernels.pair_spread(p.pos, p.vel, pairs)
+            return shared, coupling, ALWAYS, np.zeros(p.pairs.shape)
+        return shared, coupling, self._rules, transition_kernels.pair_spread(p.pos, p.vel, p.pairs)
 
     def _relate(self) -> None:
         p, rules = self.particles, self._rules
         if p.people < 2:
             return
-        some = np.asarray(p.related.any(axis=0))
         if self.belief is None:
-            pairs = transition_kernels.near_pairs(p.pos, some, rules)
-            odds = np.full(len(pairs), self.config.relation_bias)
+            p.hold(transition_kernels.near_pairs(p.pos, rules))
+            odds = np.full(len(p.pairs), self.config.relation_bias)
         else:
-            seen, odds = self.belief.seen(), _log_odds(self.belief)
-            pairs = np.argwhere(np.triu(seen[:, None] & seen & (some | np.isfinite(odds)), 1))
-            odds = odds[pairs[:, 0], pairs[:, 1]]
+            log_odds, seen = _log_odds(self.belief), self.belief.seen()
+            p.hold(np.argwhere(np.triu(np.isfinite(log_odds), 1)))
+            odds = np.where(seen[p.pairs].all(axis=1), log_odds[p.pairs[:, 0], p.pairs[:, 1]], np.nan)
             rules = np.where(np.isin(range(4), (DISTANCE, VELOCITY)), 0.0, rules)
-        uniforms = self.draws[RELATIONS].random((p.count, p.people, 2))
-        transition_kernels.relate(p.pos, p.vel, p.related, pairs, odds, uniforms, rules)
+        uniforms = self.streams.uniforms(RELATIONS, self.slots.key, p.count, 2)
+        transition_kernels.relate(p.pos, p.vel, p.pairs, p.related, odds, uniforms, rules)
 
     def _follow(self, state: Array) -> None:
         if self.belief is not None:
@@ -83,16 +82,16 @@ class Relational(Particle):
     def _relate_newcomers(self, points: Array) -> None:
         p, new = self.particles, len(points)
         label = np.empty(p.exist.shape, np.int64)
-        known = np.ascontiguousarray(p.related[:, :-new, :-new])
-        particle_set_kernels.group_labels(known, label[:, :-new])
-        uniforms = self.draws[JOINING].random((new, p.count))
+        particle_set_kernels.group_labels(p.pairs, p.related, label)
+        uniforms = self.streams.uniforms(JOINING, self.slots.key[-new:], 1, p.count)[0]
         share = self.config.newcomer_share
-        transition_kernels.join(p.pos, p.exist, p.related, label, points, share, uniforms, self._rules)
+        pairs, related = transition_kernels.join(p.pos, p.exist, label, points, share, uniforms, self._rules)
+        p.pairs, p.related = np.concatenate([p.pairs, pairs]), np.concatenate([p.related, related])
 
     def _report(self, frame: Frame) -> Tracks:
         tracks, p = super()._report(frame), self.particles
         if self.belief is None:
-            self.together = particle_set_kernels.pairs_together(p.related, p.exist, p.weights, p.one_weight)
+            self.together = particle_set_kernels.pairs_together(p.pairs, p.related, p.exist, p.weights, p.one_weight)
         else:
             self.together = 1 / (1 + np.exp(-_log_odds(self.belief)))
             np.fill_diagonal(self.together, 1.0)

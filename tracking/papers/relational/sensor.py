@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.papers.relational import sensor_kernels
+from tracking.papers.relational import particle_set_kernels, sensor_kernels
 from tracking.papers.relational.config import ParticleConfig
 from tracking.papers.relational.particle_set import ParticleSet
 
@@ -82,16 +82,18 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
     else:
         logs, free = np.empty(particles.exist.shape), _free(particles, pairs, density, count, detect, config)
         sensor_kernels.person_sums(*given, free, logs, marginals)
-        sensor_kernels.partner_factors(particles.related, particles.weights, sight.missed, logs)
+        sensor_kernels.partner_factors(particles.pairs, particles.related, particles.weights, sight.missed, logs)
     particles.weigh(logs)
     measured = sensor_kernels.measured(marginals, pairs, people)
     if not certain:
         unseen = particles.exist * (1 - detect) / np.maximum(1 - particles.exist * detect, np.finfo(float).tiny)
         particles.exist = np.minimum(measured + (1 - measured) * unseen, 1.0)
     found = np.zeros((people, count))
-    found[person, pairs[:, 1]] = np.einsum("pn,pn->n", particles.weights[:, person], marginals)
-    exist = particles.existence
-    seen = np.divide((particles.weights * measured).sum(axis=0), exist, out=np.zeros(people), where=exist > 0)
+    found[person, pairs[:, 1]] = particle_set_kernels.pair_sums(
+        particles.weights, np.ones_like(particles.exist), person, marginals
+    )
+    exist, seen = particles.existence, particle_set_kernels.column_sums(particles.weights, measured)
+    seen = np.divide(seen, exist, out=np.zeros(people), where=exist > 0)
     return Weighing(False, found, seen, 1.0 - found.sum(axis=0))
 
 
@@ -113,7 +115,7 @@ def _pairs(
     pairs = np.argwhere(sensor_kernels.near_detections(particles.pos, points, reach))
     density = sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, sight.eye, reach)
     person = pairs[:, 0]
-    mean = np.einsum("pn,pn->n", (particles.weights * particles.exist)[:, person], density)
+    mean = particle_set_kernels.pair_sums(particles.weights, particles.exist, person, density)
     odds = mean * sight.detect[person] / config.clutter_density
     total = 1 - particles.existence * sight.detect + np.bincount(person, odds, particles.people)
     likely = odds > UNLIKELY * total[person]
@@ -129,6 +131,6 @@ def _free(
     """
     person = pairs[:, 0]
     mean = np.zeros((particles.people, count))
-    found = np.einsum("pn,pn->n", (particles.weights * particles.exist)[:, person], density)
+    found = particle_set_kernels.pair_sums(particles.weights, particles.exist, person, density)
     mean[person, pairs[:, 1]] = found * detect[person] / config.clutter_density
     return sensor_kernels.free_detections(mean, np.maximum(1 - particles.existence * detect, 0.0))

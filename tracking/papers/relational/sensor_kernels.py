@@ -193,29 +193,31 @@ def near_detections(pos: Array, points: Array, most: float) -> Bools:
 
 
 @njit(cache=True)
-def partner_factors(related: Bools, weights: Array, missed: Bools, logs: Array) -> None:
+def partner_factors(pairs: Ints, related: Bools, weights: Array, missed: Bools, logs: Array) -> None:
     """Add to the log-likelihoods of each missed person those of the partners: what is seen of them tells where the
     person is.
 
-    related (P, K, K): who walks together by the frame's relations; weights (P, K): of the particles before the
-    frame; missed (K,); logs (P, K): log-likelihoods of each person; changed.
+    pairs (N, 2), related (N, P): who walks together by the frame's relations; weights (P, K): of the particles before
+    the frame; missed (K,); logs (P, K): log-likelihoods of each person; changed.
 
     The factor of a partner is l(p) / mean l in the particles in which the two walk together, 1 in all others. So the
     person has the posterior of the joint filter if the partner's is independent of it.
     """
-    particles, n, _ = related.shape
+    particles, n = logs.shape
     if not missed.any():
         return
-    own = logs.copy()
+    own, level = logs.copy(), np.full(n, -np.inf)
     for v in range(n):
         top, mean = own[:, v].max(), 0.0
         if top == -np.inf:
             continue
         for p in range(particles):
             mean += weights[p, v] * math.exp(own[p, v] - top)
-        level = top + math.log(max(mean, 1e-300))
-        for h in range(n):
-            if missed[h] and h != v:
+        level[v] = top + math.log(max(mean, 1e-300))
+    for k in range(len(pairs)):
+        i, j = pairs[k]
+        for h, v in ((i, j), (j, i)):
+            if missed[h] and level[v] > -np.inf:
                 for p in range(particles):
-                    if related[p, h, v]:
-                        logs[p, h] += own[p, v] - level
+                    if related[k, p]:
+                        logs[p, h] += own[p, v] - level[v]

@@ -8,6 +8,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.detect.point_detections import followed_sizes
+from tracking.filters.person_streams import Keys
 
 
 @dataclass
@@ -22,17 +23,20 @@ class Slots:
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     missed: Array = field(default_factory=lambda: np.zeros(0))
     size: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
     next_id: int = 1
 
-    def add(self, size: Array) -> None:
-        """Add people who are measured in this frame; size (M, 2): width, height of the boxes, px, nan without."""
+    def add(self, size: Array, key: Keys) -> None:
+        """Add people who are measured in this frame; size (M, 2): width, height of the boxes, px, nan without; key
+        (M,)."""
         self.id = np.append(self.id, np.full(len(size), -1))
         self.missed = np.append(self.missed, np.zeros(len(size)))
-        self.size = np.concatenate([self.size, size])
+        self.size, self.key = np.concatenate([self.size, size]), np.concatenate([self.key, key])
 
     def keep(self, rows: Bools) -> None:
         """Remove all people but those where `rows` (K,) is True."""
         self.id, self.missed, self.size = self.id[rows], self.missed[rows], self.size[rows]
+        self.key = self.key[rows]
 
     def measure(self, seen: Array, pairs: Array, sizes: Array | None, dt: Array) -> None:
         """Note who was measured in a frame: those with seen (K,) above 1/2; dt (K,): s by which others count as missed.

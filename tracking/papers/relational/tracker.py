@@ -42,10 +42,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.rng import rng
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
+from tracking.filters.person_streams import PersonStreams, birth_keys
 from tracking.image_scale import required
 from tracking.papers.relational import sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig
@@ -54,19 +54,19 @@ from tracking.papers.relational.particle_diversity import ParticleDiversity
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.slots import Slots
 
-MOTION, BIRTHS, RESAMPLING, RELATIONS, JOINING, COUPLING = range(6)
-"""Keys of the random streams. Relations have streams of their own, so that they change no other draw."""
+MOTION, BIRTHS, RESAMPLING, SPREAD, RELATIONS, JOINING, COUPLING = range(7)
+"""What random numbers are drawn for. Relations have streams of their own, so that they change no other draw."""
 
 
 class Particle:
     """The tracker `particle`: a particle filter of people who do not know of each other.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
-    the people; hidden (K,): probability that each person is behind a known pillar or wall, or behind
-    another person; cut (K,): that the feet are behind another person; pixels: detector of blobs,
-    None from points; shown: the tracks reported last, None before; plane, "ground" or "image"; context; draws, the
-    random streams; vanished: number of frames in which all weights were 0; diversity: how many particles the weights
-    are worth. All but config exist after `reset` only.
+    the people; streams, the random numbers of each person; hidden (K,): probability that each person is behind a known
+    pillar or wall, or behind another person; cut (K,): that the feet are behind another person; pixels: detector of
+    blobs, None from points; shown: the tracks reported last, None before; plane, "ground" or "image"; context;
+    vanished: number of frames in which all weights were 0; diversity: how many particles the weights are worth. All but
+    config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -92,7 +92,7 @@ class Particle:
         if self.pixels is not None:
             self.context = context = context.replace(px_per_m=self.pixels.scale)
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
-        self.draws = [rng(seed, "tracker", key) for key in range(COUPLING + 1)]
+        self.streams = PersonStreams(seed)
         flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
         self.plane: Plane = "image" if flat else "ground"
         self.hidden = np.zeros(0)
@@ -111,13 +111,14 @@ class Particle:
                 self.pixels.follow(self.config, self.config.most_foreground)
             known = None if self.shown is None else self.shown.box
             detections = self.pixels.detections(frame, np.zeros((0, 4)) if known is None else known)
+        self.streams.frame += 1
         self._forecast()
         if detections is not None:
             self._measure(detections)
         self.shown = tracks = self._report(frame)
         if detections is not None:
             c = self.config
-            self.particles.resample(c.resample_share, c.resampling, c.kernel_width, self.draws[RESAMPLING])
+            self.particles.resample(c.resample_share, c.resampling, c.kernel_width, self._own_draws)
             self.diversity.resample(self.particles)
         return tracks
 
@@ -150,11 +151,11 @@ class Particle:
     def _forecast(self) -> None:
         """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
-        noise = self.draws[MOTION].standard_normal((p.count, p.people, 2))
-        shared, coupling, alike, pairs, spread = self._coupling()
+        noise = self.streams.normals(MOTION, self.slots.key, p.count, 2)
+        shared, coupling, alike, spread = self._coupling()
         table = c.speed_table(self.dt)
         transition_kernels.move(
-            p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, pairs, spread, self.dt
+            p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, coupling, alike, spread, self.dt
         )
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
@@ -168,12 +169,10 @@ class Particle:
         camera = self.context.camera if self.plane == "ground" else None
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
-    def _coupling(self) -> tuple[Array, Array, Array, Ints, Array]:
+    def _coupling(self) -> tuple[Array, Array, Array, Array]:
         """Returns the normals that groups have in common (P, K, 2), and the coupling (2,), the rules (4,) by which
-        partners count, the related pairs (N, 2) and their spread (N, 2) of transition_kernels; people of `particle`
-        have none."""
-        pairs = np.zeros((0, 2), np.int64)
-        return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4), pairs, np.zeros(pairs.shape)
+        partners count, and the spread (N, 2) of the pairs of transition_kernels; people of `particle` have none."""
+        return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4), np.zeros((0, 2))
 
     def _relate(self) -> None:
         """Draw new relations; people of `particle` have none."""
@@ -225,12 +224,21 @@ class Particle:
         Place and velocity are normal about the detection and about 0. The existence is the share of new people among
         new people and false alarms (ours).
         """
-        p, c = self.particles, self.config
-        draws = self.draws[BIRTHS].standard_normal((len(points), 2, p.count, 2)).transpose(1, 2, 0, 3)
+        p, c, key = self.particles, self.config, birth_keys(points, self.streams.frame)
+        draws = self.streams.normals(BIRTHS, key, 2 * p.count, 2).reshape(2, p.count, len(points), 2)
         exist = c.birth_rate * self.dt / (c.birth_rate * self.dt + c.clutter_density)
         p.add(points + self.noise * draws[0], c.speed_prior * draws[1], exist)
+        self.slots.add(sizes, key)
         self._relate_newcomers(points)
-        self.slots.add(sizes)
+
+    def _own_draws(self, people: Ints) -> tuple[Array, Array]:
+        """Returns uniforms (R, P) and normals (R, 4, P) by which the `people` (R,) are resampled."""
+        count, key = self.particles.count, self.slots.key[people]
+        uniforms, normals = (
+            self.streams.uniforms(RESAMPLING, key, 1, count),
+            self.streams.normals(SPREAD, key, 1, 4 * count),
+        )
+        return uniforms[0], normals.reshape(len(key), 4, count)
 
     def _relate_newcomers(self, points: Array) -> None:
         """Relate the last slots, of new people at `points` (M, 2), m, to others; people of `particle` are alone."""

@@ -1,8 +1,9 @@
 """Kernels of `relational`: motion given relations (sec. 3.2), and relations given motion.
 
-Arrays are over P particles and K people. related (P, K, K) bool, symmetric, is the relation "walking together" of each
-pair; the groups of a particle are the connected components of its related pairs. The columns of the speed table are
-named here.
+Arrays are over P particles and K people. The relation "walking together" is kept for the pairs only that walk together
+in some particle, so that the cost is that of the neighbours: pairs (N, 2) are people i < j, in order of j, then i, and
+related (N, P) says in which particles. The groups of a particle are the connected components of its related pairs. The
+columns of the speed table are named here.
 """
 
 from __future__ import annotations
@@ -47,15 +48,14 @@ def _boxes(pos):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def move(
-    pos: Array, vel: Array, exist: Array, related: Bools, noise: Array, shared: Array, table: Array, coupling: Array,
-    alike: Array, pairs: Ints, spread: Array, dt: float,
+    pos: Array, vel: Array, exist: Array, pairs: Ints, related: Bools, noise: Array, shared: Array, table: Array,
+    coupling: Array, alike: Array, spread: Array, dt: float,
 ) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
-    pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; related (P, K, K): old relations;
-    noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling (2,); alike (4,):
-    rules by which a partner counts; pairs (N, 2): people i < j who walk together in some particle; spread (N, 2): of
-    `pair_spread`.
+    pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; pairs (N, 2), related (N,
+    P): old relations; noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling
+    (2,); alike (4,): rules by which a partner counts; spread (N, 2): of `pair_spread`.
 
     v_i = u - B u / |u| + C e_i, x_i = x_i + v_i dt, with B, C of the table's row for |u| (Table 3). For a person alone
     u = v_i and e_i = noise. A partner j who walks together with i counts with w_j = `belonging` by `alike` at their old
@@ -73,7 +73,7 @@ def move(
             sums[i, 3], sums[i, 4], sums[i, 5], sums[i, 6] = shared[p, i, 0], shared[p, i, 1], 1.0, 0.0
         for k in range(len(pairs)):
             i, j = pairs[k]
-            if related[p, i, j]:
+            if related[k, p]:
                 dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
                 du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
                 distance = math.sqrt(max(dx * dx + dy * dy - spread[k, 0], 0.0))
@@ -138,60 +138,78 @@ def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
 
 
 @njit(cache=True)
-def near_pairs(pos: Array, related: Bools, rules: Array) -> Ints:
-    """Return the pairs i < j (N, 2) whose relation may change, in order.
+def near_pairs(pos: Array, rules: Array) -> Ints:
+    """Return the pairs i < j (N, 2) that may start to walk together, in order of j, then i.
 
-    pos (P, K, 2), m; related (K, K): pairs that walk together in any particle; rules (4,). Pairs that do not, and whose
-    boxes round all particles are so far apart that their belonging is below NEGLIGIBLE, are left out (ours).
+    pos (P, K, 2), m; rules (4,). Pairs whose boxes round all particles are so far apart that their belonging is below
+    NEGLIGIBLE are left out (ours).
     """
     n = pos.shape[1]
-    box, found, count = _boxes(pos), np.empty((n * (n - 1) // 2, 2), np.int64), 0
-    for i in range(n):
-        for j in range(i + 1, n):
+    box, found = _boxes(pos), [(np.int64(0), np.int64(0)) for _ in range(0)]
+    for j in range(n):
+        for i in range(j):
             dx = max(box[i, 0] - box[j, 1], box[j, 0] - box[i, 1], 0.0)
             dy = max(box[i, 2] - box[j, 3], box[j, 2] - box[i, 3], 0.0)
-            if related[i, j] or belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= NEGLIGIBLE:
-                found[count, 0], found[count, 1] = i, j
-                count += 1
-    return found[:count]
+            if belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= NEGLIGIBLE:
+                found.append((np.int64(i), np.int64(j)))
+    out = np.empty((len(found), 2), np.int64)
+    for k in range(len(found)):
+        out[k, 0], out[k, 1] = found[k]
+    return out
+
+
+@njit(cache=True)
+def pairs_of_people(pairs: Ints, people: int) -> tuple[Ints, Ints]:
+    """Return the rows of the pairs (N, 2) of each person: those of person a are rows[start[a] : start[a + 1]], in
+    order."""
+    start, rows = np.zeros(people + 1, np.int64), np.empty(2 * len(pairs), np.int64)
+    for k in range(len(pairs)):
+        for a in pairs[k]:
+            start[a + 1] += 1
+    start = np.cumsum(start)
+    end = start.copy()
+    for k in range(len(pairs)):
+        for a in pairs[k]:
+            rows[end[a]] = k
+            end[a] += 1
+    return start, rows
 
 
 @njit(cache=True)
 def relate(
-    pos: Array, vel: Array, related: Bools, pairs: Ints, odds: Array, uniforms: Array, rules: Array
+    pos: Array, vel: Array, pairs: Ints, related: Bools, odds: Array, uniforms: Array, rules: Array
 ) -> None:  # fmt: skip
-    """Draw new relations of pairs: p(s^r_t | s^a_t, s^r_t-1), eq. 7; related (P, K, K) is changed.
+    """Draw new relations of pairs: p(s^r_t | s^a_t, s^r_t-1), eq. 7; related (N, P) is changed.
 
-    pos (P, K, 2), m, and vel (P, K, 2), m/s: new places and velocities. pairs (N, 2): people i < j; odds (N,): log odds
-    of each pair, from which the losses of rules (4,) are taken; uniforms (P, K, 2) in [0, 1). The paper leaves this
-    distribution open. Ours: with g the probability that these log odds are, a person reconsiders all relations with the
-    rate / 2, and walks together with those whose g is above one uniform number. So each pair is a chain of two states
-    that starts and stops with the hazards rate g and rate (1 - g), and a person leaves or joins a group at once.
+    pos (P, K, 2), m, and vel (P, K, 2), m/s: new places and velocities. pairs (N, 2); odds (N,): log odds of each pair,
+    from which the losses of rules (4,) are taken, nan for pairs that stay as they are; uniforms (P, K, 2) in [0, 1).
+    The paper leaves this distribution open. Ours: with g the probability that these log odds are, a person reconsiders
+    all relations with the rate / 2, and walks together with those whose g is above one uniform number. So each pair is
+    a chain of two states that starts and stops with the hazards rate g and rate (1 - g), and a person leaves or joins a
+    group at once.
     """
     change, n = 1.0 - math.sqrt(1.0 - rules[RATE]), pos.shape[1]
-    of, count = np.empty((n, n), np.int64), np.zeros(n, np.int64)
-    for k in range(len(pairs)):
-        for a in pairs[k]:
-            of[a, count[a]] = k
-            count[a] += 1
+    start, rows = pairs_of_people(pairs, n)
     for p in range(len(pos)):
         for a in range(n):
             if uniforms[p, a, 0] >= change:
                 continue
-            for k in of[a, : count[a]]:
+            for k in rows[start[a] : start[a + 1]]:
+                if math.isnan(odds[k]):
+                    continue
                 i, j = pairs[k]
                 dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
                 du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
                 lost = rules[DISTANCE] * math.sqrt(dx * dx + dy * dy) + rules[VELOCITY] * math.sqrt(du * du + dv * dv)
-                related[p, i, j] = related[p, j, i] = uniforms[p, a, 1] < 1.0 / (1.0 + math.exp(lost - odds[k]))
+                related[k, p] = uniforms[p, a, 1] < 1.0 / (1.0 + math.exp(lost - odds[k]))
 
 
 @njit(cache=True)
 def join(
-    pos: Array, exist: Array, related: Bools, label: Ints, points: Array, share: float, uniforms: Array, rules: Array
-) -> None:
+    pos: Array, exist: Array, label: Ints, points: Array, share: float, uniforms: Array, rules: Array
+) -> tuple[Ints, Bools]:
     """Relate M new people, the last slots, to the groups that they join in each particle, one after the other (sec.
-    3.2); related (P, K, K) and the groups label (P, K) of the new people are changed.
+    3.2). Return their pairs (N, 2) and relations (N, P); the groups label (P, K) of the new people are changed.
 
     pos (P, K, 2), m; exist (P, K): with the new people; points (M, 2), m: where they were detected; uniforms (M, P) in
     [0, 1); rules (4,). With the probability `share` (the paper: 1/2) a person joins a group, people alone being groups
@@ -201,47 +219,95 @@ def join(
     """
     particles, n, _ = pos.shape
     old = n - len(points)
-    box, near = _boxes(pos), np.zeros(n)
-    groups, weight = np.empty(n, np.int64), np.empty(n)
-    ends = np.empty(len(points), np.int64)
-    some, count = [np.int64(0) for _ in range(0)], 0
+    some, ends = _neighbours(_boxes(pos), points, rules)
+    near, groups, weight = np.zeros(n), np.empty(n, np.int64), np.empty(n)
+    last, following = np.empty(n, np.int64), np.empty(n, np.int64)
+    found, count = np.empty((4 * n, 3), np.int64), 0
+    for p in range(particles):
+        for i in range(old):
+            following[i] = -1
+            if label[p, i] < i:
+                following[last[label[p, i]]] = i
+            last[label[p, i]] = i
+        begin = 0
+        for m in range(len(points)):
+            new, neighbours, begin = old + m, some[begin : ends[m]], ends[m]
+            label[p, new], last[new], following[new] = new, new, -1
+            if uniforms[m, p] >= share:  # alone, whoever is near
+                continue
+            for i in neighbours:
+                dx, dy = pos[p, i, 0] - points[m, 0], pos[p, i, 1] - points[m, 1]
+                g = exist[p, i] * belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
+                near[label[p, i]] = max(near[label[p, i]], g)
+            total, several = 0.0, 0
+            for i in neighbours:
+                g = label[p, i]
+                if near[g] > 0:
+                    total += near[g]
+                    at = several
+                    while at > 0 and groups[at - 1] > g:
+                        groups[at], weight[at] = groups[at - 1], weight[at - 1]
+                        at -= 1
+                    groups[at], weight[at] = g, near[g]
+                    near[g], several = 0.0, several + 1
+            left = uniforms[m, p] * max(total, 1.0)
+            for k in range(several):
+                left -= share * weight[k]
+                if left < 0:
+                    g = groups[k]
+                    i, label[p, new] = g, g
+                    while i >= 0:
+                        if count == len(found):
+                            found = np.concatenate((found, np.empty_like(found)))
+                        found[count] = m, i, p
+                        i, count = following[i], count + 1
+                    following[last[g]] = last[g] = new
+                    break
+    return _relations(found[:count], len(points), n, particles)
+
+
+@njit(cache=True)
+def _neighbours(box, points, rules):  # type: ignore[no-untyped-def]
+    """Returns the people before each new one whose belonging is not below FAR in all particles, all in a row, and where
+    those of each new person end."""
+    old, ends = len(box) - len(points), np.empty(len(points), np.int64)
+    some, count = np.empty(64, np.int64), 0
     for m in range(len(points)):
         for i in range(old + m):
             dx = max(box[i, 0] - points[m, 0], points[m, 0] - box[i, 1], 0.0)
             dy = max(box[i, 2] - points[m, 1], points[m, 1] - box[i, 3], 0.0)
             if belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= FAR:
-                some.append(np.int64(i))
+                if count == len(some):
+                    some = np.concatenate((some, np.empty_like(some)))
+                some[count] = i
                 count += 1
         ends[m] = count
-    for p in range(particles):
-        begin = 0
-        for m in range(len(points)):
-            new, neighbours, begin = old + m, range(begin, ends[m]), ends[m]
-            label[p, new] = new
-            if uniforms[m, p] >= share:  # alone, whoever is near
-                continue
-            for c in neighbours:
-                i = int(some[c])
-                dx, dy = pos[p, i, 0] - points[m, 0], pos[p, i, 1] - points[m, 1]
-                g = exist[p, i] * belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
-                near[label[p, i]] = max(near[label[p, i]], g)
-            total, found = 0.0, 0
-            for c in neighbours:
-                g = label[p, some[c]]
-                if near[g] > 0:
-                    total += near[g]
-                    at = found
-                    while at > 0 and groups[at - 1] > g:
-                        groups[at], weight[at] = groups[at - 1], weight[at - 1]
-                        at -= 1
-                    groups[at], weight[at] = g, near[g]
-                    near[g], found = 0.0, found + 1
-            left = uniforms[m, p] * max(total, 1.0)
-            for k in range(found):
-                left -= share * weight[k]
-                if left < 0:
-                    label[p, new] = groups[k]
-                    for i in range(groups[k], new):
-                        if label[p, i] == groups[k]:
-                            related[p, new, i] = related[p, i, new] = True
-                    break
+    return some, ends
+
+
+@njit(cache=True)
+def _relations(found: Ints, new: int, people: int, particles: int) -> tuple[Ints, Bools]:
+    """Returns pairs (N, 2) and relations (N, P) of R rows (R, 3): number of a new person, partner, particle."""
+    ends = np.zeros(new + 1, np.int64)
+    for r in range(len(found)):
+        ends[found[r, 0] + 1] += 1
+    ends = np.cumsum(ends)
+    order, at = np.empty(len(found), np.int64), ends[:-1].copy()
+    for r in range(len(found)):
+        order[at[found[r, 0]]] = r
+        at[found[r, 0]] += 1
+    row, owner = np.full((new, people), -1, np.int32), np.full(people, -1, np.int64)
+    count = 0
+    for m in range(new):
+        for r in order[ends[m] : ends[m + 1]]:
+            owner[found[r, 1]] = m
+        for i in range(people - new + m):
+            if owner[i] == m:
+                row[m, i] = count
+                count += 1
+    pairs, related = np.empty((count, 2), np.int64), np.zeros((count, particles), np.bool_)
+    for r in range(len(found)):
+        m, i, p = found[r]
+        k = row[m, i]
+        pairs[k, 0], pairs[k, 1], related[k, p] = i, people - new + m, True
+    return pairs, related

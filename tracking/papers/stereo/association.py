@@ -28,28 +28,47 @@ def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: Stereo
     """
     if not groups or not len(points):
         return np.full(len(points), -1)
-    spread = np.stack([g.spread for g in groups])
-    P = np.stack([g.ekf.P for g in groups])
-    d2, position = _log_density(points.pos, points.cov, groups, (spread, P), POS, config)
-    _, velocity = _log_density(points.vel, points.vel_cov, groups, (spread, P), VEL, config)
-    total = config.position_weight * position + config.velocity_weight * velocity
-    inside = d2 < config.gate
-    return np.where(inside.any(0), np.where(inside, total, -np.inf).argmax(0), -1)
+    total = np.full((len(groups), len(points)), -np.inf)
+    g, m = _in_reach(groups, points, config)
+    d2, position = _log_density(groups, g, points.pos[m], points.cov[m], POS, config)
+    near = d2 < config.gate
+    g, m, position = g[near], m[near], position[near]
+    _, velocity = _log_density(groups, g, points.vel[m], points.vel_cov[m], VEL, config)
+    total[g, m] = config.position_weight * position + config.velocity_weight * velocity
+    inside = np.zeros(total.shape, bool)
+    inside[g, m] = True
+    return np.where(inside.any(0), total.argmax(0), -1)
+
+
+def _in_reach(groups: Sequence[SpaceGroup], points: SpacePoints, config: StereoConfig) -> tuple[Ints, Ints]:
+    """Returns groups and points (R,) that may be within the gate: the squared Mahalanobis distance is at least the
+    squared distance over the trace of S."""
+    trace = np.array([_of_group(g, POS, config).trace() for g in groups])
+    own = np.trace(points.cov, axis1=1, axis2=2) if config.point_covariance else np.zeros(len(points))
+    square = np.zeros((len(groups), len(points)))
+    for y, x in zip(points.pos.T, np.stack([g.pos for g in groups]).T, strict=True):
+        square += np.square(y - x[:, None])
+    rows, columns = np.nonzero(square <= config.gate * (1 + 1e-9) * (trace[:, None] + own))
+    return np.asarray(rows, np.int64), np.asarray(columns, np.int64)
+
+
+def _of_group(group: SpaceGroup, part: list[int], config: StereoConfig) -> Array:
+    """Returns what a group adds to S (3, 3)."""
+    block = np.ix_(part, part)
+    return group.spread[block] + group.ekf.P[block] if config.point_covariance else group.spread[block]
 
 
 def _log_density(
-    y: Array, cov: Array, groups: Sequence[SpaceGroup], both: tuple[Array, Array], part: list[int], config: StereoConfig
+    groups: Sequence[SpaceGroup], row: Ints, y: Array, cov: Array, part: list[int], config: StereoConfig
 ) -> tuple[Array, Array]:
-    """Returns squared Mahalanobis distances (G, M) and log densities, without their constant, of eqs 9 and 10.
+    """Returns squared Mahalanobis distances (R,) and log densities (R,), without their constant, of eqs 9 and 10.
 
-    y (M, 3), cov (M, 3, 3): positions or velocities of the points; part: the entries of the state. both: Sigma and P
-    (G, 6, 6) of the groups.
+    row (R,): groups. y (R, 3), cov (R, 3, 3): positions or velocities of the points; part: the entries of the state.
     """
-    spread, P = (a[:, part][:, :, part] for a in both)
-    S = spread[:, None] + np.zeros((1, len(y), 1, 1))
+    S = np.stack([_of_group(g, part, config) for g in groups])[row]
     if config.point_covariance:
-        S = (spread + P)[:, None] + cov
-    away = y - np.stack([g.ekf.x[part, 0] for g in groups])[:, None]
+        S = S + cov
+    away = y - np.stack([g.ekf.x[part, 0] for g in groups])[row]
     inverse = np.linalg.inv(S)
-    d2 = np.einsum("gmi,gmij,gmj->gm", away, inverse, away)
+    d2 = np.einsum("ri,rij,rj->r", away, inverse, away)
     return d2, (np.linalg.slogdet(inverse)[1] - d2) / 2

@@ -46,11 +46,15 @@ def overlap(a: SpaceGroup, b: SpaceGroup, gate: float) -> bool:
 def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[int, int]]:
     """Returns the pairs of indices of groups whose regions may overlap: f(1/2) <= gate in
     tracking.filters.ellipsoid_overlap."""
-    i, j = np.triu_indices(len(groups), 1)
-    if not len(i):
+    if len(groups) < 2:
         return []
     x = np.stack([g.ekf.x for g in groups])
     A = np.stack([g.spread for g in groups])
+    # 2 f(1/2) is at least the squared distance over the trace of both Sigma: most pairs need no more than that
+    trace, square = np.trace(A, axis1=1, axis2=2), np.zeros((len(groups), len(groups)))
+    for values in x[..., 0].T:
+        square += np.square(values - values[:, None])
+    i, j = np.nonzero(np.triu(square <= 2 * gate * (1 + 1e-9) * (trace[:, None] + trace), 1))
     d = x[j] - x[i]
     half = (d * np.linalg.solve(A[i] + A[j], d)).sum((1, 2)) / 2
     close = half <= gate
@@ -99,7 +103,8 @@ def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> Whole
     kept.count = float(counts.sum())
     kept.first_seen, kept.last_seen = min(g.first_seen for g in parts), max(g.last_seen for g in parts)
     kept.measured_time = max(g.measured_time for g in parts)
-    groups[:] = [g for g in groups if g is kept or g not in parts]
+    gone = {id(g) for g in parts if g is not kept}
+    groups[:] = [g for g in groups if id(g) not in gone]
     if not known:
         kept.parent = max(g.parent for g in parts)
         return None

@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import chi2
 
 from tests.reference_joint import all_partitions, label_of, log_component, log_evidence
+from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint.cluster_evidence_kernels import (
     SUMS,
     add_person,
@@ -131,7 +132,9 @@ def test_the_true_partition_of_two_pairs_is_the_most_probable_of_all_15():
 def test_the_option_has_the_evidence_as_p_of_z_given_x(dt):
     """Eq. 4 with log p(Z, X), weighted per second, so that a second counts the same at any frame rate."""
     config = JointConfig(validity="bayesian", evidence_rate=3.0, belief_rate=0.0)
-    model = FrameModel(config, dt, 0.1, np.full((5, 2), np.nan), np.zeros((5, 5)), *np.random.default_rng(0).spawn(3))
+    model = FrameModel(
+        config, dt, 0.1, np.full((5, 2), np.nan), np.zeros((5, 5)), PersonStreams(0), np.zeros(5, np.uint64)
+    )
     state, parts = states(5), list(all_partitions(5))
     label, out = np.array([[label_of(p) for p in parts]]), np.empty((1, len(parts)))
     log_evidences(state[None], label, config.mixture, out)

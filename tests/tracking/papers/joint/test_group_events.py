@@ -156,8 +156,8 @@ def placed(pos, label, count=4000):
     """The partitions after the last person, alone so far, was placed."""
     points = np.concatenate([np.asarray(pos, float), np.zeros((len(pos), 2))], axis=1)[None]
     labels = np.tile(np.asarray(label, np.int64), (1, count, 1))
-    uniforms = np.random.default_rng(0).random((1, count))
-    division_kernels.place_newcomer(points, labels, len(pos) - 1, uniforms, 8.0, SCALES)
+    uniforms = np.random.default_rng(0).random((1, count, 1))
+    division_kernels.place_newcomers(points, labels, uniforms, 8.0, SCALES)
     return labels[0]
 
 
@@ -182,3 +182,39 @@ def test_a_newcomer_who_was_joined_by_another_stays():
     label = [1, 1, 0, 4, 4]
     drawn = placed([[0, 0], [0.7, 0], [9, 9], [0.2, 0.8], [0.5, 0.5]], label, count=200)
     assert (drawn == label).all()
+
+
+def placed_slowly(points, label, uniforms):
+    """New people, the last ones, join the nearest cluster, one after the other; all clusters are looked at. Changes
+    label (K,)."""
+    n = len(points)
+    for person in range(n - len(uniforms), n):
+        heads = [k for k in range(n) if label[k] in (0, k + 1)]
+        members = {k: np.flatnonzero(label == k + 1) if label[k] else np.array([k]) for k in heads}
+        if label[person] > 0 or len(heads) < 2:
+            continue
+        others = [k for k in heads if k != person]
+        away = [np.linalg.norm(points[members[k], :2].mean(axis=0) - points[person, :2]) for k in others]
+        near = members[others[int(np.argmin(away))]]
+        both = points[np.concatenate([[person], near])]
+        apart, together = (validity(both, p, *SCALES) for p in ([[0], [*range(1, len(both))]], [[*range(len(both))]]))
+        if uniforms[person - n + len(uniforms)] < 1 / (1 + np.exp(min(8.0 * (together - apart), 700))):
+            rows = np.append(near, person)
+            label[rows] = 1 + rows.min()
+
+
+def test_many_newcomers_join_as_with_a_look_at_all_clusters():
+    """60 people, 45 of them new, one far away: newcomers join groups, people and each other."""
+    rng = np.random.default_rng(6)
+    points = np.concatenate([rng.uniform(0, 12, (3, 59, 2)), rng.normal(0, 0.5, (3, 59, 2))], axis=2)
+    points = np.concatenate([points, np.full((3, 1, 4), 300.0)], axis=1)
+    labels = np.zeros((3, 6, 60), np.int64)
+    labels[:, :, [0, 4]], labels[:, 3:, [5, 7, 9]] = 1, 6
+    uniforms = rng.random((3, 6, 45))
+    expected = labels.copy()
+    for i, j in np.ndindex(3, 6):
+        placed_slowly(points[i], expected[i, j], uniforms[i, j])
+    division_kernels.place_newcomers(points, labels, uniforms, 8.0, SCALES)
+    assert np.array_equal(labels, expected)
+    assert (labels[..., 15:] > 15).any()
+    assert ((labels[..., 15:] > 0) & (labels[..., 15:] <= 15)).any()

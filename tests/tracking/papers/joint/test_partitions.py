@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, binder_gain, label_of, validity
+from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint import partition_kernels
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.distributions import FrameModel, stam_cumulated
@@ -43,6 +44,17 @@ def test_the_validity_is_that_of_the_definition():
     np.testing.assert_allclose(validities(points, [label_of(p) for p in parts]), expected)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_validity_of_many_clusters_is_that_of_the_definition(seed):
+    """Some of them are wide, so that they matter far away, and one person is far from all."""
+    rng = np.random.default_rng(seed)
+    points = np.concatenate([rng.uniform(0, 25, (90, 4)), [[400, -300, 0, 0]]])
+    order = rng.permutation(90)
+    parts = [sorted(order[a:b].tolist()) for a, b in ((0, 9), (9, 12), *((k, k + 1) for k in range(12, 90)))] + [[90]]
+    found = validities(points, [label_of(parts)])
+    np.testing.assert_allclose(found, validity(points, parts, *SCALES), rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     "points",
     [PAIRS, [[0, 0], [0.7, 0], [1.4, 0]], [[0, 0], [0.7, 0], [5, 5]]],
@@ -67,7 +79,9 @@ def test_the_example_of_two_pairs():
 def test_the_data_of_the_validity_are_the_states():
     """Eq. 4: d_cl(Z, X) with X in m and m/s, so that people who pass each other are no cluster."""
     config = JointConfig(belief_rate=0.0, validity_rate=3.0)
-    model = FrameModel(config, 0.1, 0.1, np.full((4, 2), np.nan), np.zeros((4, 4)), *np.random.default_rng(0).spawn(3))
+    model = FrameModel(
+        config, 0.1, 0.1, np.full((4, 2), np.nan), np.zeros((4, 4)), PersonStreams(0), np.zeros(4, np.uint64)
+    )
     state = np.array([[0, 0, 1, 0], [0, 0.7, 1, 0], [5, 0, 1, 0], [5, 0.7, -1, 0]])
     parts = list(all_partitions(4))
     found = model.energy(state[None], np.array([[label_of(p) for p in parts]]))[0]
@@ -120,8 +134,8 @@ def test_co_membership_is_the_share_of_partitions():
     rng = np.random.default_rng(4)
     label, weights = sampled(rng, 5, 30), rng.dirichlet(np.ones(30))[None]
     out = np.empty((5, 5))
-    partition_kernels.co_membership(np.sort(label, axis=1), weights, out)
-    label = np.sort(label, axis=1)
+    label[0] = label[0, np.lexsort(label[0].T)]  # equal partitions follow each other
+    partition_kernels.co_membership(label, weights, out)
     same = (label[0, :, :, None] == label[0, :, None]) & (label[0, :, :, None] > 0)
     expected = np.einsum("j,jkl->kl", weights[0], same.astype(float))
     np.fill_diagonal(expected, 1)

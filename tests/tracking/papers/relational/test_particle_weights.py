@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sim.types import Context, Detections, Frame
+from tests.reference_relational import drawn, relate
 from tracking.papers.relational import sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
@@ -57,7 +58,7 @@ def test_people_get_weights_of_their_own_only_after_resampling():
     particles.share_weights(False)
     assert particles.one_weight
     assert np.array_equal(particles.weights, before)
-    particles.resample(1.0, "residual", 0.0, np.random.default_rng(0))
+    particles.resample(1.0, "residual", 0.0, drawn(particles, np.random.default_rng(0)))
     particles.share_weights(False)
     assert not particles.one_weight
 
@@ -65,28 +66,28 @@ def test_people_get_weights_of_their_own_only_after_resampling():
 def test_with_one_weight_particles_are_resampled_as_a_whole():
     particles = three()
     particles.share_weights(True)
-    particles.related[:, 0, 1] = particles.related[:, 1, 0] = np.random.default_rng(3).random(400) < 0.5
+    relate(particles, 0, 1, np.random.default_rng(3).random(400) < 0.5)
     particles.weigh(np.random.default_rng(4).normal(0, 1, (400, 1)))
-    old = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related, strict=True)}
-    particles.resample(0.9, "systematic", 0.0, np.random.default_rng(0))
-    new = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related, strict=True)}
+    old = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related.T, strict=True)}
+    particles.resample(0.9, "systematic", 0.0, drawn(particles, np.random.default_rng(0)))
+    new = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related.T, strict=True)}
     assert new < old
 
 
 def test_a_person_is_resampled_alone_and_takes_the_own_relations():
     """The others stay in their particles, and the relations stay symmetric."""
     particles, few = three(), np.arange(400) < 40
-    particles.related[:, 0, 1] = particles.related[:, 1, 0] = few
-    particles.related[:, 1, 2] = particles.related[:, 2, 1] = ~few
+    relate(particles, 0, 1, few)
+    relate(particles, 1, 2, ~few)
     particles.weights[:, 0] = few / 40
     old = {tuple(x) for x in particles.pos[few, 0]}
     others = particles.pos[:, 1:].copy()
-    particles.resample(0.9, "residual", 0.0, np.random.default_rng(0))
+    particles.resample(0.9, "residual", 0.0, drawn(particles, np.random.default_rng(0)))
     assert {tuple(x) for x in particles.pos[:, 0]} <= old
     assert np.array_equal(particles.pos[:, 1:], others)
-    assert particles.related[:, 0, 1].all()
-    assert np.array_equal(particles.related[:, 1, 2], ~few)
-    assert np.array_equal(particles.related, particles.related.transpose(0, 2, 1))
+    assert particles.pairs.tolist() == [[0, 1], [1, 2]]
+    assert particles.related[0].all()
+    assert np.array_equal(particles.related[1], ~few)
 
 
 def test_a_new_person_has_the_one_weight_of_the_particles():
@@ -128,7 +129,7 @@ def test_weights_of_a_person_are_those_of_the_joint_filter_with_the_others_avera
 def test_a_missed_person_has_the_weights_of_the_partners():
     """Where the two walk together in a particle, what is seen of the one tells of the other."""
     particles = three()
-    particles.related[:200, 0, 2] = particles.related[:200, 2, 0] = True
+    relate(particles, 0, 2, np.arange(particles.count) < 200)
     points, missed = particles.pos[:1, 0], np.array([False, False, True])
     sensor.weigh(particles, points, sight([0.9, 0.9, 0.0], missed), 0.08, RelationalConfig())
     own, other = particles.weights[:200, 0], particles.weights[:200, 2]
@@ -140,7 +141,7 @@ def test_the_kernel_keeps_the_moments_and_draws_equal_particles_apart():
     particles = three(20_000)
     particles.pos[:] = particles.pos[np.random.default_rng(5).integers(0, 20, 20_000)]
     before = [np.cov(particles.pos[:, 0].T), particles.pos[:, 0].mean(axis=0)]
-    particles.resample(1.0, "systematic", 1.0, np.random.default_rng(6))
+    particles.resample(1.0, "systematic", 1.0, drawn(particles, np.random.default_rng(6)))
     assert len(np.unique(particles.pos[:, 0, 0])) == 20_000
     np.testing.assert_allclose(particles.pos[:, 0].mean(axis=0), before[1], atol=0.003)
     np.testing.assert_allclose(np.cov(particles.pos[:, 0].T), before[0], rtol=0.05, atol=3e-4)

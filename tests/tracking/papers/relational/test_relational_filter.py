@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
+from tests.reference_relational import drawn, relate, relations
+from tracking.filters.person_streams import birth_keys
 from tracking.grouping.belief import UNSEEN, default_belief
 from tracking.grouping.pair_evidence import frames_per_step
 from tracking.grouping.pair_probabilities import pair_probabilities
@@ -37,9 +40,10 @@ def flat_table(diffusion):
 def move(particles, noise, table, coupling, dt, shared=None, alike=ALWAYS, spread=0.0):
     """Move the particles by a step of dt s; spread: of the squares of distances and velocity differences."""
     p, shared = particles, np.zeros(noise.shape) if shared is None else shared
-    pairs = np.argwhere(np.triu(p.related.any(axis=0)))
-    spread = np.full(pairs.shape, spread)
-    transition_kernels.move(p.pos, p.vel, p.exist, p.related, noise, shared, table, coupling, alike, pairs, spread, dt)
+    spread = np.full(p.pairs.shape, spread)
+    transition_kernels.move(
+        p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, coupling, alike, spread, dt
+    )  # fmt: skip
 
 
 def detections(index, *points):
@@ -65,6 +69,13 @@ def placed(count, pos, vel=None, exist=1.0):
     for place, velocity in zip(pos, vel, strict=True):
         made.add(np.tile(place, (count, 1))[:, None], np.tile(velocity, (count, 1))[:, None], exist)
     return made
+
+
+def seat(tracker, particles):
+    """Gives the tracker these people, who have not been measured in the last frame."""
+    tracker.particles = particles
+    people = particles.people
+    tracker.slots.add(np.full((people, 2), np.nan), birth_keys(np.zeros((people, 2)), 1))
 
 
 def sight(detect, missed=None):
@@ -165,7 +176,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
     """The velocity variance of person 2, per axis, by frame; person 1 is measured where `seen`."""
     config = ParticleConfig(**flat_table(1.0), point_noise=r, clutter_density=1e-6)
     rng, particles, out = np.random.default_rng(1), placed(count, [[0, 0], [5, 0]]), []
-    particles.related[:, 0, 1] = particles.related[:, 1, 0] = related
+    relate(particles, 0, 1, related)
     truth, velocity = np.zeros(2), np.zeros(2)
     for _ in range(steps):
         move(particles, rng.standard_normal((count, 2, 2)), config.speed_table(1.0), AT_ONCE, 1.0)
@@ -175,7 +186,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         particles.pos[:, 1] = 1e6  # never near the detection
         if seen:
             sensor.weigh(particles, points, sight([0.9, 0.0], [False, True]), r, config)
-            particles.resample(1.0, "residual", 0.0, rng)
+            particles.resample(1.0, "residual", 0.0, drawn(particles, rng))
         out.append(particles.vel[:, 1].var(axis=0).mean())
     return np.array(out)
 
@@ -214,6 +225,14 @@ def test_people_who_are_equal_in_all_particles_change_no_weight(detect):
     np.testing.assert_allclose(particles.weights, 1 / 50, rtol=1e-12)
 
 
+def joined_by(particles, label, points, uniforms, rules):
+    """Relates the new people, the last slots, to the groups that they join."""
+    pairs, related = transition_kernels.join(particles.pos, particles.exist, label, points, 0.5, uniforms, rules)
+    particles.hold(pairs)
+    particles.related[len(particles.pairs) - len(pairs) :] = related
+    assert np.array_equal(particles.pairs[len(particles.pairs) - len(pairs) :], pairs)
+
+
 def test_a_newcomer_in_an_empty_scene_is_alone_and_beside_a_group_in_it_by_half():
     """Sec. 3.2; far from all groups a newcomer is alone (ours)."""
     rules, count = np.array([0.05, 12.0, 3.0, 3.0]), 20_000
@@ -222,11 +241,11 @@ def test_a_newcomer_in_an_empty_scene_is_alone_and_beside_a_group_in_it_by_half(
     def joined(pos, related=()):
         particles = placed(count, np.array(pos).reshape(-1, 2))
         for i, j in related:
-            particles.related[:, i, j] = particles.related[:, j, i] = True
+            relate(particles, i, j)
         place = np.array([[0.0, 0.5]])
         particles.add(np.tile(place, (count, 1))[:, None], np.zeros((count, 1, 2)), 1.0)
         label = particles.labels()
-        transition_kernels.join(particles.pos, particles.exist, particles.related, label, place, 0.5, u[None], rules)
+        joined_by(particles, label, place, u[None], rules)
         assert np.array_equal(label, particles.labels())
         group = np.where(label[:, -1] == len(pos), -1, label[:, -1])
         return [float((group == g).mean()) for g in range(-1, len(pos))]
@@ -254,19 +273,20 @@ def test_new_relations_depend_on_new_attributes_alone(monkeypatch):
     for seed in (0, 1):
         tracker = Relational(RelationalConfig(relation_evidence="state", particles=300))
         tracker.reset(Context(10.0, float("nan")), 7)
-        tracker.particles = placed(300, np.random.default_rng(seed).normal(0, 3, (4, 2)))
-        tracker.particles.related[:, 0, 1] = tracker.particles.related[:, 1, 0] = True
+        seat(tracker, placed(300, np.random.default_rng(seed).normal(0, 3, (4, 2))))
+        relate(tracker.particles, 0, 1)
         tracker._forecast()
-        found.append(tracker.particles.related.copy())
+        found.append(relations(tracker.particles))
     assert np.array_equal(*found)
     assert 0 < found[0].mean() < 1
 
 
 def reconsidered(particles, rules, rng):
-    pairs = transition_kernels.near_pairs(particles.pos, particles.related.any(axis=0), rules)
+    particles.hold(transition_kernels.near_pairs(particles.pos, rules))
     uniforms = rng.random((particles.count, particles.people, 2))
-    odds = np.full(len(pairs), rules[transition_kernels.BIAS])
-    transition_kernels.relate(particles.pos, particles.vel, particles.related, pairs, odds, uniforms, rules)
+    odds = np.full(len(particles.pairs), rules[transition_kernels.BIAS])
+    related = particles.related
+    transition_kernels.relate(particles.pos, particles.vel, particles.pairs, related, odds, uniforms, rules)
 
 
 def test_a_pairs_relation_approaches_its_equilibrium_at_its_rate():
@@ -275,16 +295,17 @@ def test_a_pairs_relation_approaches_its_equilibrium_at_its_rate():
     g, rng = 1 / (1 + np.exp(0.5 - 1.0)), np.random.default_rng(0)
     for step in range(1, 21):
         reconsidered(particles, rules, rng)
-        assert particles.related[:, 0, 1].mean() == pytest.approx(g * (1 - np.exp(-0.05 * step)), abs=0.012)
+        assert relations(particles)[:, 0, 1].mean() == pytest.approx(g * (1 - np.exp(-0.05 * step)), abs=0.012)
 
 
 def test_a_person_leaves_a_group_at_once():
     """Relations of one person end together far more often than by themselves; none ends of people far from it."""
     rules, rng = np.array([0.05, 3.0, 1.0, 0.0]), np.random.default_rng(1)
     particles = placed(40_000, [[0, 0], [0.4, 0], [0, 0.4], [0.4, 0.4]])
-    particles.related[:] = ~np.eye(4, dtype=bool)
+    for i, j in itertools.combinations(range(4), 2):
+        relate(particles, i, j)
     reconsidered(particles, rules, rng)
-    ends = ~particles.related[:, 0, 1:]
+    ends = ~relations(particles)[:, 0, 1:]
     assert ends[:, 0].mean() == pytest.approx(0.05 * 0.069, abs=0.001)
     assert ends.all(axis=1).mean() > 0.3 * ends[:, 0].mean()
 
@@ -294,10 +315,11 @@ def test_pairs_that_are_far_in_all_particles_and_not_related_are_left_out():
     particles.pos[0, 2] = [49.0, 0.0]
 
     def pairs():
-        return transition_kernels.near_pairs(particles.pos, particles.related.any(axis=0), rules).tolist()
+        particles.hold(transition_kernels.near_pairs(particles.pos, rules))
+        return particles.pairs.tolist()
 
     assert pairs() == [[0, 1]]
-    particles.related[3, 0, 2] = particles.related[3, 2, 0] = True
+    relate(particles, 0, 2, np.arange(particles.count) == 3)
     assert pairs() == [[0, 1], [0, 2]]
     particles.pos[5, 2] = [3.0, 0.0]
     assert pairs() == [[0, 1], [0, 2], [1, 2]]
@@ -331,7 +353,7 @@ def test_diffusion_is_that_of_any_frame_rate(related, time):
     spreads = []
     for fps in (25.0, 12.5):
         particles, rng = placed(20_000, [[0, 0], [1, 0]], [[1, 0], [1, 0]]), np.random.default_rng(3)
-        particles.related[:, 0, 1] = particles.related[:, 1, 0] = related
+        relate(particles, 0, 1, related)
         coupling = np.array([1 - np.exp(-1 / (fps * time)), 0.5]) if time else AT_ONCE
         for _ in range(round(fps)):
             noise, shared = rng.standard_normal((2, 20_000, 2, 2))
@@ -346,7 +368,7 @@ def test_velocities_of_partners_approach_each_other_with_the_time_constant():
     """Their difference falls by e in coupling_time, at any frame rate, and the mean stays; a person alone goes on."""
     for fps in (10.0, 40.0):
         particles = placed(1, [[0, 0], [0, 1], [9, 9]], [[2, 0], [0, 1], [1, 1]])
-        particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+        relate(particles, 0, 1)
         coupling = np.array([1 - np.exp(-1 / (fps * 0.5)), 0.5])
         for _ in range(round(0.5 * fps)):
             move(particles, np.zeros((1, 3, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), coupling, 1 / fps)
@@ -360,7 +382,8 @@ def test_partners_have_a_share_of_the_noise_in_common():
     """The variance of each person's noise is that of a person alone; the correlation of partners is common_noise."""
     count, rng = 40_000, np.random.default_rng(4)
     particles = placed(count, [[0, 0], [0, 1], [1, 0], [9, 9]])
-    particles.related[:, :3, :3] = ~np.eye(3, dtype=bool)
+    for i, j in itertools.combinations(range(3), 2):
+        relate(particles, i, j)
     noise, shared = rng.standard_normal((2, count, 4, 2))
     move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), np.array([0.5, 0.7]), 1.0, shared)
     expected = np.eye(4)
@@ -374,12 +397,12 @@ def test_partners_count_by_how_alike_they_are():
     noises of both have the correlation 2 c w / (1 + w^2), c = common_noise w."""
     alike, w = np.array([0.0, 3.0, 2.0, 3.0]), 1 / (1 + np.exp(2))
     particles = placed(1, [[0, 0], [0, 1]], [[2, 0], [1, 0]])
-    particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+    relate(particles, 0, 1)
     move(particles, np.zeros((1, 2, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), AT_ONCE, 1.0, None, alike)
     np.testing.assert_allclose(particles.vel[0, :, 0], [(2 + w) / (1 + w), (1 + 2 * w) / (1 + w)], rtol=1e-12)
     count, rng = 40_000, np.random.default_rng(5)
     particles = placed(count, [[0, 0], [0, 1.3]])
-    particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+    relate(particles, 0, 1)
     noise, shared = rng.standard_normal((2, count, 2, 2))
     coupling, w = np.array([0.5, 0.7]), 1 / (1 + np.exp(2 * 1.3 - 3))
     move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), coupling, 1.0, shared, alike)
@@ -391,7 +414,7 @@ def test_what_uncertainty_adds_to_the_squares_is_taken_off():
     """Two people 1 m apart, with a velocity difference of 1 m/s, whose squares are lowered by 0.36."""
     alike, w = np.array([0.0, 3.0, 2.0, 3.0]), 1 / (1 + np.exp(5 * 0.8 - 3))
     particles = placed(1, [[0, 0], [0, 1]], [[2, 0], [1, 0]])
-    particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+    relate(particles, 0, 1)
     table = ParticleConfig(**flat_table(0.0)).speed_table(1.0)
     move(particles, np.zeros((1, 2, 2)), table, AT_ONCE, 1.0, None, alike, 0.36)
     np.testing.assert_allclose(particles.vel[0, :, 0], [(2 + w) / (1 + w), (1 + 2 * w) / (1 + w)], rtol=1e-12)
@@ -423,12 +446,12 @@ def test_the_squares_of_partners_who_move_alike_are_those_of_their_errors():
 def test_presets_couple_velocities_as_the_paper(name):
     tracker = Relational(RelationalConfig.preset(name))
     tracker.reset(Context(25.0, float("nan")), 0)
-    tracker.particles = placed(50, np.random.default_rng(0).normal(0, 3, (4, 2)))
-    tracker.particles.related[:25, 0, 1] = tracker.particles.related[:25, 1, 0] = True
-    _, coupling, alike, pairs, spread = tracker._coupling()
+    seat(tracker, placed(50, np.random.default_rng(0).normal(0, 3, (4, 2))))
+    relate(tracker.particles, 0, 1, np.arange(tracker.particles.count) < 25)
+    _, coupling, alike, spread = tracker._coupling()
     assert coupling.tolist() == AT_ONCE.tolist()
     assert transition_kernels.belonging(50.0, 9.0, alike) == 1
-    assert pairs.tolist() == [[0, 1]]
+    assert tracker.particles.pairs.tolist() == [[0, 1]]
     assert not spread.any()
 
 
@@ -437,15 +460,16 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
     tracker = Relational(RelationalConfig(particles=20_000, relation_rate=2.0))
     tracker.reset(Context(10.0, float("nan")), 3)
     place = np.array([[0, 0], [0.5, 0], [0, 0.5], [30, 0]])
-    tracker.particles = placed(20_000, place, np.array([[0, 0], [1, 0], [0, 0], [0, 0]]))
-    tracker.particles.related[:, 0, 3] = tracker.particles.related[:, 3, 0] = True
+    seat(tracker, placed(20_000, place, np.array([[0, 0], [1, 0], [0, 0], [0, 0]])))
+    relate(tracker.particles, 0, 3)
     tracker._follow(np.concatenate([place, np.zeros((4, 2))], axis=1))
     assert tracker.belief is not None
     assert (tracker.belief.log_odds[3, :3] == UNSEEN).all()
     tracker.belief.log_odds[:3, :3] = odds = np.array([[0, 1.0, -2.0], [1.0, 0, 0.5], [-2.0, 0.5, 0]])
     for _ in range(60):
+        tracker.streams.frame += 1
         tracker._relate()
-    found = tracker.particles.related.mean(axis=0)
+    found = relations(tracker.particles).mean(axis=0)
     apart = ~np.eye(3, dtype=bool)
     np.testing.assert_allclose(found[:3, :3][apart], (1 / (1 + np.exp(-odds)))[apart], atol=0.015)
     assert found[3].max() == 0
@@ -453,10 +477,11 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
     gone[1] = np.nan
     for _ in range(tracker.belief.size):
         tracker._follow(gone)
-    before = tracker.particles.related[:, 1].copy()
+    before = relations(tracker.particles)[:, 1]
     for _ in range(60):
+        tracker.streams.frame += 1
         tracker._relate()
-    assert np.array_equal(tracker.particles.related[:, 1], before)  # who is not seen stays with the partners
+    assert np.array_equal(relations(tracker.particles)[:, 1], before)  # who is not seen stays with the partners
 
 
 def test_the_probabilities_are_those_of_the_belief_over_the_reported_tracks():
@@ -524,17 +549,17 @@ def test_newcomers_of_a_frame_join_as_if_one_came_after_the_other():
 
     def joined(portions):
         particles, begin = placed(count, old), 0
-        particles.related[:, 0, 1] = particles.related[:, 1, 0] = True
+        relate(particles, 0, 1)
         for points in np.split(new, portions):
             label = np.empty((count, particles.people + len(points)), np.int64)
             label[:, : particles.people] = particles.labels()
             places = np.tile(points, (count, 1, 1))
             particles.add(places, np.zeros_like(places), 0.7)
             u = uniforms[begin : begin + len(points)]
-            transition_kernels.join(particles.pos, particles.exist, particles.related, label, points, 0.5, u, rules)
+            joined_by(particles, label, points, u, rules)
             assert np.array_equal(label, particles.labels())
             begin += len(points)
-        return particles.related
+        return relations(particles)
 
     together = joined([])
     assert np.array_equal(together, joined([1, 2, 3, 4, 5, 6]))

@@ -1,0 +1,82 @@
+"""Random numbers of people: what they depend on, and what their distributions are."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from sim.elementary import normal_quantile
+from tracking.filters.person_streams import NOBODY, PersonStreams, birth_keys
+
+PLACES = np.random.default_rng(0).uniform(-50, 50, (400, 2))
+
+
+def test_the_numbers_of_a_person_do_not_depend_on_the_others():
+    streams, keys = PersonStreams(7), birth_keys(PLACES, 3)
+    for draw in (streams.normals, streams.uniforms):
+        every, some = draw(1, keys, 30, 2), draw(1, keys[[200, 5]], 30, 2)
+        assert np.array_equal(every[:, [200, 5]], some)
+        assert np.array_equal(every[:10], draw(1, keys, 10, 2))
+
+
+def test_numbers_differ_by_seed_role_frame_person_and_index():
+    first, later, keys = PersonStreams(7), PersonStreams(7), birth_keys(PLACES[:9], 3)
+    later.frame = 1
+    drawn = [
+        first.uniforms(1, keys, 20, 2), first.uniforms(2, keys, 20, 2), later.uniforms(1, keys, 20, 2),
+        PersonStreams(8).uniforms(1, keys, 20, 2), PersonStreams(2**64 + 7).uniforms(1, keys, 20, 2),
+        first.uniforms(1, birth_keys(PLACES[:9], 4), 20, 2), first.uniforms(1, NOBODY, 20, 2),
+    ]  # fmt: skip
+    numbers = np.concatenate([x.ravel() for x in drawn])
+    assert len(np.unique(numbers)) == len(numbers)
+    assert np.array_equal(copy.deepcopy(later).normals(0, keys, 5, 1), later.normals(0, keys, 5, 1))
+
+
+def test_keys_are_those_of_the_place_to_a_millimetre():
+    keys = birth_keys(PLACES, 3)
+    assert len(np.unique(keys)) == len(keys)
+    assert np.array_equal(birth_keys(PLACES[::-1], 3)[::-1], keys)
+    assert np.array_equal(birth_keys(np.round(PLACES, 3), 3), keys)
+    assert not np.isin(birth_keys(PLACES, 4), keys).any()
+    assert not np.isin(birth_keys(PLACES + np.array([0, 0.001]), 3), keys).any()
+    assert not np.isin(birth_keys(PLACES[:, ::-1], 3), keys).any()
+
+
+def test_people_at_one_place_have_different_keys():
+    twice = birth_keys(np.repeat(PLACES[:3], 2, axis=0), 3)
+    assert len(np.unique(twice)) == 6
+    assert np.array_equal(
+        np.sort(twice)[np.isin(np.sort(twice), birth_keys(PLACES[:3], 3))], np.sort(birth_keys(PLACES[:3], 3))
+    )
+    assert len(birth_keys(np.zeros((0, 2)), 3)) == 0
+
+
+def test_normals_are_the_quantiles_of_uniforms():
+    """The bits of both are the same, but that normals are taken in the middle of a step."""
+    streams, keys = PersonStreams(1), birth_keys(PLACES, 1)
+    u, z = streams.uniforms(0, keys, 500, 2), streams.normals(0, keys, 500, 2)
+    np.testing.assert_allclose(z, normal_quantile(u + 2.0**-53), rtol=1e-12, atol=1e-15)
+    assert np.abs(z).max() > 4.5
+
+
+@pytest.mark.parametrize("of", ["people", "rows", "frames", "roles"])
+def test_the_distributions_and_no_correlation(of):
+    """Along each way in which numbers are counted."""
+    streams, keys, n = PersonStreams(2), birth_keys(PLACES, 1), 20_000
+    if of in ("people", "rows"):
+        z = streams.normals(0, keys, 100, 1)[..., 0]
+        z = z if of == "people" else z.T
+    else:
+        drawn = []
+        for k in range(400):
+            streams.frame = k if of == "frames" else 0
+            drawn.append(streams.normals(k if of == "roles" else 0, keys[:1], 100, 1).ravel())
+        z = np.array(drawn).T
+    z = z.ravel()[:n]
+    assert stats.kstest(z, "norm").pvalue > 1e-3
+    for lag in (1, 2, 3):
+        assert abs(np.corrcoef(z[:-lag], z[lag:])[0, 1]) < 4 / n**0.5
+        assert abs(np.corrcoef(z[:-lag] ** 2, z[lag:] ** 2)[0, 1]) < 4 / n**0.5

@@ -1,0 +1,158 @@
+"""Kernels of cell lists: which of N places in the plane are near a point, without a look at all of them.
+
+A grid of square cells covers most of the places. It is a tuple: x and y of its corner, width of a cell, numbers of
+columns and rows. Places beyond the grid are in its border cells, so that one far away costs nothing. A list to which
+places are added, and from which they are taken, is a tuple of `first` (C,), the first place of each cell, `after` (N,),
+the next one in the cell of each place, -1 being the end, and the grid. A list that stays as it is, is a tuple of
+`start` (C + 1,), `order` (N,) and the grid: the places of cell c are order[start[c] : start[c + 1]].
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from sim.compiler import njit
+from sim.types import Array, Ints
+
+FEW = 24
+"""Up to so many places a look at all of them costs less than a list."""
+COVERED = 3.0
+"""The grid reaches so many mean deviations to each side of the mean place."""
+MOST_RINGS = 8
+"""`nearest_place` looks at all places if none is found so many cells away."""
+
+
+@njit(cache=True)
+def grid_of(places: Array, count: int) -> tuple[float, float, float, int, int]:
+    """Return the grid of `count` places (N, 2 or more), with about one place in a cell."""
+    mean, spread = np.zeros(2), np.zeros(2)
+    for d in range(2):
+        for k in range(count):
+            mean[d] += places[k, d] / count
+        for k in range(count):
+            spread[d] += abs(places[k, d] - mean[d]) / count
+    size = max(4 * math.sqrt(spread[0] * spread[1] / count), 4 * max(spread[0], spread[1]) / count, 1e-3)
+    corner = mean - COVERED * spread
+    sides = (2 * COVERED * spread / size).astype(np.int64) + 1
+    return corner[0], corner[1], size, sides[0], sides[1]
+
+
+@njit(cache=True)
+def _column(x: float, grid: Any) -> int:
+    return int(min(max((x - grid[0]) / grid[2], 0.0), grid[3] - 1.0))
+
+
+@njit(cache=True)
+def _row(y: float, grid: Any) -> int:
+    return int(min(max((y - grid[1]) / grid[2], 0.0), grid[4] - 1.0))
+
+
+@njit(cache=True)
+def empty_list(count: int, grid: Any) -> Any:
+    """Return a list without places, with room for `count` of them."""
+    return np.full(grid[3] * grid[4], -1), np.full(count, -1), grid
+
+
+@njit(cache=True)
+def insert(k: int, x: float, y: float, cells: Any) -> None:
+    """Add place k at x, y to a list."""
+    first, after, grid = cells
+    c = _column(x, grid) * grid[4] + _row(y, grid)
+    after[k], first[c] = first[c], k
+
+
+@njit(cache=True)
+def remove(k: int, x: float, y: float, cells: Any) -> None:
+    """Take place k, which was added at x, y, out of a list."""
+    first, after, grid = cells
+    c = _column(x, grid) * grid[4] + _row(y, grid)
+    at = first[c]
+    if at == k:
+        first[c] = after[k]
+        return
+    while after[at] != k:
+        at = after[at]
+    after[at] = after[k]
+
+
+@njit(cache=True)
+def nearest_place(places: Array, k: int, cells: Any) -> int:
+    """Return the listed place nearest to place k, of equal ones the first; -1 without another one. places (N, 2 or
+    more)."""
+    first, after, grid = cells
+    middle, level = _column(places[k, 0], grid), _row(places[k, 1], grid)
+    best, least = -1, np.inf
+    for ring in range(min(MOST_RINGS, max(grid[3], grid[4])) + 1):
+        for column in range(max(middle - ring, 0), min(middle + ring, grid[3] - 1) + 1):
+            whole = abs(column - middle) == ring  # of the other columns all but the ends has been looked at
+            for row in range(level - ring, level + ring + 1, 1 if whole else 2 * ring):
+                if 0 <= row < grid[4]:
+                    best, least = _nearer(places, k, first[column * grid[4] + row], after, best, least)
+        if least < (ring * grid[2]) ** 2:  # what was not looked at is farther away
+            return best
+    for c in range(len(first)):
+        best, least = _nearer(places, k, first[c], after, best, least)
+    return best
+
+
+@njit(cache=True)
+def _nearer(places, k, at, after, best, least):  # type: ignore[no-untyped-def]
+    """Returns the nearest place and its squared distance after a look at a cell, whose first place is `at`."""
+    while at >= 0:
+        far = (places[at, 0] - places[k, 0]) ** 2 + (places[at, 1] - places[k, 1]) ** 2
+        if at != k and (far < least or (far == least and at < best)):
+            best, least = at, far
+        at = after[at]
+    return best, least
+
+
+@njit(cache=True)
+def nearest_places(places: Array, count: int, nearest: Ints) -> None:
+    """Write the nearest other one of `count` places (N, 2 or more) to each, of equal ones the first; -1 without another
+    one."""
+    if count <= FEW:
+        for k in range(count):
+            nearest[k], least = -1, np.inf
+            for other in range(count):
+                far = (places[other, 0] - places[k, 0]) ** 2 + (places[other, 1] - places[k, 1]) ** 2
+                if other != k and far < least:
+                    nearest[k], least = other, far
+        return
+    cells = empty_list(count, grid_of(places, count))
+    for k in range(count):
+        insert(k, places[k, 0], places[k, 1], cells)
+    for k in range(count):
+        nearest[k] = nearest_place(places, k, cells)
+
+
+@njit(cache=True)
+def cell_list(places: Array, count: int) -> Any:
+    """Return the list of `count` places (N, 2 or more), which stays as it is."""
+    grid = grid_of(places, count)
+    start, order, cell = np.zeros(grid[3] * grid[4] + 1, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
+    for k in range(count):
+        cell[k] = _column(places[k, 0], grid) * grid[4] + _row(places[k, 1], grid)
+        start[cell[k] + 1] += 1
+    for c in range(1, len(start)):
+        start[c] += start[c - 1]
+    end = start[:-1].copy()
+    for k in range(count):
+        order[end[cell[k]]] = k
+        end[cell[k]] += 1
+    return start, order, grid
+
+
+@njit(cache=True)
+def listed_near(x: float, y: float, reach: float, cells: Any, out: Ints) -> int:
+    """Write the places of the cells within `reach` of a point into out (N,), and return their number. Some of them are
+    farther away."""
+    start, order, grid = cells
+    low, high, found = _row(y - reach, grid), _row(y + reach, grid), 0
+    for column in range(_column(x - reach, grid), _column(x + reach, grid) + 1):
+        for at in range(start[column * grid[4] + low], start[column * grid[4] + high + 1]):
+            out[found] = order[at]
+            found += 1
+    return found

@@ -1,0 +1,96 @@
+"""Kernels of tracking.filters.person_streams: numbers by counters, with SplitMix64 (Steele, Lea & Flood 2014).
+
+Number n of a stream that begins at b is mixed(b + (n + 1) GOLDEN): it needs no state. Normal numbers are quantiles of
+uniform ones (Wichura 1988, AS 241), with the coefficients of sim.elementary.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from sim.compiler import njit
+from sim.elementary import CENTRE_BELOW, CENTRE_TOP, FAR_BELOW, FAR_TOP, TAIL_BELOW, TAIL_TOP
+from sim.types import Array
+
+GOLDEN: Any = np.uint64(0x9E3779B97F4A7C15)
+FIRST, SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+SHIFTS = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(12)
+ONE_TO_TWO = np.uint64(0x3FF0000000000000)
+"""Exponent of the floats in [1, 2), whose 52 other bits are random."""
+HALF_STEP = 2.0**-53
+
+
+@njit(cache=True)
+def mixed(z: Any) -> Any:
+    """Return the 64 bits of a number, mixed; z: uint64."""
+    z = (z ^ (z >> SHIFTS[0])) * FIRST
+    z = (z ^ (z >> SHIFTS[1])) * SECOND
+    return z ^ (z >> SHIFTS[2])
+
+
+@njit(cache=True)
+def mix_in(key: Any, values: Any) -> None:
+    """Mix values (K,) into keys (K,), both uint64; keys are changed."""
+    for k in range(len(key)):
+        key[k] = mixed(key[k] + GOLDEN) ^ values[k]
+        key[k] = mixed(key[k])
+
+
+@njit(cache=True)
+def fill_uniforms(begin: Any, key: Any, out: Array) -> None:
+    """Write uniform numbers in [0, 1) into out (A, K, C); begin (1,): uint64, of all; key (K,): uint64, of each."""
+    rows, people, columns = out.shape
+    bits = np.empty(rows * columns, np.uint64)
+    values = bits.view(np.float64)
+    for k in range(people):
+        _fill_bits(mixed(begin[0] ^ key[k]), bits)
+        for a in range(rows):
+            for c in range(columns):
+                out[a, k, c] = values[a * columns + c] - 1.0
+
+
+@njit(cache=True)
+def fill_normals(begin: Any, key: Any, out: Array) -> None:
+    """Write standard normal numbers into out (A, K, C); arguments as of fill_uniforms."""
+    rows, people, columns = out.shape
+    bits, normals = np.empty(rows * columns, np.uint64), np.empty(rows * columns)
+    values = bits.view(np.float64)
+    for k in range(people):
+        _fill_bits(mixed(begin[0] ^ key[k]), bits)
+        for n in range(len(bits)):  # no branch, so that it is computed for several numbers at once
+            centred = (values[n] - 1.5) + HALF_STEP
+            values[n] = centred
+            normals[n] = centred * _ratio(CENTRE_TOP, CENTRE_BELOW, 0.180625 - centred * centred)
+        for n in range(len(bits)):
+            if abs(values[n]) > 0.425:
+                normals[n] = _tail(values[n])
+        for a in range(rows):
+            for c in range(columns):
+                out[a, k, c] = normals[a * columns + c]
+
+
+@njit(cache=True)
+def _fill_bits(at, bits):  # type: ignore[no-untyped-def]
+    """Writes floats in [1, 2) as their bits (N,); at: uint64, where the stream begins."""
+    for n in range(len(bits)):
+        bits[n] = (mixed(at + np.uint64(n + 1) * GOLDEN) >> SHIFTS[3]) | ONE_TO_TWO
+
+
+@njit(cache=True)
+def _tail(centred):  # type: ignore[no-untyped-def]
+    """Returns the normal quantile at 0.5 + centred, |centred| above 0.425."""
+    r = math.sqrt(-math.log(0.5 - abs(centred)))
+    value = _ratio(TAIL_TOP, TAIL_BELOW, r - 1.6) if r <= 5.0 else _ratio(FAR_TOP, FAR_BELOW, r - 5.0)
+    return value if centred > 0.0 else -value
+
+
+@njit(cache=True)
+def _ratio(top, below, x):  # type: ignore[no-untyped-def]
+    """Returns the ratio of two polynomials, given by 8 coefficients each, from the highest power down."""
+    p, q = top[0], below[0]
+    for k in range(1, 8):
+        p, q = p * x + top[k], q * x + below[k]
+    return p / q
