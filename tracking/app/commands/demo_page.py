@@ -32,7 +32,7 @@ from these detections. Point at a heading to read what it means; a dash means th
 example people where a tracker reports only groups.</p>
 """
 FROM_PIXELS = """<h2>One scene, from its pictures</h2>
-<p>The same {frames} frames were tracked by background subtraction. The videos show trails, groups and events; thin white
+<p>The same {frames} frames were tracked by background subtraction. The videos show trails, groups, events; thin white
 boxes are the truth. Each name opens a replay: the tracks beside the truth, with a timeline of events.</p>
 """
 EXTREMES = """<p>Best and worst scene of <code>{run}</code>: <a href="{best}">{best_name}</a> ({key} {most}) and
