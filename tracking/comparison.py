@@ -56,7 +56,7 @@ class ComparedRuns:
         """Returns the ranking by a score as a table, one row per run, best first, after the oracle.
 
         Columns: run; first, last: the range of ranks, null for the oracle; mean, low, high: of the score, with its 95 %
-        interval; then the mean of every score of the catalogue that is known for some run.
+        interval within the score's range; then the mean of every score of the catalogue that is known for some run.
         """
         import pyarrow as pa
 
@@ -70,7 +70,8 @@ class ComparedRuns:
             "last": [None, *ranking.last.tolist()],
         }
         for part in ("mean", "low", "high"):
-            columns[part] = [*getattr(of_oracle, part).tolist(), *getattr(ranking, part).tolist()]
+            ends = np.concatenate([getattr(of_oracle, part), getattr(ranking, part)])
+            columns[part] = np.clip(ends, CATALOGUE[key].low, CATALOGUE[key].high).tolist()
         for each in CATALOGUE:
             means = [_mean(np.array([one[each] for one in row])) for row in rows]
             if np.isfinite(means).any():

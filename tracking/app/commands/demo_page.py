@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sim.io.files.own_files import GENERATOR
 from tracking.app.commands.score import summary
+from tracking.app.commands.score_ranking import COLUMNS, rank_words
 from tracking.app.commands.score_tables import SHOWN, SIMILARITY, SequenceScores, number
 from tracking.comparison import ComparedRuns
 from tracking.scoring.catalogue import CATALOGUE
@@ -16,7 +17,7 @@ from tracking.scoring.catalogue import CATALOGUE
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 76rem; padding: 0 1rem; color: #1b1f24 }
 table { border-collapse: collapse; margin: 0 0 2rem } th, td { padding: .25rem .8rem; text-align: right }
-th:first-child, td:first-child { text-align: left; white-space: nowrap }
+th:first-child, td:first-child { text-align: left; white-space: nowrap } td small { white-space: nowrap }
 th[title] { text-decoration: underline dotted #8a8f98; cursor: help } thead th { border-bottom: 2px solid #1b1f24 }
 tfoot td { border-top: 1px solid #8a8f98; font-weight: 600 }
 small { color: #57606a; font-weight: 400 }
@@ -108,12 +109,16 @@ def demo_page(root: Path, scene: PixelScene, tables: list[RankingTable], section
 def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> str:
     """Returns a ranking as HTML, the oracle first, with links to the best and worst scene of the best tracker."""
     entries = table.compared.to_arrow(table.key).to_pylist()
-    keys = [k for k in SHOWN if k != table.key and any(math.isfinite(e.get(k, math.nan)) for e in entries)]
+    keys = [
+        k
+        for k in COLUMNS
+        if k not in (table.key, table.key.removesuffix("_hull"))
+        and any(math.isfinite(e.get(k, math.nan)) for e in entries)
+    ]
     rows = []
     for e in entries:
         own = {"mean": e["mean"], "low": e["low"], "high": e["high"]}
-        rank = "" if e["first"] is None else str(e["first"]) if e["first"] == e["last"] else f"{e['first']}–{e['last']}"
-        cells = [escape(e["run"]), rank, _interval(table.key, own)]
+        cells = [escape(e["run"]), rank_words(e), _interval(table.key, own)]
         rows.append(_cells("td", [*cells, *(number(k, e[k], mean=True) for k in keys)]))
     head = "<tr><th>tracker</th><th>rank</th>" + "".join(map(_heading, [table.key, *keys])) + "</tr>"
     body = f'<div class="wide"><table><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'

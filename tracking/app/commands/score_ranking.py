@@ -223,7 +223,11 @@ def _text(every: RankedRuns, all_sequences: bool) -> Any:
 
 def _ranking_table(every: RankedRuns) -> Any:
     entries = _entries(every)
-    keys = [k for k in COLUMNS if k != every.key and any(math.isfinite(e["scores"][k]) for e in entries)]
+    keys = [
+        k
+        for k in COLUMNS
+        if k not in (every.key, every.key.removesuffix("_hull")) and any(math.isfinite(e["scores"][k]) for e in entries)
+    ]
     inputs = {text for e in entries for text in e["detections"]}
     table = empty_table()
     for name in ("rank", "run"):
@@ -233,7 +237,7 @@ def _ranking_table(every: RankedRuns) -> Any:
     if len(inputs) > 1:
         table.add_column("detections", overflow="fold")
     for e in entries:
-        cells = [_rank_words(e), printable(e["run"]), number(every.key, e["mean"], mean=True), _interval(every.key, e)]
+        cells = [rank_words(e), printable(e["run"]), number(every.key, e["mean"], mean=True), _interval(every.key, e)]
         cells += [number(k, e["scores"][k], mean=True) for k in keys]
         cells += [printable(", ".join(e["detections"]))] if len(inputs) > 1 else []
         table.add_row(*cells, style="dim" if e["first"] is None else None)
@@ -242,7 +246,7 @@ def _ranking_table(every: RankedRuns) -> Any:
     return with_title(title, table)
 
 
-def _rank_words(entry: Mapping[str, Any]) -> str:
+def rank_words(entry: Mapping[str, Any]) -> str:
     first, last = entry["first"], entry["last"]
     return "" if first is None else str(first) if first == last else f"{first}–{last}"
 
