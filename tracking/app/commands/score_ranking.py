@@ -247,6 +247,7 @@ def _ranking_table(every: RankedRuns) -> Any:
 
 
 def rank_words(entry: Mapping[str, Any]) -> str:
+    """Returns the range of ranks of a row of a ranking in words; "" for the oracle."""
     first, last = entry["first"], entry["last"]
     return "" if first is None else str(first) if first == last else f"{first}–{last}"
 

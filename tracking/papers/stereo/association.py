@@ -28,47 +28,40 @@ def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: Stereo
     """
     if not groups or not len(points):
         return np.full(len(points), -1)
+    x = np.stack([g.ekf.x[:, 0] for g in groups])
+    own = np.stack([g.spread + g.ekf.P if config.point_covariance else g.spread for g in groups])
     total = np.full((len(groups), len(points)), -np.inf)
-    g, m = _in_reach(groups, points, config)
-    d2, position = _log_density(groups, g, points.pos[m], points.cov[m], POS, config)
+    g, m = _in_reach(x, own, points, config)
+    d2, position = _log_density(points.pos[m] - x[g][:, POS], own[g], points.cov[m], POS, config)
     near = d2 < config.gate
     g, m, position = g[near], m[near], position[near]
-    _, velocity = _log_density(groups, g, points.vel[m], points.vel_cov[m], VEL, config)
+    _, velocity = _log_density(points.vel[m] - x[g][:, VEL], own[g], points.vel_cov[m], VEL, config)
     total[g, m] = config.position_weight * position + config.velocity_weight * velocity
     inside = np.zeros(total.shape, bool)
     inside[g, m] = True
     return np.where(inside.any(0), total.argmax(0), -1)
 
 
-def _in_reach(groups: Sequence[SpaceGroup], points: SpacePoints, config: StereoConfig) -> tuple[Ints, Ints]:
+def _in_reach(x: Array, own: Array, points: SpacePoints, config: StereoConfig) -> tuple[Ints, Ints]:
     """Returns groups and points (R,) that may be within the gate: the squared Mahalanobis distance is at least the
-    squared distance over the trace of S."""
-    trace = np.array([_of_group(g, POS, config).trace() for g in groups])
-    own = np.trace(points.cov, axis1=1, axis2=2) if config.point_covariance else np.zeros(len(points))
-    square = np.zeros((len(groups), len(points)))
-    for y, x in zip(points.pos.T, np.stack([g.pos for g in groups]).T, strict=True):
-        square += np.square(y - x[:, None])
-    rows, columns = np.nonzero(square <= config.gate * (1 + 1e-9) * (trace[:, None] + own))
+    squared distance over the trace of S. x (G, 6), own (G, 6, 6): states of the groups, and what they add to S."""
+    trace, square = np.einsum("gii->g", own[:, POS][:, :, POS]), np.zeros((len(x), len(points)))
+    spread = np.einsum("mii->m", points.cov) if config.point_covariance else np.zeros(len(points))
+    for d, k in enumerate(POS):
+        square += np.square(points.pos[:, d] - x[:, k, None])
+    rows, columns = np.nonzero(square <= config.gate * (1 + 1e-9) * (trace[:, None] + spread))
     return np.asarray(rows, np.int64), np.asarray(columns, np.int64)
 
 
-def _of_group(group: SpaceGroup, part: list[int], config: StereoConfig) -> Array:
-    """Returns what a group adds to S (3, 3)."""
-    block = np.ix_(part, part)
-    return group.spread[block] + group.ekf.P[block] if config.point_covariance else group.spread[block]
-
-
-def _log_density(
-    groups: Sequence[SpaceGroup], row: Ints, y: Array, cov: Array, part: list[int], config: StereoConfig
-) -> tuple[Array, Array]:
+def _log_density(away: Array, own: Array, cov: Array, part: list[int], config: StereoConfig) -> tuple[Array, Array]:
     """Returns squared Mahalanobis distances (R,) and log densities (R,), without their constant, of eqs 9 and 10.
 
-    row (R,): groups. y (R, 3), cov (R, 3, 3): positions or velocities of the points; part: the entries of the state.
+    away (R, 3): positions or velocities of points less those of groups; own (R, 6, 6): what the groups add to S; cov
+    (R, 3, 3): of the points; part: the entries of the state.
     """
-    S = np.stack([_of_group(g, part, config) for g in groups])[row]
+    S = own[:, part][:, :, part]
     if config.point_covariance:
         S = S + cov
-    away = y - np.stack([g.ekf.x[part, 0] for g in groups])[row]
     inverse = np.linalg.inv(S)
     d2 = np.einsum("ri,rij,rj->r", away, inverse, away)
     return d2, (np.linalg.slogdet(inverse)[1] - d2) / 2
