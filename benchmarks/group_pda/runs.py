@@ -26,7 +26,7 @@ from tracking.detect.background_training import Trained, train
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.run import TrackingRun, track
 from tracking.scoring import evaluate
-from tracking.scoring.one_plane import in_image
+from tracking.scoring.one_plane import in_one_plane
 
 Row = dict[str, float]
 
@@ -109,7 +109,8 @@ def rows_of_job(job: TrackingJob) -> dict[str, Row] | str:
     sequence = in_memory(live) if streams else live
     with trained_once():
         answers = tracked(sequence, job.variants, job.mode)
-    return {v.name: row(truth, in_image(answers[v.name]) if v.in_image else answers[v.name]) for v in job.variants}
+    image = {v.name: in_one_plane(truth, [answers[v.name]], [True], "image")[0][0] for v in job.variants if v.in_image}
+    return {v.name: row(truth, image.get(v.name, answers[v.name])) for v in job.variants}
 
 
 def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMode) -> dict[str, TrackingRun]:

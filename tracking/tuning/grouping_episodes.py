@@ -65,7 +65,7 @@ def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Epis
         px_per_m *= errors.scale ** rng(source.seed, "label", repeat=repeat).uniform(-1, 1)
     tracks = derive(people_as_tracks(people), truth.fps, px_per_m, rule)
     grouped = time.perf_counter()
-    found = evaluate(truth, tracks)
+    found = evaluate(truth, tracks, similarity="image" if tracks and tracks[0].plane == "image" else None)
     scored = time.perf_counter()
     scores = {key: value for key, value in found.items() if value == value}
     return Episode(

@@ -320,11 +320,13 @@ def hard_scene():
 
 
 def with_a_covered_picture(sequence):
-    """The sequence in memory, without truth; something bright covers the left of its 51st picture."""
+    """The sequence in memory, without truth; something bright covers the left of its pictures from the 51st on for 2 s,
+    which is longer than lost people are kept."""
     frames = list(sequence)
-    covered = frames[50].image.copy()
-    covered[:, :250] = (60, 120, 220)
-    frames[50] = dataclasses.replace(frames[50], image=covered)
+    for k in range(50, 50 + round(2 * sequence.fps)):
+        covered = frames[k].image.copy()
+        covered[:, :250] = (60, 120, 220)
+        frames[k] = dataclasses.replace(frames[k], image=covered)
     sample = sequence.background()
     return dataclasses.replace(sequence, frames=lambda: iter(frames), load_background=lambda: sample, load_truth=None)
 

@@ -46,6 +46,7 @@ def test_people_of_no_frame(tmp_path, make_sequence, same, length):
     empty = {f: getattr(t, f)[:0] for f in ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading")}
     empty |= {f: getattr(t, f)[:0] for f in ("height", "truncation", "visible_box")}
     bare = t.replace(**empty, groups=tuple(g.none() for g in t.groups), groups_px=None, events=(), near=None, orders=())
+    bare = bare.replace(camera=None, scene=None)  # of the sequence
     assert len(none) == 0
     lone = Sequence("none", 10.0, length, live.frames, load_truth=lambda: bare)
     sequence_folder.write_sequence(tmp_path / "a", lone, scenario=SCENARIO, seed=0)
