@@ -17,10 +17,10 @@ from sim import compiler
 ROOT = Path(__file__).resolve().parents[2]
 KERNEL = """
 import warnings
+import numpy as np
 with warnings.catch_warnings(record=True) as found:
     warnings.simplefilter("always")
     from sim.geometry.hull_kernels import convex_hulls, monotone_chains
-import numpy as np
 (hull,) = convex_hulls([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]])])
 print(len(hull), monotone_chains._cache.cache_path, *{str(w.message)[:35] for w in found})
 """
