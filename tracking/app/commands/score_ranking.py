@@ -288,11 +288,13 @@ def _verdict(every: RankedRuns) -> list[str]:
     """Returns lines that say in words which runs are surely better, and that the others share ranks."""
     pairs, count = _pairs(every), every.comparison.ranking(every.key).sequences
     sure = [p for p in pairs if p["sure"]]
-    lines = [
-        f"{printable(p['run'])} is better than {printable(p['minus'])} by {number(every.key, abs(p['mean']))} "
-        f"({number(every.key, p['low'])} to {number(every.key, p['high'])})"
-        for p in sure
-    ]
+    lines = []
+    for run in dict.fromkeys(p["run"] for p in sure):
+        nearest, *others = (p for p in sure if p["run"] == run)
+        low, mean, high = (number(every.key, x) for x in sorted(abs(nearest[end]) for end in ("mean", "low", "high")))
+        rest = f", and than {printable(', '.join(p['minus'] for p in others))}" if others else ""
+        by = f"by {mean} ({low} to {high})"
+        lines.append(f"{printable(run)} is better than {printable(nearest['minus'])} {by}{rest}")
     if count < FEWEST:
         lines.append(f"{counted(count, 'sequence')}: with fewer than {FEWEST} no difference is sure")
     elif len(sure) < len(pairs):
