@@ -6,8 +6,9 @@ could report from the same detections.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -143,15 +144,26 @@ def compare_one(
 ) -> list[Scores]:
     """Returns the scores of the oracle and of each run of one sequence, all compared alike. Raises InputError as
     `compare`."""
+    info = next((run.info for run in runs if isinstance(run, TrackingRun) and run.info), {})
+    with scorer_of(sequence) as scorer:
+        best = oracle(sequence, info, similarity)
+        return scorer.evaluate_all([best, *runs], similarity=similarity, group_match=group_match)
+
+
+@contextmanager
+def scorer_of(sequence: Sequence) -> Iterator[Scorer]:
+    """Gives a scorer of the sequence's truth; what it cannot compare becomes an InputError that names the sequence.
+
+    Raises InputError if the sequence has no labels, the runs cannot be compared as asked, or an id occurs twice in one
+    frame.
+    """
     if sequence.truth is None:
         raise InputError(
             file=sequence.source.get("path", sequence.name), got="no labels", expected="a sequence with truth",
             remedy="give one with gt/",
         )  # fmt: skip
-    info = next((run.info for run in runs if isinstance(run, TrackingRun) and run.info), {})
     try:
-        best = oracle(sequence, info, similarity)
-        return Scorer(sequence.truth).evaluate_all([best, *runs], similarity=similarity, group_match=group_match)
+        yield Scorer(sequence.truth)
     except IncomparableError as error:
         raise InputError(
             file=sequence.name, place="--similarity", got=str(error), expected="what all sides have",

@@ -19,14 +19,14 @@ from tracking.app.commands.score_ranking import is_class, ranking, sparse_notes,
 from tracking.app.commands.score_tables import Means, SequenceScores, detections_words, difference_table, tables
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import find_tracks, match_tracks
+from tracking.comparison import scorer_of
 from tracking.recording_intervals import recording_differences, recording_intervals
 from tracking.run import TrackingRun
 from tracking.run_info import input_summary
 from tracking.scoring.catalogue import ALL, CATALOGUE
-from tracking.scoring.evaluation import Scorer
 from tracking.scoring.frame_weights import weighted_scorers
 from tracking.scoring.group_scores import GroupMatch
-from tracking.scoring.people_comparison import IncomparableError, Similarity
+from tracking.scoring.people_comparison import Similarity
 from tracking.stats import SURE, mean_interval, paired
 
 INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{seconds:.4g}} s"
@@ -80,7 +80,7 @@ def score(options: ScoreOptions) -> CommandResult:
         *dict.fromkeys(each[0].note for each in scored if each[0].note),
     ]
     if options.blocks:
-        means, differences = _block_intervals(sequences[0], scored[0], options.blocks)
+        means, differences = _block_intervals(sequences[0], scored[0], method, options.blocks)
         result = _result([(rows, means)], [*notes, *_short_notes(sequences[0])])
     else:
         result = _result([(part, summary(part)) for part in _by_detections(rows)], notes)
@@ -94,12 +94,11 @@ def score(options: ScoreOptions) -> CommandResult:
 @dataclass(frozen=True)
 class ScoredRun:
     """A run of one sequence with its scores. run: the tracks as they were compared, and the content of run.json.
-    method: how they were compared. note: what was done to compare them with another run, "" if nothing.
+    note: what was done to compare them with another run, "" if nothing.
     """
 
     row: SequenceScores
     run: TrackingRun
-    method: ComparisonMethod
     note: str = ""
 
 
@@ -135,7 +134,7 @@ def _scored_alike(sequence: Sequence, runs: list[TrackingRun], method: Compariso
     rows = score_runs(sequence, runs, method)
     moved = {"ground" if run[0].plane != "image" else "image" for run in runs if len(run)} - {rows[0].scores.surface}
     note = MOVED.format(plane=SURFACE_WORDS[rows[0].scores.surface]) if moved else ""
-    return [ScoredRun(row, run, method, note) for row, run in zip(rows, runs, strict=True)]
+    return [ScoredRun(row, run, note) for row, run in zip(rows, runs, strict=True)]
 
 
 def _paired_differences(rows: list[SequenceScores], others: list[SequenceScores]) -> Means:
@@ -146,7 +145,9 @@ def _paired_differences(rows: list[SequenceScores], others: list[SequenceScores]
     return {key: {**d, "pairs": n} for (key, d), n in zip(found.items(), pairs, strict=True)}
 
 
-def _block_intervals(sequence: Sequence, scored: list[ScoredRun], draws: int) -> tuple[Means, Means | None]:
+def _block_intervals(
+    sequence: Sequence, scored: list[ScoredRun], method: ComparisonMethod, draws: int
+) -> tuple[Means, Means | None]:
     """Returns the scores of the first run by key, with 95 % intervals of a single recording, and the differences to the
     second run, if any, first minus second under equal weights.
 
@@ -154,7 +155,6 @@ def _block_intervals(sequence: Sequence, scored: list[ScoredRun], draws: int) ->
     """
     truth = sequence.truth
     assert truth is not None
-    method = scored[0].method
     scorers = weighted_scorers(truth, [each.run for each in scored], method.similarity, method.group_match)
     found = _by_key(recording_intervals(truth, scorers[0], draws))
     if len(scored) == 1:
@@ -175,22 +175,8 @@ def score_runs(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMe
     this way, or the scale in px per m is not above 0 where groups are derived in the image, or an id
     occurs twice in one frame.
     """
-    if sequence.truth is None:
-        raise InputError(
-            file=sequence.source.get("path", sequence.name), got="no labels", expected="a sequence with truth",
-            remedy="give one with gt/",
-        )  # fmt: skip
-    try:
-        scores = Scorer(sequence.truth).evaluate_all(runs, similarity=method.similarity, group_match=method.group_match)
-    except IncomparableError as error:
-        raise InputError(
-            file=sequence.name, place="--similarity", got=str(error), expected="what all sides have",
-            remedy="choose another --similarity, or track from the same detections",
-        ) from None  # fmt: skip
-    except ValueError as error:
-        raise InputError(
-            file=sequence.name, got=str(error), expected="each id once in a frame", remedy="remove one of the two rows",
-        ) from None  # fmt: skip
+    with scorer_of(sequence) as scorer:
+        scores = scorer.evaluate_all(runs, similarity=method.similarity, group_match=method.group_match)
     return [
         SequenceScores(sequence.name, found, input_summary(run.info)) for found, run in zip(scores, runs, strict=True)
     ]

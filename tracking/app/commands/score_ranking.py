@@ -111,8 +111,8 @@ def sparse_notes(scores: list[Scores]) -> list[str]:
 
 def usual_key(comparison: ComparedRuns) -> str:
     """Returns "objective"; "group_F1_hull" if it would mean something else for some runs, which track whole groups."""
-    people = [np.isfinite(comparison.values("HOTA")).any(axis=1)]
-    return "group_F1_hull" if len(np.unique(people)) > 1 else "objective"
+    people = np.isfinite(comparison.values("HOTA")).any(axis=1)
+    return "group_F1_hull" if people.any() and not people.all() else "objective"
 
 
 Source = str | list[tuple[Sequence, StoredTracks]]
