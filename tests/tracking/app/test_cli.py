@@ -210,8 +210,12 @@ def length(name: str, place: Place) -> int:
     return LENGTHS[name]
 
 
+# Python drops a KeyboardInterrupt raised in a destructor and reports it; `tracking.interrupts` raises it again.
+LOST = pytest.mark.filterwarnings("ignore:(?s).*KeyboardInterrupt:pytest.PytestUnraisableExceptionWarning")
+
+
 @pytest.mark.parametrize("as_json", [False, True], ids=["text", "json"])
-@pytest.mark.parametrize("state", ["good", "bad", pytest.param("interrupted", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("state", ["good", "bad", pytest.param("interrupted", marks=[pytest.mark.slow, LOST])])
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n == "demo")) for n in COMMANDS])
 def test_command(name, state, as_json, place, capsys):
     """Codes 0, 2 and 130; one line or one object; what is written is whole, or nothing is."""
