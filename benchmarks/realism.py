@@ -2,7 +2,6 @@
 
     python -m benchmarks.realism walking [--seeds 0:40]
     python -m benchmarks.realism recording [--data FOLDER] [--seeds 0:40] [--scenarios street …]
-    python -m benchmarks.realism middle [--data FOLDER] [--seeds 0:40] [--scenarios street …]
     python -m benchmarks.realism replays [--data FOLDER]
 
 walking: free speeds, speeds and shapes of groups that walk alone on open ground, measured from 4 s after the start.
@@ -10,9 +9,6 @@ recording: seq_hotel (BIWI) and scenarios of the catalogue, sampled at 2.5 frame
 differences. Printed for each: quantiles (5, 25, 50, 75, 95 %) of the speeds of people who walk (> 0.3 m/s) and of the
 closest approach, the least distance of two people of different groups who come within 3 m; then Wasserstein distances
 to the recording in speed and closest approach, and the ratio of the 99 % quantiles of the acceleration.
-middle: medians of rough motion (benchmarks.roughness) of seq_hotel, zara01 and scenarios, these also with the errors of
-a labeller. Then what tells errors of labels from motion: repeated labels, labels on straight lines, and the amplitudes
-of positions along and across the walk by frequency and speed.
 replays: whole recordings replayed at 10 frames/s. `off`: distance of the replay from the labelled position at the time
 of the label (50, 99 %, m). Speeds (50, 99 %, m/s) and accelerations (99 %, m/s²) of the recording are differences of
 its labels at its own rate, those of the replay at 10 frames/s. Events are measured on the labels and on the replay.
@@ -28,27 +24,19 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import wasserstein_distance
 
-from benchmarks import roughness
-from benchmarks.belonging.sources import sample
-from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser
-from benchmarks.support.tables import table
+from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER, add_data, add_seeds, new_parser
 from scenarios.loading.resolve import load, names
 from scenarios.schema.observation import ObservationSpec
 from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
 from sim.dataset.replay import on_ground, replay
 from sim.io.source import open_source
-from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Motion, Sequence, Truth
-from tracking.tuning.grouping_episodes import SURVEYED, with_label_errors
 
 STEP = 0.4  # s
 WALKING = 0.3  # m/s
 MEETING = 3.0  # m
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-PACES = ((0.8, 1.2), (1.2, 1.6), (1.6, 2.2))  # m/s
-FEW = 30  # walks
-ON_A_LINE = 1e-3  # m/s²: labels on a straight line at constant speed
 OPEN_GROUND = {"schema": 1, "duration": 9.0, "warmup": 4.0, "world": {"size": [60, 20]}}
 
 
@@ -218,59 +206,6 @@ def recording(folder: Path, scenarios: list[str], seeds: range) -> None:
         print(f"W {speed:.2f} m/s, {closest:.2f} m, acceleration x {ratio:.2f}", flush=True)
 
 
-def middle(data: Path, scenarios: list[str], seeds: range) -> None:
-    rough = {name: roughness.roughness([sample(_labels(data / name))]) for name in (HOTEL, ZARA)}
-    for name in scenarios:
-        truths = [truth for seed in seeds if (truth := simulate(load(name), seed, streams=()).truth) is not None]
-        wrong = [with_label_errors(truth, SURVEYED, seed) for truth, seed in zip(truths, seeds, strict=True)]
-        rough[name] = roughness.roughness(map(sample, truths))
-        rough[f"{name}, label errors"] = roughness.roughness(map(sample, wrong))
-    columns = ["acceleration, m/s²", "above 0.94 Hz along, across, mm", "velocity difference of mates, m/s"]
-    columns += ["spread of their distance, m", "angle of pairs (10, 50 %)"]
-    table("medians", "source", columns, {name: _middle(r) for name, r in rough.items()})
-    columns = ["labels as the one before, standing", "no acceleration, walking or not"]
-    columns += ["error of labels, standing, m"]
-    table("labels", "source", columns, {name: _label_signs(rough[name]) for name in (HOTEL, ZARA)})
-    f = [f"{x:g} Hz" for x in roughness.frequencies()[1:]]
-    table(
-        "amplitude along / across, mm/√Hz", "source, speed", f, {k: v for r in rough.items() for k, v in _spectra(*r)}
-    )
-
-
-def _labels(folder: Path) -> Truth:
-    truth = open_source(folder)[0].truth
-    assert truth is not None
-    return truth
-
-
-def _middle(r: roughness.Roughness) -> list[str]:
-    def median(x: Array) -> str:
-        return f"{np.median(x):.2f}" if len(x) else "–"
-
-    fast = ", ".join(f"{x:.1f}" for x in roughness.fast_part(r.walks)) if len(r.walks) else "–"
-    angle = "{:.0f}, {:.0f}°".format(*np.quantile(r.mates_angle, (0.1, 0.5))) if len(r.mates_angle) else "–"
-    return [median(r.acceleration), fast, f"{np.median(r.mates_velocity):.3f}" if len(r.mates_velocity) else "–",
-            f"{np.median(r.mates_spread):.3f}" if len(r.mates_spread) else "–", angle]  # fmt: skip
-
-
-def _label_signs(r: roughness.Roughness) -> list[str]:
-    error = np.sqrt(np.mean(r.still[:, 1] ** 2))
-    return [f"{r.still[:, 0].mean():.0%}", f"{np.mean(r.acceleration < ON_A_LINE):.0%}", f"{error:.3f}"]
-
-
-def _spectra(name: str, r: roughness.Roughness) -> list[tuple[str, list[str]]]:
-    """Returns a row per range of speeds: square roots of the median power over ln 2, the mean of exponential power."""
-    out = []
-    for low, high in PACES:
-        k = (r.pace >= low) & (r.pace < high)
-        if k.sum() >= FEW:
-            along, across = np.sqrt(np.median(r.walks[k], axis=0) / np.log(2))[:, 1:]
-            out.append(
-                (f"{name}, {low}–{high} m/s", [f"{a:.0f} / {b:.0f}" for a, b in zip(along, across, strict=True)])
-            )
-    return out
-
-
 def label_distances(source: Sequence, made: Sequence) -> Array:
     """Returns the distances, m, between labels and replay at the labels that fall on a frame of the replay."""
     labels, truth, origin = source.truth, made.truth, made.source["origin"]
@@ -327,17 +262,15 @@ def replays(data: Path) -> None:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["walking", "recording", "middle", "replays"])
+    parser.add_argument("mode", choices=["walking", "recording", "replays"])
     add_seeds(parser, "0:40")
-    parser.add_argument("--scenarios", nargs="*", default=names(), help="recording, middle: scenarios to compare")
+    parser.add_argument("--scenarios", nargs="*", default=names(), help="recording: scenarios to compare")
     add_data(parser)
     args = parser.parse_args()
     if args.mode == "walking":
         walking(args.seeds)
     elif args.mode == "recording":
         recording(args.data / HOTEL, args.scenarios, args.seeds)
-    elif args.mode == "middle":
-        middle(args.data, args.scenarios, args.seeds)
     else:
         replays(args.data)
 

@@ -1,4 +1,6 @@
-"""Mode `ghosts` of `benchmarks.foreground`: backgrounds with people who stood, with and without the search for ghosts.
+"""Backgrounds with people who stood, with and without the search for ghosts: scores of `blob` from pixels.
+
+    python -m benchmarks.ghosts [--seeds 20000:20002] [--data FOLDER]
 
 videos: 30 s at FPS frames per second, JPEG of quality 80. Scenes of the catalogue are seen from the side, as bare video
 with the scale; streets from above, with their camera. Columns: means over videos of HOTA and MOTA of `blob`; what the
@@ -21,6 +23,7 @@ import numpy as np
 
 import tracking
 from benchmarks.support.in_memory import people_in_view
+from benchmarks.support.options import PETS, add_data, add_seeds, new_parser
 from benchmarks.support.tables import head, row, signed
 from scenarios import load
 from sim import simulate
@@ -42,11 +45,14 @@ RATES = 0.999, 0.9993, 0.9995, 0.9997, 0.9998
 WORKERS = 2
 
 
-def ghosts(seeds: range, pets_folder: Path) -> None:
-    """Prints the table of videos and that of PETS."""
-    jobs = [(name, seed) for name in (*SIDE, *STREETS) for seed in seeds]
+def main() -> None:
+    parser = new_parser(__doc__)
+    add_data(parser)
+    add_seeds(parser, "20000:20002")
+    given = parser.parse_args()
+    jobs = [(name, seed) for name in (*SIDE, *STREETS) for seed in given.seeds]
     rows_of(f"{len(jobs)} videos", jobs, of_video)
-    rows_of("PETS, one recording: indicative", [(pets_folder, rate) for rate in RATES], of_pets)
+    rows_of("PETS, one recording: indicative", [(given.data / PETS, rate) for rate in RATES], of_pets)
 
 
 def rows_of(title: str, jobs: Iterable[tuple[object, ...]], of: Callable[..., Array]) -> None:
@@ -138,3 +144,7 @@ def measure(
     assert video.truth is not None
     scores = tracking.evaluate(video.truth, run, similarity="boxes")
     return [float(scores["HOTA"]), float(scores["MOTA"]), mended, of_people]
+
+
+if __name__ == "__main__":
+    main()
