@@ -63,7 +63,7 @@ class CameraSpec(Model):
 
 
 class CrowdSpec(Model):
-    """How people walk; the defaults are measured values (docs/experiments/realism.md).
+    """How people walk; the defaults are measured values (docs/results/simulation.md).
 
     free_speed (of a person alone, m/s), spacing between neighbours in a group (m), body height (m): numbers or
     distributions. slowdown_per_member: n people walk at their mean free speed less this times (n - 1), m/s. sway:
