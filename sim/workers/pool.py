@@ -19,15 +19,9 @@ from sim.workers.protocol import MAX_LOSSES, THREAD_VARIABLES, R, RunItems, T, w
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[RunItems]:
-    """Give the RunItems (run a function over items) of `workers` local worker processes for the length of the block.
-
-    workers: 1 or more; with 0 no item is run. A process is spawned when it gets its first item, and again after its
-    death. The block sets THREAD_VARIABLES (OMP_NUM_THREADS and others) to 1 in this process's environment, so that the
-    workers inherit them, and restores them at its end. The end of the block terminates the processes, also in the
-    middle of a call. Reading results raises the exception of the function, the pickling error of an item, and WorkError
-    for an item of which three processes died unless `on_loss` is given. `ahead` is ignored.
-    """
+    """Yields the RunItems of `workers` spawned processes; the end of the block terminates them, also in a call."""
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    # The processes inherit the variables.
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     processes = [WorkerProcess() for _ in range(workers)]
 
@@ -53,10 +47,7 @@ def process_pool(workers: int) -> Iterator[RunItems]:
 
 @dataclass
 class _PendingItem(Generic[T]):
-    """An item that has no result yet.
-
-    item: the argument for the function. losses: number of worker processes that have died while running it, 0 at first.
-    """
+    """An item without result, and how many processes have died of it."""
 
     item: T
     losses: int = 0
@@ -68,15 +59,6 @@ def _run_items(
     items: Iterable[T],
     on_loss: Callable[[T, WorkError], R] | None,
 ) -> Iterator[tuple[T, R]]:
-    """Yield (item, function(item)) for every item, in the order in which the results arrive.
-
-    items: read one whenever a process is idle; items to repeat come first. Each of `processes` runs one item at a time,
-    so the death of a process is the loss of one item. The item is run again until MAX_LOSSES (3) processes have died of
-    it. Then on_loss(item, error) becomes its result; if `on_loss` is None, the WorkError is raised. It is raised in
-    spite of `on_loss` after more than MAX_LOSSES × (number of processes + 1) deaths without a result in between. Raises
-    the exception of the function, and the pickling error of a function or item. When the iteration ends early, busy
-    processes are terminated.
-    """
     from multiprocessing.connection import wait
 
     waiting, to_repeat, idle = map(_PendingItem, items), list[_PendingItem[T]](), list(processes)
@@ -84,6 +66,7 @@ def _run_items(
     losses_in_a_row = 0  # deaths since the last result
     try:
         while True:
+            # Items are read one by one, so that a generator can react to earlier results.
             while idle and (pending := to_repeat.pop() if to_repeat else next(waiting, None)) is not None:
                 process = idle.pop()
                 busy[process.send(function, pending.item)] = process, pending
@@ -99,6 +82,7 @@ def _run_items(
             pending.losses, losses_in_a_row = pending.losses + 1, losses_in_a_row + 1
             if pending.losses < MAX_LOSSES:
                 to_repeat.append(pending)
+            # If all die without a result in between, the fault is not the item's.
             elif on_loss is None or losses_in_a_row > MAX_LOSSES * (len(processes) + 1):
                 raise worker_loss(MAX_LOSSES, process.ended)
             else:

@@ -20,9 +20,7 @@ EXIT_TIMEOUT = 5.0  # s that a terminated process has to exit before it is kille
 
 
 class RemoteTraceback(Exception):
-    """The text of a traceback from a worker process: `__cause__` of the call's exception when that is raised in the
-    parent.
-    """
+    """The text of a traceback in a worker: the cause of the call's exception when that is raised here."""
 
     def __str__(self) -> str:
         return f"\n{self.args[0]}"
@@ -30,20 +28,14 @@ class RemoteTraceback(Exception):
 
 @dataclass(frozen=True)
 class WorkResult:
-    """The outcome of one call in a worker.
+    """The outcome of one call in a worker."""
 
-    value: the return value, None after an exception. error: the exception, None after success. trace: the text of the
-    exception's traceback in the worker, "" after success.
-    """
-
-    value: Any = None
-    error: BaseException | None = None
-    trace: str = ""
+    value: Any = None  # the return value, None after an exception
+    error: BaseException | None = None  # the exception, None after success
+    trace: str = ""  # the text of the exception's traceback in the worker, "" after success
 
     def result(self) -> Any:
-        """Return the call's value, or raise the call's exception with the worker's traceback (RemoteTraceback) as its
-        cause.
-        """
+        """Returns the call's value, or raises its exception, caused by a RemoteTraceback."""
         if self.error is not None:
             raise self.error from RemoteTraceback(self.trace)
         return self.value
@@ -62,13 +54,7 @@ class WorkerProcess:
         self._pipe: Any = None
 
     def send(self, function: Callable[[Any], Any], item: Any) -> Any:
-        """Send the call function(item); returns the connection that becomes readable when the call is done or the
-        process is dead.
-
-        Starts a process if none is alive. The outcome is read with `receive`, before the next `send`. Raises the
-        pickling error of a function or item that cannot be pickled. A process that dies while the call is sent raises
-        nothing here.
-        """
+        """Sends the call function(item); returns the connection that is readable at its end or the process's."""
         call = pickle.dumps((function, item))
         if self._process is None or not self._process.is_alive():
             self._start()
@@ -77,32 +63,23 @@ class WorkerProcess:
         return self._pipe
 
     def receive(self) -> WorkResult | None:
-        """Wait for the outcome of the call that was sent last; returns None if the process died instead, and then sets
-        `ended`.
-
-        An exception of the call is not raised; it is in the WorkResult. Raises the unpickling error of a value that
-        cannot be unpickled here.
-        """
+        """Returns the outcome of the call that was sent last; None if the process died, and then sets `ended`."""
         try:
             body = self._pipe.recv_bytes()
         except (EOFError, OSError):
             self.join()
             return None
+        # Some exceptions can be pickled, but not unpickled; these become a RuntimeError.
         result: WorkResult = pickle.loads(body)
         return result
 
     def terminate(self) -> None:
-        """Ask the process to exit at once, without waiting for its call or for its exit; does nothing without a
-        process.
-        """
+        """Asks the process to exit at once, without waiting."""
         if self._process is not None:
             self._process.terminate()
 
     def join(self) -> None:
-        """Wait until the process has exited, close its pipe and set `ended`; does nothing without a process.
-
-        Kills a process that takes longer than EXIT_TIMEOUT (5 s).
-        """
+        """Waits until the process has exited (kills it after 5 s), closes its pipe and sets `ended`."""
         if self._process is None:
             return
         self._process.join(EXIT_TIMEOUT)
@@ -127,12 +104,7 @@ class WorkerProcess:
 
 
 def _serve(pipe: Any) -> None:
-    """Run in the worker process: run each pickled call from `pipe` and send back its pickled WorkResult, until the
-    parent closes it.
-
-    A closed or broken pipe ends it without an error. Ignores Ctrl-C. The worker exits with code 1 when its parent
-    exits; a thread waits for that.
-    """
+    # The parent handles Ctrl-C.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     with suppress(EOFError, OSError):
@@ -141,12 +113,7 @@ def _serve(pipe: Any) -> None:
 
 
 def run_pickled(call: bytes) -> bytes:
-    """Run a pickled (function, item) and return the pickled WorkResult; never raises, not even SystemExit.
-
-    An exception of the call is stored in the WorkResult with the text of its traceback. A result that cannot be pickled
-    gives a WorkResult with the pickling error. An exception that does not survive pickling becomes a RuntimeError with
-    its type and text.
-    """
+    """Runs a pickled (function, item) and returns the pickled WorkResult; never raises, not even SystemExit."""
     try:
         function, item = pickle.loads(call)
         return pickle.dumps(WorkResult(function(item)))
@@ -169,4 +136,5 @@ def _exit_with_parent() -> None:
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])
+        # A killed parent leaves no worker behind.
         os._exit(1)

@@ -14,19 +14,13 @@ from pathlib import Path
 from scenarios.errors import InputError
 from sim.io.files.atomic import write_error
 
+# folders whose lock an enclosing block of this thread holds
 _held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
-"""Folders whose lock an enclosing block of this thread holds."""
 
 
 @contextmanager
 def lock_folder(root: Path) -> Iterator[None]:
-    """Create the folder `root` and hold its lock for the length of the block; the block gets None.
-
-    Folders that it created are removed at the end if they are empty. `hold_lock` is the same for a writer that may run
-    inside such a block. Raises InputError at once, without waiting, if another process, or another block of this one,
-    holds the lock. An OSError inside the block is raised as WorkError if the disk is full, else as InputError. Systems
-    and file systems without such locks, as NFS, run unlocked.
-    """
+    """Creates the folder `root` and holds its lock for the block; InputError at once if somebody else holds it."""
     made = [p for p in (root, *root.parents) if not p.exists()]
     try:
         with _lock(root):
@@ -43,7 +37,7 @@ def lock_folder(root: Path) -> Iterator[None]:
 
 
 def hold_lock(root: Path) -> AbstractContextManager[None]:
-    """Return `lock_folder(root)`, or a block without effect inside one of the same thread for the same folder."""
+    """Returns `lock_folder(root)`, or a block without effect inside one of this thread for the same folder."""
     return nullcontext() if root.resolve() in _held.get() else lock_folder(root)
 
 
@@ -80,8 +74,8 @@ def _lock(root: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
+# Whoever held the lock may have removed the folder, and another may stand at its path now.
 def _is_folder(descriptor: int, root: Path) -> bool:
-    """Returns whether the open folder still stands at the path `root`, where another one may have been created."""
     try:
         return os.path.samestat(os.fstat(descriptor), os.stat(root))
     except FileNotFoundError:

@@ -13,14 +13,13 @@ from scenarios.limits import is_number
 
 @dataclass(frozen=True)
 class Rule:
-    """What a value must be. accepts: returns True for a right value, whatever the type. words: for the error."""
+    """What a value must be."""
 
-    accepts: Callable[[Any], bool]
-    words: str
+    accepts: Callable[[Any], bool]  # returns True for a right value, whatever the type
+    words: str  # for the error
 
 
-Rules = Mapping[str, Rule]
-"""Rules by key."""
+Rules = Mapping[str, Rule]  # rules by key
 
 TEXT = Rule(lambda v: isinstance(v, str), "a text")
 TABLE = Rule(lambda v: isinstance(v, dict), "an object")
@@ -28,7 +27,7 @@ FLAG = Rule(lambda v: isinstance(v, bool), "true or false")
 
 
 def whole(low: int, high: int) -> Rule:
-    """Return the rule for whole numbers from `low` to `high`, both included."""
+    """Returns the rule for whole numbers from `low` to `high`, both included."""
     return Rule(
         lambda v: isinstance(v, int) and not isinstance(v, bool) and low <= v <= high,
         f"a whole number from {low} to {high}",
@@ -36,32 +35,27 @@ def whole(low: int, high: int) -> Rule:
 
 
 def number(low: float, high: float) -> Rule:
-    """Return the rule for numbers from `low` to `high`, both included."""
+    """Returns the rule for numbers from `low` to `high`, both included."""
     return Rule(lambda v: is_number(v, low, high), f"a number from {low:g} to {high:g}")
 
 
 def one_of(*words: str) -> Rule:
-    """Return the rule for one of these texts."""
+    """Returns the rule for one of these texts."""
     return Rule(lambda v: v in words, f"one of {', '.join(words)}")
 
 
 def list_of(rule: Rule) -> Rule:
-    """Return the rule for lists, possibly empty, whose values all follow `rule`."""
+    """Returns the rule for lists, possibly empty, whose values all follow `rule`."""
     return Rule(lambda v: isinstance(v, list) and all(map(rule.accepts, v)), f"a list, each {rule.words}")
 
 
 def or_none(rule: Rule) -> Rule:
-    """Return the rule for null, and for values that follow `rule`."""
+    """Returns the rule for null, and for values that follow `rule`."""
     return Rule(lambda v: v is None or rule.accepts(v), f"null, or {rule.words}")
 
 
 def check_values(path: Path, values: Any, rules: Rules, remedy: str, *, inside: str = "") -> None:
-    """Raise InputError, with the key, for the first value that does not follow its rule; do nothing otherwise.
-
-    path: of the file, for the error. values: what was read from it, or from its key `inside` ("" for the whole file).
-    Values of an inner object must all be there; keys of the whole file that are missing are not checked, nor are keys
-    without a rule. remedy: for the error.
-    """
+    """Raises InputError, with the key, for the first value that does not follow its rule."""
     if not isinstance(values, dict):
         raise InputError(file=path, place=inside, got=repr(values), expected=TABLE.words, remedy=remedy)
     for key, rule in rules.items():

@@ -20,12 +20,7 @@ SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios 
 
 
 def read_calibration(path: Path) -> Camera:
-    """Return the Camera of the calibration file `path`: Tsai's XML if its name ends in .xml, OpenCV's YAML of a
-    rectified pair if it ends in .yml or .yaml, else our camera.json.
-
-    Raises InputError if there is no such file, it is no XML, YAML or JSON object, a value is missing or of the wrong
-    kind or shape, the camera cannot be used (sim.scene.camera_check), or its lengths cannot be metres.
-    """
+    """Returns the camera of a calibration file: Tsai's .xml, OpenCV's .yml of a rectified pair, or camera.json."""
     require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
     if path.suffix.lower() == ".toml":
         remedy = "give the recording's calibration; a TOML file describes a view for `flockscope replay --camera`"
@@ -41,12 +36,8 @@ def read_calibration(path: Path) -> Camera:
 
 
 def _require_metres(camera: Camera, path: Path) -> Camera:
-    """Return the camera unchanged; raise InputError if its lengths cannot be metres.
-
-    The height is no length in m if a person right below would be smaller than 2 px in any direction of view; the
-    baseline is none if it is longer than 2 m and than a quarter of the height.
-    """
     height = float(camera.position[2])
+    # From so high, a person right below would be smaller than 2 px in any direction of view.
     person = camera.focal_px[1] * PERSON / height if camera.kind == "pinhole" else np.inf
     if person < SMALLEST:
         got = f"height {height:g} m, from where a person is {person:.2g} px tall"
@@ -63,18 +54,11 @@ def _require_metres(camera: Camera, path: Path) -> Camera:
 def scaled_to_image(
     camera: Camera, image: tuple[int, int] | None, path: Path, aspect: Fraction = Fraction(1)
 ) -> Camera:
-    """Return the camera for pictures of `image` = (width, height) px, if it was calibrated at another size.
-
-    Focal lengths and image centre are scaled per axis, px_per_m by the geometric mean of both factors; position,
-    rotation and distortion stay. With `image` None or equal to the camera's size, the camera is returned unchanged.
-    path: the recording, for the error. aspect: width / height of the recording's stored pixels, which `image` shows as
-    squares; the camera may be calibrated with stored or square pixels.
-
-    Raises InputError if the aspect ratios differ by more than SHAPE_TOLERANCE (1 %).
-    """
+    """Returns the camera for pictures of `image` (width, height) px; `aspect` is that of the stored pixels."""
     if image is None or image == camera.image:
         return camera
     x, y = image[0] / camera.image[0], image[1] / camera.image[1]
+    # It may be calibrated with the stored pixels or with square ones.
     if all(abs(x / y / ratio - 1) > SHAPE_TOLERANCE for ratio in (1.0, float(aspect))):
         raise InputError(
             file=path, place="--camera", got="a calibration for {}×{} px".format(*camera.image),

@@ -13,27 +13,20 @@ from sim.io.formats.mot_people import PEDESTRIAN, classes_of
 from sim.io.formats.mot_table import MotTable
 from sim.types import Bools, Unscored
 
-DISTRACTORS = (2, 7, 8, 12)
-"""Classes of distractors from MOT16 on."""
+DISTRACTORS = (2, 7, 8, 12)  # classes of distractors from MOT16 on
 
-MOT20 = "MOT20"
-"""Begins the names of MOT20's sequences."""
+MOT20 = "MOT20"  # begins the names of MOT20's sequences
 
 MOT20_DISTRACTORS = (*DISTRACTORS, 6)
 
+# columns after the box in labels of MOTChallenge: flag, class, visibility. More columns have other classes.
 LABEL_COLUMNS = 3
-"""Columns after the box in labels of MOTChallenge: flag, class, visibility. More columns have other classes."""
 
-CLASSES = range(1, 14)
-"""Classes of MOTChallenge. A text with another class has classes of its own, and no distractors."""
+CLASSES = range(1, 14)  # classes of MOTChallenge. A text with another class has classes of its own, and no distractors.
 
 
 def unscored_rows(table: MotTable, people: Bools, name: str, person_class: int | None) -> Unscored | None:
-    """Returns the labelled rows beside the `people` (N,), sorted by frame; None if there are no distractors among them.
-
-    name: the sequence's; the folder of gt/gt.txt counts as well. person_class: the class of people that the user named,
-    None if none; classes in which a person is not 1 are not those of MOTChallenge and have no distractors.
-    """
+    """Returns the labelled rows beside `people` (N,), sorted by frame; None if no distractor is among them."""
     found = classes_of(table, person_class is not None)
     if (
         found is None

@@ -11,25 +11,19 @@ from sim.io.formats.mot_ground import has_ground
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable
 from sim.types import Array, Bools
 
-PEDESTRIAN = 1
-"""Class of a person from MOT16 on."""
+PEDESTRIAN = 1  # class of a person from MOT16 on
 
-LABELS = "gt.txt"
-"""Name of a text of labels. Its column 7 is a flag; that of another text may be a confidence."""
+LABELS = "gt.txt"  # name of a text of labels. Its column 7 is a flag; that of another text may be a confidence.
 
-LAST_CLASS = 100
-"""Greatest class of the usual sets of classes; COCO has up to 91."""
+LAST_CLASS = 100  # greatest class of the usual sets of classes; COCO has up to 91
 
-SHOWN = 8
-"""Most values that a message lists."""
+SHOWN = 8  # most values that a message lists
 
 
 def labelled_people(table: MotTable, person_class: int | None) -> Bools:
-    """Return flags (N,), True for rows that are labelled people: an id from 0, a flag other than 0, the right class.
+    """Returns flags (N,) of rows that are people: an id from 0, another flag than 0, the right class.
 
-    person_class: the class of people; None: 1, with a warning about rows of other classes. Column 7 of a text that is
-    no gt.txt counts as a flag only if all its values are 0, 1 or -1 and not all are 0. Raises InputError if there are
-    rows but no person, or if `person_class` is given and the text has no classes.
+    person_class: the class of people; None: 1, with a warning about rows of other classes.
     """
     keep, file = np.asarray(table.id >= 0), table.rows.file
     if len(keep) and not keep.any():
@@ -38,6 +32,7 @@ def labelled_people(table: MotTable, person_class: int | None) -> Bools:
             remedy="give each person an id",
         )  # fmt: skip
     flag = table.rest[:, 0] if table.rest.shape[1] else np.ones(len(keep))
+    # Column 7 of another text may be a confidence.
     if file.name == LABELS or (np.isin(flag, (0, 1, -1)).all() and flag.any()):
         keep &= flag != 0
         if len(keep) and not keep.any():
@@ -57,10 +52,7 @@ def labelled_people(table: MotTable, person_class: int | None) -> Bools:
 
 
 def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
-    """Return `keep` (N,) without the rows of other classes than that of people; `keep` itself if there are no classes.
-
-    person_class: None: 1, with a warning about rows of other classes. Raises InputError if this leaves no row.
-    """
+    """Returns `keep` (N,) without the rows of other classes than that of people."""
     found = classes_of(table, person_class is not None)
     if found is None or not keep.any():
         return keep
@@ -81,12 +73,7 @@ def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
 
 
 def classes_of(table: MotTable, named: bool) -> Array | None:
-    """Return column 8 (N,) if it holds classes, else None. named: True if the user named a class (--class).
-
-    8 or 9 columns have a class unless it is -1 in all rows. 10 columns have one if the user named one, or if z is -1 in
-    all rows, and column 8 has whole numbers from 0. If columns 8 to 10 are no metres, column 8 is a class, as in
-    VisDrone, if each person has one all the time and not all are 0 or 1, which may be flags.
-    """
+    """Returns column 8 (N,) if it holds classes, else None. named: True if the user named one (--class)."""
     if table.rest.shape[1] < 2 or table.rows.values.shape[1] == GROUND_COLUMNS:
         return None
     column = table.rest[:, 1]
@@ -96,11 +83,11 @@ def classes_of(table: MotTable, named: bool) -> Array | None:
         return column
     if (column < 0).any() or (column != np.round(column)).any():
         return None
+    # If columns 8 to 10 are no metres, column 8 may be a category, as in VisDrone.
     return column if named or (table.rest[:, 3] == -1).all() or _one_for_each(table, column) else None
 
 
 def _one_for_each(table: MotTable, column: Array) -> bool:
-    """Return True if column 8 is a category that each id keeps; 10 columns that may be metres have none."""
     if (table.id < 0).any() or column.max(initial=0) < 2 or column.max(initial=0) > LAST_CLASS or has_ground(table):
         return False
     order = np.lexsort((column, table.id))

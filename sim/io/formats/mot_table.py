@@ -17,55 +17,45 @@ from sim.io.formats.box_columns import BoxScale, reject_missing_ids
 from sim.io.formats.named_columns import column_names, read_named
 from sim.types import Array, Bools, Ints
 
-GROUND_COLUMNS = 4
-"""Columns of a text of ground positions alone: frame, id, x, y."""
+GROUND_COLUMNS = 4  # columns of a text of ground positions alone: frame, id, x, y
 
+# what the columns of a text without names must be, and what to do
 LAYOUT = "frame,id,left,top,width,height,… or frame,id,x,y: name the columns in the first line, if they are others"
-"""What the columns of a text without names must be, and what to do."""
 
 
 @dataclass(frozen=True)
 class MotTable:
-    """A MOTChallenge text file, N rows in the order of the file.
+    """A MOTChallenge text file, N rows in the order of the file."""
 
-    rows: the numbers as read, with their lines for errors. frame (N,): from 1. id (N,): of the person or track, usually
-    -1 for detections. box (N, 4): left, top, width, height in px, all -1 for no box. rest (N, 0 to 4): the columns
-    after the box: confidence or flag; then class and visibility, or x, y, z in m.
-    """
-
-    rows: NumericTable
-    frame: Ints
-    id: Ints
-    box: Array
-    rest: Array
+    rows: NumericTable  # the numbers as read, with their lines for errors
+    frame: Ints  # (N,) from 1
+    id: Ints  # (N,) of the person or track, usually -1 for detections
+    box: Array  # (N, 4) left, top, width, height in px, all -1 for no box
+    rest: Array  # (N, 0 to 4) the columns after the box: confidence or flag; then class and visibility, or x, y, z in m
 
     def boxes(self) -> Array:
-        """Return the boxes of the rows that have one, (B, 4). Raises nothing."""
+        """Returns the boxes of the rows that have one, (B, 4)."""
         return self.box[~self.without_box()]
 
     def without_box(self) -> Bools:
-        """Return flags (N,), True for rows whose box is -1,-1,-1,-1, which means that the row has no box. Raises
-        nothing."""
+        """Returns flags (N,): True for rows whose box is -1,-1,-1,-1."""
         return np.asarray((self.box == -1).all(axis=1))
 
 
 def read_table(
     path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None
 ) -> MotTable:
-    """Read the MOTChallenge text file `path` of 6 to 10 columns: frame, id, left, top, width, height, and up to four
-    more; or of 4 columns: frame, id, x, y in m, which are read as rows without box, of confidence 1 and z = 0.
+    """Reads a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
 
-    length: the last frame allowed; None: 1,000,000. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors
-    of x and y that make the boxes pixels; None: 1. A file without
-    lines gives a table without rows. Rows stay in the order of the file. Raises InputError if the file is unreadable,
-    and, with the line, if a cell is no finite number, the number of columns is wrong, a frame is outside 1 to `length`,
-    a frame or id is no integer, a number is beyond 1e6, a frame has more than 5000 lines, or a box has no area.
+    length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
+    boxes pixels. Rows stay in the order of the file.
     """
     named = column_names(path)
     rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS, layout=LAYOUT) if named is None else read_named(path, named)
     frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] == GROUND_COLUMNS:
+        # A text of positions: no box, confidence 1, z = 0.
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
     table = MotTable(rows, frame, id, box, rest)
     last = FRAMES if length is None else length

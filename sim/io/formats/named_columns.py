@@ -15,9 +15,10 @@ from sim.io.files.numeric_text import NumericTable, is_number_text, read_numbers
 
 Column = np.ndarray[tuple[int], np.dtype[np.float64]]
 
+# units that may end the names of positions, as x_cm,y_cm, in m
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
-"""Units that may end the names of positions, as x_cm,y_cm, in m."""
 
+# meaning of a column, and the names it may have
 NAMES = {
     "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_index"),
     "id": ("id", "track_id", "trackid", "person_id", "ped_id", "target_id"),
@@ -34,7 +35,6 @@ NAMES = {
     "x": ("x", *(f"x_{unit}" for unit in UNITS)),
     "y": ("y", *(f"y_{unit}" for unit in UNITS)),
 }
-"""Meaning of a column, and the names it may have."""
 
 EXPECTED = (
     "frame and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), or frame,id,x,y in m (x_cm,y_cm in cm)"
@@ -42,20 +42,14 @@ EXPECTED = (
 
 
 def column_names(path: Path) -> list[str] | None:
-    """Return the names in the first line that is not empty, in lower case; None if no cell of it is a name."""
+    """Returns the names in the first line of a text, in lower case; None if a cell of it is a number."""
     line = next((line for line in read_text(path).splitlines() if line.strip()), "")
     cells = [cell.strip().strip('"').lower() for cell in line.split("," if "," in line else None)]
     return cells if cells and not line.startswith("#") and not any(map(is_number_text, cells)) and cells[0] else None
 
 
 def read_named(path: Path, names: list[str]) -> NumericTable:
-    """Read a text with named columns as rows of 8 columns of a MOTChallenge text, or of 4: frame, id, x, y in m.
-
-    Ids are -1 if no column is an id. Scores are 1 and classes -1 if the text has none. Columns of other names are not
-    used, with a warning. Frames that begin with 0 are counted from 1, with a warning.
-
-    Raises InputError if names are missing or double, and as `read_numbers`.
-    """
+    """Reads a text with named columns as 8 columns of a MOTChallenge text, or as 4: frame, id, x, y in m."""
     rows = read_numbers(path, (len(names), len(names)), header=True, layout="those that line 1 names")
     found: dict[str, int] = {}
     for k, name in enumerate(names):
@@ -90,7 +84,6 @@ def read_named(path: Path, names: list[str]) -> NumericTable:
 
 
 def _box(column: Callable[[str], Column], have: Set[str]) -> tuple[Column, Column, Column, Column] | None:
-    """Return left, top, width, height from the columns that there are; None if they make no box."""
     w, h = column("width"), column("height")
     if have >= {"left", "top", "width", "height"}:
         return column("left"), column("top"), w, h

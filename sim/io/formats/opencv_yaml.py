@@ -21,26 +21,20 @@ from sim.io.files.numeric_text import read_text
 from sim.scene.camera_check import require_camera
 from sim.types import Array, Camera
 
-SAME = 1e-6
-"""Relative difference allowed between P1 and the left part of P2."""
+SAME = 1e-6  # relative difference allowed between P1 and the left part of P2
 KEYS = ("image_width", "image_height", "P1", "P2", "rotation", "position")
 KEY = re.compile(r"([A-Za-z_]\w*)\s*:\s*(.*)")
 NUMBER = re.compile(r"[-+]?([0-9]{1,30}\.?[0-9]{0,30}|\.[0-9]{1,30})([eE][-+]?[0-9]{1,3})?")
 LIST = re.compile(r"\[([^\[\]]*)\]")
+# A matrix of two or of any number of dimensions, as FileStorage writes it
 MATRIX = re.compile(
     r"!!opencv-(?:nd-)?matrix\s+(?:rows:\s*([0-9]{1,2})\s+cols:\s*([0-9]{1,2})|sizes:\s*\[([0-9,\s]{0,20})\])\s+"
     r"dt:\s*\w+\s+data:\s*(\[[^\[\]]*\])\s*"
 )
-"""A matrix of two or of any number of dimensions, as FileStorage writes it."""
 
 
 def read_opencv_yaml(path: Path) -> Camera:
-    """Return the left Camera, with its baseline, of a rectified pair in OpenCV's YAML `path`.
-
-    OpenCV's pixel coordinates begin at the centre of the first pixel, ours at its corner; 0.5 px is added. Raises
-    InputError if the file cannot be read as OpenCV's YAML, keys are missing or of a wrong shape, P1 and P2 are no
-    rectified horizontal pair, or the camera cannot be used (sim.scene.camera_check).
-    """
+    """Returns the left Camera, with its baseline, of a rectified pair in OpenCV's YAML `path`."""
     blocks = _blocks(path, read_text(path))
     missing = [key for key in KEYS if key not in blocks]
     if missing:
@@ -65,6 +59,7 @@ def read_opencv_yaml(path: Path) -> Camera:
         )
     camera = Camera(
         kind="pinhole", image=(int(width), int(height)), focal_px=(fx, fy),
+        # OpenCV's pixel coordinates begin at the centre of the first pixel, ours at its corner.
         centre_px=(float(left[0, 2]) + 0.5, float(left[1, 2]) + 0.5), position=position, rotation=rotation,
         baseline=float(-right[0, 3] / fx),
     )  # fmt: skip
@@ -72,7 +67,6 @@ def read_opencv_yaml(path: Path) -> Camera:
 
 
 def _blocks(path: Path, text: str) -> dict[str, str]:
-    """Returns the text of each key of the first level, its indented lines included, without comments."""
     lines = [line.partition("#")[0].rstrip() for line in text.splitlines()]
     if not lines or not lines[0].startswith("%YAML"):
         expected = "a file of cv2.FileStorage, which begins with %YAML"
@@ -89,7 +83,6 @@ def _blocks(path: Path, text: str) -> dict[str, str]:
 
 
 def _value(block: str) -> Array | None:
-    """Returns a number, a list of numbers or a matrix as an array; None if the block is something else."""
     matrix = MATRIX.fullmatch(block)
     body = (block if matrix is None else matrix[4]).strip()
     if matrix is None and NUMBER.fullmatch(body):
@@ -107,7 +100,6 @@ def _value(block: str) -> Array | None:
 
 
 def _numbers(path: Path, values: Mapping[str, Array | None], key: str, shape: tuple[int, ...]) -> Array:
-    """Returns the value of a key in the shape; raises InputError if it is missing or does not fit."""
     value = values.get(key)
     if value is None or value.size != int(np.prod(shape)) or not (np.abs(value) <= COORDINATE).all():
         got = "no such numbers" if value is None else f"shape {value.shape}"

@@ -31,13 +31,7 @@ POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
 
 
 def read_tsai(path: Path) -> Camera:
-    """Return the Camera (kind "pinhole") of Tsai's calibration as XML; lengths in m, focal lengths and centre in px.
-
-    path: the file, whose lengths are in mm. Its elements Geometry, Intrinsic and Extrinsic hold the numbers as
-    attributes. Raises InputError if the file is unreadable or no XML, or if a number is missing, beyond 1e9, or not
-    above 0 where it must be (image size, pixel size, focal length, sx). Also if the camera cannot be used
-    (sim.scene.camera_check).
-    """
+    """Returns the camera of Tsai's calibration as XML, in m and px."""
     v = _values(path)
     rotation = _rotation(v["rx"], v["ry"], v["rz"])
     shift = np.array([v["tx"], v["ty"], v["tz"]]) / MM
@@ -79,7 +73,6 @@ def _values(path: Path) -> dict[str, float]:
 
 
 def _rotation(rx: float, ry: float, rz: float) -> Array:
-    """Return the rotation matrix Rz Ry Rx, (3, 3), of three angles in rad about the x, y and z axis."""
     (a, b, c), (sa, sb, sc) = np.cos([rx, ry, rz]), np.sin([rx, ry, rz])
     x = np.array([[1, 0, 0], [0, a, -sa], [0, sa, a]])
     y = np.array([[b, 0, sb], [0, 1, 0], [-sb, 0, b]])
