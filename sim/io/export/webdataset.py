@@ -32,8 +32,7 @@ UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
 RECORD = tarfile.RECORDSIZE
 INDEX = "index.json"
 INDEX_MARKS: Rules = {"content_hash": TEXT, "shards": list_of(TABLE)}
-SHARD_MARKS: Rules = {"manifests": TEXT, "sequences": TABLE}
-"""What every index.json, and every .json of a shard, has."""
+SHARD_MARKS: Rules = {"manifests": TEXT, "sequences": TABLE}  # what every index.json, and every .json of a shard, has
 
 Progress = Callable[[int, int, str], None]
 
@@ -46,17 +45,17 @@ def webdataset(
     samples: str = "sequence",
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Pack a generated dataset into OUT/shard-000000.tar, …, and write OUT/index.json; returns the index as a dict.
+    """Packs a generated dataset into OUT/shard-000000.tar, …, and writes OUT/index.json.
 
-    shard_size: bytes that a shard may have. A sequence is never divided, so a shard of a single sequence may be larger.
-    samples: "sequence" (all files of a sequence) or "frame" (one frame's labels and pictures). A .json beside each
-    shard describes it. Complete shards of an earlier run are kept. progress: called as progress(shards done, shards in
-    all, name of the last one) after each shard. Keys of the index: format, samples, content_hash, and shards, the
-    content of each shard's .json.
+    Args:
+        source: A generated sequence or dataset.
+        out: The folder. Complete shards of an earlier run are kept.
+        shard_size: Bytes that a shard may have. A sequence is never divided, so a shard of one sequence may be larger.
+        samples: "sequence" (all files of a sequence) or "frame" (one frame's labels and pictures).
+        progress: Called as progress(shards done, shards in all, name of the last one) after each shard.
 
-    Raises InputError if the source is not a generated dataset or a file of it is missing or altered, two sequences
-    share a name, OUT holds shards of another export, another process writes to OUT, OUT cannot be written, or samples
-    are frames and the pictures are videos. Raises WorkError if the disk is full.
+    Returns:
+        The index: format, samples, content_hash, and shards, the content of the .json beside each shard.
     """
     items, root = _items(Path(source), samples), Path(out)
     shards = list(_shards(items, shard_size))
@@ -76,11 +75,7 @@ def webdataset(
 
 
 def size_of(text: str) -> int:
-    """Return the number of bytes that a text names: `500MB`, `1.5 GB`, `3 kB`, `20000000`; units are powers of 1000.
-
-    Units are B, kB, MB and GB, spelt so; blanks around are ignored. Fractions of a byte are rounded. Raises InputError
-    if the text is no such size (as `500M` or `3 KB`) or rounds to 0.
-    """
+    """Returns the bytes that a text such as `500MB`, `1.5 GB` or `3 kB` names; units are powers of 1000."""
     found = re.fullmatch(r"([0-9]{1,12}(?:\.[0-9]{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
     if size < 1:
@@ -91,12 +86,6 @@ def size_of(text: str) -> int:
 
 
 def _items(source: Path, samples: str) -> list[SequenceItem]:
-    """Return the sequences to pack, sorted by their names <split>/<sequence>.
-
-    source: path of a dataset or sequence. samples: "sequence" or "frame". Raises InputError if the source is not a
-    generated dataset or holds no sequence, a manifest is invalid, two sequences share a name, or samples are "frame"
-    and a sequence has videos.
-    """
     found = sorted((read_item(p, samples) for p in sequence_folders(source, "generated")), key=lambda item: item.name)
     twice = next((a.name for a, b in pairwise(found) if a.name == b.name), None)
     if twice is not None:
@@ -111,10 +100,7 @@ def _items(source: Path, samples: str) -> list[SequenceItem]:
 
 
 def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]]:
-    """Yield the sequences of each shard: consecutive items, as many as fit into a tar of `size` bytes, at least one.
-
-    Without items one empty shard is yielded.
-    """
+    """Yields the consecutive sequences of each shard, as many as fit into a tar of `size` bytes, at least one."""
     some: list[SequenceItem] = []
     full = 0
     for item in items:
@@ -127,29 +113,18 @@ def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]
 
 
 def _facts(samples: str, number: int, items: list[SequenceItem]) -> dict[str, Any]:
-    """Return what the .json of a shard holds before its tar is written.
-
-    Keys: name ("shard-000000.tar" for number 0), samples, manifests (one hash of the manifests' hashes, in order),
-    sequences (content hash by <split>/<sequence>). The size and hash of the tar are added later. number: of the shard,
-    from 0. items: its sequences.
-    """
     manifests = hashing.canonical_hash([item.manifest for item in items])
     hashes = {item.name: item.content for item in items}
     return {"name": f"shard-{number:06d}.tar", "samples": samples, "manifests": manifests, "sequences": hashes}
 
 
 def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
-    """Raise InputError if OUT (`root`) holds a shard of another export; do nothing otherwise.
-
-    plan: the facts of each shard to write. A shard-*.tar is of another export if the plan does not name it or its .json
-    contradicts the plan. A tar without .json is accepted, as an interrupted run leaves it. Also raises InputError if a
-    .json is unreadable or no JSON object, or if a file of others has the name of one that will be written.
-    """
     wanted = {facts["name"]: facts for facts in plan}
     refuse_foreign_file(root / INDEX, INDEX_MARKS)
     for name in wanted:
         refuse_foreign_file((root / name).with_suffix(".json"), SHARD_MARKS)
     for path in sorted(root.glob("shard-*.tar")):
+        # A tar without .json is what an interrupted run leaves.
         beside = path.with_suffix(".json")
         facts = wanted.get(path.name)
         if facts is None or (beside.is_file() and not facts.items() <= tables.read_json(beside).items()):
@@ -160,12 +135,6 @@ def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
 
 
 def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the .json of a shard in OUT (`root`) that is complete: its tar has the hash that the .json names; else
-    None.
-
-    facts: its "name" is the shard's file name. None, too, if the tar or its .json is missing. Raises InputError if the
-    .json is unreadable or no JSON object.
-    """
     path = root / facts["name"]
     if not path.is_file() or not path.with_suffix(".json").is_file():
         return None
@@ -177,6 +146,7 @@ def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
 
 def _write_shard(root: Path, facts: dict[str, Any], items: list[SequenceItem]) -> dict[str, Any]:
     path = root / facts["name"]
+    # The .json stands for a whole tar.
     path.with_suffix(".json").unlink(missing_ok=True)
     with new_file(path) as beside:
         _tar(beside, (member for item in items for member in tar_members(item, facts["samples"])))

@@ -18,57 +18,47 @@ from sim.io.store.sequence_folder import open_sequence
 from sim.io.store.streams import file_name
 from sim.types import Array, Detections, FrameTruth, Groups
 
+# streams with one picture per frame; a frame's sample holds those of them that are stored
 FRAME_STREAMS = ("left", "right", "disparity", "ids")
-"""Streams with one picture per frame; a frame's sample holds those of them that are stored."""
 
 BLOCK = 512  # bytes: a tar holds whole blocks
 
+# name of a file in the tar, its size in bytes, and a call that reads its content
 Member = tuple[str, int, Callable[[], bytes]]
-"""Name of a file in the tar, its size in bytes, and a call that reads its content."""
 
 
 @dataclass(frozen=True)
 class SequenceItem:
-    """A stored sequence to pack.
+    """A stored sequence to pack."""
 
-    folder: where it is stored. bytes: what its members add to a tar. content: its content hash, which names truth,
-    detections and pixels. manifest: the hash of its manifest. images: file type of its pictures ("jpg", "png" or
-    "mp4"), None without pictures or with 16-bit streams only.
-    """
-
-    folder: Path
-    bytes: int
-    content: str
-    manifest: str
+    folder: Path  # where it is stored
+    bytes: int  # what its members add to a tar
+    content: str  # its content hash, which names truth, detections and pixels
+    manifest: str  # the hash of its manifest
+    # file type of its pictures ("jpg", "png" or "mp4"), None without pictures or with 16-bit streams only
     images: str | None
 
     @property
     def name(self) -> str:
-        """The name <split>/<sequence>, the last two parts of the folder's path."""
+        """The name <split>/<sequence>."""
         return split_and_name(self.folder)
 
     @property
     def key(self) -> str:
-        """The name <split>/<sequence> as a sample's key; dots become %2E because webdataset ends a key at its first
-        dot.
-        """
+        """The name as a sample's key; webdataset ends a key at its first dot."""
         return self.name.replace(".", "%2E")
 
 
 def read_item(folder: Path, samples: str) -> SequenceItem:
-    """Return the item (size, hashes, file type) of a stored sequence's folder.
-
-    samples: "sequence" or "frame"; for frames, truth and detections are read. Raises InputError if its manifest is
-    missing, altered, of another format or not whole, or a file that is read is altered.
-    """
+    """Returns the item of a stored sequence. samples: "sequence" or "frame"."""
     manifest = read_whole_manifest(folder)
     item = SequenceItem(folder, 0, manifest["content_hash"], manifest["sha256"], manifest.get("images"))
     return replace(item, bytes=sum(_tar_bytes(name, size) for name, size, _ in tar_members(item, samples)))
 
 
 def _tar_bytes(name: str, size: int) -> int:
-    """Returns what a member adds to a tar: a header and its content; a name over 100 bytes is a member of its own."""
     letters = len(name.encode())
+    # A name of more than 100 bytes is a member of its own.
     longer = BLOCK + _whole(letters + 1) if letters > tarfile.LENGTH_NAME else 0
     return longer + BLOCK + _whole(size)
 
@@ -78,12 +68,9 @@ def _whole(size: int) -> int:
 
 
 def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
-    """Yield the tar members of a stored sequence as (name, bytes, function that reads them), in the order of packing.
+    """Yields the members of a stored sequence, in the order of packing.
 
-    item: the sequence; names begin with its key. samples "sequence": every file of the sequence, the manifest first.
-    Otherwise, for each frame, its JSON labels and then its stored pictures (left, right, disparity, ids). Iterating
-    raises InputError if the manifest is invalid; for frames also if a file of labels or detections differs from it. The
-    reading functions raise InputError if their file is missing or differs from the manifest.
+    All files, the manifest first; or, for samples "frame", the labels and then the pictures of each frame.
     """
     manifest = read_manifest(item.folder)
     stored = StoredPictures(item.folder, manifest)
@@ -103,16 +90,9 @@ def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
 
 
 def frame_labels(folder: Path, manifest: dict[str, Any]) -> Iterator[bytes]:
-    """Yield the JSON object of each frame of a stored sequence, from frame 1, as UTF-8 bytes; unknown values are null.
+    """Yields the JSON labels of each frame of a stored sequence, from frame 1; unknown values are null.
 
-    manifest: that of the folder. Keys: sequence (name), fps, image_size [width, height] px, frame (from 1), t in s.
-    people, where the truth is stored: id, group (-1 for alone), box (left, top, width, height in px, amodal), x, y in
-    m, vx, vy in m/s (left out if the truth has no velocities), visibility. groups, likewise: id, members (person ids),
-    hull (list of [x, y]) in m; null if unknown. detections, where they are stored: score, box, plane, and x, y, (z) in
-    m or px by the plane.
-
-    Iterating raises InputError if a file of the sequence is missing or altered, AssertionError for a truth without
-    positions.
+    Keys: sequence, fps, image_size, frame, t, and, where stored, people, groups and detections.
     """
     sequence = open_sequence(folder)
     truth = sequence.truth
@@ -151,5 +131,4 @@ def _detections(found: Detections) -> Iterator[dict[str, Any]]:
 
 
 def _numbers(row: Array) -> list[float | None]:
-    """Return the values of `row`, an array (N,), as a list of JSON numbers, None for nan."""
     return [tables.nan_to_none(value) for value in row.tolist()]

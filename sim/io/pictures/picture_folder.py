@@ -24,11 +24,9 @@ Picture = TypeVar("Picture", bound=NDArray[Any])
 
 
 def fill_gaps(pairs: Iterable[tuple[int, Image]], length: int | None, place: str) -> Iterator[Image | None]:
-    """Yield a picture for each frame from 1 on, None for a frame that `pairs` leave out.
+    """Yields the picture of each frame from 1 to `length`, None where the ascending `pairs` have none.
 
-    pairs: (frame, picture), frames from 1 and ascending; read while iterating. length: number of frames; None: up to
-    the last pair; pairs beyond it are yielded, too. The first missing frame is reported by a warning with the
-    recording's name `place`; further ones are not.
+    length: None: up to the last pair. The first missing frame causes a warning about the recording `place`.
     """
     shown, warned = 0, False
     for number, picture in pairs:
@@ -49,15 +47,12 @@ def _warn_lost(place: str, frame: int) -> bool:
 
 
 def size_of(picture: NDArray[Any]) -> tuple[int, int]:
-    """Return (width, height) in px of a picture of shape (H, W) or (H, W, 3)."""
+    """Returns (width, height) in px of a picture of shape (H, W) or (H, W, 3)."""
     return picture.shape[1], picture.shape[0]
 
 
 def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str = "") -> Picture:
-    """Return the picture unchanged if its (width, height) in px is `size`, else raise InputError.
-
-    path, place: the file, and the frame in it, for the error.
-    """
+    """Returns the picture unchanged if its (width, height) is `size`, else raises InputError."""
     if size_of(picture) != size:
         got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)
         raise InputError(file=path, place=place, got=got, expected=expected, remedy="give pictures of one size")
@@ -65,20 +60,17 @@ def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str
 
 
 def read_picture(path: Path) -> Image | None:
-    """Return the picture file `path` as (H, W, 3) BGR uint8; None if it is missing, unreadable, truncated, no JPEG,
-    PNG, BMP or TIFF, or declares more than 16,384 px a side or 40 million px.
-
-    Grey pictures become BGR, 16-bit pictures keep their upper 8 bits, transparency is dropped. OpenCV's messages are
-    silenced meanwhile. Raises nothing.
-    """
+    """Returns a picture file as (H, W, 3) BGR uint8; None if it is missing, damaged, too large or of another kind."""
     import cv2
 
     try:
         body = path.read_bytes()
     except OSError:
         return None
+    # Some decoders return half a picture of a truncated file, or print to stderr.
     if not is_complete(body) or not is_bearable(body):
         return None
+    # A damaged picture is a lost frame, and no message of OpenCV.
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         picture = cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_COLOR)
@@ -90,11 +82,7 @@ def read_picture(path: Path) -> Image | None:
 
 
 def is_complete(body: bytes) -> bool:
-    """Return False if `body`, the bytes of a picture file, is empty, or a JPEG or PNG without its end mark; else True.
-
-    Other bytes, also those of no picture, count as complete. Checked before decoding, because some decoders return half
-    a picture of a truncated file, or print to stderr.
-    """
+    """Returns False if a picture file's bytes are empty, or a JPEG or PNG without its end mark."""
     if body.startswith(b"\xff\xd8"):
         return body.rfind(b"\xff\xd9") > body.rfind(b"\xff\xda") > 0
     return b"IEND" in body[-64:] if body.startswith(b"\x89PNG") else len(body) > 0
@@ -102,15 +90,13 @@ def is_complete(body: bytes) -> bool:
 
 @dataclass(frozen=True)
 class PictureFolder:
-    """The picture files of a recording.
+    """The picture files of a recording."""
 
-    folder: their folder. files: path of the file of each frame, by frame number (from 1); a frame without a picture has
-    no entry. `last` is the highest number, so frames without a picture below it are gaps. numbering: how the numbers in
-    the names became frames, None for files in the order of their names.
-    """
-
-    folder: Path
+    folder: Path  # their folder
+    # path of the file of each frame, by frame number (from 1); a frame without a picture has no entry. `last` is the
+    # highest number, so frames without a picture below it are gaps.
     files: dict[int, Path]
+    # how the numbers in the names became frames, None for files in the order of their names
     numbering: Numbering | None
 
     @property
@@ -119,19 +105,12 @@ class PictureFolder:
         return max(self.files, default=0)
 
     def first_size(self) -> tuple[int, int] | None:
-        """Return (width, height) in px of the first picture, in the order of `files`, that can be read; None if none
-        can."""
+        """Returns (width, height) px of the first picture that can be read; None if none can."""
         found = (read_picture(path) for path in self.files.values())
         return next((size_of(picture) for picture in found if picture is not None), None)
 
     def read(self, frames: Iterable[int], size: tuple[int, int] | None) -> Iterator[tuple[int, Image]]:
-        """Yield (frame, picture) for those of `frames` (from 1) whose picture can be read; pictures are (H, W, 3) BGR
-        uint8.
-
-        Pictures come in the order of `frames`, read one by one while iterating. size: (width, height) px of all
-        pictures; None means that no file can be read. Iterating raises InputError for None, and for a picture of
-        another size.
-        """
+        """Yields (frame, picture) of those `frames` whose picture can be read, all of this size, in px."""
         if size is None:
             raise InputError(
                 file=self.folder, got=f"{len(self.files)} pictures, none of which can be read", expected="JPG or PNG",
@@ -144,14 +123,9 @@ class PictureFolder:
 
 
 def find_pictures(folder: Path, length: int | None, labelled: Labelled | None) -> PictureFolder:
-    """Return the picture files of a folder by frame (from 1); a missing folder gives no files.
+    """Returns the picture files of a folder by frame; `picture_numbers` says which frame a file is.
 
-    length: number of frames, None if unknown. labelled: returns the labelled frames, None without labels and
-    detections. Files ending in .jpg, .jpeg, .png, .bmp, .tif and .tiff count, except hidden and side files. Which frame
-    a file is, and what is refused: `picture_numbers`.
-
-    Also raises InputError for a FIFO, device, folder or other thing that is no regular file. A link to a missing file
-    is a frame without picture.
+    length: number of frames, None if unknown. labelled: returns the labelled frames, None without labels.
     """
     files = _picture_files(folder)
     numbering = numbering_of(folder, files, length, labelled)
@@ -159,10 +133,7 @@ def find_pictures(folder: Path, length: int | None, labelled: Labelled | None) -
 
 
 def find_right_pictures(folder: Path, left: PictureFolder) -> PictureFolder:
-    """Return the picture files of the right camera by frame, numbered like those of the left one.
-
-    Raises InputError if the files have no number and are not as many as the left ones, and as `find_pictures`.
-    """
+    """Returns the picture files of the right camera by frame, numbered like those of the left one."""
     files = _picture_files(folder)
     if files and left.numbering is None and len(files) != len(left.files):
         got, expected = f"{len(files)} pictures without numbers", f"{len(left.files)}, as in {left.folder.name}"

@@ -15,10 +15,7 @@ LONELY_MARKERS = frozenset(range(0xD0, 0xDA)) | {0x01}  # of JPEG: without a len
 
 
 def declared_size(body: bytes) -> tuple[int, int] | None:
-    """Return (width, height) in px by the header of a picture file's bytes.
-
-    Returns None if the bytes are no JPEG, PNG, BMP or TIFF, or their header is damaged.
-    """
+    """Returns (width, height) px by the header of a picture file; None for other or damaged bytes."""
     try:
         if body.startswith(b"\x89PNG\r\n\x1a\n"):
             return struct.unpack(">II", body[16:24])
@@ -35,7 +32,7 @@ def declared_size(body: bytes) -> tuple[int, int] | None:
 
 
 def is_bearable(body: bytes) -> bool:
-    """Return True if the declared size is known, not empty, at most 16,384 px a side and 40 million px in all."""
+    """Returns True if the declared size is known and a picture of it may be decoded."""
     size = declared_size(body)
     return size is not None and fits_picture(*size)
 

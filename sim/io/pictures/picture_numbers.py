@@ -20,37 +20,28 @@ from scenarios.errors import InputError
 from scenarios.limits import FRAMES
 from sim.types import Ints
 
-SPARSE = 100
-"""Numbers in file names that use less than 1 of 100 values are time stamps, not frames."""
+SPARSE = 100  # numbers in file names that use less than 1 of 100 values are time stamps, not frames
 
+# returns the labelled frames, ascending, each once; called only where they decide something
 Labelled = Callable[[], Ints]
-"""Returns the labelled frames, ascending, each once; called only where they decide something."""
 
+# the words and the numbers of a file name without suffix, in the order in which they alternate
 Key = tuple[tuple[str, ...], tuple[int, ...]]
-"""The words and the numbers of a file name without suffix, in the order in which they alternate."""
 
 
 @dataclass(frozen=True)
 class Numbering:
-    """How picture numbers become frames: frame = (number - origin) / step + 1.
+    """How picture numbers become frames: frame = (number - origin) / step + 1."""
 
-    origin: the number of frame 1. step: between the numbers of successive frames.
-    """
-
-    origin: int = 1
-    step: int = 1
+    origin: int = 1  # the number of frame 1
+    step: int = 1  # between the numbers of successive frames
 
 
 def numbering_of(folder: Path, files: list[Path], length: int | None, labelled: Labelled | None) -> Numbering | None:
-    """Return how the files' numbers become frames; None if files are frames in the natural order of their names.
+    """Returns how the files' numbers become frames; None if files are frames in the natural order of their names.
 
-    Files are in that order if their names have no number, or time stamps. Else, without labels, the lowest number is
-    frame 1 if it is 0, if the highest exceeds `length`, or if `length` is None; otherwise the number is the frame.
-    `length` pictures with a steady step are counted in order. With labels see `_labelled_numbering`.
-
-    folder: for messages. length: number of frames, None if unknown. labelled: None without labels and detections.
-    Raises InputError if most files are named alike and some otherwise, or if pictures and labels can be matched in two
-    ways or in none. Warns if labelled pictures are not taken by their numbers.
+    length: number of frames, None if unknown. labelled: None without labels. Raises InputError if pictures and labels
+    can be matched in two ways or in none; warns if labelled pictures are not taken by their numbers.
     """
     keys = [_key(path) for path in files]
     _refuse_odd_names(folder, files, keys)
@@ -67,16 +58,13 @@ def numbering_of(folder: Path, files: list[Path], length: int | None, labelled: 
     steps = np.unique(np.diff(found))
     if length == len(found) and len(steps) == 1:
         return Numbering(low, int(steps[0]))
+    # Without labels, nothing says what the numbers are, but their lowest and highest.
     free = length is None and labelled is None
     return Numbering(low if low == 0 or free or (length is not None and high > length) else 1)
 
 
 def frames_of(folder: Path, files: list[Path], numbering: Numbering | None) -> dict[int, Path]:
-    """Return the picture file of each frame (from 1), ascending; a frame without a picture has no entry.
-
-    folder: for messages. numbering: as of `numbering_of`. Raises InputError if two files are one frame, as 1.jpg and
-    01.jpg, a file is no frame of that numbering, or a frame is beyond 1,000,000.
-    """
+    """Returns the picture file of each frame (from 1), ascending; a frame without a picture has no entry."""
     keys = [_key(path) for path in files]
     if numbering is None:
         ordered = sorted(zip(keys, files, strict=True), key=lambda pair: (*pair[0], pair[1]))
@@ -106,7 +94,6 @@ def _key(path: Path) -> Key:
 
 
 def _refuse_odd_names(folder: Path, files: list[Path], keys: list[Key]) -> None:
-    """Raises InputError for names beside a series of numbered ones, as of copies: they would shift the frames."""
     counts = Counter(words for words, numbers in keys if numbers)
     if not counts:
         return
@@ -122,8 +109,6 @@ def _refuse_odd_names(folder: Path, files: list[Path], keys: list[Key]) -> None:
 
 
 def _numbers(keys: list[Key]) -> list[int] | None:
-    """Returns the number of each name: the only one that varies, else the last; None if there is none, if several vary,
-    or for time stamps."""
     if not keys or len({words for words, _ in keys}) > 1 or not keys[0][1]:
         return None
     columns = list(zip(*(numbers for _, numbers in keys), strict=True))
@@ -135,25 +120,21 @@ def _numbers(keys: list[Key]) -> list[int] | None:
 
 
 def _labelled_numbering(folder: Path, found: Ints, length: int | None, labels: Ints) -> Numbering:
-    """Returns the numbering by which labels fit pictures; found (P,), labels (L,): picture numbers and labelled frames,
-    ascending, each once, not empty.
-
-    The number is the frame if each labelled frame then has a picture. Otherwise pictures are counted in order if their
-    numbers have a steady step and the labels would fit; or counted from the first, gaps included, if the labels end
-    with the last picture, or before the first number. Otherwise the number is the frame, and labelled frames lack
-    pictures.
-    """
     low, high, first, last = int(found[0]), int(found[-1]), int(labels[0]), int(labels[-1])
     span, count, steps = high - low + 1, len(found), np.unique(np.diff(found))
     beyond = length is not None and high > length
+    # Each labelled frame has the picture of its number.
     if low > 0 and not beyond and np.isin(labels, found).all():
         return Numbering()
+    # Pictures in even steps, labels counted in order.
     if len(steps) == 1 and steps[0] > 1 and last <= count:
         _say(folder, f"pictures {low} to {high} in steps of {steps[0]}", f"1 to {count}, as the labels are numbered")
         return Numbering(low, int(steps[0]))
+    # Labels end with the last picture, or before the first number: counted from the first.
     if low != 1 and (last == span or (last < span and (last < low or (low > 0 and beyond)))):
         _say(folder, f"pictures {low} to {high}", f"1 to {span}, as the labels are numbered")
         return Numbering(low)
+    # Both readings are possible.
     doubtful = low == 0 or (low > 1 and last <= span) or (low == 1 and last == count < span)
     if doubtful or last < low or first > high:
         raise InputError(

@@ -31,16 +31,12 @@ Facts = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class WrittenPictures:
-    """What `write_pictures` wrote; all empty if nothing was.
+    """What `write_pictures` wrote; all empty if nothing was."""
 
-    streams: names of the streams. images: file type ("jpg", "png" or "mp4"), None if the streams leave no choice.
-    pixels: hash of the raw pixels by stream. files: {"sha256", "bytes"} of each file, by name relative to the sequence
-    folder.
-    """
-
-    streams: tuple[str, ...] = ()
-    images: str | None = None
-    pixels: dict[str, str] = field(default_factory=dict)
+    streams: tuple[str, ...] = ()  # names of the streams
+    images: str | None = None  # file type ("jpg", "png" or "mp4"), None if the streams leave no choice
+    pixels: dict[str, str] = field(default_factory=dict)  # hash of the raw pixels by stream
+    # {"sha256", "bytes"} of each file, by name relative to the sequence folder
     files: Facts = field(default_factory=dict)
 
 
@@ -50,11 +46,8 @@ NO_PICTURES = WrittenPictures()
 class StreamWriter:
     """Writes one stream as picture files or as one video below `folder`; used as a context manager.
 
-    stream: its name, "left", "right", "disparity", "ids" or "background". images: file type, "jpg", "png" or "mp4"
-    (disparity and ids are always PNG). size: (width, height) in px; fps: frames/s; both for a video only. State: the
-    hash of the raw pixels so far (`pixels`), the open video if there is one, and `files`: {"sha256", "bytes"} of each
-    complete file, by name relative to `folder`. A video is listed when the block ends without exception. Entering the
-    block raises InputError if a video's width or height is odd, OSError if it cannot be opened.
+    State: the hash of the raw pixels so far, the open video if there is one, and {"sha256", "bytes"} of each complete
+    file by name. A video is listed when the block ends without exception.
     """
 
     def __init__(self, folder: Path, stream: str, images: str, size: tuple[int, int], fps: float):
@@ -65,12 +58,7 @@ class StreamWriter:
             self._open = write_video(folder / streams.file_name(stream, images, 1), size, fps)
 
     def add(self, picture: NDArray[Any]) -> None:
-        """Write the next picture of the stream: (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and
-        disparity.
-
-        Frames count from 1 in the order of the calls. It also adds to `pixels`, and to `files` unless the stream is a
-        video. Raises OSError if the file cannot be written.
-        """
+        """Writes the next picture: (H, W, 3) BGR uint8, or (H, W) uint16 for ids and disparity."""
         self.pixels.add(picture)
         if self._movie is not None:
             self._movie.add(picture)
@@ -94,11 +82,7 @@ class StreamWriter:
 
 
 def encoded(picture: NDArray[Any], kind: str) -> bytes:
-    """Return a picture as the bytes of a file of type `kind`: "jpg" (quality 95) or "png" (lossless).
-
-    picture: (H, W, 3) BGR uint8, or (H, W) uint16 for "png" only. Raises cv2.error for a picture or type that OpenCV
-    cannot encode.
-    """
+    """Returns a picture as the bytes of a file of type `kind`, "jpg" (quality 95) or "png"."""
     import cv2
 
     options = [cv2.IMWRITE_JPEG_QUALITY, JPG_QUALITY] if kind == "jpg" else []
@@ -108,14 +92,9 @@ def encoded(picture: NDArray[Any], kind: str) -> bytes:
 
 
 def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], images: str) -> WrittenPictures:
-    """Draw the streams `wanted` of a sequence and write them into a folder; returns what was written.
+    """Draws the streams `wanted` of a sequence and writes them into a folder, one picture at a time.
 
-    wanted: some of "left", "right", "disparity", "ids", "background". One picture per stream is in memory at a time.
-    images: file type, "jpg", "png" or "mp4". If the sequence has exact pixels and truth, gt/pixels.parquet is written
-    too. An empty `wanted` writes nothing. The sequence needs an image size, else AssertionError.
-
-    Raises InputError if the sequence lacks a stream, or its width or height is odd for "mp4"; WorkError if the stream
-    ids has a person id above 999; OSError if a file cannot be written. Also raises what drawing raises.
+    images: file type, "jpg", "png" or "mp4". gt/pixels.parquet is written if the sequence has exact pixels and truth.
     """
     if not wanted:
         return NO_PICTURES
@@ -147,12 +126,6 @@ def _background(sequence: Sequence) -> Image:
 
 
 def _add(outputs: dict[str, StreamWriter], sequence: Sequence, frame: Frame, known: list[PixelTruth]) -> None:
-    """Add one frame to each open stream (`outputs`, by name), and append its PixelTruth without the images to `known`.
-
-    `known` is changed; it stays as it is for a sequence without exact pixels. The stream "background" gets nothing.
-    Raises InputError if the sequence lacks a stream, WorkError if the stream ids has a person id above 999 or a
-    disparity is 256 px or more, OSError if a file cannot be written.
-    """
     for name, picture in (("left", frame.image), ("right", frame.right)):
         if name in outputs:
             if picture is None:
@@ -180,13 +153,10 @@ def _missing(sequence: Sequence, stream: str) -> InputError:
 
 
 def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
-    """Return the table of visible pixels as Parquet bytes: one row per person and frame, in the order of the truth's
-    rows.
+    """Returns the table of visible pixels, a row per person and frame in the order of the truth's rows.
 
-    known: the PixelTruth of every frame, from frame 1, at least one (else ValueError). Columns: frame (from 1), id,
-    visible_px and amodal_px (numbers of pixels that show the person, and that would without occlusion), visibility_px
-    (their ratio, 0 for 0 of 0), modal_left, modal_top, modal_width, modal_height (px; box of the visible pixels, nan if
-    hidden), blob (number, from 0 in each frame, of the region of people who touch in the image, -1 if hidden).
+    visible_px, amodal_px: pixels that show the person, and that would without occlusion; visibility_px: their ratio;
+    modal_…: box of the visible pixels; blob: region of people who touch in the image, from 0 in each frame.
     """
 
     def joined(name: str) -> NDArray[Any]:

@@ -28,30 +28,25 @@ from sim.types import Array, Image, Ints, PixelTruth
 
 @dataclass(frozen=True)
 class StoredPictures:
-    """The pictures of a stored sequence, read when asked for.
+    """The pictures of a stored sequence, read when asked for."""
 
-    folder: the sequence folder. manifest: the content of its manifest.json, with the stored streams ("left", "right",
-    "disparity", "ids", "background") and the hash of each file.
-    """
-
-    folder: Path
+    folder: Path  # the sequence folder
+    # the content of its manifest.json, with the stored streams ("left", "right", "disparity", "ids", "background") and
+    # the hash of each file
     manifest: dict[str, Any]
 
     @property
     def streams(self) -> tuple[str, ...]:
-        """The stored streams, some of "left", "right", "disparity", "ids", "background"; () without pictures."""
+        """The stored streams."""
         return tuple(self.manifest["streams"])
 
     @property
     def images(self) -> str:
-        """File type of the pictures: "jpg", "png" or "mp4"; "png" without pictures or with 16-bit streams only."""
+        """File type of the pictures; "png" without pictures or with 16-bit streams only."""
         return self.manifest.get("images") or "png"
 
     def body(self, name: str) -> bytes:
-        """Return the bytes of the file `name`, relative to the sequence folder.
-
-        Raises InputError if the file is missing, the manifest does not name it, or its hash is not the manifest's.
-        """
+        """Returns the bytes of a file; raises InputError if they are not those that the manifest names."""
         path, facts = self.folder / name, self.manifest["files"].get(name)
         wanted = "a file that manifest.json names" if facts is None else f"the {facts['bytes']} bytes of manifest.json"
         try:
@@ -66,13 +61,7 @@ class StoredPictures:
         return body
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
-        """Return picture number `index` (from 1; the frame, except for "background") of a stream that is stored as
-        picture files.
-
-        Shape (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity (coded: see decode_ids,
-        decode_disparity). Raises InputError if the file is missing, altered or not named by the manifest, is no
-        picture, or is of another size than the sequence's.
-        """
+        """Returns picture `index` (from 1) of a stream of picture files: BGR, or codes of ids and disparity."""
         import cv2
 
         name = streams.file_name(stream, self.images, index)
@@ -90,13 +79,7 @@ class StoredPictures:
         return width, height
 
     def all(self, stream: str, count: int, wanted: list[int] | None = None) -> Iterator[NDArray[Any]]:
-        """Yield the pictures 1 to `count` of a stream, or only the numbers `wanted` (ascending, from 1), in order.
-
-        Shape (H, W, 3) BGR uint8, or (H, W) uint16 for the streams ids and disparity. None or an empty `wanted` yields
-        all, except that an empty one yields none of a video. Iterating raises InputError if a file is missing or
-        altered, no picture, or of another size. At its end it raises it if a video did not give as many pictures as
-        `wanted` has, or `count` if that is None.
-        """
+        """Yields the pictures 1 to `count` of a stream, or only the numbers `wanted` (ascending, from 1)."""
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))
             return
@@ -111,29 +94,15 @@ class StoredPictures:
             raise InputError(file=path, got=f"{found} pictures", expected=count, remedy=REDO)
 
     def sample(self, wanted: list[int]) -> Iterable[tuple[int, Image]]:
-        """Return pairs (frame, picture (H, W, 3) BGR uint8) of the left camera, read while iterating.
-
-        wanted: frames, from 1, ascending, not empty. Iterating raises InputError if a file is missing, altered or no
-        picture.
-        """
+        """Returns (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
 
     def table(self) -> StoredTable:
-        """Return the table of visible pixels, gt/pixels.parquet: one row per person and frame.
-
-        Columns: frame (from 1), id, visible_px, amodal_px, visibility_px, modal_left, modal_top, modal_width,
-        modal_height, blob (see pixel_table). Raises InputError if the file is missing or damaged. Its hash is not
-        checked.
-        """
+        """Returns the table of visible pixels (`pixel_table`)."""
         return read_table(self.folder / TABLE)
 
     def pixel_loader(self) -> Callable[[int], PixelTruth]:
-        """Return a function that maps a frame (from 1) to its PixelTruth, read from the streams ids and disparity.
-
-        The stream ids must be stored. People without visible pixels are included, in the order of ids. Disparities are
-        rounded to steps of 1/64 px, so they are off by 1/128 px at most; the field is None if the stream is not stored.
-        The function raises InputError if a file is missing or damaged, as for a frame beyond the last.
-        """
+        """Returns a function that maps a frame (from 1) to its PixelTruth; the stream ids is stored."""
 
         @cache
         def columns() -> tuple[Ints, Array, Array, Array, Ints]:

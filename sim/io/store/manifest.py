@@ -21,34 +21,26 @@ from sim.io.store.streams import check_streams, coding, is_picture
 
 SCHEMA = 1
 MANIFEST = "manifest.json"
+# what every manifest.json of ours has, and no other program writes
 MARKS: Rules = {"scenario_hash": TEXT, "content_hash": TEXT}
-"""What every manifest.json of ours has, and no other program writes."""
 
 REDO = "run the same `flockscope generate` again"
 
 
 def is_sequence(folder: Path) -> bool:
-    """Return True if the folder has a manifest.json or scenario.toml: it is a stored sequence, perhaps an incomplete
-    one.
-    """
+    """Returns True if the folder is a stored sequence, perhaps an incomplete one."""
     return (folder / MANIFEST).is_file() or (folder / "scenario.toml").is_file()
 
 
 def is_own_sequence(folder: Path) -> bool:
-    """Return True if flockscope wrote the sequence in the folder: its manifest is ours or, if that is missing or
-    damaged, one of its tables.
-    """
+    """Returns True if flockscope wrote the sequence: its manifest or, without a readable one, a table is ours."""
     return any(is_ours(path, MARKS) for path in (folder / MANIFEST, *folder.rglob("*.parquet")))
 
 
 def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (), images: str = "jpg") -> dict[str, Any]:
-    """Return the fields of a manifest that identify a sequence, by name.
+    """Returns the fields of a manifest that identify a sequence.
 
-    Keys: format, schema, engine (numbers of versions), seed, repeat, scenario_hash, streams (in the order left, right,
-    disparity, ids, background; "background" is added to "left" or "right"), images (None if no stream depends on it).
-    scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies. streams:
-    stored pictures. images: their file type, "jpg", "png" or "mp4". Raises InputError for an unknown stream or file
-    type.
+    scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies.
     """
     wanted = check_streams(streams, images)
     return {
@@ -64,12 +56,7 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read the manifest.json of a sequence folder, as a dict.
-
-    Raises InputError if it is missing, unreadable or no JSON object, has another format number, lacks a key,
-    names a file outside the folder, or was altered, that is, its fields do not have the hash in its key sha256. The
-    files that it names are not read.
-    """
+    """Reads the manifest.json of a sequence folder, and checks its seal, but no other file."""
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
@@ -83,11 +70,9 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def damaged_files(folder: Path, manifest: dict[str, Any], *, pictures: bool = True) -> Iterator[InputError]:
-    """Yield (not raise) an InputError for each file of the manifest that is missing, unreadable or whose hash differs.
+    """Yields an error for each file of the manifest that is missing or altered.
 
-    folder: the sequence folder. Files are read while iterating, in the order of the manifest. pictures: True compares
-    the hash of every file. False compares only the size of pictures; a picture of another size is reported. Files that
-    the manifest does not name are ignored.
+    pictures: False compares only the size of pictures; their hash is checked when they are read.
     """
     size_only = () if pictures else tuple(filter(is_picture, manifest["files"]))
     return seal.damaged_files(folder, manifest["files"], seal=MANIFEST, remedy=REDO, size_only=size_only)

@@ -17,6 +17,7 @@ from sim.types import BACKGROUNDS
 SIDES = list_of(whole(1, PICTURE_SIDE))
 SIZE = Rule(lambda v: SIDES.accepts(v) and len(v) == 2 and fits_picture(*v), f"[width, height], {PICTURE_SIZES}")
 
+# what each value of the key "sequence" must be
 SEQUENCE: Rules = {
     "name": TEXT,
     "fps": number(*FRAME_RATES),
@@ -24,7 +25,7 @@ SEQUENCE: Rules = {
     "image_size": or_none(SIZE),
     "px_per_m": or_none(number(*SCALES)),
 }
-"""What each value of the key "sequence" must be."""
+# what other values must be; keys that a manifest may lack are checked if they are there
 TOP: Rules = {
     "seed": whole(0, INTEGER),
     "repeat": whole(0, INTEGER),
@@ -35,15 +36,10 @@ TOP: Rules = {
     "images": or_none(one_of(*IMAGES)),
     "stride": whole(1, FRAMES),
 }
-"""What other values must be; keys that a manifest may lack are checked if they are there."""
 
 
 def check_manifest(path: Path, manifest: dict[str, Any]) -> dict[str, Any]:
-    """Return the manifest unchanged if its values are of the kinds that readers expect; raise InputError otherwise.
-
-    path: of the manifest.json, for the message. Checked are the values of "sequence" and seed, repeat, hashes, streams
-    and images. Pictures need an image size.
-    """
+    """Returns the manifest unchanged; raises InputError for a value that readers do not expect."""
     check_values(path, manifest["sequence"], SEQUENCE, REDO, inside="sequence")
     check_values(path, manifest, TOP, REDO)
     if manifest.get("streams") and manifest["sequence"]["image_size"] is None:
@@ -54,11 +50,7 @@ def check_manifest(path: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 
 
 def read_whole_manifest(folder: Path) -> dict[str, Any]:
-    """Return the manifest of a sequence that is exported; its files are looked up, not read.
-
-    Raises InputError as `read_manifest` and `check_manifest`, if the manifest does not name the scenario or a picture
-    of its streams, and if a file is a link that leads out of the folder.
-    """
+    """Returns the manifest of a sequence that is exported: it must name every file of the sequence."""
     path = folder / MANIFEST
     manifest = check_manifest(path, read_manifest(folder))
     length, images = manifest["sequence"]["length"], manifest.get("images") or "png"
@@ -70,6 +62,7 @@ def read_whole_manifest(folder: Path) -> dict[str, Any]:
     if missing:
         got = f"no {missing[0]}" + (f" and {len(missing) - 1} more" if len(missing) > 1 else "")
         raise InputError(file=path, place="files", got=got, expected="every file of the sequence", remedy=REDO)
+    # A stranger's dataset must not make an export read files elsewhere.
     inside = folder.resolve()
     for name in (MANIFEST, *manifest["files"]):
         if not (folder / name).resolve().is_relative_to(inside):

@@ -18,12 +18,7 @@ WIDTH = 0.50  # m, diameter of the upright cylinder
 
 
 def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["measured", "projected", "none"]:
-    """Return where the boxes of stored tracks come from, the value `boxes` of run.json.
-
-    tracks: those of one tracker, one Tracks per frame. "measured": the tracker gave a box in at least one frame with
-    tracks. "projected": it gave none, its tracks are people on the ground or in space, and the camera is known; with a
-    camera also without any Tracks. "none": otherwise, that is without a camera, for tracks in the image, or for groups.
-    """
+    """Returns where the boxes of stored tracks come from, the value `boxes` of run.json."""
     if any(t.box is not None and len(t.id) for t in tracks):
         return "measured"
     upright = not any(t.plane == "image" or t.unit == "group" for t in tracks)
@@ -31,11 +26,9 @@ def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["meas
 
 
 def upright_boxes(camera: Camera, pos: Array) -> Array:
-    """Return the boxes (N, 4) left, top, width, height in px of upright cylinders that stand at `pos`.
+    """Returns the boxes (N, 4) px of people, 1.7 m high and 0.5 m across, at `pos` (N, 2 or 3) m.
 
-    A cylinder is 1.7 m high and 0.5 m across. pos: (N, 3) m, or (N, 2) m on the ground z = 0. Boxes are not clipped to
-    the image. A box is nan for a cylinder of which a part is behind the camera or, for a pinhole, less than 0.05 m in
-    front of it, and for a nan position.
+    Not clipped to the image; nan for somebody who is partly behind the camera, and for a nan position.
     """
     from sim.scene.camera import project
 

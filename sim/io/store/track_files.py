@@ -38,23 +38,22 @@ def write_tracks(
     info: dict[str, Any] | None = None,
     pairs: bytes | None = None,
 ) -> Path:
-    """Write the tracks of consecutive frames of one tracker into `folder`, and return the folder.
+    """Writes the tracks of consecutive frames of one tracker into a folder; run.json comes last.
 
-    Files: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if there are groups, pairs.parquet
-    if `pairs` is given, events.json, and run.json last, which names all others with their hashes. Files of these names
-    from an earlier run are replaced or deleted, others stay. A killed run leaves the earlier run whole, or a folder
-    that `read_tracks` refuses.
+    Args:
+        folder: Where. Files of an earlier run are replaced; others stay.
+        tracks: One Tracks per frame, all of one plane and unit.
+        fps: Frames per second.
+        camera: People on the ground or in space whose tracker gives no boxes get those of upright people in the texts.
+        scene: Gives the height of the ground under 2-D positions; None: 0.
+        info: Content of run.json, to which "format", "boxes", "files" and "sha256" are added.
+        pairs: Content of pairs.parquet (`pair_table`); None: no such file.
 
-    tracks: one Tracks per frame, all of one plane and unit (else AssertionError). fps: frames/s. camera: if the tracker
-    gives no boxes, tracks of people on the ground or in space get the boxes of upright people in the texts; None: no
-    such boxes. scene: gives the height of the ground under 2-D positions; None: 0. info: content of run.json, to which
-    "format", "boxes" (where the boxes come from: "measured", "projected" or "none"), "files" and "sha256" are added.
-    pairs: the content of pairs.parquet (`pair_table`); None: no such file.
+    Returns:
+        The folder.
 
-    Raises InputError if the tracks have wrong ids or unknown positions, a value of `info` is of the wrong kind, the
-    folder is a stored sequence or lies in one, it holds such a file of another program, another process writes to it,
-    or it cannot be written. Raises WorkError if the disk is full,
-    ValueError if `info` holds NaN or infinity, TypeError if it holds what JSON cannot.
+    Raises:
+        InputError: Tracks or `info` are wrong, or a file of others, or a stored sequence, is in the way.
     """
     folder = Path(folder)
     files = tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info, pairs=pairs)
@@ -73,18 +72,7 @@ def tracks_files(
     info: dict[str, Any] | None = None,
     pairs: bytes | None = None,
 ) -> dict[str, bytes]:
-    """Return the files of one tracker's tracks, as `write_tracks` writes them: content by name, run.json last.
-
-    Names: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if a frame has groups,
-    pairs.parquet with the content `pairs` if it is given, events.json, run.json. tracks: one Tracks per frame, of
-    consecutive frames, all of one plane and unit (else AssertionError). fps: frames/s. camera: gives people without
-    boxes those of upright people; None: no such boxes. scene: gives the height of the ground; None: 0. info: content of
-    run.json, to which "format", "boxes", "files" and "sha256" are added.
-
-    Nothing is written. No tracks give tables without rows, in the plane "ground". Raises InputError if an id is
-    negative or stands twice in a frame, a position or score is not finite, or a value of `info` is of the wrong kind.
-    Raises ValueError if `info` holds NaN or infinity, TypeError if it holds what JSON cannot.
-    """
+    """Returns the files of one tracker's tracks, as `write_tracks` writes them: content by name, run.json last."""
     every = list(tracks)
     rows, boxes = flatten(every), box_source(every, camera)
     rows.reject_faults("tracks", "correct the tracker")
@@ -124,18 +112,19 @@ def _text(rows: RunRows, box: Array, place: Array | None, *, full: bool) -> byte
 
 
 def read_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:
-    """Read the tracks of a folder that write_tracks wrote, of one of its files, or of another program's MOT text.
+    """Reads the tracks of a run, or of another program's MOTChallenge text.
 
-    Returns one Tracks per frame. A run of ours is checked as a whole, whichever file of it is given: every file must
-    have the hash in run.json. tracks.parquet is exact; tracks.mot.txt is read as text. Other texts are those of another
-    program: velocities are differences over 0.5 s, covariances nan, and everybody is alone; beside a tracks.txt, groups
-    and events are those of groups.csv and events.json, where they exist. fps (None: 25) and length (None: to the last
-    frame in the file) apply to text only; `length` adds empty frames at the end. An event belongs to the frame that
-    reported it; if that is not stored, to the frame in which it was emitted, else to its end.
+    Args:
+        path: A folder that `write_tracks` wrote, a file of it, or a text. Of a text, velocities are differences over
+            0.5 s, covariances nan, and everybody is alone, but for groups.csv and events.json beside a tracks.txt.
+        fps: Frames per second of a text; None: 25.
+        length: Frames of a text; None: to the last frame in the file.
 
-    Raises InputError if there are no tracks, a run is unfinished, damaged or mixed with another, a file is unreadable
-    or invalid, a frame is beyond `length`, or an event's frame is outside the tracks. Warns about a text without rows
-    if `length` is given.
+    Returns:
+        One Tracks per frame. An event belongs to the frame that reported it, else to `emitted`, else to its end.
+
+    Raises:
+        InputError: There are no tracks, or they are unfinished, damaged, invalid or mixed with those of another run.
     """
     folder = run_folder(Path(path))
     if folder is not None:
@@ -147,11 +136,7 @@ def read_checked_tracks(
     path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: int | None = None,
     box_scale: BoxScale | None = None,
 ) -> list[Tracks]:  # fmt: skip
-    """Read tracks as `read_tracks` does, but of a run that `check_run` found whole: no hash is compared again.
-
-    person_class: the class of people in a text of another program; None: 1. box_scale: factors of x and y of its boxes;
-    None: 1.
-    """
+    """Reads tracks as `read_tracks` does, but compares no hash of a run again."""
     path = Path(path)
     folder = path if path.is_dir() else path.parent
     whole = path.is_dir() or path.name in WHOLE

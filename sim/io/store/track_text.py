@@ -27,18 +27,9 @@ from sim.types import Array, Ints, Plane, Tracks
 def read_track_text(
     path: Path, fps: float, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None
 ) -> list[Tracks]:
-    """Return the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`; frames without rows are empty.
+    """Returns the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`, sorted by id.
 
-    length: None: to the last frame in the file. fps: frames/s. person_class: the class of people, if the file has
-    classes; None: 1, with a warning about rows of other classes, which are left
-    out. box_scale: factors of x and y of the boxes; None: 1. Tracks of a frame are sorted by id. Positions are on the
-    ground (m) if the file has them, else box centres in the image (px). Velocities are differences over 0.5 s,
-    covariances nan, and everybody is alone (group -1). Boxes are None if a row lacks one. Scores are 1 if the file has
-    none; scores outside [0, 1] are mapped into it as `unit_scores` does.
-
-    Raises InputError if the file is unreadable, a line is invalid, a frame is beyond `length`, an id is negative or
-    stands twice in a frame, only some lines have a ground position, a line has neither box nor ground position, or the
-    file has no row and `length` is None. Warns about a file without rows otherwise.
+    length: None: to the last frame in the file. person_class, box_scale: as of `read_detections`.
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     require_pixels(table.rows, table.boxes())
@@ -67,6 +58,7 @@ def read_track_text(
         some = (id[a:b], np.full(b - a, -1, np.int64), pos[a:b], vel[a:b], np.full((b - a, 4, 4), np.nan))
         return *some, None if box is None else box[a:b], score[a:b]
 
+    # Most frames of sparse texts are empty: they share their arrays.
     nobody = Tracks(0, 0.0, plane, "person", *arrays(0, 0))  # type: ignore[arg-type]
     none = (nobody.id, nobody.group, nobody.pos, nobody.vel, nobody.cov, nobody.box, nobody.score)
     return [
@@ -76,11 +68,6 @@ def read_track_text(
 
 
 def _reject_empty(table: MotTable, length: int | None) -> None:
-    """Raise InputError for a table without rows if `length`, the number of frames, is None; else warn that nobody was
-    tracked.
-
-    Does nothing if the table has rows.
-    """
     if len(table.frame):
         return
     if length is None:
@@ -89,17 +76,14 @@ def _reject_empty(table: MotTable, length: int | None) -> None:
 
 
 def _centres(table: MotTable) -> Array:
-    """Return the centres x, y of the boxes, (N, 2) px, in the table's order. Raises InputError if a row has no box."""
     table.rows.reject(table.without_box(), "a box, or a ground position in every line", "complete the lines")
     return table.box[:, :2] + table.box[:, 2:] / 2
 
 
 def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
-    """Return copies of one tracker's tracks with the groups of a groups.csv; each member's `group` is its group's id.
+    """Returns copies of one tracker's tracks with the groups of a groups.csv.
 
-    found: one Tracks per frame, from frame 1; not changed. path: the groups.csv. People in no group keep their group;
-    of a person in two groups the one with the higher id counts. Members without a track are ignored, but stay in the
-    groups. Raises InputError if the file is unreadable or invalid, or names a frame beyond the tracks.
+    A person in two groups gets the one with the higher id. Members without a track stay in the groups.
     """
     every = read_groups_csv(path, len(found))
     answers = []
