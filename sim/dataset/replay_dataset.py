@@ -27,38 +27,25 @@ Progress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """Options that all replays of a dataset share.
+    """Options that all replays of a dataset share."""
 
-    view: camera, sensor, light and picture, with the frame rate. cut: the part of each recording to replay, default
-    all. calibration: camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an
-    error for others. streams: pictures to store, some of "left", "right", "disparity", "ids", "background"; () for
-    none. images: their file type, "jpg", "png" or "mp4".
-    """
-
-    view: ObservationSpec
-    cut: Cut = WHOLE
+    view: ObservationSpec  # camera, sensor, light and picture, with the frame rate
+    cut: Cut = WHOLE  # the part of each recording to replay, default all
+    # camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an error for
+    # others
     calibration: Camera | str | Path | None = None
+    # pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none
     streams: tuple[str, ...] = ("left",)
-    images: str = "jpg"
+    images: str = "jpg"  # their file type, "jpg", "png" or "mp4"
 
 
 def store_replays(
     sources: Iterable[Sequence], options: ReplayOptions, seeds: range, out: str | Path, progress: Progress | None = None
 ) -> list[Path]:
-    """Write OUT/flockscope-<split>/<recording>-s<seed>/ for every source and seed, and OUT/seqmaps; returns the
-    folders.
+    """Stores a replay of every source with every seed, as `generate` does; returns the folders.
 
-    All seeds of the first source come first; no sources give []. <recording> is the recording's name, with "-" for
-    characters other than letters, digits, "_", "." and "-", with "replay-" in front if it does not begin with a letter,
-    and with "-t<start in s>" for a cut that begins later. A
-    stored replay with the same options is kept if its files are intact. progress: called as progress(replays done,
-    replays in all, name of the last one) after each replay. The first error ends the work; replays stored before it are
-    kept and listed in OUT/seqmaps.
-
-    Raises InputError if `seeds` is empty or spans two splits, two recordings share a name, a recording of real motion
-    is given with seeds below 20,000 (the tuning splits), a stream or file type is unknown, a folder holds another
-    sequence, or another process writes to `out`. Also raises InputError as sim.replay, as for a source without labelled
-    people or a cut outside it. Raises WorkError if the disk is full.
+    The first error ends the work; replays stored before it are kept. Recordings of real motion need seeds from 20,000
+    on.
     """
     recordings, split, root = list(sources), split_of(seeds), Path(out)
     folder = root / f"flockscope-{split}"
@@ -102,10 +89,5 @@ def _store(recording: Sequence, options: ReplayOptions, seed: int, folder: Path)
 
 
 def _job(form: ReplaySpec, seed: int, folder: Path, options: ReplayOptions) -> SequenceJob:
-    """Return the SequenceJob of one replay; its folder is folder/<name>-s<seed, 5 digits>.
-
-    form: the replay's specification, which takes the scenario's place. folder: OUT/flockscope-<split>. options: give
-    streams and images.
-    """
     entry = Entry(form.name, cast(Any, form))
     return SequenceJob(output_path(folder, form.name, f"-s{seed:05d}"), entry, seed, options.streams, options.images)

@@ -12,11 +12,7 @@ LONGEST = 40  # characters of a value
 
 
 def setting_differences(stored: Table, wanted: Table) -> str:
-    """Return the settings that differ between two scenarios, as "camera.fps 10 → 5, duration 20 → 30".
-
-    stored, wanted: tables of resolved scenarios. The stored value stands first, "none" for a missing one. At most 3
-    settings are named, others counted; "" for equal ones.
-    """
+    """Returns the settings that differ between two scenarios, as "camera.fps 10 → 5, duration 20 → 30"."""
     before, after = (dict(_flat("", table)) for table in (stored, wanted))
     keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
     words = [f"{key} {_value(before, key)} → {_value(after, key)}" for key in keys[:MOST]]
@@ -24,7 +20,6 @@ def setting_differences(stored: Table, wanted: Table) -> str:
 
 
 def _flat(prefix: str, value: Any) -> list[tuple[str, Any]]:
-    """Return pairs (key, value) of a nested value, with keys as "group[0].size". Lists of plain values stay whole."""
     if isinstance(value, dict):
         dot = "." if prefix else ""
         return [pair for key, inner in value.items() for pair in _flat(f"{prefix}{dot}{key}", inner)]

@@ -8,7 +8,7 @@ from sim.types import Image
 
 
 def compressed(image: Image, quality: int) -> Image:
-    """Return the image (H, W, 3) uint8, BGR, after JPEG compression with this quality, 1 (worst) to 100."""
+    """Returns the image (H, W, 3) uint8, BGR, after JPEG compression with this quality, 1 (worst) to 100."""
     import cv2
 
     code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]

@@ -18,24 +18,18 @@ FRAMES = 16  # frames of a batch
 
 @dataclass(frozen=True, eq=False)
 class PeopleInView:
-    """N people of one or more frames as one camera view sees them.
+    """N people of one or more frames as one camera view sees them."""
 
-    projected: ProjectedPeople: rays in the axes of body and head, outlines in px. shadows: PeopleShadows; None if the
-    light casts none. sunlit (N, 3): 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing,
-    as a wall, hides it.
-    """
-
-    projected: ProjectedPeople
-    shadows: PeopleShadows | None
+    projected: ProjectedPeople  # ProjectedPeople: rays in the axes of body and head, outlines in px
+    shadows: PeopleShadows | None  # PeopleShadows; None if the light casts none
+    # (N, 3) 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing, as a wall, hides it
     sunlit: Array
 
 
 class FrameBatch:
-    """The people of up to 16 (FRAMES) consecutive frames of a Motion, among them frame `index` (from 1 on).
+    """The people of up to 16 consecutive frames of a Motion, among them frame `index`; batches begin at 1, 17, 33, ….
 
-    Batches begin at frames 1, 17, 33, …; `first` is the first frame's number. `index in batch` tells whether a frame
-    number belongs to it, also behind the Motion's last frame. light: the Illumination, for sun and shadows. State: all
-    people of the batch, and what each view sees of them, computed when first asked for.
+    State: all people of the batch, and what each view sees of them, computed when first asked for.
     """
 
     def __init__(self, motion: Motion, light: Illumination, index: int) -> None:
@@ -53,18 +47,11 @@ class FrameBatch:
         return slice(int(self._starts[k]), int(self._starts[k + 1]))
 
     def people(self, index: int) -> DrawnPeople:
-        """Return the people of frame `index` (from 1 on), sorted by id; 0 rows if nobody is present.
-
-        The frame must belong to the batch. Raises IndexError if the Motion has no such frame.
-        """
+        """Returns the people of frame `index`, sorted by id."""
         return take_rows(self._people, self._rows(index))
 
     def in_view(self, view: CameraView, side: int, index: int) -> PeopleInView:
-        """Return the people of frame `index` (from 1 on) as a view sees them, in the order of `people`.
-
-        side: number under which the view's results are kept; it must always name the same view. Shadows are None if the
-        light casts none. The frame must belong to the batch. Raises IndexError if the Motion has no such frame.
-        """
+        """Returns the people of frame `index` as a view sees them; `side` always names the same view."""
         if side not in self._views:
             light, people = self.light, self._people
             shadows = None
