@@ -22,23 +22,15 @@ from sim.types import Array, Order
 
 
 def groups_made(scenario: Scenario) -> int:
-    """Returns an upper bound of the number of new groups that the orders of a scenario make; 0 without orders.
-
-    A merge counts 1 and a split its parts. A queue makes none but counts 1, too.
-    """
+    """Returns an upper bound of the number of new groups that the orders of a scenario make."""
     return sum(len(e.parts) if isinstance(e, SplitOrder) else 1 for e in scenario.event)
 
 
 class OrderExecution:
     """Carries out the orders of one scenario on the groups of a running simulation.
 
-    - groups: the groups whose members, ways and places the orders change. placement: turn and mirror of the script.
-    - pending: all orders, in the order of the file, fired or not. come_true: ids of orders whose rule has held long
-      enough (people are together, apart or in line, as ordered).
-    - queues: the opened queues, by index (from 0) of their order in the file.
-    - seed, repeat (the suite entry's copy, 0 for none): keys of the random draws of times, goals and service times.
-
-    Construction takes scenario, groups, placement, seed and repeat, and draws each order's delay and time.
+    State: pending: all orders, fired or not; come_true: ids of orders whose rule has held long enough; queues: the
+    opened ones, by index of their order in the file.
     """
 
     def __init__(
@@ -53,23 +45,15 @@ class OrderExecution:
         return rng(self.seed, role, *keys, repeat=self.repeat)
 
     def _pending(self, order: MergeOrder | SplitOrder | QueueOrder, k: int) -> PendingOrder:
-        """Returns the order with index k (from 0) in the file, ready to wait for its trigger; its delay and time are
-        drawn, s.
-
-        The time is inf unless the trigger is `time`.
-        """
         when = order.when
         time = np.inf if when.time is None else draw(when.time, self._rng("event", k, 1))
         at = None if when.reach is None or when.reach.at is None else self.placement.point(np.array(when.reach.at))
         return PendingOrder(order, k, draw(when.delay, self._rng("event", k, 0)), time, at)
 
     def advance(self, tick: int, t: float, state: Array) -> bool:
-        """Fires orders that are due at time t (s), serves queues, and lets groups that have arrived stand in a circle.
+        """Fires orders that are due at tick and time t (s), serves queues, and lets arrived groups settle.
 
-        tick: of the script, from 0; in the warm-up nothing fires. state (P, 4): x, y, vx, vy by
-        column, m, m/s, nan while absent. Orders are taken in the order of the file. From the tick after firing, an
-        order's rule is examined until it has held long enough; then its id joins come_true. Returns False only if
-        nothing has changed that `GroupState.fill` writes. It is always True once a queue has opened.
+        state (P, 4): x, y, vx, vy by column, nan while absent. Returns True if something changed for `GroupState.fill`.
         """
         changed = bool(self.queues)
         for pending in self.pending:
@@ -95,13 +79,6 @@ class OrderExecution:
             self._line_up(pending, order)
 
     def _merge(self, pending: PendingOrder, order: MergeOrder, state: Array) -> None:
-        """Makes one new group of the merging groups, which cease to exist; it gathers where they meet.
-
-        Then it stands there in a circle (goal "meet"), or walks to the order's goal. It is no faster than its slowest
-        parent; a walking group also no faster than its members' mean free speed less the slowdown. Its spacing is the
-        mean of the parents'. state (P, 4): x, y, vx, vy by column, m, m/s. Sets pending.before and pending.after
-        (columns).
-        """
         groups, arrays = self.groups, self.groups.arrays
         parents = [self._end(name) for name in order.groups]
         parts = [list(groups.members[g]) for g in parents]
@@ -109,6 +86,7 @@ class OrderExecution:
         columns = sorted(c for part in parts for c in part)
         pending.after = (tuple(columns),)
         g = groups.new_group(order.into, columns, float(np.mean([groups.spacing[p] for p in parents])))
+        # No faster than the slowest parent: nobody runs to a merge.
         pace = min(float(arrays.speed[p]) for p in parents)
         r = self._rng("event", pending.index, 2)
         middles = np.array([state[c, :2].mean(axis=0) for c in parts])
@@ -128,21 +106,13 @@ class OrderExecution:
         groups.take_places(columns, places, meeting, g, state[columns, :2])
 
     def _end(self, name: str) -> int:
-        """Ends a group, which also leaves its queue, and returns its index; the caller makes new groups of its
-        people.
-        """
         g = self.groups.alive.pop(name)
+        # A group that is in a queue leaves it.
         for queue in self.queues.values():
             queue.remove(g)
         return g
 
     def _split(self, pending: PendingOrder, order: SplitOrder, state: Array) -> None:
-        """Divides a group, which ceases to exist, into the order's parts and gives each part a way to its own goal.
-
-        Each member joins the part in whose goal's direction it is furthest ahead, as far as the parts' sizes allow.
-        state (P, 4): x, y, vx, vy by column, m, m/s. Each part keeps the group's heading and spacing. Sets
-        pending.before and pending.after (columns).
-        """
         groups = self.groups
         parent = self._end(order.group)
         columns = groups.members[parent]
@@ -162,16 +132,11 @@ class OrderExecution:
             groups.goals[g] = (goal, part.at_goal)
             groups.go(g, here, via, goal, part.at_goal, groups.walking_speed(own))
             groups.take_places(own, walking(len(own), groups.spacing[g]), here, g, state[own, :2])
+            # A part turns to its goal, as people do, and does not jump round.
             groups.arrays.heading[g] = groups.arrays.heading[parent]
         pending.after = tuple(after)
 
     def _line_up(self, pending: PendingOrder, order: QueueOrder) -> None:
-        """Opens a queue and sends the order's groups to it.
-
-        Draws each group's service time (s). Overwrites where each group goes afterwards, if the order has a goal.
-        Without one, groups keep their own. A group that is in another queue leaves that one. Sets
-        pending.before (columns of each group) and pending.after (all columns as one part).
-        """
         groups = self.groups
         queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
         for queue in self.queues.values():
@@ -195,12 +160,6 @@ class OrderExecution:
             )
 
     def _serve(self, k: int, queue: ServiceQueue, t: float, state: Array) -> None:
-        """Advances a queue to time t (s): sets the target place of each person in it, and sends served groups to their
-        goals.
-
-        A served group leaves the queue and walks on in formation. k: index of the queue's order. state (P, 4): x, y,
-        vx, vy by column, m, m/s.
-        """
         groups = self.groups
         slots, done = queue.advance(t, groups.members, state[:, :2])
         for column, slot in slots.items():
@@ -214,12 +173,7 @@ class OrderExecution:
             groups.places[columns] = walking(len(columns), groups.spacing[g])
 
     def record(self, frames: FrameTimes) -> tuple[Order, ...]:
-        """Returns all orders of the script, in the order of the file, with the person ids (column + 1) of each group
-        before and after.
-
-        `fired` is the nearest of the frames, from 1. Of an order that never fired `fired` and `time` are None, and
-        before and after are empty.
-        """
+        """Returns all orders of the script with the frame at which each fired, and its people before and after."""
 
         def ids(parts: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
             return tuple(tuple(c + 1 for c in part) for part in parts)

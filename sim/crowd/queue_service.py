@@ -19,32 +19,24 @@ SERVED_RADIUS = 0.35  # m from the head's place: service can begin
 
 @dataclass
 class ServiceQueue:
-    """One queue at a service point. Groups are given by index; a group is served as a whole.
-
-    - Fixed: head (2,): place of the first person, m. along (2,): unit vector from head to tail. spacing: between
-      neighbouring places, m. service: service time in s of each group, by group index.
-    - State: joined: groups in the queue, head first. coming: groups on their way to it. busy_until: time at which the
-      group at the head is done, s; None while no group is being served.
-    """
+    """One queue at a service point. Groups are given by index; a group is served as a whole."""
 
     head: Array
-    along: Array
-    spacing: float
+    along: Array  # (2,) unit vector from head to tail
+    spacing: float  # between neighbouring places, m
+    # service time in s of each group, by group index. State: joined: groups in the queue, head first.
     service: dict[int, float]
     joined: list[int] = field(default_factory=list)
-    coming: list[int] = field(default_factory=list)
+    coming: list[int] = field(default_factory=list)  # groups on their way to it
+    # time at which the group at the head is done, s; None while no group is being served
     busy_until: float | None = None
 
     def slot(self, k: int) -> Array:
-        """Returns the place (2,), x, y in m, with index k in the queue; 0 is the head's. k is not limited by the
-        queue's length."""
+        """Returns the place (2,) with index k in the queue; 0 is the head's."""
         return self.head + k * self.spacing * self.along
 
     def remove(self, g: int) -> None:
-        """Takes group g out of the queue, as when it merges, splits or joins another queue; nothing if it is not in it.
-
-        If the group was being served, its service ends, and that of the next group can begin.
-        """
+        """Takes group g out of the queue, if it is in it, as when it merges; its service ends."""
         if self.joined[:1] == [g]:
             self.busy_until = None
         self.joined = [other for other in self.joined if other != g]
@@ -53,14 +45,8 @@ class ServiceQueue:
     def advance(self, t: float, members: dict[int, list[int]], pos: Array) -> tuple[dict[int, Array], list[int]]:
         """Advances the queue to time t (s): ends and begins service, and lets groups join at the tail.
 
-        Returns (places, done). places: the place (2,) in m of each person, keyed by the person's column. done: list of
-        the group whose service has ended; empty if none has, at most one. That group gets no places any more. A coming
-        group joins as soon as one member is within JOIN_RADIUS (0.5 m) of the first free place. Several may join in one
-        call, the nearest to the tail first (ties: lower index). Groups that are still coming get the places behind the
-        tail, in that order. Modifies joined, coming and busy_until.
-
-        members: columns of the people of each group, at least one; the list of a group still coming is sorted in place,
-        nearest to the head first. pos (P, 2): x, y in m, by column.
+        Returns the place of each person by column, and the group that was served, in a list. members: columns of each
+        group; those of a group still coming are sorted, nearest to the head first. pos (P, 2): m.
         """
         done = self._serve(t, members, pos)
         tail = sum(len(members[g]) for g in self.joined)
@@ -78,11 +64,7 @@ class ServiceQueue:
         return slots, done
 
     def _give_slots(self, g: int, k: int, members: dict[int, list[int]], slots: dict[int, Array]) -> int:
-        """Writes the places k, k + 1, … (2,), m, of the members of group g to `slots`, keyed by column; returns the
-        next free place's index.
-
-        members: columns by group index. Place 0 is the head's.
-        """
+        """Writes the places of a group's members from index k on; returns the next free index."""
         for column in members[g]:
             slots[column] = self.slot(k)
             k += 1
@@ -92,13 +74,7 @@ class ServiceQueue:
         return bool(np.min(length(pos[members[g]] - self.slot(k))) < JOIN_RADIUS)
 
     def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
-        """Returns the group whose service ends by time t (s), as a list of one, and removes it from `joined`; else [].
-
-        Service of the first group begins once its first member is within SERVED_RADIUS (0.35 m) of the head's place;
-        this call sets busy_until and returns []. When service ends, busy_until is None again; the next group's service
-        begins in a later call. Without joined groups the result is []. members: columns by group index. pos (P, 2): x,
-        y in m, by column.
-        """
+        """Returns the group whose service ends by time t, in a list; begins the service of the next."""
         if not self.joined:
             return []
         first = self.joined[0]

@@ -15,34 +15,23 @@ from sim.types import Array
 
 @dataclass(frozen=True)
 class PlannedStop:
-    """One stop of one group, drawn.
+    """One stop of one group, drawn."""
 
-    - at (2,): place in the world, m. stay: s. until: times, s after the first recorded frame, ascending; may be empty.
-    - members: numbers of the members who stop, from 0, ascending; at least one. whole: True if all members stop.
-    """
-
-    at: Array
-    stay: float
-    until: tuple[float, ...]
-    members: tuple[int, ...]
-    whole: bool
+    at: Array  # (2,) place in the world, m
+    stay: float  # s
+    until: tuple[float, ...]  # times, s after the first recorded frame, ascending; may be empty
+    members: tuple[int, ...]  # numbers of the members who stop, from 0, ascending; at least one
+    whole: bool  # True if all members stop
 
     def end(self, t: float) -> float:
-        """Returns the time, s, at which people who arrive at time t walk on; inf if they never do.
-
-        It is `stay` after t; with `until`, `stay` after the first of its times from t on.
-        """
+        """Returns when people who arrive at time t walk on, s; inf if never."""
         return next((u for u in self.until if u >= t), np.inf) + self.stay if self.until else t + self.stay
 
 
 def draw_stops(
     stops: tuple[Stop, ...], size: int, place: Callable[[Point], Array], r: np.random.Generator
 ) -> list[PlannedStop]:
-    """Returns the stops of a group of `size` people, in order; stops that the group leaves out are not in the list.
-
-    place: returns a point of the script in the world (2,), m; it may draw from r. A stop is left out if no member
-    stops, or if `stay` is drawn as 0 or less and there is no `until`. Who stops is drawn from r if not all do.
-    """
+    """Returns the stops of a group of `size` people; place: gives a point of the script in the world."""
     planned = []
     for stop in stops:
         at, stay = place(stop.at), max(0.0, draw(stop.stay, r))

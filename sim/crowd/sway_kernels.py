@@ -16,13 +16,11 @@ PI = 3.141592653589793
 
 @njit(cache=True)
 def sway(wanted, gait, dt, out):  # type: ignore[no-untyped-def]
-    """Add the acceleration of each person by the sway of the strides to out (N, 2), m/s², and advance gait by dt (s).
+    """Adds the acceleration by the sway of the strides to out (N, 2), and advances gait (N, 5) by dt (s).
 
-    The sway is A(v) sin(phase) to the left of the wanted velocity; wanted (N, 2), m/s, is without its fluctuations, and
-    v is its size. The phase grows by 2 pi STRIDES sqrt(v) per s. A is the person's amplitude at USUAL_SPEED. It falls
-    linearly to 0 at SWAYLESS, and below SLOW with the speed. The acceleration is the change of the velocity of the sway
-    in dt, divided by dt. Overwrites cosine and sine of the phase and velocity of the sway in gait (N, 5), as they are
-    after dt.
+    The sway is A(v) sin(phase) to the left of the wanted velocity (N, 2) of size v. The phase grows by 2 pi STRIDES
+    sqrt(v) per s. A is the person's amplitude at USUAL_SPEED; it falls linearly to 0 at SWAYLESS, and below SLOW with
+    the speed.
     """
     for i in range(len(gait)):
         pace = sqrt(wanted[i, X] * wanted[i, X] + wanted[i, Y] * wanted[i, Y])

@@ -24,15 +24,13 @@ BRIDGE_TIME = 0.5  # s for which hulls may be further apart within one encounter
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Encounters:
-    """E encounters (stretches in which two groups are near each other), sorted by first frame, last frame and group
-    ids.
+    """E stretches in which two groups are near each other, sorted by first frame, last frame and group ids."""
 
-    first, last (E,): frames from 0, both inclusive. a, b (E,): group ids, a < b. Indexing with a slice, indices or
-    flags gives Encounters of these rows; len() gives E.
-    """
-
+    # first, last (E,): frames from 0, both inclusive
     first: Ints
     last: Ints
+    # a, b (E,): group ids, a < b. Indexing with a slice, indices or flags gives Encounters of these rows; len() gives
+    # E.
     a: Ints
     b: Ints
 
@@ -45,28 +43,19 @@ class Encounters:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MembersByFrame:
-    """The members of each group in each frame: G rows, one for each group and frame, sorted by (frame, group id).
+    """The members of each group in each frame: G rows, one for each group and frame, sorted by (frame, group id)."""
 
-    - t (G,): frame from 0. name (G,): group id. key (G,): t * width + name, ascending, for look-ups.
-    - width: greatest group id + 1; 1 without groups.
-    - first, count (G,): the members of a row are person[first : first + count].
-    - person (R,): columns (person id - 1) of the members of row after row, ascending within a row.
-    """
-
-    t: Ints
-    name: Ints
-    key: Ints
-    width: int
+    t: Ints  # (G,) frame from 0
+    name: Ints  # (G,) group id
+    key: Ints  # (G,) t * width + name, ascending, for look-ups
+    width: int  # greatest group id + 1; 1 without groups
+    # first, count (G,): the members of a row are person[first : first + count]
     first: Ints
     count: Ints
-    person: Ints
+    person: Ints  # (R,) columns (person id - 1) of the members of row after row, ascending within a row
 
     def find(self, t: Ints, name: Ints) -> tuple[Ints, Ints]:
-        """Returns (first, count), both (K,), of the groups with ids name (K,) in frames t (K,), which count from 0.
-
-        The members are person[first : first + count]. count is 0 where the group does not exist in that frame; `first`
-        then means nothing. Ids must be from 0 to width - 1, else wrong groups may be found.
-        """
+        """Returns (first, count), both (K,), of the groups name (K,) in frames t (K,); count is 0 if there is none."""
         if not len(self.t):
             return np.zeros_like(t), np.zeros_like(t)
         key = t * self.width + name
@@ -75,21 +64,13 @@ class MembersByFrame:
         return self.first[place], np.where(found, self.count[place], 0)
 
     def members(self, t: int, name: int) -> Ints:
-        """Returns the columns (person id - 1), ascending, of the members of group id `name` in frame t, which counts
-        from 0.
-
-        Empty if the group does not exist in that frame.
-        """
+        """Returns the columns (person id - 1), ascending, of the members of a group in frame t (from 0)."""
         first, count = self.find(np.array([t]), np.array([name]))
         return self.person[first[0] : first[0] + count[0]]
 
 
 def members_by_frame(group: Ints) -> MembersByFrame:
-    """Returns the members of all groups in all frames.
-
-    group (T, P): group id of each person in each frame, -1 (or less) = alone or absent. A group of one member gets a
-    row, too. No group gives a result without rows.
-    """
+    """Returns the members of all groups in all frames. group (T, P): group ids, -1 = alone or absent."""
     t, person = np.nonzero(group >= 0)
     order = np.lexsort((person, group[t, person], t))
     t, person = t[order], person[order]
@@ -100,11 +81,9 @@ def members_by_frame(group: Ints) -> MembersByFrame:
 
 
 def encounters(pos: Array, rows: MembersByFrame, fps: float) -> Encounters:
-    """Returns all encounters of two groups of two or more people each, sorted by first frame, last frame and group ids.
+    """Returns all encounters of two groups of two or more people.
 
-    An encounter is a stretch in which the hulls of the members' footprints (polygons of 0.25 m round each person) are
-    within CROSS_GAP (1.0 m). Breaks of at most BRIDGE_TIME (0.5 s) do not end it. pos (T, P, 2): x, y in m, finite for
-    all members. rows: the members of all groups by frame; without rows there is no encounter. fps: frames per s.
+    pos (T, P, 2): m, finite for all members. rows: the members of all groups by frame.
     """
     if not len(rows.t):
         return Encounters(rows.t, rows.t, rows.t, rows.t)
@@ -118,13 +97,7 @@ def encounters(pos: Array, rows: MembersByFrame, fps: float) -> Encounters:
 
 
 def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
-    """Returns the pairs (i, j), i < j, of rows of one frame whose hulls are within CROSS_GAP (1.0 m), each of shape
-    (K,).
-
-    A row is one group in one frame; only rows of two or more people count. A hull is that of the members' footprints
-    (0.25 m round each). t, count (G,): frame, ascending, and number of people of each row. places (R, 2): x, y of the
-    members of row after row, m. Raises ValueError without rows.
-    """
+    """Returns the pairs (i, j), i < j, of rows of one frame whose hulls are within CROSS_GAP, (K,) each."""
     start = np.cumsum(count) - count
     middle = np.add.reduceat(places, start) / count[:, None]
     radius = np.maximum.reduceat(length(places - np.repeat(middle, count, axis=0)), start) + FOOTPRINT_RADIUS
@@ -148,31 +121,23 @@ def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupPath:
-    """The path of one of the two groups of each encounter (a stretch in which two groups are near each other).
+    """The path of one of the two groups of each encounter: R rows, frames in and around the encounters."""
 
-    R rows: frames in and around the encounters, one encounter after another.
-
-    - middle, vel (R, 2): mean position x, y, m, and mean velocity, m/s, of the members at the meeting who are present
-      in the row's frame; nan if none of them is.
-    - same_members (R,): True if the group has no other members than at the meeting, and the present ones all belong to
-      it. One who alone is still present need not belong to it.
-    """
-
+    # middle, vel (R, 2): mean position x, y, m, and mean velocity, m/s, of the members at the meeting who are present
+    # in the row's frame; nan if none of them is
     middle: Array
     vel: Array
+    # (R,) True if the group has no other members than at the meeting, and the present ones all belong to it. One who
+    # alone is still present need not belong to it.
     same_members: Bools
 
 
 def group_paths(
     pos: Array, vel: Array, group: Ints, rows: MembersByFrame, name: Ints, met: Ints, encounter: Ints, frame: Ints
 ) -> GroupPath:
-    """Returns the path of one group of each of E encounters (stretches in which two groups are near each other).
+    """Returns the path of one group of each encounter, as means over its members in frame `met` (E,).
 
-    Its means are over the members that the group had at the meeting, frame `met`. pos, vel (T, P, 2): m, m/s, nan while
-    absent. group (T, P): group ids. rows: the members by frame. name (E,): group id in each encounter. met (E,): frame,
-    from 0; the group must exist in it. encounter, frame (R,): the rows wanted, encounters ascending, frames from 0;
-    none give a path without rows. A single member who stays after the other members have left the scene counts as the
-    same group.
+    pos, vel (T, P, 2): m, m/s, nan while absent. name (E,): group ids. encounter, frame (R,): the rows, frames from 0.
     """
     first, count = rows.find(met, name)
     row, place = runs(first[encounter], (first + count)[encounter])
@@ -189,11 +154,7 @@ def group_paths(
 
 
 def _mean(values: Array, there: Bools, start: Ints) -> Array:
-    """Returns the means (R, 2) of R consecutive runs of values (N, 2); the runs begin at the indices start (R,).
-
-    A row counts if both its numbers are finite and its flag in `there` (N,) is True; nan for a run without such rows.
-    No runs give shape (0, 2).
-    """
+    """Returns the means (R, 2) of consecutive runs of finite values (N, 2) that are there; nan for a run without any."""
     known = there & np.isfinite(values[:, 0]) & np.isfinite(values[:, 1])
     if not len(start):
         return np.zeros((0, 2))
@@ -203,31 +164,18 @@ def _mean(values: Array, there: Bools, start: Ints) -> Array:
 
 
 def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
-    """Returns how often path b crosses path a from left to right, minus right to left, for each encounter, shape
-    (count,).
+    """Returns how often path b crosses path a from left to right, minus right to left, per encounter (count,).
 
-    Left is as seen along path a. An encounter is a stretch in which two groups are near each other. a, b (R, 2): points
-    of both paths in m, encounter after encounter; points with nan are left out, of each
-    path for itself. encounter (R,): number of each row's
-    encounter, from 0, ascending. An encounter without points gives 0. The two need not be at the crossing at the same
-    time.
-
-    Let s and t be times on a and b. The difference b(t) - a(s) winds round zero once for each crossing as (s, t) goes
-    round the square of all times. The turns along the four sides of the square are summed. Paths that meet in a vertex
-    of both are no special case, as they would be if segments were intersected.
+    a, b (R, 2): points of both paths, m. encounter (R,): of each row, from 0, ascending. Let s and t be times on a and
+    b. The difference b(t) - a(s) winds round zero once for each crossing as (s, t) goes round the square of all times.
+    The turns along the four sides are summed. Paths that meet in a vertex of both are then no special case.
     """
     turns = _turns(a, b, encounter, count) - _turns(b, a, encounter, count)
     return np.asarray(np.round(turns / (2 * np.pi)), np.int64)
 
 
 def _turns(path: Array, other: Array, encounter: Ints, count: int) -> Array:
-    """Returns a difference of two turning angles for each of `count` encounters, in radians, counter-clockwise, shape
-    (count,).
-
-    It is by how much the direction to `path` turns, seen from the first point of `other`, minus the same seen from its
-    last point. path, other (R, 2): m; points with nan are left out. encounter (R,): encounter of each row, from 0,
-    ascending. An encounter without points gives 0.
-    """
+    """Returns how far `path` turns, rad, seen from the first point of `other`, minus the same from its last point."""
     known = np.isfinite(path).all(axis=1)
     point, own = path[known], encounter[known]
     seen = np.flatnonzero(np.isfinite(other).all(axis=1))

@@ -30,33 +30,23 @@ NEVER = np.iinfo(np.int64).max
 
 @dataclass(frozen=True, slots=True)
 class MeasuredMotion:
-    """The motion from which groups are found: T frames, P people.
+    """The motion from which groups are found: T frames, P people."""
 
-    - pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P): flags.
-    - intent (T, P): index of the group that the script means a person to belong to, -1 while absent.
-    - hold: number of frames for which the merge or split rule must hold.
-    """
-
+    # pos, vel (T, P, 2): m, m/s, nan while absent
     pos: Array
     vel: Array
-    present: Bools
-    intent: Ints
-    hold: int
+    present: Bools  # (T, P) flags
+    intent: Ints  # (T, P) index of the group that the script means a person to belong to, -1 while absent
+    hold: int  # number of frames for which the merge or split rule must hold
 
 
 def partitions(
     pos: Array, vel: Array, present: Bools, intent: Ints, fps: float
 ) -> Iterator[tuple[int, list[PersonSet]]]:
-    """Yields (t, parts) for frame 0 and for each later frame t in which the parts may have changed; frames count from
-    0.
+    """Yields (t, parts) for frame 0 and for each later frame t (from 0) in which the parts may have changed.
 
-    parts: disjoint sets of columns (person id - 1) that make up all people present; a set of one is a person alone.
-    They are valid until the next t. Parts meant to be one group join in the first frame from which they are less than
-    1.5 m apart, with velocities differing by less than 0.5 m/s, for 2 s. A part meant to be several groups divides
-    likewise: more than 2.5 m apart, or 1.5 m with a difference above 0.7 m/s.
-
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): index of the group a person is meant to belong to,
-    -1 while absent. fps: frames per s. Yields nothing for a motion without frames.
+    parts: disjoint sets of columns (person id - 1) that make up all people present, valid until the next t. pos, vel
+    (T, P, 2): m, m/s. present (T, P). intent (T, P): the group a person is meant to belong to, -1 while absent.
     """
     there = present[..., None]
     pos, vel = np.where(there, pos, np.nan), np.where(there, vel, np.nan)
@@ -75,14 +65,7 @@ def partitions(
 
 
 def _turns(present: Bools, intent: Ints) -> Ints:
-    """Returns frame 0 and the frames, counted from 0 and ascending, from which on something is different.
-
-    That is the first frame of a person, the first frame without a person who has left, and the first frame in which a
-    person is meant to be in another group.
-
-    present (T, P): flags. intent (T, P): index of the group each person is meant to belong to, -1 while absent. Empty
-    for a motion without frames.
-    """
+    """Returns frame 0 and the frames from which somebody else is present, or meant to be in another group."""
     if not len(present):
         return np.zeros(0, np.int64)
     moved = (np.diff(present, axis=0) | (np.diff(intent, axis=0) != 0)).any(axis=1)
@@ -90,22 +73,13 @@ def _turns(present: Bools, intent: Ints) -> Ints:
 
 
 def _enter_and_leave(parts: list[PersonSet], motion: MeasuredMotion, t: int) -> list[PersonSet]:
-    """Returns the parts (sets of columns) in frame t, without people who have left and with people who have entered.
-
-    Parts with nobody left are dropped; the others keep their order. People who enter come last and form one new part
-    for each group that `motion.intent` means them to belong to. They join no existing part here.
-    """
     here = frozenset(np.flatnonzero(motion.present[t]).tolist())
     stay = [part & here for part in parts if part & here]
     return stay + list(_by_intent(here - frozenset().union(*stay), motion, t).values())
 
 
 def _by_intent(people: Iterable[int], motion: MeasuredMotion, t: int) -> dict[int, PersonSet]:
-    """Returns sets of the given columns `people`, keyed by the index of the group that they are meant to belong to in
-    frame t; -1 for absent people.
-
-    The keys are in the order of each group's least column.
-    """
+    """Returns the people by the group that they are meant to belong to in frame t."""
     found: dict[int, set[int]] = {}
     for p in sorted(people):
         found.setdefault(int(motion.intent[t, p]), set()).add(p)
@@ -113,10 +87,10 @@ def _by_intent(people: Iterable[int], motion: MeasuredMotion, t: int) -> dict[in
 
 
 class _RuleTimes:
-    """When parts (sets of columns, person id - 1) will join or divide in one motion.
+    """When parts of the crowd will join or divide in one motion.
 
-    State: for each rule ("merge" or "split") and two parts, the frames from which the rule will hold long enough (2 s).
-    They are measured once, when both parts exist for the first time, and remain valid while the parts stay the same.
+    State: for each rule and two parts, the frames from which the rule will hold long enough. They are measured once,
+    when both parts exist for the first time, and remain valid while the parts stay the same.
     """
 
     def __init__(self, motion: MeasuredMotion) -> None:
@@ -124,11 +98,7 @@ class _RuleTimes:
         self._known: dict[tuple[Rule, PersonSet, PersonSet], Ints] = {}
 
     def join_and_divide(self, parts: list[PersonSet], t: int) -> list[PersonSet]:
-        """Returns the parts (sets of columns) after all joins and divisions that are due in frame t, which counts from
-        0.
-
-        It divides, then joins, and repeats this until nothing changes. If nothing is due, `parts` itself is returned.
-        """
+        """Returns the parts after all joins and divisions that are due in frame t (from 0)."""
         while True:
             divided = [piece for part in parts for piece in self._divide(part, t)]
             joined = _connected(divided, self._due_to_join(divided, t))
@@ -137,26 +107,18 @@ class _RuleTimes:
             parts = joined
 
     def next_change(self, parts: list[PersonSet], t: int) -> int:
-        """Returns the first frame after t in which parts join or may divide; NEVER (the largest int64) if there is
-        none.
-
-        parts: disjoint sets of columns. Frames count from 0.
-        """
+        """Returns the first frame after t in which parts join or may divide; NEVER if there is none."""
         times = [_first(frames, t + 1) for _, frames in self._meant_to_join(parts, t)]
         for part in parts:
             times += [_first(self._onsets("split", a, b, t), t + 1) for a, b in self._meant_to_divide(part, t)]
         return min(times, default=NEVER)
 
     def _meant_to_join(self, parts: list[PersonSet], t: int) -> Iterator[tuple[tuple[PersonSet, PersonSet], Ints]]:
-        """Yields ((a, b), frames) for each two of the parts (sets of columns) that are meant to be one group in frame
-        t.
-
-        frames: ascending, from 0, those from which the merge rule will hold long enough. A part counts only if more
-        than half of its people are meant to be in that group; the rule is measured between these people.
-        """
+        """Yields ((a, b), frames of the merge rule) for each two parts that are meant to be one group in frame t."""
         meant: dict[int, list[tuple[PersonSet, PersonSet]]] = {}
         for part in parts:
             g, core = max(_by_intent(part, self.motion, t).items(), key=lambda item: len(item[1]))
+            # A part joins as the group that most of its people are meant to be in; the rule is measured between these.
             if 2 * len(core) > len(part):
                 meant.setdefault(g, []).append((part, core))
         for some in meant.values():
@@ -167,41 +129,23 @@ class _RuleTimes:
         return [pair for pair, frames in self._meant_to_join(parts, t) if _first(frames, t) == t]
 
     def _meant_to_divide(self, part: PersonSet, t: int) -> Iterator[tuple[PersonSet, PersonSet]]:
-        """Returns an iterator over each two subsets of a part (a set of columns) that are meant to be different groups
-        in frame t; may be empty."""
         return combinations(_by_intent(part, self.motion, t).values(), 2) if len(part) > 1 else iter(())
 
     def _divide(self, part: PersonSet, t: int) -> list[PersonSet]:
-        """Returns the pieces (sets of columns) into which a part divides in frame t; the part itself, in a list, if it
-        does not divide.
-
-        The pieces are its subsets by intended group. Two subsets stay together unless frame t is one from which the
-        split rule holds between them for 2 s, or if a third one connects them.
-        """
         if len(part) == 1:
             return [part]
+        # Two subsets stay together, too, if a third one connects them.
         unsplit = [(a, b) for a, b in self._meant_to_divide(part, t) if _first(self._onsets("split", a, b, t), t) != t]
         return _connected(list(_by_intent(part, self.motion, t).values()), unsplit)
 
     def _onsets(self, rule: Rule, a: PersonSet, b: PersonSet, t: int) -> Ints:
-        """Returns the frames (from 0), ascending, from which the rule ("merge" or "split") will hold long enough
-        between parts a and b.
-
-        a, b: sets of columns. The frames are measured at the first call for this rule and these parts, from frame t on;
-        later calls return the same array.
-        """
+        """Returns the frames, ascending, from which the rule will hold long enough between parts a and b."""
         key = (rule, a, b)
         if key not in self._known:
             self._known[key] = self._measure(rule, np.array(sorted(a)), np.array(sorted(b)), t)
         return self._known[key]
 
     def _measure(self, rule: Rule, a: Ints, b: Ints, t: int) -> Ints:
-        """Returns the frames from t on (from 0), ascending, from which the rule holds between columns a and b for
-        `hold` frames.
-
-        rule: "merge" or "split". The intent must agree in these frames, too. Empty if a and b are never both present
-        from t on.
-        """
         motion = self.motion
         both = motion.present[t:, a].any(axis=1) & motion.present[t:, b].any(axis=1)
         ends = np.flatnonzero(both)
@@ -214,12 +158,6 @@ class _RuleTimes:
         return np.flatnonzero(holds_for(holds, motion.hold)) + t
 
     def _intended(self, rule: Rule, window: slice, a: Ints, b: Ints) -> Bools:
-        """Returns for each frame of the window (a slice of frames) whether intent agrees with the rule between columns
-        a and b, shape (frames,).
-
-        merge: each person of a is meant to be in the same group as each person of b. split: no person of a is meant to
-        be in the group of a person of b. Absent people are ignored; a frame in which a or b has nobody agrees.
-        """
         intent, present = self.motion.intent[window], self.motion.present[window]
         same = intent[:, a, None] == intent[:, None, b]
         there = present[:, a, None] & present[:, None, b]
@@ -228,16 +166,12 @@ class _RuleTimes:
 
 
 def _first(frames: Ints, t: int) -> int:
-    """Returns the first of the ascending `frames` that is t or later; NEVER (the largest int64) if there is none."""
     k = int(np.searchsorted(frames, t))
     return int(frames[k]) if k < len(frames) else NEVER
 
 
 def _connected(parts: list[PersonSet], links: list[tuple[PersonSet, PersonSet]]) -> list[PersonSet]:
-    """Returns the parts, each set united with all sets that links connect it to, directly or through other parts.
-
-    The order of the first sets is kept; a united set appears once.
-    """
+    """Returns the parts, each united with all that links connect it to."""
     whole = {part: part for part in parts}
     for a, b in links:
         one = whole[a] | whole[b]

@@ -21,12 +21,8 @@ INSTANT = 0.02  # s: half the step by which ground velocities become image veloc
 def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
     """Returns the Groups of each frame as the camera sees them, with the ids, members and sizes of the ground groups.
 
-    truth: with boxes and velocities (else AssertionError). ground: Groups of each frame from frame 1, on the ground.
-    shapes: ellipsoids of body and head of the people, in the order of the truth's rows. Of each group: pos (px) and
-    extent (px²): mean and covariance of the middles of the members' boxes; vel: mean velocity of their bodies' centres
-    in the image, px/s; hull: of their silhouettes, px. If a member is not wholly in front of the camera, pos and extent
-    are nan and the hull is empty (0, 2). vel is nan if the centre of a member's body is not projected. A frame without
-    groups gives empty Groups.
+    shapes: ellipsoids of body and head, in the order of the truth's rows. pos and extent: of the boxes' middles, px.
+    hull: of the silhouettes, empty if a member is not wholly in front of the camera.
     """
     assert truth.box is not None
     assert truth.vel is not None
@@ -45,11 +41,7 @@ def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shape
 
 
 def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
-    """Returns the indices of the truth's rows of all groups' members, group after group, frame after frame.
-
-    Also returns where each of the G groups begins in them, shape (G + 1,), the end last. ground: Groups of each frame
-    from frame 1; members that the truth does not have give wrong rows, not an error. Without groups: no rows, and [0].
-    """
+    """Returns the truth's rows of all groups' members, and where each of the G groups begins in them (G + 1,)."""
     starts = np.searchsorted(truth.frame, np.arange(1, len(ground) + 1))
     rows, sizes = [np.zeros(0, np.int64)], [0]
     for index, (start, groups) in enumerate(zip(starts, ground, strict=True), start=1):
@@ -60,21 +52,12 @@ def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
 
 
 def _means(values: Array, cuts: Ints) -> Array:
-    """Returns the mean (G, ...) of values (R, ...) over each group's rows; shape (0, ...) if there is no group.
-
-    cuts (G + 1,): index of the row at which each group begins, the end last; each group has at least one row.
-    """
     count = np.diff(cuts).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(np.add.reduceat(values, cuts[:-1], axis=0) / count) if len(count) else values[:0]
 
 
 def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
-    """Returns the convex hull (V, 2) of each group of silhouettes, px, counter-clockwise in (u, v) coordinates.
-
-    ellipses: outlines of body and head of all members, group after group; each gives 24 points. cuts (G + 1,): index of
-    the member at which each group begins, the end last. A group with a silhouette that is nan, or without members, gets
-    an empty hull (0, 2).
-    """
+    """Returns the convex hull (V, 2) px of each group of silhouettes. cuts (G + 1,): where each group begins."""
     from sim.geometry import hull_kernels
 
     edge = contour(ellipses, POINTS)[: cuts[-1]]
@@ -83,10 +66,6 @@ def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
 
 
 def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
-    """Returns the velocities (N, 2) in px/s in the image of points middle (N, 3), m, that move at vel (N, 2), m/s.
-
-    They move at constant height; the step is 0.02 s back and forth. nan where the camera does not project the point,
-    for example behind it.
-    """
+    """Returns the velocities (N, 2) px/s in the image of points middle (N, 3) m that move at vel (N, 2) m/s."""
     step = INSTANT * np.column_stack([vel, np.zeros(len(vel))])
     return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))

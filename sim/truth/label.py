@@ -22,24 +22,14 @@ from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Near, Order, Sta
 
 
 def bodies(motion: Motion, camera: Camera | None) -> Truth:
-    """Returns a Truth with positions, boxes and visibility of every person in every frame, but without groups.
+    """Returns a Truth with positions, boxes and visibility of everybody in every frame, but without groups.
 
-    Its rows are people present in a frame, sorted by (frame, id); frames count from 1, the id is the column + 1. group
-    is -1 in every row; groups, groups_px, events, near and labelled are None. The motion's orders are taken over.
-    camera None: no camera; boxes, truncation and visible boxes are then None, visibility is 1 and px_per_m nan. Else
-    px_per_m is the scale at the image centre; a person not wholly in front of the camera has nan boxes, visibility 0
-    and truncation 1.
+    Without a camera, boxes are None and visibility is 1.
     """
     return _bodies(motion, camera, recorded_bodies(motion))
 
 
 def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Truth:
-    """Returns a Truth with positions, boxes and visibility of every person in every frame, but without groups (group is
-    -1).
-
-    people: rows and shapes as recorded_bodies(motion) returns them. camera None: boxes, truncation and visible boxes
-    are None, visibility is 1 and px_per_m nan.
-    """
     t, p = people.frame - 1, people.id - 1
     seen = None if camera is None else measure_visibility(
         camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
@@ -66,12 +56,7 @@ def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Tr
 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
-    """Returns the whole Truth: bodies, and groups, events and hard negatives measured from motion and intent.
-
-    Hard negatives: pairs of strangers who walk like a group. All frames count as labelled. The motion's orders are
-    taken over; whether they came true is not checked. camera None: no camera; boxes, truncation, visible boxes and
-    groups in the image are then None, visibility is 1 and px_per_m nan. Else px_per_m is the scale at the image centre.
-    """
+    """Returns the whole Truth: bodies, and groups, events and hard negatives measured from motion and intent."""
     from sim.truth.merge_split_events import groups_and_events
 
     people = recorded_bodies(motion)
@@ -93,7 +78,6 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
 
 
 def _events(s: States, found: GroupsAndEvents) -> list[GroupEvent]:
-    """Returns all events of a crowd at the ticks of its states, in no order; crossings and queues are measured here."""
     from sim.truth.crossing_events import crossings
     from sim.truth.queue_detection import queues
 
@@ -105,11 +89,7 @@ def _events(s: States, found: GroupsAndEvents) -> list[GroupEvent]:
 def _events_in_frames(
     events: list[GroupEvent], motion: Motion, group: Ints, shown: FrameTicks
 ) -> tuple[tuple[GroupEvent, ...], tuple[Order, ...]]:
-    """Returns the events with frames in place of ticks, sorted, and the orders with the events that fulfil them.
-
-    group (C, P): group id of each person at each tick. Groups that enter or leave between two frames of which none
-    shows it have no such event.
-    """
+    """Returns the events with frames in place of ticks, sorted, and the orders with the events that fulfil them."""
     ticks = sorted(events, key=_sorting)
     converted = [_in_frames(event, shown) for event in ticks]
     every = sorted((e for e in converted if e is not None), key=_sorting)
@@ -127,10 +107,10 @@ def _sorting(e: GroupEvent) -> tuple[int, int, str, tuple[int, ...], tuple[int, 
 
 
 def _in_frames(event: GroupEvent, shown: FrameTicks) -> GroupEvent | None:
-    """Returns the event with frames in place of ticks, both from 1; None if its people enter or leave unseen."""
     last = len(shown.tick) - 1
     if event.kind in ("enter", "leave"):  # a leave is in the last frame before the change
         start = shown.first(event.start - 1) if event.kind == "enter" else shown.first(event.start) - 1
+        # Groups that enter or leave between two frames of which none shows it have no such event.
         seen = 0 <= start <= last and not (event.kind == "leave" and start == last)
         return replace(event, start=start + 1, end=start + 1) if seen else None
     start = min(shown.first(event.start - 1), last)
@@ -138,7 +118,6 @@ def _in_frames(event: GroupEvent, shown: FrameTicks) -> GroupEvent | None:
 
 
 def _near_in_frames(near: Near, shown: FrameTicks) -> Near:
-    """Returns the stretches with frames in place of ticks, without those that no frame shows."""
     start = np.searchsorted(shown.tick, near.start - 1) + 1
     end = np.searchsorted(shown.tick, near.end - 1, side="right")
     kept = start <= end
@@ -146,9 +125,6 @@ def _near_in_frames(near: Near, shown: FrameTicks) -> Near:
 
 
 def _ground_groups(truth: Truth) -> Iterator[Groups]:
-    """Yields the Groups on the ground of frame 1, 2, … in turn; the truth must have pos and vel, else
-    AssertionError.
-    """
     from sim.truth.group_hulls import frame_groups
 
     assert truth.pos is not None

@@ -21,31 +21,23 @@ from sim.types import Array, Bools, GroupEvent, Ints, Near
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupsAndEvents:
-    """What is measured of the groups in a motion of T frames and P people.
+    """What is measured of the groups in a motion of T frames and P people."""
 
-    - group (T, P): id of each person's group, from 1; -1 for a person who is alone or absent.
-    - events: merge, split, form, dissolve, enter and leave, in order of the frame in which the group changed; () if
-      none.
-    - near: pairs of people who satisfy the merge rule (less than 1.5 m apart, velocities differing by less than 0.5
-      m/s, for 2 s) but are strangers (hard negatives).
-    """
-
-    group: Ints
+    group: Ints  # (T, P) id of each person's group, from 1; -1 for a person who is alone or absent
+    # merge, split, form, dissolve, enter and leave, in order of the frame in which the group changed; () if none
     events: tuple[GroupEvent, ...]
+    # pairs of people who satisfy the merge rule (less than 1.5 m apart, velocities differing by less than 0.5 m/s, for
+    # 2 s) but are strangers (hard negatives)
     near: Near
 
 
 def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> GroupsAndEvents:
     """Returns the group ids, the events (all kinds but cross and queue) and the near strangers of a motion.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): index of the group a person is meant to belong to.
-    pos and vel are nan, intent is -1 where a person is absent. fps: frames per s. The id of a person is the column + 1;
-    frames of events count from 1. Without frames there are no events.
-
-    A merge, split, form or dissolve event starts in the first frame in which its rule holds, and ends when the rule has
-    held for HOLD_TIME (2 s). Rules: together if less than 1.5 m apart with velocities differing by less than 0.5 m/s;
-    apart if beyond 2.5 m, or 1.5 m with a difference above 0.7 m/s. An enter event lies in the group's first frame, a
-    leave event in the last frame before the change. Groups that are there in frame 1 have no enter event.
+    pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P). intent (T, P): the group a person is meant to belong
+    to, -1 while absent. Frames of events count from 1, a person's id is the column + 1. A merge, split, form or
+    dissolve starts in the first frame in which its rule holds, and ends when it has held for HOLD_TIME. An enter lies
+    in the group's first frame, a leave in the last frame before the change.
     """
     group = np.full(present.shape, -1, np.int64)
     identities, events = Identities(), []
@@ -61,13 +53,6 @@ def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps:
 
 
 def _event(change: GroupChange, t: int, hold: int, pos: Array) -> GroupEvent:
-    """Returns the event of a change in frame t, which counts from 0; `members` of the change are columns (person id -
-    1).
-
-    Frames of the event count from 1. A leave is in the last frame before t, all other kinds start in t. hold: length in
-    frames of all kinds but enter and leave (one frame). pos (T, P, 2): m, nan while absent. The event's position is the
-    mean of its people who are present in its first frame; nan if none is.
-    """
     start = t if change.kind == "leave" else t + 1
     end = start if change.kind in ("enter", "leave") else start + hold - 1
     x, y = mean_of_present(pos[start - 1 : start, list(change.members)])[0]

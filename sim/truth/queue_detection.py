@@ -33,65 +33,49 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class DetectedQueue:
-    """A queue found in measured motion. People are columns (person id - 1).
+    """A queue found in measured motion. People are columns (person id - 1)."""
 
-    - first: first frame with 3 people in line; last: last frame in which the line was seen. Frames from 0, both
-      inclusive; only examined frames (about 10 per s) count.
-    - order: members from one end of the line to the other; either end may be the head. People who joined later are
-      inserted between those they stood between. Empty if nobody was in line for MEMBER_TIME (1 s).
-    - left: members who left before the end, in the order of leaving; () if none.
-    - middle: x, y of the line's middle when it was first followed, m; this may be before frame `first`.
-    - fifo: True if everyone who left did so from the same end of the line, or nobody left. A person may leave up to
-      MEMBER_TIME before people nearer to that end.
-    """
-
-    first: int
+    first: int  # first frame with 3 people in line;
+    # last frame in which the line was seen. Frames from 0, both inclusive; only examined frames (about 10 per s) count.
     last: int
+    # members from one end of the line to the other; either end may be the head. People who joined later are inserted
+    # between those they stood between. Empty if nobody was in line for MEMBER_TIME (1 s).
     order: tuple[int, ...]
-    left: tuple[int, ...]
-    middle: Vector
+    left: tuple[int, ...]  # members who left before the end, in the order of leaving; () if none
+    middle: Vector  # x, y of the line's middle when it was first followed, m; this may be before frame `first`
+    # True if everyone who left did so from the same end of the line, or nobody left. A person may leave up to
+    # MEMBER_TIME before people nearer to that end.
     fifo: bool
 
 
 @dataclass(frozen=True, slots=True)
 class _LineNow:
-    """A line of waiting people in one moment.
+    """A line of waiting people in one moment."""
 
-    - t: frame, from 0. order: columns (person id - 1) from one end to the other. u: unit vector x, y from the first
-      person towards the last.
-    - middle: x, y of their mean position, m. drift: their mean velocity along u and to the left of u, m/s.
-    """
-
-    t: int
-    order: tuple[int, ...]
-    u: Vector
-    middle: Vector
-    drift: Vector
+    t: int  # frame, from 0
+    order: tuple[int, ...]  # columns (person id - 1) from one end to the other
+    u: Vector  # unit vector x, y from the first person towards the last
+    middle: Vector  # x, y of their mean position, m
+    drift: Vector  # their mean velocity along u and to the left of u, m/s
 
     def turned(self) -> _LineNow:
-        """Returns the same line with its ends exchanged: order, u and drift reversed."""
+        """Returns the same line with its ends exchanged."""
         return replace(self, order=self.order[::-1], u=(-self.u[0], -self.u[1]), drift=(-self.drift[0], -self.drift[1]))
 
 
 @dataclass
 class _FollowedLine:
-    """A line of waiting people that is followed through time. Frames count from 0; people are columns (person id - 1).
+    """A line of waiting people that is followed through time; frames from 0, people are columns."""
 
-    - now: the line when last seen. since, three: first and last frame with at least 3 people (QUEUE_PEOPLE).
-    - middle: x, y of the line's middle in the frame in which following began, m.
-    - seen: by person, number of moments (examined frames) in the line. gone: by person, the line in the last of these
-      moments.
-    - ranks: all people seen, in order along the line.
-    - drift: sum over `moments` moments of the line's mean velocity along itself and to its left, m/s.
-    """
-
-    now: _LineNow
+    now: _LineNow  # the line when last seen
+    # since, three: first and last frame with at least 3 people (QUEUE_PEOPLE)
     since: int
     three: int
-    middle: Vector
-    seen: dict[int, int] = field(default_factory=dict)
-    gone: dict[int, _LineNow] = field(default_factory=dict)
-    ranks: list[int] = field(default_factory=list)
+    middle: Vector  # x, y of the line's middle in the frame in which following began, m
+    seen: dict[int, int] = field(default_factory=dict)  # by person, number of moments (examined frames) in the line
+    gone: dict[int, _LineNow] = field(default_factory=dict)  # by person, the line in the last of these moments
+    ranks: list[int] = field(default_factory=list)  # all people seen, in order along the line
+    # sum over `moments` moments of the line's mean velocity along itself and to its left, m/s
     drift: Vector = (0.0, 0.0)
     moments: int = 0
 
@@ -99,17 +83,11 @@ class _FollowedLine:
 def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
     """Returns a queue event for each queue, in order of first and last frame.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. group (T, P): group ids, -1 = alone. fps: frames per s. A person
-    with a nan position counts as absent. A line is people who wait behind one another: 0.4 to 1.5 m apart along a
-    straight line, at most 0.5 m off it, turning by at most 60°. It has at least two thirds of its crowd, the waiting
-    people linked by distances below 1.5 m. A queue is a line that has 3 people (QUEUE_PEOPLE) for at least QUEUE_TIME
-    (3 s); a line may be lost for 1.5 s. Waiting means slower than WAITING_SPEED (0.4 m/s), except for up to 3 s when
-    advancing. A line that moves sideways, on average faster than 0.1 m/s and than along itself, is no queue.
-
-    The event starts in the first frame with 3 people and ends in the last frame with two in line. Its members are all
-    people who were in line for MEMBER_TIME (1 s); a queue without a member gives no event. Its position is the middle
-    of the line when it was first followed. before, after: sorted ids of the groups of the members present in the first
-    and last frame, -1 once for each member alone. The id of a person is the column + 1; frames of events count from 1.
+    pos, vel (T, P, 2): m, m/s. present (T, P). group (T, P): group ids, -1 = alone. A queue is a line (see
+    `queue_shapes`) of people who wait, that has QUEUE_PEOPLE for QUEUE_TIME and may be lost for BRIDGE_TIME. A line
+    that moves sideways is none. The event starts in the first frame with 3 people and ends in the last with two in
+    line. Its members are all who were in line for MEMBER_TIME. Its position is the middle of the line when it was first
+    followed.
     """
     found = []
     for q in detect_queues(pos, vel, present, fps):
@@ -123,18 +101,14 @@ def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> l
 
 
 def _groups_of(label: Ints) -> tuple[int, ...]:
-    """Returns the ids of the groups among label (K,), the group ids of K people: -1 once for each negative label, then
-    each id once, ascending.
-    """
+    """Returns the ids of the groups among labels (K,), after -1 once for each person alone."""
     return (-1,) * int((label < 0).sum()) + tuple(np.unique(label[label >= 0]).tolist())
 
 
 def detect_queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[DetectedQueue]:
-    """Returns all queues, sorted by first frame, last frame and members, also queues without members (empty `order`).
+    """Returns all queues, sorted, also those without members; about MAX_RATE frames per second are examined.
 
-    A queue is a line of waiting people that has at least 3 for 3 s. pos, vel (T, P, 2): m, m/s. present (T, P): flags.
-    fps: frames per s. A person with a nan position counts as absent. At most about 10 frames per second (MAX_RATE) are
-    examined, from frame 0. No frames give [].
+    pos, vel (T, P, 2): m, m/s. present (T, P).
     """
     there = present & np.isfinite(pos).all(axis=2)
     stride = max(1, round(fps / MAX_RATE))
@@ -152,12 +126,7 @@ def detect_queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[De
 
 
 def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
-    """Returns for each person and frame whether the person waits, shape (T, P); False while absent.
-
-    A person waits who is slower than WAITING_SPEED (0.4 m/s), or who was and will be so at two times at most
-    ADVANCE_TIME (3 s) apart. vel (T, P, 2): m/s; nan is not slow. there (T, P): the person is present. fps: frames per
-    s.
-    """
+    """Returns who waits in each frame (T, P): slow people, and those who advance for up to ADVANCE_TIME between."""
     with np.errstate(invalid="ignore"):
         slow = there & (length(vel) < WAITING_SPEED)
     p, t = np.nonzero(slow.T)
@@ -169,9 +138,6 @@ def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
 
 
 def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
-    """Returns the lines of waiting people in every `stride`-th frame from frame 0, ordered by frame, then by least
-    column. pos, vel (T, P, 2): m, m/s. waits (T, P): the person waits.
-    """
     t, p = np.nonzero(waits[::stride])
     i, j = close_pairs(t, pos[t * stride, p], MAX_SPACING)
     made: list[_LineNow] = []
@@ -181,11 +147,6 @@ def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
 
 
 def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array) -> Iterator[_LineNow]:
-    """Yields the lines of the table c (M ordered sets of people).
-
-    t, p: frame (from 0) and column of the person in each row that c.rows refers to. vel (T, P, 2): m/s; nan counts as
-    0.
-    """
     within = np.arange(c.rows.shape[1]) < c.count[:, None]
     mean = np.where(within[..., None], np.nan_to_num(vel[t[c.rows], p[c.rows]]), 0.0).sum(axis=1) / c.count[:, None]
     along, aside = (mean * c.u).sum(axis=1), mean[:, 1] * c.u[:, 0] - mean[:, 0] * c.u[:, 1]
@@ -196,14 +157,7 @@ def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array) -> Iterator[_LineNow
 
 
 def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: int) -> None:
-    """Adds the line `now` to the line in `following` that shares most people with it, or appends it as a new one.
-
-    A followed line fits if it was last seen earlier and shares at least two people, in the same order; ties go to the
-    older. `now` is turned so that both run the same way. A line of fewer than 3 people (QUEUE_PEOPLE) that fits none is
-    dropped. hold: frames for which a queue needs 3 people. bridge: frames for which a line may be lost. The record of a
-    followed line starts anew if it had fewer than 3 people for more than `bridge` frames before it reached `hold`.
-    Modifies `following`; returns nothing.
-    """
+    """Adds the line `now` to the line in `following` that shares most people with it, or appends it as a new one."""
     people, long = set(now.order), len(now.order) >= QUEUE_PEOPLE
     fits = [f for f in following if f.now.t < now.t and len(people.intersection(f.now.order)) > 1]
     fits = [f for f in fits if _same_order(f.now, now)]
@@ -216,6 +170,7 @@ def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: in
     else:
         return
     if long:
+        # A line that was too short for too long before it became a queue starts anew.
         if now.t - f.three > bridge and f.three - f.since < hold:
             f.since, f.seen, f.gone, f.ranks, f.drift, f.moments = now.t, {}, {}, [], (0.0, 0.0), 0
         f.three = now.t
@@ -230,36 +185,23 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 def _same_order(before: _LineNow, now: _LineNow) -> bool:
-    """Returns True if the people who are in both lines stand in the same order; `now` is read backwards if it points
-    the other way.
-
-    With fewer than two people in both lines the answer is True.
-    """
+    """Returns True if the people who are in both lines stand in the same order."""
     order = now.order if _dot(before.u, now.u) >= 0 else now.order[::-1]
     return [p for p in order if p in before.order] == [p for p in before.order if p in order]
 
 
 def _record_people(f: _FollowedLine) -> None:
-    """Counts the people of f.now in `seen`, sets `gone`, and inserts new people in `ranks` behind all who stand before
-    them.
-
-    A new person with nobody before comes first. Modifies f.
-    """
     for k, p in enumerate(f.now.order):
         f.seen[p] = f.seen.get(p, 0) + 1
         f.gone[p] = f.now
+        # A new person comes behind all who stand before them in line.
         if p not in f.ranks:
             ahead = [f.ranks.index(q) for q in f.now.order[:k]]
             f.ranks.insert(max(ahead) + 1 if ahead else 0, p)
 
 
 def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[DetectedQueue]:
-    """Returns the queue that a followed line f was, as a list of one; [] if it was too short or moved sideways.
-
-    Too short: the first and last frame with 3 people are less than `hold` - `stride` frames apart. Sideways: on average
-    faster than 0.1 m/s, and faster than along itself. stride: frames between two moments. fps: frames per s. People in
-    line for less than 1 s are no members; the queue may have none.
-    """
+    """Returns the queue that a followed line was, as a list of one; [] if it was too short or moved sideways."""
     along, aside = (abs(v) / f.moments for v in f.drift)
     if f.three - f.since + stride < hold or (aside > SIDEWAYS_SPEED and aside > along):
         return []
@@ -269,11 +211,7 @@ def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[Dete
 
 
 def _from_one_end(f: _FollowedLine, left: list[int], late: float) -> bool:
-    """Returns True if all people (columns) in `left` left the followed line f from the same end; True if `left` is
-    empty.
-
-    For a person who left, all people between that person and the end must have left at most `late` frames later.
-    """
+    """Returns True if all people in `left` left the line from the same end, but for `late` frames."""
 
     def stay(p: int, beyond: tuple[int, ...]) -> bool:
         return any(f.gone[q].t > f.gone[p].t + late for q in beyond)

@@ -29,27 +29,21 @@ MAX_CELLS = 2_000_000  # numbers handled together: bounds memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QueueShapes:
-    """M lines of people who stand behind one another.
+    """M lines of people who stand behind one another."""
 
-    - rows (M, n): row numbers, in the table of positions, of the people in order along the line; only the first count
-      (M,) of each are valid.
-    - u (M, 2): unit vector along the line from the first person towards the last. middle (M, 2): mean position x, y, m.
-    """
-
+    # (M, n) row numbers, in the table of positions, of the people in order along the line; only the first count (M,) of
+    # each are valid
     rows: Ints
     count: Ints
-    u: Array
-    middle: Array
+    u: Array  # (M, 2) unit vector along the line from the first person towards the last
+    middle: Array  # (M, 2) mean position x, y, m
 
 
 def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
-    """Yields tables of the lines of all crowds, at most one line for each crowd; a table holds crowds of equal size.
+    """Yields tables of the lines of all crowds, at most one for each crowd; a table holds crowds of equal size.
 
-    pos (N, 2): x, y in m. i, j (K,): pairs of rows of pos that stand close to each other. A crowd is a set of two or
-    more rows connected by such pairs. The line holds the whole crowd if that passes the three tests: neighbours 0.4 to
-    1.5 m apart along the straight line, nobody more than 0.5 m off it, turns of at most 60°. Else it is the longest
-    line of at least three people and two thirds of the crowd that passes them, if any; of several, the straightest. A
-    table may be empty. Nothing is yielded without pairs.
+    pos (N, 2): m. i, j (K,): rows that stand close to each other; a crowd is connected by such pairs. The line is the
+    whole crowd, else the longest line of three people and two thirds of the crowd; of several, the straightest.
     """
     for crowd in _crowds(len(pos), i, j):
         portion = max(1, MAX_CELLS // (crowd.shape[1] * crowd.shape[1] * crowd.shape[1]))
@@ -62,11 +56,7 @@ def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
 
 
 def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
-    """Yields for each size n > 1 that occurs, ascending, the rows (C, n) of the C crowds of n people, ascending in each
-    crowd.
-
-    people: number of rows. i, j (K,): pairs of rows that stand close; a crowd is a set of rows that pairs connect.
-    """
+    """Yields the rows (C, n) of the C crowds of each size n > 1."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -80,13 +70,7 @@ def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
 
 
 def _best(p: Array) -> tuple[Ints, Ints]:
-    """Returns the order (C, n) of the people along the line in each crowd, and the number of people in the line (C,).
-
-    The order holds indices into the crowd; only the first `number` entries are valid. The number is 0 for a crowd
-    without a line. p (C, n, 2): positions, m. Unless the whole crowd is a line, the longest line of at least 3 people
-    and two thirds of the crowd is taken; of several, the one with the smallest squared distances from its straight
-    line.
-    """
+    """Returns the order (C, n) of the people along the line in each crowd, and how many are in it (C,), or 0."""
     n = p.shape[1]
     whole_crowd = np.full(len(p), n)
     u = _axes(p, whole_crowd)[0]
@@ -103,11 +87,8 @@ def _best(p: Array) -> tuple[Ints, Ints]:
 
 
 def _axes(p: Array, count: Ints) -> tuple[Array, Array, Array]:
-    """Returns the straight line that fits each of M sets of positions best (least squared distances).
-
-    Three arrays: its unit vector (M, 2), from the first position towards the last; the mean position (M, 2), m; the
-    root of the sum of squared distances from the line (M,), m. p (M, n, 2): positions, m, of which the first count (M,)
-    are valid.
+    """Returns the best straight line of each set: unit vector (M, 2), middle (M, 2) m, root of the squared distances
+    (M,).
     """
     within = np.arange(p.shape[1]) < count[:, None]
     middle = np.where(within[..., None], p, 0.0).sum(axis=1) / count[:, None]
@@ -121,11 +102,7 @@ def _axes(p: Array, count: Ints) -> tuple[Array, Array, Array]:
 
 
 def _fits(p: Array, count: Ints) -> Bools:
-    """Returns for each of M ordered sets of positions whether it passes the three tests of a line, shape (M,).
-
-    The tests: at most 0.5 m off the best straight line, neighbours 0.4 to 1.5 m apart along it, turns of at most 60°. p
-    (M, n, 2): m, of which the first count (M,) are valid.
-    """
+    """Returns which of M ordered sets of positions pass the three tests of a line."""
     u, middle, _ = _axes(p, count)
     arm = p - middle[:, None]
     off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
@@ -137,28 +114,18 @@ def _fits(p: Array, count: Ints) -> Bools:
 
 
 def _steps_fit(along: Array) -> Bools:
-    """Returns whether neighbours are 0.4 to 1.5 m apart, shape (M, n - 1); along (M, n): positions along
-    the line, m.
-    """
     steps = np.diff(along, axis=1)
     return np.asarray((steps >= MIN_SPACING) & (steps <= MAX_SPACING))
 
 
 def _turns_fit(p: Array) -> Bools:
-    """Returns whether the direction turns by at most 60° at each inner position, shape (M, n - 2); p (M, n, 2): m."""
     step = np.diff(p, axis=1)
     size = length(step)
     return np.asarray((step[:, :-1] * step[:, 1:]).sum(axis=2) >= MIN_TURN_COSINE * size[:, :-1] * size[:, 1:])
 
 
 def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
-    """Returns lines of `least` or more people in crowds p (C, n, 2), m: at most one for each two people 0.4 to 1.5 m
-    apart.
-
-    Each is sought along the straight line through the two and passes the tests of a line. Four arrays for M lines:
-    crowd (M,), from 0; order (M, n) of the people in the crowd, of which the first `length` are valid; length (M,);
-    root of the sum of squared distances from the line (M,), m.
-    """
+    """Returns crowd, order, length and misfit of lines sought through each two people of crowds (C, n, 2)."""
     i, j = np.triu_indices(p.shape[1], 1)
     crowd, seed = np.nonzero(_steps_fit(np.stack([np.zeros((len(p), len(i))), _lengths(p, i, j)], axis=1))[:, 0])
     i, j, places = i[seed], j[seed], p[crowd]
@@ -180,17 +147,11 @@ def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]
 
 
 def _lengths(p: Array, i: Ints, j: Ints) -> Array:
-    """Returns the distances (C, K), m, between positions i and j (K,) of each crowd p (C, n, 2)."""
     return length(p[:, j] - p[:, i])
 
 
 def _longest(links: Bools) -> tuple[Ints, Ints]:
-    """Returns the start index (M,) and length (M,), in positions, of the longest run of linked positions in each of M
-    rows.
-
-    links (M, n - 1): True if position k is linked to position k + 1. Without links the start is 0 and the length 1. Of
-    equally long runs the first is taken.
-    """
+    """Returns start and length (M,) of the longest run of linked positions in each row."""
     start, count, run = np.zeros(len(links), np.int64), np.ones(len(links), np.int64), np.ones(len(links), np.int64)
     for k in range(links.shape[1]):
         run = np.where(links[:, k], run + 1, 1)
