@@ -13,16 +13,13 @@ import numpy as np
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Ints
 
-BOXES = 100
-"""Boxes that the first frames must hold together."""
+BOXES = 100  # boxes that the first frames must hold together
 
 
 def scale_of_first_boxes(frame: Ints, height: Array) -> tuple[float, int]:
-    """Return the image scale, px per m, and the last frame that it was taken from.
+    """Returns the image scale, px per m, by the first 100 boxes, and the last frame that it was taken from.
 
-    The scale is the median height of the boxes of the first frames, divided by 1.7 m. As many frames are taken as hold
-    100 boxes together; all, if there are fewer boxes. frame (R,): frame of each box, from 1, in any order. height (R,):
-    px; rows with nan are left out. Without any row left the result is (nan, 0).
+    frame, height (R,): of each box, in any order; height px.
     """
     known = np.isfinite(height)
     frame, height = frame[known], height[known]
@@ -33,8 +30,5 @@ def scale_of_first_boxes(frame: Ints, height: Array) -> tuple[float, int]:
 
 
 def scale_of_all_boxes(height: Array) -> float:
-    """Return the image scale of a truth, px per m: the median height of all labelled boxes, divided by 1.7 m.
-
-    height (R,): px, finite. Without any row the result is nan.
-    """
+    """Returns the image scale, px per m, by the heights (R,) px of all labelled boxes."""
     return float(np.median(height)) / PERSON_HEIGHT if len(height) else float("nan")

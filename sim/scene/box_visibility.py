@@ -16,17 +16,9 @@ from sim.types import Array, Truth
 
 
 def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
-    """Return a copy of the truth with visibility, truncation and visible boxes estimated from its boxes, row by row.
+    """Returns the truth with visibility, truncation and visible boxes estimated from its boxes.
 
-    Each box is taken for an upright person (ellipses of body and head) who fills it, sampled on 16 x 32 points. Of two
-    people of a frame, the one whose box ends lower in the image hides the other; of equally low ones the earlier row
-    does. Nothing but people hides people. The truth itself is returned if it has no boxes (None or no rows), or has
-    visible boxes already. If any of its visibilities is below 1, all its visibilities are kept; truncation and visible
-    boxes are estimated all the same.
-
-    image_size: width, height in px. If None, the image ends at the furthest right and lower edges of the boxes; then a
-    nan box raises ValueError. With a size given, a nan box has visibility 0, truncation 1 and a nan visible box, as has
-    a box without width or height in any case.
+    image_size: (width, height) px; None: the image ends with the boxes. Visibilities that the labels state are kept.
     """
     if truth.box is None or truth.visible_box is not None or not len(truth.box):
         return truth
@@ -47,11 +39,7 @@ def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
 
 
 def inscribed_outlines(box: Array) -> Outlines:
-    """Return body and head of N people as Outlines in px that fill the boxes (N, 4), left, top, width, height in px.
-
-    Each box is taken as that of an upright person seen from the front: the body takes its full width, the head a third.
-    A nan box gives nan ellipses.
-    """
+    """Returns body and head of N people that fill the boxes (N, 4) px."""
     left, top, width, height = box.T
     middle = left + width / 2
     centre, shape = np.empty((len(box), 2, 2)), np.zeros((len(box), 2, 2, 2))
@@ -62,11 +50,7 @@ def inscribed_outlines(box: Array) -> Outlines:
 
 
 def image_size_of_boxes(*boxes: Array) -> tuple[int, int]:
-    """Return width and height (px, rounded up) of the smallest image from (0, 0) that holds all boxes.
-
-    boxes: any number of arrays (N, 4), left, top, width, height in px. Each side is at least 1 px; the result is (1, 1)
-    without boxes. Raises ValueError if a box is nan.
-    """
+    """Returns the (width, height) px of the smallest image from (0, 0) that holds all boxes (N, 4)."""
     far = np.concatenate([box[:, :2] + box[:, 2:] for box in boxes]) if boxes else np.zeros((0, 2))
     width, height = np.ceil(far.max(axis=0, initial=1.0)) if len(far) else (1.0, 1.0)
     return int(width), int(height)

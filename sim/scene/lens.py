@@ -15,22 +15,14 @@ from sim.types import Array
 
 
 def undistort(x: Array, k: float) -> Array:
-    """Return the ideal points y = x (1 + k |x|²), (N, 2), of distorted points x (N, 2); x itself, not a copy, if k is
-    0.
-
-    Points are in units of the focal length, from the image centre. k: the lens's radial coefficient. nan stays nan.
-    """
+    """Returns the ideal points y = x (1 + k |x|²) of distorted points x (N, 2)."""
     if k == 0.0:
         return x
     return np.asarray(x * (1.0 + k * dot(x, x)[:, None]))
 
 
 def distort(y: Array, k: float) -> Array:
-    """Return the distorted points x (N, 2) of ideal points y (N, 2), where y = x (1 + k |x|²); y itself if k is 0.
-
-    Points are in units of the focal length, from the image centre. k: the lens's radial coefficient. For k < 0 a point
-    with |y| > 2/(3 √(-3k)) is not shown by the lens: its row is nan.
-    """
+    """Returns the distorted points x (N, 2) of ideal points y (N, 2); nan where the lens does not show the point."""
     if k == 0.0:
         return y
     root = np.sqrt(3.0 * abs(k))
@@ -50,10 +42,6 @@ def distort(y: Array, k: float) -> Array:
 
 
 def undistort_jacobian(x: Array, k: float) -> Array:
-    """Return the derivative (N, 2, 2) of `undistort` at distorted points x (N, 2): (1 + k |x|²) I + 2 k x xᵀ.
-
-    Rows are the ideal point's coordinates, columns those of x. Points are in units of the focal length, from the image
-    centre. k: the lens's radial coefficient.
-    """
+    """Returns the derivative (N, 2, 2) of `undistort` at x (N, 2): (1 + k |x|²) I + 2 k x xᵀ."""
     r2 = dot(x, x)
     return np.asarray((1.0 + k * r2)[:, None, None] * np.eye(2) + 2.0 * k * x[:, :, None] * x[:, None, :])

@@ -164,7 +164,7 @@ def _mean(values: Array, there: Bools, start: Ints) -> Array:
 
 
 def net_crossings(a: Array, b: Array, encounter: Ints, count: int) -> Ints:
-    """Returns how often path b crosses path a from left to right, minus right to left, per encounter (count,).
+    """Returns how often path b crosses path a from left to right, minus right to left, in each encounter.
 
     a, b (R, 2): points of both paths, m. encounter (R,): of each row, from 0, ascending. Let s and t be times on a and
     b. The difference b(t) - a(s) winds round zero once for each crossing as (s, t) goes round the square of all times.
