@@ -17,11 +17,7 @@ FAR = "whole numbers within 64 bits"
 
 
 def parse_toml(text: str, file: object = "") -> dict[str, Any]:
-    """Return the table that a TOML text stands for.
-
-    file: for the message, "" for none. Raises InputError if the text is no TOML, is nested deeper than 32 tables and
-    lists, or has a whole number beyond 64 bits.
-    """
+    """Returns the table that a TOML text stands for."""
     remedy = "correct the line; strings need quotes, tables inside a line need { }"
     try:
         table = tomllib.loads(text)
@@ -39,11 +35,7 @@ def parse_toml(text: str, file: object = "") -> dict[str, Any]:
 
 
 def parse_json(text: str, file: object = "", remedy: str = "correct the file") -> Any:
-    """Return the value that a JSON text stands for.
-
-    file, remedy: for the message. Raises InputError if the text is no JSON, holds NaN or Infinity, is nested deeper
-    than 32 objects and lists, or has a whole number beyond 64 bits.
-    """
+    """Returns the value that a JSON text stands for."""
     try:
         value = json.loads(text, parse_constant=_constant)
     except json.JSONDecodeError as error:
@@ -63,8 +55,8 @@ def _constant(word: str) -> NoReturn:
 
 
 def _reason(error: Exception) -> str:
-    """Return the error's words; Python's advice to raise its limit of digits is left out."""
     text = str(error)
+    # Python's advice to raise its limit of digits helps no user.
     return "a number of thousands of digits" if "integer string conversion" in text else text
 
 
@@ -73,10 +65,7 @@ def _too_deep(file: object) -> InputError:
 
 
 def _require_plain(value: Any, file: object) -> None:
-    """Raise InputError if a value is nested deeper than DEPTH, or has a whole number beyond 64 bits.
-
-    It works without recursion, since the nesting may be deeper than Python's stack.
-    """
+    # Without recursion: the nesting may be deeper than Python's stack.
     level = [value]
     for _ in range(DEPTH + 1):
         for item in level:

@@ -21,11 +21,7 @@ KINDS = {
 
 
 def require_regular(path: Path, remedy: str = "check the path") -> int:
-    """Return the size in bytes of the regular file `path`; symbolic links are followed.
-
-    The file is not opened. Raises InputError, with `remedy`, if there is no such file, it is no regular file, or the
-    path cannot be looked up, as one with a NUL character or a circle of links.
-    """
+    """Returns the size in bytes of the regular file `path`, which is not opened; links are followed."""
     try:
         found = os.stat(path)
     except (OSError, ValueError) as error:
@@ -38,16 +34,13 @@ def require_regular(path: Path, remedy: str = "check the path") -> int:
 
 
 def refuse_irregular(path: Path) -> None:
-    """Raise InputError as `require_regular` does, but not for a missing file or a link to a missing one."""
+    """Raises InputError as `require_regular` does, but not for a missing file or a link to one."""
     if os.path.lexists(path) and (os.path.exists(path) or not _dangles(path)):
         require_regular(path)
 
 
 def is_present(path: Path) -> bool:
-    """Return True if the regular file `path` exists, False if there is nothing or a link to a missing file.
-
-    Raises InputError if there is something else, as a FIFO: a reader must not take it for a missing file.
-    """
+    """Returns True if the regular file exists; raises InputError for something else, as a FIFO."""
     refuse_irregular(path)
     return os.path.isfile(path)
 
@@ -63,11 +56,7 @@ def _dangles(path: Path) -> bool:
 
 
 def read_regular(path: Path, limit: int, remedy: str = "check the path") -> bytes:
-    """Return the bytes of the regular file `path`.
-
-    limit: the greatest size in bytes. Raises InputError, with `remedy`, if the file is missing, unreadable, no regular
-    file or larger.
-    """
+    """Returns the bytes of the regular file `path`, at most `limit`."""
     size = require_regular(path, remedy)
     if size > limit:
         got, expected = f"a file of {size:,} bytes", f"at most {limit:,} bytes"

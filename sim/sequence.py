@@ -51,8 +51,8 @@ def simulate(
         scenario: As `scenarios.load` returns it.
         seed: 0 or more.
         repeat: Number of the suite entry's copy, 0 without copies.
-        streams: Some of "left", "right", "disparity", "ids", "background". "left" and "right" give frames with pictures;
-            any of them gives `background()` and exact pixels (`load_pixels`). () draws nothing.
+        streams: Some of "left", "right", "disparity", "ids", "background". "left" and "right" give frames with
+            pictures; any of them gives `background()` and exact pixels (`load_pixels`). () draws nothing.
         stride: Of the camera's frames only 1, 1 + stride, … are in the sequence.
 
     Returns:

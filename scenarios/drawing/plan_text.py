@@ -30,11 +30,7 @@ class CharacterPlan:
         self.cells = [[" "] * columns for _ in range(self.rows)]
 
     def put(self, at: XY, text: str, over: str = "") -> None:
-        """Writes text to the right of a point (x, y), m; with `over`, only where the grid has one of its characters.
-
-        A point outside the grid is moved to its edge. Text that would pass the right edge is moved to the left. What is
-        longer than the grid is wide is cut.
-        """
+        """Writes text to the right of a point (x, y), m; with `over`, only where the grid has one of its characters."""
         text, column = text[: self.columns], self._column(at, text)
         row = min(max(int((self.size[1] - at[1]) / self.size[1] * self.rows), 0), self.rows - 1)
         for k, character in enumerate(text):
@@ -42,15 +38,10 @@ class CharacterPlan:
                 self.cells[row][column + k] = character
 
     def _column(self, at: XY, text: str) -> int:
-        """Returns the column, from 0, in which text at a point begins, so that it ends inside the grid if it fits."""
         return max(min(int(at[0] * self.scale), self.columns - len(text)), 0)
 
     def name(self, at: XY, text: str) -> None:
-        """Writes a name to the right of a point (x, y), m.
-
-        It takes the nearest of five rows (the point's own, then one and two below or above) where the name covers only
-        blanks and ways (·); the point's own row if there is none. A name longer than the grid is wide is cut.
-        """
+        """Writes a name to the right of a point (x, y), m."""
         column = self._column(at, text)
         step = self.size[1] / self.rows
         for shift in (0, -1, 1, -2, 2):
@@ -65,8 +56,6 @@ class CharacterPlan:
     def line(self, a: XY, b: XY, character: str, over: str = "", gap: float = 0.5) -> None:
         """Writes a character repeatedly along the segment from a to b (x, y in m), about `gap` columns apart, both ends
         included.
-
-        With `over`, only where the grid has one of its characters.
         """
         steps = max(int(math.dist(a, b) * self.scale / gap), 1)
         for k in range(steps + 1):
@@ -81,10 +70,6 @@ class CharacterPlan:
 def character_plan(scenario: Scenario, columns: int = 64) -> str:
     """Returns the plan of a scenario as lines of text, `columns` characters wide plus a frame, with its size and
     legend.
-
-    columns: at least 8, so that names fit (not checked). Ways are dots that begin two columns apart. Later things cover
-    earlier ones: stairs, ways (on blanks only), queues, walls, pillars, service points, goals, names of groups (first 8
-    characters, in capitals), orders (① to ⑳, then again from ①).
     """
     world = scenario.world
     plan = CharacterPlan(world.size, columns)

@@ -18,17 +18,11 @@ from scenarios.schema.geometry import clearance, door_fits, queue_places
 from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder, group_names
 from scenarios.schema.values import Point, bounds, fixed
 
-BODY = 0.2
-"""m: least distance from a person's middle to a wall or pillar (the radius of a body in the physics)."""
+BODY = 0.2  # m: least distance from a person's middle to a wall or pillar (the radius of a body in the physics)
 
 
 def check(scenario: Scenario, file: str | Path = "") -> None:
-    """Raises InputError, naming `file`, for the first thing in the scenario that cannot work; returns nothing.
-
-    Checked in this order: walls, doors and stairs; groups; ranges of values (value_check); hidden groups of the sensor;
-    places inside the world and clear of walls; the orders of the script. file: the scenario's, for the message only; ""
-    names none.
-    """
+    """Raises InputError, naming `file`, for the first thing in the scenario that cannot work."""
     try:
         _check_world(scenario)
         _check_groups(scenario)
@@ -41,9 +35,6 @@ def check(scenario: Scenario, file: str | Path = "") -> None:
 
 
 def _check_world(scenario: Scenario) -> None:
-    """Raises InputError for a wall or stairs without length, or for a door whose opening does not lie wholly on one
-    wall.
-    """
     world = scenario.world
     for k, wall in enumerate(world.walls):
         if wall[:2] == wall[2:]:
@@ -60,11 +51,6 @@ def _check_world(scenario: Scenario) -> None:
 
 
 def _check_groups(scenario: Scenario) -> None:
-    """Raises InputError for a group whose name is taken, or whose size or time of entry cannot be.
-
-    The size must be at least 0.5 in every draw. The entry must be before the end in some draw, and a finite lower bound
-    of it not before the warm-up.
-    """
     seen: set[str] = set()
     for group in scenario.group:
         for name in group_names(group):
@@ -85,11 +71,6 @@ def _check_groups(scenario: Scenario) -> None:
 
 
 def _check_sensor(scenario: Scenario) -> None:
-    """Raises InputError for an artificial occlusion of a group that the script does not have, or that does not end
-    after its start.
-
-    Groups that merges and splits make count, too.
-    """
     known = [name for group in scenario.group for name in group_names(group)] + [
         name
         for event in scenario.event
@@ -104,12 +85,7 @@ def _check_sensor(scenario: Scenario) -> None:
 
 
 def _check_points(scenario: Scenario) -> None:
-    """Raises InputError for a place that can lie outside the world, or is less than 0.2 m (BODY) from a wall or pillar.
-
-    Places are those where people start or are sent. Places drawn from a distribution are checked against the world by
-    their finite bounds only, and not against walls. A script that may be mirrored is checked both ways against walls. A
-    script that may be turned (turn_deg not 0) is not checked.
-    """
+    # A script that may be turned is anywhere; only a simulation tells whether it fits.
     if bounds(scenario.turn_deg) != (0.0, 0.0):
         return
     width, depth = scenario.world.size
@@ -128,13 +104,7 @@ def _check_points(scenario: Scenario) -> None:
 
 
 def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
-    """Yields (key, point in m) for every place in the script: where people start, pass, are sent, or trigger an order.
-
-    Groups come first: start, goal, stops, via. Then orders: the place `reach.at` of the trigger, if given; goal and via
-    of each part of a split; via and goal of a merge; of a queue the first 3 places, all with the key `event.ID.at`, and
-    its goal. A missing goal and "meet" are left out. Coordinates are numbers or distributions. Keys are as
-    "group.ID.via.0".
-    """
+    """Yields (key, point in m) for every place where people start, pass, are sent, or trigger an order."""
     for group in scenario.group:
         yield f"group.{group.id}.start", group.start
         yield f"group.{group.id}.goal", group.goal

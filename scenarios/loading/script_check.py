@@ -13,25 +13,17 @@ from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOr
 from scenarios.schema.values import bounds
 
 SizeRange = tuple[float, float]
-QUEUE_PEOPLE = 3
-"""Least number of people in a queue; sim.truth.queue_detection has the same number."""
+QUEUE_PEOPLE = 3  # least number of people in a queue; sim.truth.queue_detection has the same number
 
 
 def fail(place: str, got: str, expected: str, remedy: str) -> NoReturn:
-    """Always raises an InputError with these texts; its `file` is "", and the caller `check` fills that in.
-
-    place: key in the scenario, as "event.ID.when".
-    """
+    """Always raises an InputError with these texts; `check` adds the file."""
     raise InputError(place=place, got=got, expected=expected, remedy=remedy)
 
 
 def check_script(scenario: Scenario) -> None:
-    """Raises InputError, without a file, for the first order of the script that cannot work; returns nothing.
-
-    Orders are taken in the order of the file. Each merge and split ends its groups and makes new groups, whose possible
-    sizes follow. Checked are unique ids, triggers (their groups, earlier orders and times), existing groups, new names,
-    sizes of parts, and queues whose groups can have 3 people together.
-    """
+    """Raises InputError, without a file, for the first order of the script that cannot work."""
+    # Each merge and split ends its groups and makes new ones, whose possible sizes follow.
     alive = {name: _people(bounds(group.size)) for group in scenario.group for name in group_names(group)}
     gone: dict[str, str] = {}
     orders: list[str] = []
@@ -45,22 +37,13 @@ def check_script(scenario: Scenario) -> None:
 
 
 def _people(size: SizeRange) -> SizeRange:
-    """Returns the least and greatest number of people for the bounds (least, greatest) of a group's `size`.
-
-    The least is rounded and at least 1; the greatest is not rounded and may be inf.
-    """
+    """Returns the least and greatest number of people for the bounds of a group's `size`."""
     return max(1.0, float(round(size[0]))), size[1]
 
 
 def _check_when(
     event: ScriptOrder, key: str, orders: list[str], alive: dict[str, SizeRange], gone: dict[str, str], duration: float
 ) -> None:
-    """Raises InputError for a trigger of an order that names what does not exist, or that is too early or too late.
-
-    key: `event.ID`. orders: ids of earlier orders; `after` must be one of them. alive, gone: existing groups with their
-    (least, greatest) sizes, and for each ended group the order that ended it. The least possible delay, and the least
-    delay plus the least time, must be 0 or more, and that sum must be below duration, s.
-    """
     when = event.when
     if when.after is not None and when.after not in orders:
         fail(
@@ -80,11 +63,6 @@ def _check_when(
 
 
 def _exists(name: str, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Raises InputError unless the group `name` exists at this point of the script.
-
-    place: key for the message. alive: (least, greatest) size by name of existing group. gone: for each ended group the
-    id of the order that ended it.
-    """
     if name in gone:
         expected = "a group that still exists: " + ", ".join(alive)
         fail(place, f"{name!r}, which ended with {gone[name]!r}", expected, "name another group, or move the order up")
@@ -93,11 +71,6 @@ def _exists(name: str, place: str, alive: dict[str, SizeRange], gone: dict[str, 
 
 
 def _add_group(name: str, size: SizeRange, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Adds a new group with its (least, greatest) size to `alive`; raises InputError if its name is or was another
-    group's.
-
-    place: key for the message. gone: for each ended group the order that ended it.
-    """
     if name in alive or name in gone:
         fail(place, f"{name!r}, which is another group's name", "a new name", "rename it")
     alive[name] = size
@@ -113,12 +86,6 @@ def _apply(event: ScriptOrder, key: str, alive: dict[str, SizeRange], gone: dict
 
 
 def _merge(event: MergeOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Checks a merge, moves its groups from `alive` to `gone`, and adds the new group, whose size is their sum.
-
-    alive: (least, greatest) size by name of existing group. gone: for each ended group the order that ended it. Both
-    are modified. key: `event.ID`. Raises InputError for a group that does not exist or is named twice, or a new name
-    that is or was taken.
-    """
     for k, name in enumerate(event.groups):
         _exists(name, f"{key}.groups.{k}", alive, gone)
         if name in event.groups[:k]:
@@ -129,19 +96,13 @@ def _merge(event: MergeOrder, key: str, alive: dict[str, SizeRange], gone: dict[
 
 
 def _split(event: SplitOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Checks a split, moves its group from `alive` to `gone`, and adds the parts with their ranges of sizes.
-
-    alive: (least, greatest) size by name of existing group. gone: for each ended group the order that ended it. Both
-    are modified. key: `event.ID`. Raises InputError for a group that does not exist, a part's name that is or was
-    taken, and sizes that do not fit every possible size of the group: parts without a size need one person each; if all
-    have sizes, the sum must be exact.
-    """
     _exists(event.group, f"{key}.group", alive, gone)
     low, high = alive.pop(event.group)
     gone[event.group] = event.id
     given = [part.size for part in event.parts if part.size is not None]
     open_parts = len(event.parts) - len(given)
     has = f"{low:g} people" if low == high else f"{low:g} to {high:g} people"
+    # Sizes must fit every possible size of the group.
     if sum(given) + open_parts > low or (not open_parts and not low == high == sum(given)):
         got = f"parts of {' + '.join(map(str, given + ['1 or more'] * open_parts))}"
         fail(f"{key}.parts", got, f"parts of {event.group!r}, which has {has}", "remove a size, or change one")
@@ -152,12 +113,6 @@ def _split(event: SplitOrder, key: str, alive: dict[str, SizeRange], gone: dict[
 
 
 def _queue(event: QueueOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    """Raises InputError if a name or pattern of a queue fits no existing group, or its groups cannot have 3 people in
-    sum.
-
-    key: `event.ID`. alive: least and greatest size by existing group. gone: for each ended group the order that ended
-    it. A group that several patterns name counts once.
-    """
     queued: list[str] = []
     for k, pattern in enumerate(event.groups):
         found = expand(pattern, list(alive))

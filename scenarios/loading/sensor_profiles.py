@@ -27,18 +27,22 @@ class SensorFile(Model):
 
 
 def sensor_settings(path: str | Path) -> tuple[str, ...]:
-    """Returns a setting `sensor.key=value` for each key given in the file's `[sensor]` table, in its order.
+    """Returns the profile of a detector as settings of a scenario.
 
-    Raises InputError if the file does not exist or is not TOML, if it has no `[sensor]`, or if a key or value is wrong.
+    Args:
+        path: A TOML file with a [sensor] table.
+
+    Returns:
+        A setting "sensor.key=value" for each key given in the file.
+
+    Raises:
+        InputError: The file does not exist.
     """
     return tuple(f"sensor.{key}={toml_value(v)}" for key, v in sensor_table(path).items())
 
 
 def sensor_table(path: str | Path) -> Table:
-    """Returns the keys given in the file's `[sensor]` table with their values, without defaults.
-
-    Raises InputError if the file does not exist or is not TOML, if it has no `[sensor]`, or if a key or value is wrong.
-    """
+    """Returns the keys given in the file's [sensor] table with their values, without defaults."""
     path = Path(path)
     if not os.path.exists(path):
         raise InputError(
@@ -52,10 +56,7 @@ def sensor_table(path: str | Path) -> Table:
 
 
 def dump_sensor(sensor: Sensor, about: str = "") -> str:
-    """Returns the text of a profile file with all keys of a sensor, defaults included, as TOML.
-
-    Keys that are None and an empty `hide` are left out. about: text that becomes comment lines at the top; "" for none.
-    """
+    """Returns the text of a profile file with all keys of a sensor; `about` becomes comment lines at the top."""
     table = sensor.model_dump(mode="python", exclude_none=True)
     lines = [f"# {line}".rstrip() for line in about.splitlines()]
     rows = [f"{key} = {toml_value(v)}" for key, v in table.items() if key != "hide" or v]

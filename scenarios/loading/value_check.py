@@ -15,32 +15,23 @@ from scenarios.schema.observation import ObservationSpec
 from scenarios.schema.scenario import QueueOrder, Scenario
 from scenarios.schema.values import Distribution, Value, share_within
 
-SURE = 0.999
-"""Least probability that a value lies in its range."""
-FASTEST = 10.0
-"""m/s: as fast as a sprinter."""
-TALLEST = 3.0
-"""m."""
+SURE = 0.999  # least probability that a value lies in its range
+FASTEST = 10.0  # m/s: as fast as a sprinter
+TALLEST = 3.0  # m
 
 
 class _Range(NamedTuple):
-    """A value at the key `place` of a scenario, and the least and greatest number allowed there, both included.
-
-    unit: a text for messages, with a blank in front (" m"), "" for none."""
+    """A value at the key `place` of a scenario, and the least and greatest number allowed there, both included."""
 
     place: str
     value: Value
     low: float
     high: float
-    unit: str
+    unit: str  # a text for messages, with a blank in front (" m"), "" for none
 
 
 def check_values(scenario: Scenario) -> None:
-    """Raises InputError, without a file, for the first value that is out of its range; returns nothing.
-
-    Also for a scenario of more than 1,000,000 recorded frames, 5000 people in all entries of `group` together, or
-    20,000,000 frames times people. A size that is a distribution counts as `_most` says.
-    """
+    """Raises InputError, without a file, for the first value that is out of its range, or if it is all too much."""
     _require(_crowd(scenario))
     check_observation(scenario)
     frames = scenario.duration * scenario.camera.fps
@@ -61,7 +52,7 @@ def most_people(scenario: Scenario) -> float:
 
 
 def check_observation(spec: Scenario | ObservationSpec) -> None:
-    """Raises InputError, without a file, for the first value of camera, sensor, light or picture out of its range."""
+    """Raises InputError, without a file, for the first value of camera, sensor, light or picture out of range."""
     _require(_observation(spec))
     if not fits_picture(*spec.camera.image):
         fail("camera.image", "{}×{} px".format(*spec.camera.image), PICTURE_SIZES, "make the image smaller")
@@ -125,12 +116,10 @@ def _observation(spec: Scenario | ObservationSpec) -> Iterator[_Range]:
 
 
 def _most(size: Value) -> float:
-    """Returns the number of people of a group that 999 of 1000 draws of its size do not exceed, rounded up to a power
-    of 2 for a distribution.
-    """
     if not isinstance(size, Distribution):
         return max(1.0, float(round(size)))
     most = 1
+    # A power of 2 is near enough for a bound.
     while size.share_within(-math.inf, most) < SURE:
         most *= 2
     return most

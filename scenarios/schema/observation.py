@@ -22,10 +22,7 @@ from scenarios.schema.values import Model, NonNegative, Positive
 
 
 class ObservationSpec(Model):
-    """Camera, sensor, light and picture, with the keys that they have in a scenario; an absent table has all defaults.
-
-    schema_: version of the format, 1. Unknown keys and wrong values raise pydantic.ValidationError.
-    """
+    """Camera, sensor, light and picture, with the keys that they have in a scenario."""
 
     schema_: Literal[1] = Field(1, alias="schema")
     camera: CameraSpec = CameraSpec()
@@ -58,11 +55,7 @@ class ReplayOrigin(Model):
 
 
 class ReplaySpec(ObservationSpec):
-    """A replay with all defaults filled in, as stored in its scenario.toml.
-
-    name: of the sequence. replay: which part of which recording it shows. schema_ (1), camera, sensor, light, picture:
-    how it is observed.
-    """
+    """A replay with all defaults filled in, as stored in its scenario.toml."""
 
     name: str
     replay: ReplayOrigin

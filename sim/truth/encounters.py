@@ -154,7 +154,7 @@ def group_paths(
 
 
 def _mean(values: Array, there: Bools, start: Ints) -> Array:
-    """Returns the means (R, 2) of consecutive runs of finite values (N, 2) that are there; nan for a run without any."""
+    """Returns the means (R, 2) of consecutive runs of the finite values (N, 2) that are there; nan without any."""
     known = there & np.isfinite(values[:, 0]) & np.isfinite(values[:, 1])
     if not len(start):
         return np.zeros((0, 2))
