@@ -13,8 +13,7 @@ import numpy as np
 from sim.crowd.forces import END
 from sim.crowd.formation import standing, to_world, walking
 from sim.crowd.group_state import GroupState
-from sim.crowd.population import EnteringGroup, is_free
-from sim.crowd.stops import PlannedStop
+from sim.crowd.population import EnteringGroup, PlannedStop, is_free
 from sim.elementary import length, unit
 from sim.types import Array, Scene
 

@@ -1,4 +1,4 @@
-"""Draws who takes part: groups with sizes, starts and goals, and each person's height, speed, gait and fluctuations.
+"""Draws who takes part: groups with sizes, starts, stops and goals, and each person's height, speed and gait.
 
 Every person draws from streams of their own, so one person more changes nobody else. A start from a distribution is
 drawn again, for this group alone, until the group has room there.
@@ -6,19 +6,48 @@ drawn again, for this group alone, until the group has room there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, group_names
+from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names
 from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
-from sim.crowd.stops import PlannedStop, draw_stops
 from sim.elementary import dot, exp, length, unit
 from sim.rng import autoregression, draw, normals, rng, uniforms
 from sim.types import Array, Scene
+
+
+@dataclass(frozen=True)
+class PlannedStop:
+    """One stop of one group, drawn."""
+
+    at: Array  # (2,) place in the world, m
+    stay: float  # s
+    until: tuple[float, ...]  # times, s after the first recorded frame, ascending; may be empty
+    members: tuple[int, ...]  # numbers of the members who stop, from 0, ascending; at least one
+    whole: bool  # True if all members stop
+
+    def end(self, t: float) -> float:
+        """Returns when people who arrive at time t walk on, s; inf if never."""
+        return next((u for u in self.until if u >= t), np.inf) + self.stay if self.until else t + self.stay
+
+
+def draw_stops(
+    stops: tuple[Stop, ...], size: int, place: Callable[[Point], Array], r: np.random.Generator
+) -> list[PlannedStop]:
+    """Returns the stops of a group of `size` people; place: gives a point of the script in the world."""
+    planned = []
+    for stop in stops:
+        at, stay = place(stop.at), max(0.0, draw(stop.stay, r))
+        wanted = size if stop.members is None else min(round(draw(stop.members, r)), size)
+        if wanted > 0 and (stay > 0 or stop.until):
+            who = range(size) if wanted == size else sorted(r.permutation(size)[:wanted].tolist())
+            planned.append(PlannedStop(at, stay, tuple(sorted(stop.until)), tuple(who), wanted == size))
+    return planned
+
 
 BODY_RADIUS = 0.20  # m, in the physics
 START_GAP = 0.55  # m between people of different groups at the start

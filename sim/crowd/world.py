@@ -58,8 +58,7 @@ def accelerate(
     written, if a state is not below 1e9.
     """
     from sim.crowd.forces_avoidance_kernels import avoid
-    from sim.crowd.forces_goal_kernels import drive
-    from sim.crowd.sway_kernels import sway
+    from sim.crowd.forces_goal_kernels import drive, sway
 
     if not drive(state, *people, *groups, obstacles.stairs, dt, rules, out):
         return False

@@ -2,7 +2,8 @@
 
 A frame starts from the empty scene (`sim.render.background`). Wind moves its plants, shadows darken it, and people are
 drawn over it by depth. The result is blurred, multiplied by the brightness of the moment, given noise and, if the
-scenario wants it, compressed as JPEG."""
+scenario wants it, compressed as JPEG. The people of up to 16 consecutive frames are computed at once, which is faster.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +19,77 @@ from sim.render.blur_noise import blur_weights, noise_offsets, noise_pool
 from sim.render.camera_view import NODE_STEP, CameraView
 from sim.render.canvas import UNIT, FrameCanvas
 from sim.render.clothing import clothing_atlas
-from sim.render.compression import compressed
 from sim.render.disparity import empty_scene_disparities, frame_disparities
 from sim.render.foliage import Foliage, grow_plants
-from sim.render.frame_batch import FrameBatch, PeopleInView
 from sim.render.illumination import Illumination, draw_illumination
-from sim.render.people import DrawnPeople
+from sim.render.people import DrawnPeople, ProjectedPeople, people_of_frames, project_people, take_rows
 from sim.render.pixel_truth import pixel_truth
+from sim.render.shadows import PeopleShadows, people_shadows, sunlit_shares
 from sim.scene import camera as cameras
-from sim.types import BACKGROUNDS, Camera, Frame, Image, Motion, PixelTruth
+from sim.types import BACKGROUNDS, Array, Camera, Frame, Image, Motion, PixelTruth
 
 if TYPE_CHECKING:
     from scenarios.schema.picture import Light, Picture
+
+
+def compressed(image: Image, quality: int) -> Image:
+    """Returns the image (H, W, 3) uint8, BGR, after JPEG compression with this quality, 1 (worst) to 100."""
+    import cv2
+
+    code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    return np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
+
+
+FRAMES = 16  # frames of a batch
+
+
+@dataclass(frozen=True, eq=False)
+class PeopleInView:
+    """N people of one or more frames as one camera view sees them."""
+
+    projected: ProjectedPeople  # ProjectedPeople: rays in the axes of body and head, outlines in px
+    shadows: PeopleShadows | None  # PeopleShadows; None if the light casts none
+    # (N, 3) 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing, as a wall, hides it
+    sunlit: Array
+
+
+class FrameBatch:
+    """The people of up to 16 consecutive frames of a Motion, among them frame `index`; batches begin at 1, 17, 33, ….
+
+    State: all people of the batch, and what each view sees of them, computed when first asked for.
+    """
+
+    def __init__(self, motion: Motion, light: Illumination, index: int) -> None:
+        self.first = index - (index - 1) % FRAMES
+        self.light = light
+        last = min(self.first + FRAMES, len(motion.present) + 1)
+        self._people, self._starts = people_of_frames(motion, self.first, last)
+        self._views: dict[int, PeopleInView] = {}
+
+    def __contains__(self, index: int) -> bool:
+        return index in range(self.first, self.first + FRAMES)
+
+    def _rows(self, index: int) -> slice:
+        k = index - self.first
+        return slice(int(self._starts[k]), int(self._starts[k + 1]))
+
+    def people(self, index: int) -> DrawnPeople:
+        """Returns the people of frame `index`, sorted by id."""
+        return take_rows(self._people, self._rows(index))
+
+    def in_view(self, view: CameraView, side: int, index: int) -> PeopleInView:
+        """Returns the people of frame `index` as a view sees them; `side` always names the same view."""
+        if side not in self._views:
+            light, people = self.light, self._people
+            shadows = None
+            if light.shadow > 0:
+                shadows = people_shadows(view.camera, people, light.sun, light.penumbra, view.level)
+            lit = sunlit_shares(view.solids, people, light.sun)
+            self._views[side] = PeopleInView(project_people(view.camera, view.rays, people), shadows, lit)
+        whole, rows = self._views[side], self._rows(index)
+        shadows = None if whole.shadows is None else take_rows(whole.shadows, rows)
+        return PeopleInView(take_rows(whole.projected, rows), shadows, whole.sunlit[rows])
+
 
 LEFT, RIGHT, MISALIGNED = 0, 1, 2  # views; the last: the right camera as it is, if it is not as calibrated
 

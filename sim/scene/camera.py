@@ -2,19 +2,55 @@
 
 World: x right, y away, z up (m). Camera: x right, y down, z forward; x_cam = R (X - C) with rotation R and the camera's
 position C. Pinhole: u = fx x/z + cx, v = fy y/z + cy with focal lengths fx, fy and image centre cx, cy in px. Top
-(orthographic, R looks down): u = s x + cx, v = s y + cy, s = px_per_m. The lens of a pinhole camera may distort
-(`radial`, of calibrated recordings): `sim.scene.lens` then changes x/z, y/z before they become px.
-`sim.scene.camera_placement` finds where a scenario's camera stands.
+(orthographic, R looks down): u = s x + cx, v = s y + cy, s = px_per_m.
+
+The lens of a pinhole camera may distort (`radial` = k, of calibrated recordings; Tsai). In units of the focal length,
+from the image centre, it shows at the distorted point x, |x| = r, what an ideal lens shows at y = x (1 + k r²). Given
+|y| = q, the distorted radius r is the root of r + k r³ = q that continues r = 0: r = 2/√(3k) sinh(asinh(3/2 q √(3k))/3)
+for k > 0. For k < 0 sin and asin with √(-3k) replace sinh and asinh; points with q > 2/(3 √(-3k)) are not shown at all.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sim.elementary import PI, length, product, sin, turned, unit
-from sim.scene import lens
+from sim.elementary import PI, atan2, dot, exp, length, log, product, sin, turned, unit
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera
+
+
+def undistort(x: Array, k: float) -> Array:
+    """Returns the ideal points y = x (1 + k |x|²) of distorted points x (N, 2)."""
+    if k == 0.0:
+        return x
+    return np.asarray(x * (1.0 + k * dot(x, x)[:, None]))
+
+
+def distort(y: Array, k: float) -> Array:
+    """Returns the distorted points x (N, 2) of ideal points y (N, 2); nan where the lens does not show the point."""
+    if k == 0.0:
+        return y
+    root = np.sqrt(3.0 * abs(k))
+    q = length(y)[:, None]
+    known = np.isfinite(q)
+    x = np.where(known, 1.5 * q * root, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        if k > 0:
+            e = exp(log(x + np.sqrt(x * x + 1.0)) / 3)  # asinh and sinh
+            third = (e - 1.0 / e) / 2
+        else:
+            third = sin(atan2(x, np.sqrt(1.0 - x * x)) / 3)
+        r = np.where(x < 0.02, q, third * 2 / root)
+        for _ in range(3):  # Newton's steps, where the closed form would lose digits
+            r = np.where(x < 0.5, r - (r + k * r * r * r - q) / (1.0 + 3.0 * k * r * r), r)
+        return np.asarray(y * np.where(known, np.where(q > 0, r / q, 1.0), np.nan))
+
+
+def undistort_jacobian(x: Array, k: float) -> Array:
+    """Returns the derivative (N, 2, 2) of `undistort` at x (N, 2): (1 + k |x|²) I + 2 k x xᵀ."""
+    r2 = dot(x, x)
+    return np.asarray((1.0 + k * r2)[:, None, None] * np.eye(2) + 2.0 * k * x[:, :, None] * x[:, None, :])
+
 
 STEEP_DEG = 70.0  # a camera tilted more than this foreshortens an upright person to a dot
 FARTHEST = 10_000.0  # m: ground further away counts as not seen
@@ -37,7 +73,7 @@ def project(camera: Camera, xyz: Array) -> tuple[Array, Array]:
     if camera.kind == "top":
         return x[:, :2] * camera.px_per_m + camera.centre_px, depth
     z = np.where(depth > NEAREST_DEPTH, depth, np.nan)
-    return lens.distort(x[:, :2] / z[:, None], camera.radial) * camera.focal_px + camera.centre_px, depth
+    return distort(x[:, :2] / z[:, None], camera.radial) * camera.focal_px + camera.centre_px, depth
 
 
 def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
@@ -48,7 +84,7 @@ def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
         origin = camera.position + turned(camera.rotation[:2].T, across)
         return origin, np.broadcast_to(camera.rotation[2], origin.shape)
     x = np.ones((len(uv), 3))
-    x[:, :2] = lens.undistort((uv - camera.centre_px) / camera.focal_px, camera.radial)
+    x[:, :2] = undistort((uv - camera.centre_px) / camera.focal_px, camera.radial)
     return np.broadcast_to(camera.position, x.shape), turned(camera.rotation.T, x)
 
 
@@ -86,7 +122,7 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     focal = np.array(camera.focal_px)
     bend = np.eye(2)[None]
     if camera.radial:
-        bend = lens.undistort_jacobian((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
+        bend = undistort_jacobian((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
     step = product(np.swapaxes(bend / focal, 1, 2), camera.rotation[:2])  # dD/du, dD/dv as rows
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (z - origin[:, 2]) / direction[:, 2]

@@ -14,8 +14,7 @@ import numpy as np
 from scenarios.errors import OrderError
 from sim.elementary import length
 from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY
-from sim.truth.queue_detection import QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, detect_queues
-from sim.truth.queue_shapes import MAX_SPACING, MIN_SPACING
+from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, detect_queues
 from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, States, Truth
 
 PATIENCE = 10.0  # s from the firing of an order until its rule has come true

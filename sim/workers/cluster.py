@@ -26,8 +26,7 @@ from typing import Any
 
 from scenarios.errors import InputError, WorkError
 from sim.versions import runtime
-from sim.workers.process import WorkResult, run_pickled
-from sim.workers.protocol import THREAD_VARIABLES, R, RunItems, T, worker_loss
+from sim.workers.pool import THREAD_VARIABLES, R, RunItems, T, WorkResult, run_pickled, worker_loss
 
 ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]+/?"
 SAME = "install the same on all (pip install -c constraints.txt) and restart the workers"

@@ -12,8 +12,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim.workers.cluster import cluster_workers
-from sim.workers.pool import process_pool
-from sim.workers.protocol import R, RunItems, T
+from sim.workers.pool import R, RunItems, T, process_pool
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
-"""Tells a file that flockscope wrote from a file of the same name that somebody else wrote, by its parsed content.
+"""Tells what a file is: ours, a stranger's of the same name, or a side file that an operating system put there.
 
-JSON files have keys that only we write, Parquet tables our metadata. Pages, PNG pictures and MP4 videos name the
-program that made them.
+JSON files of ours have keys that only we write, Parquet tables our metadata. Pages, PNG pictures and MP4 videos name
+the program that made them. Side files are ignored by readers of folders.
 """
 
 from __future__ import annotations
@@ -9,11 +9,25 @@ from __future__ import annotations
 import struct
 import zlib
 from html.parser import HTMLParser
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from scenarios.errors import InputError
 from sim.io.files import tables
-from sim.io.files.value_check import Rules
+from sim.io.files.tables import Rules
+
+NAMES = frozenset({"__macosx", ".ds_store", "thumbs.db", "ehthumbs.db", "desktop.ini", "@eadir", "icon\r"})
+APPLE_DOUBLE = "._"  # beginning of the files in which macOS keeps attributes on disks that cannot store them
+
+
+def is_side_file(name: str | PurePath) -> bool:
+    """Returns True if a part of a relative path is the name of a side file or folder."""
+    return any(part.startswith(APPLE_DOUBLE) or part.lower() in NAMES for part in PurePath(name).parts)
+
+
+def is_hidden(path: PurePath) -> bool:
+    """Returns True if readers ignore the file or folder: its own name begins with a dot or is that of a side file."""
+    return path.name.startswith(".") or is_side_file(path.name)
+
 
 GENERATOR = "flockscope"  # the name in the element <meta name="generator"> of a page, and in the comment of a video
 

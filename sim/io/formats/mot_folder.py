@@ -17,7 +17,7 @@ from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, i
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.regular_file import is_present
 from sim.io.files.numeric_text import read_number, read_text
-from sim.io.files.side_files import is_hidden
+from sim.io.files.own_files import is_hidden
 from sim.io.formats import mot_text
 from sim.io.formats.box_columns import BoxScale, size_doubt
 from sim.io.formats.calibration import scaled_to_image

@@ -16,7 +16,7 @@ from scenarios.limits import FRAME_RATES, INTEGER
 from sim.hashing import labels_hash
 from sim.io.files import tables
 from sim.io.files.own_files import is_ours
-from sim.io.files.value_check import FLAG, TABLE, TEXT, Rules, check_values, number, one_of, or_none, whole
+from sim.io.files.tables import FLAG, TABLE, TEXT, Rules, check_values, number, one_of, or_none, whole
 from sim.io.store import seal
 from sim.io.store.manifest import MANIFEST
 from sim.io.store.manifest import MARKS as MANIFEST_MARKS

@@ -18,15 +18,22 @@ from scenarios.errors import InputError
 from scenarios.printable import printable
 from sim import hashing
 from sim.io.files import atomic, tables
-from sim.io.files.side_files import is_side_file
+from sim.io.files.own_files import is_side_file
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
-from sim.io.pictures.picture_writer import NO_PICTURES, WrittenPictures, write_pictures
-from sim.io.pictures.stored_pictures import StoredPictures
+from sim.io.pictures.stored_pictures import NO_PICTURES, StoredPictures, WrittenPictures, write_pictures
 from sim.io.store import truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.event_files import read_script
-from sim.io.store.manifest import MANIFEST, REDO, damaged_files, identity, is_own_sequence, read_manifest, with_hash
-from sim.io.store.manifest_check import check_manifest
+from sim.io.store.manifest import (
+    MANIFEST,
+    REDO,
+    check_manifest,
+    damaged_files,
+    identity,
+    is_own_sequence,
+    read_manifest,
+    with_hash,
+)
 from sim.io.store.streams import check_streams, file_name
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
 from sim.versions import versions

@@ -14,7 +14,7 @@ from typing import Any
 from scenarios.errors import FlockscopeError, InputError
 from sim import hashing
 from sim.io.files.atomic import PARTIAL
-from sim.io.files.side_files import is_side_file
+from sim.io.files.own_files import is_side_file
 from sim.io.formats.mot_folder import read_seqinfo
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
