@@ -33,8 +33,7 @@ from benchmarks.belonging.sources import sample
 from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser
 from benchmarks.support.tables import table
 from scenarios.loading.resolve import load, names
-from scenarios.schema.observation import ObservationSpec
-from scenarios.schema.scenario import Scenario
+from scenarios.schema.scenario import ObservationSpec, Scenario
 from sim.crowd.world import run
 from sim.dataset.replay import on_ground, replay
 from sim.io.source import open_source

@@ -34,8 +34,7 @@ from sim.types import (
 )
 
 if TYPE_CHECKING:
-    from scenarios.schema.observation import ObservationSpec
-    from scenarios.schema.scenario import Scenario
+    from scenarios.schema.scenario import ObservationSpec, Scenario
 
 STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
 

@@ -1,5 +1,6 @@
-"""Explains a scenario without simulating it: `text` describes it in words, with a plan in characters; `svg` draws its
-plan and its script (groups that merge, split and queue) as SVG.
+"""Explains a scenario without simulating it: `text` describes it in words, `svg` draws its plan and its script.
+
+The script is the groups that merge, split and queue.
 """
 
 from __future__ import annotations
@@ -9,21 +10,24 @@ from html import escape
 
 from scenarios.drawing import words as describe
 from scenarios.drawing.plan_svg import MARGIN, STYLE, WIDTH, SvgPlan, badge, marker
-from scenarios.drawing.plan_text import character_plan
 from scenarios.drawing.routes import GroupRoute, OrderMark, group_routes, order_marks
 from scenarios.schema.scenario import Scenario
 
-# of groups: dark enough to read on white, and distinct for colour-blind readers
-# Dark enough to read on white, and distinct for colour-blind readers.
+# Of groups: dark enough to read on white, and distinct for colour-blind readers.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa3377", "#8a6d00", "#3d6fd6", "#b2182b", "#4d7c0f", "#6a51a3", "#5c5c5c")
-
 ROW = 30.0  # px between the lines of groups in the drawing of the script
 
 
 def text(scenario: Scenario) -> str:
     """Returns a description of a scenario for people, as lines of text: setting, people, orders, sensor."""
-    lines = [scenario.name, *([scenario.about] if scenario.about else []), "", *describe.setting(scenario), ""]
-    lines += [character_plan(scenario), "", "People"]
+    lines = [
+        scenario.name,
+        *([scenario.about] if scenario.about else []),
+        "",
+        *describe.setting(scenario),
+        "",
+        "People",
+    ]
     wide = max(len(group.id) for group in scenario.group)
     lines += [f"  {group.id:<{wide}}  {describe.people(group)}" for group in scenario.group]
     lines += ["", "Orders"] + ([] if scenario.event else ["  none"])

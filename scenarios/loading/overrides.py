@@ -16,8 +16,8 @@ from typing import Any
 from scenarios.errors import InputError
 from scenarios.limits import DEPTH, NESTING
 from scenarios.loading.toml_files import Table, did_you_mean
-from scenarios.parsing import parse_toml
 from scenarios.printable import shortened
+from scenarios.reading import parse_toml
 
 KeyPath = tuple[str | int, ...]
 SHOWN = 120  # characters of a setting that messages show

@@ -1,7 +1,8 @@
 """Loads scenarios: `load` returns the checked scenario of a catalogue name or a TOML file.
 
 `resolve` returns the entries of a scenario or a suite (a list of scenarios); each entry is one sequence to make for
-every seed.
+every seed. The profile of a detector, made by `flockscope fit sensor`, is a file with a [sensor] table alone;
+`sensor_settings(path)` returns its keys as settings, for every function that takes settings of a scenario.
 """
 
 from __future__ import annotations
@@ -10,17 +11,65 @@ import os.path
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
 
 from scenarios.errors import InputError
 from scenarios.loading import overrides, suites, toml_files
-from scenarios.loading.geometry_check import check
-from scenarios.loading.toml_files import dump, names, suite_names
+from scenarios.loading.checks import check, check_observation
+from scenarios.loading.toml_files import Table, dump, names, parse, suite_names, toml_value
 from scenarios.loading.validation import validate
-from scenarios.loading.value_check import check_observation
-from scenarios.schema.observation import ObservationSpec
-from scenarios.schema.scenario import Scenario
+from scenarios.schema.scenario import ObservationSpec, Scenario
+from scenarios.schema.sensor import Sensor
+from scenarios.schema.values import Model
 
-__all__ = ["Entry", "dump", "load", "load_observation", "names", "resolve", "suite_names"]
+
+class SensorFile(Model):
+    """The content of a profile file: `schema` (1, may be absent) and the required table `[sensor]`."""
+
+    schema_: Literal[1] = Field(1, alias="schema")
+    sensor: Sensor
+
+
+def sensor_settings(path: str | Path) -> tuple[str, ...]:
+    """Returns the profile of a detector as settings of a scenario.
+
+    Args:
+        path: A TOML file with a [sensor] table.
+
+    Returns:
+        A setting "sensor.key=value" for each key given in the file.
+
+    Raises:
+        InputError: The file does not exist.
+    """
+    return tuple(f"sensor.{key}={toml_value(v)}" for key, v in sensor_table(path).items())
+
+
+def sensor_table(path: str | Path) -> Table:
+    """Returns the keys given in the file's [sensor] table with their values, without defaults."""
+    path = Path(path)
+    if not os.path.exists(path):
+        raise InputError(
+            file=path, got="no such file", expected="a file with a [sensor] table",
+            remedy="check the path, or make one with `flockscope fit sensor`",
+        )  # fmt: skip
+    table = parse(path)
+    validate(table, path, model=SensorFile)
+    given: Table = table["sensor"]
+    return given
+
+
+def dump_sensor(sensor: Sensor, about: str = "") -> str:
+    """Returns the text of a profile file with all keys of a sensor; `about` becomes comment lines at the top."""
+    table = sensor.model_dump(mode="python", exclude_none=True)
+    lines = [f"# {line}".rstrip() for line in about.splitlines()]
+    rows = [f"{key} = {toml_value(v)}" for key, v in table.items() if key != "hide" or v]
+    return "\n".join([*lines, "schema = 1", "", "[sensor]", *rows, ""])
+
+
+__all__ = ["Entry", "dump", "load", "load_observation", "names", "resolve", "sensor_settings", "suite_names"]
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ from typing import Any, Protocol
 
 from scenarios.errors import InputError
 from scenarios.limits import TOML_BYTES
-from scenarios.parsing import parse_toml
-from scenarios.regular_file import read_regular
+from scenarios.reading import parse_toml, read_regular
 
 CATALOGUE = Path(__file__).parents[1]
 SUITES = CATALOGUE / "suites"

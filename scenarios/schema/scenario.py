@@ -2,7 +2,9 @@
 
 `flockscope scenarios --schema` and docs/reference/scenario-files.md print the descriptions of the fields. A class whose
 subject has another class in `sim` ends in Spec. Where a value may be a number or a distribution
-(scenarios.schema.values), it is drawn once for each seed."""
+(scenarios.schema.values), it is drawn once for each seed. `flockscope replay` reads a file of the tables camera,
+sensor, light and picture alone (ObservationSpec).
+"""
 
 from __future__ import annotations
 
@@ -244,3 +246,43 @@ def group_names(group: GroupSpec) -> list[str]:
 def expand(pattern: str, names: list[str]) -> list[str]:
     """Returns the names that a pattern means: for `g-*` those that begin with `g-`, else the pattern itself."""
     return [n for n in names if n.startswith(pattern[:-1])] if pattern.endswith("*") else [pattern]
+
+
+class ObservationSpec(Model):
+    """Camera, sensor, light and picture, with the keys that they have in a scenario."""
+
+    schema_: Literal[1] = Field(1, alias="schema")
+    camera: CameraSpec = CameraSpec()
+    sensor: Sensor = Sensor()
+    light: Light = Light()
+    picture: Picture = Picture()
+
+
+class ReplayOrigin(Model):
+    """The recording whose motion a replay shows.
+
+    - kind, name: format ("biwi", "mot", …) and name of the recording. real: it shows real people, so nothing may be
+      tuned on it.
+    - people: the recording's ids of persons 1, 2, … of the replay, in this order.
+    - start, duration: the part that is replayed, s. shift: positions in the replay minus those in the recording, x, y,
+      m.
+    - smoothing: movements of the labels that are quicker than this are removed as jitter, s; 0: none.
+    - motion: SHA-256 of the recording's labelled positions, ids and groups.
+    """
+
+    kind: str
+    name: str
+    real: bool
+    people: tuple[int, ...]
+    start: NonNegative
+    duration: Positive
+    smoothing: NonNegative
+    shift: tuple[float, float]
+    motion: str
+
+
+class ReplaySpec(ObservationSpec):
+    """A replay with all defaults filled in, as stored in its scenario.toml."""
+
+    name: str
+    replay: ReplayOrigin

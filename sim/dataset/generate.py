@@ -15,7 +15,7 @@ from uuid import uuid4
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from scenarios.loading.resolve import Entry
 from scenarios.loading.toml_files import dump
-from scenarios.schema.observation import ObservationSpec
+from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.sequence_job import SequenceJob, is_stored, lost_job, plan_jobs, run_job, stored_manifest

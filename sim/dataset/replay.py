@@ -17,7 +17,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load_observation
-from scenarios.schema.observation import ObservationSpec, ReplayOrigin, ReplaySpec
+from scenarios.schema.scenario import ObservationSpec, ReplayOrigin, ReplaySpec
 from sim.crowd.heading import facings, headings
 from sim.dataset.splits import is_real
 from sim.dataset.trajectories import Trajectories, nearest_row, resample

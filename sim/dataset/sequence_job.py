@@ -122,7 +122,7 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
 
 def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str, Any]) -> str:
     from scenarios.loading.toml_files import dump, parse
-    from scenarios.parsing import parse_toml
+    from scenarios.reading import parse_toml
 
     settings = ""
     if "scenario_hash" in different:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
-from scenarios.regular_file import is_present, require_regular
+from scenarios.reading import is_present, require_regular
 from sim.io.files.own_files import is_hidden
 from sim.io.formats import biwi, caviar, mot_folder, video
 from sim.io.formats.box_columns import BoxScale, parse_box_scale

@@ -14,7 +14,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import DETECTIONS, TEXT_BYTES
-from scenarios.regular_file import read_regular
+from scenarios.reading import read_regular
 from sim.types import Array, Bools, Ints
 
 NAME_THEM = "name the columns in the first line, as frame,id,x,y or frame,id,left,top,width,height"

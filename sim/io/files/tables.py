@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from scenarios.limits import JSON_BYTES, is_number
-from scenarios.parsing import parse_json
-from scenarios.regular_file import require_regular
+from scenarios.reading import parse_json, require_regular
 from sim.types import Array, Ints
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
-from scenarios.regular_file import is_present
+from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, crowded, read_number, read_numbers, read_text
 from sim.io.formats.group_labels import labelled_truth_fields, require_size

@@ -24,7 +24,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, XML_BYTES
-from scenarios.regular_file import require_regular
+from scenarios.reading import require_regular
 from sim.io.files.numeric_text import read_number, read_text
 from sim.io.store.camera_files import read_camera
 from sim.scene.camera_check import require_camera

@@ -20,7 +20,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
-from scenarios.regular_file import read_regular
+from scenarios.reading import read_regular
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import read_number, whole_number
 from sim.io.formats.group_labels import labelled_truth_fields, require_size

@@ -15,7 +15,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, is_number
 from scenarios.limits import PICTURE_SIDE as SIDE
-from scenarios.regular_file import is_present
+from scenarios.reading import is_present
 from sim.io.files.numeric_text import read_number, read_text
 from sim.io.files.own_files import is_hidden
 from sim.io.formats import mot_text

@@ -10,7 +10,7 @@ import warnings
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.regular_file import is_present
+from scenarios.reading import is_present
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable
 from sim.types import Array, Bools, Ints
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAMES, fits_picture
-from scenarios.regular_file import refuse_irregular
+from scenarios.reading import refuse_irregular
 from sim.io.files.own_files import is_hidden
 from sim.types import Image, Ints
 

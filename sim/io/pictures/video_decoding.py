@@ -19,7 +19,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAMES, PICTURE_SIZES, fits_picture
-from scenarios.regular_file import require_regular
+from scenarios.reading import require_regular
 from sim.types import Array, Image
 
 COVER = "attached_pic"

@@ -13,7 +13,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, SCALES
-from scenarios.regular_file import is_present
+from scenarios.reading import is_present
 from sim.io.files.tables import REDO, Column, StoredTable, nan_to_none, read_table, table_bytes
 from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import events_bytes, near_bytes, read_events, read_near, read_script, script_bytes
