@@ -371,17 +371,10 @@ class Truth(Frozen):
             return None if a is None else a[r]
 
         return FrameTruth(
-            index,
-            (index - 1) / self.fps,
-            self.id[r],
-            self.group[r],
-            cut(self.pos),
-            cut(self.vel),
-            cut(self.box),
-            self.visibility[r],
-            None if self.groups is None else self.groups[index - 1],
+            index, (index - 1) / self.fps, self.id[r], self.group[r], cut(self.pos), cut(self.vel), cut(self.box),
+            self.visibility[r], None if self.groups is None else self.groups[index - 1],
             None if self.groups_px is None else self.groups_px[index - 1],
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

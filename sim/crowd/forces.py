@@ -156,16 +156,9 @@ class GroupArrays(NamedTuple):
     def empty(cls, g: int, w: int) -> GroupArrays:
         """Returns arrays for g groups with room for w waypoints each."""
         return cls(
-            np.zeros((g, w, 2)),
-            np.zeros((g, w), np.int64),
-            np.zeros(g, np.int64),
-            np.zeros(g, np.int64),
-            np.zeros(g),
-            np.tile([1.0, 0.0], (g, 1)),
-            np.zeros(g, np.int64),
-            np.zeros(g, np.bool_),
-            np.zeros((g, 12)),
-        )
+            np.zeros((g, w, 2)), np.zeros((g, w), np.int64), np.zeros(g, np.int64), np.zeros(g, np.int64), np.zeros(g),
+            np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros((g, 12)),
+        )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:
         """Returns the same arrays with room for at least w waypoints; route and kind are copied if they have less."""

@@ -20,7 +20,7 @@ from sim.crowd.group_state import GroupState
 from sim.crowd.population import ScriptPlacement, draw_point
 from sim.elementary import length, unit
 from sim.rng import draw, rng
-from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY
+from sim.truth.merge_split_rules import Separation, separation
 from sim.truth.order_fulfilment import RULE_TIME
 from sim.truth.queue_detection import QUEUE_PEOPLE
 from sim.types import Array, Order
@@ -145,9 +145,8 @@ class PendingOrder:
         if when.after is not None:
             return when.after in come_true
         if when.distance_lt is not None:
-            columns = [groups.members[groups.alive[n]] for n in names]
-            pairs = [(a, b) for k, a in enumerate(columns) for b in columns[k + 1 :]]
-            return bool(pairs) and max(_nearest(state, a, b) for a, b in pairs) < when.distance_lt
+            gaps = _separations(state, [groups.members[groups.alive[n]] for n in names])
+            return bool(gaps) and bool(max(gap.distance[0] for gap in gaps) < when.distance_lt)
         assert when.reach is not None
         g = groups.alive.get(when.reach.group)
         if g is None or not groups.all_present(g):
@@ -183,20 +182,17 @@ def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
     parts = [list(p) for p in (pending.before if isinstance(order, MergeOrder) else pending.after)]
     if not all(np.isfinite(state[p]).all() for p in parts):
         return False
-    pairs = [(a, b) for k, a in enumerate(parts) for b in parts[k + 1 :]]
-    gaps = [(_nearest(state, a, b), _velocity_difference(state, a, b)) for a, b in pairs]
+    gaps = _separations(state, parts)
     if isinstance(order, MergeOrder):
-        joined = [d < MERGE_DISTANCE and v < MERGE_VELOCITY for d, v in gaps]
-        return sum(joined) >= len(parts) - 1
-    return all(d > SPLIT_DISTANCE or (d > MERGE_DISTANCE and v > SPLIT_VELOCITY) for d, v in gaps)
+        # A chain of parts is together although its ends are far apart.
+        return sum(bool(gap.merge_rule()[0]) for gap in gaps) >= len(parts) - 1
+    return all(bool(gap.split_rule()[0]) for gap in gaps)
 
 
-def _nearest(state: Array, a: list[int], b: list[int]) -> float:
-    return float(length(state[a, None, :2] - state[None, b, :2]).min())
-
-
-def _velocity_difference(state: Array, a: list[int], b: list[int]) -> float:
-    return float(length(state[a, 2:].mean(axis=0) - state[b, 2:].mean(axis=0)))
+def _separations(state: Array, parts: list[list[int]]) -> list[Separation]:
+    """Returns how far apart the people of each pair of parts (columns) are."""
+    pos, vel = state[None, :, :2], state[None, :, 2:]
+    return [separation(pos, vel, np.array(a), np.array(b)) for k, a in enumerate(parts) for b in parts[k + 1 :]]
 
 
 def groups_made(scenario: Scenario) -> int:
@@ -242,8 +238,8 @@ class OrderExecution:
                 pending.watch(t, rule_holds(pending, state, self.groups.targets))
                 if pending.true_at is not None:
                     self.come_true.add(pending.order.id)
-        for k, queue in self.queues.items():
-            self._serve(k, queue, t, state)
+        for queue in self.queues.values():
+            self._serve(queue, t, state)
         return self.groups.settle_arrived(state) or changed
 
     def _fire(self, pending: PendingOrder, tick: int, state: Array) -> None:
@@ -337,7 +333,7 @@ class OrderExecution:
                 finish if order.goal is None else order.at_goal,
             )
 
-    def _serve(self, k: int, queue: ServiceQueue, t: float, state: Array) -> None:
+    def _serve(self, queue: ServiceQueue, t: float, state: Array) -> None:
         groups = self.groups
         slots, done = queue.advance(t, groups.members, state[:, :2])
         for column, slot in slots.items():

@@ -170,12 +170,9 @@ class World:
 
     def _blown_up(self) -> WorkError:
         return WorkError(
-            file=self.scenario.name,
-            place=f"seed {self.seed}",
-            got="a position or velocity that is not finite",
-            expected="finite motion",
-            remedy="report the scenario and seed as a bug",
-        )
+            file=self.scenario.name, place=f"seed {self.seed}", got="a position or velocity that is not finite",
+            expected="finite motion", remedy="report the scenario and seed as a bug",
+        )  # fmt: skip
 
     def _read(self) -> Array:
         self._read_buffer.clear()
@@ -261,23 +258,12 @@ class World:
         else:
             heading = np.where(there, headings(frames.between_ticks(facing, present)), np.nan)
         return Motion(
-            name=self.scenario.name,
-            seed=self.seed,
-            repeat=self.repeat,
-            fps=self.scenario.camera.fps,
-            pos=state[..., :2],
-            vel=state[..., 2:],
-            heading=heading,
-            present=there,
-            intent=intent,
-            height=height,
-            width=SHOULDER_SHARE * height,
-            depth=DEPTH_SHARE * height,
-            free_speed=np.array([m.free_speed for m in self.members]),
-            scene=self.scene,
-            orders=self.orders.record(frames),
-            measured=measured,
-        )
+            name=self.scenario.name, seed=self.seed, repeat=self.repeat, fps=self.scenario.camera.fps,
+            pos=state[..., :2], vel=state[..., 2:], heading=heading, present=there, intent=intent, height=height,
+            width=SHOULDER_SHARE * height, depth=DEPTH_SHARE * height,
+            free_speed=np.array([m.free_speed for m in self.members]), scene=self.scene,
+            orders=self.orders.record(frames), measured=measured,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -189,16 +189,11 @@ def _origin(
     labels = {"frame": truth.frame, "id": truth.id, "group": truth.group, "places": places, "fps": truth.fps}
     first = source.source.get("origin") or {}  # of a replay of a replay
     return ReplayOrigin(
-        kind=str(first.get("kind", source.source.get("kind", "unknown"))),
-        name=str(first.get("name", source.name)),
-        real=is_real(source),
-        people=tuple(int(one) for one in moving.id),
-        start=cut.start,
-        duration=round(len(moving.present) / fps, 6),
-        smoothing=moving.smoothing,
-        shift=(float(shift[0]), float(shift[1])),
-        motion=canonical_hash(labels),
-    )
+        kind=str(first.get("kind", source.source.get("kind", "unknown"))), name=str(first.get("name", source.name)),
+        real=is_real(source), people=tuple(int(one) for one in moving.id), start=cut.start,
+        duration=round(len(moving.present) / fps, 6), smoothing=moving.smoothing,
+        shift=(float(shift[0]), float(shift[1])), motion=canonical_hash(labels),
+    )  # fmt: skip
 
 
 def _motion(moving: Trajectories, truth: Truth, name: str, fps: float, cut: Cut, seed: int, shift: Array) -> Motion:
@@ -206,21 +201,12 @@ def _motion(moving: Trajectories, truth: Truth, name: str, fps: float, cut: Cut,
     pos = moving.pos + shift
     height = _heights(moving.id, truth, seed)
     return Motion(
-        name=name,
-        seed=seed,
-        repeat=0,
-        fps=fps,
-        pos=pos,
-        vel=moving.vel,
-        heading=headings(facings(pos, moving.vel, moving.present, intent, fps)),
-        present=moving.present,
-        intent=intent,
-        height=height,
-        width=SHOULDER_SHARE * height,
-        depth=DEPTH_SHARE * height,
+        name=name, seed=seed, repeat=0, fps=fps, pos=pos, vel=moving.vel,
+        heading=headings(facings(pos, moving.vel, moving.present, intent, fps)), present=moving.present, intent=intent,
+        height=height, width=SHOULDER_SHARE * height, depth=DEPTH_SHARE * height,
         free_speed=np.nanmedian(np.linalg.norm(moving.vel, axis=2), axis=0),
         scene=Scene(np.nanmax(pos, axis=(0, 1)) + MARGIN),
-    )
+    )  # fmt: skip
 
 
 def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:

@@ -136,11 +136,10 @@ class RecordingOptions:
     person_class: int | None = None  # the class of people in MOTChallenge texts
     box_scale: BoxScale | None = None  # factors of x and y of the boxes of these
 
-    def reject(self, path: Path, kind: str, why: str, *names: str) -> None:
-        """Raises InputError if any of the options `names` is given: `why` says why it has no effect."""
-        given = [
-            f"--{name.removeprefix('person_').replace('_', '-')}" for name in names if getattr(self, name) is not None
-        ]
+    def reject(self, path: Path, kind: str, why: str, names: str) -> None:
+        """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect."""
+        found = [name for name in names.split() if getattr(self, name) is not None]
+        given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
         if given:
             remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
             raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
@@ -150,19 +149,14 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     suffix, o = path.suffix.lower(), options
     if suffix == ".xml":
         o.reject(
-            path,
-            "a CAVIAR recording",
-            "its truth is in the image, without pictures",
-            "camera",
-            "background",
-            "person_class",
-            "box_scale",
-        )
+            path, "a CAVIAR recording", "its truth is in the image, without pictures",
+            "camera background person_class box_scale",
+        )  # fmt: skip
         return caviar.open_file(path, fps=o.fps, px_per_m=o.px_per_m)
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, o)
     if suffix in video.SUFFIXES:
-        o.reject(path, "a video", "it has no text", "person_class", "box_scale")
+        o.reject(path, "a video", "it has no text", "person_class box_scale")
         return video.open_video(
             path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, background=o.background or video.ANY
         )
@@ -204,28 +198,12 @@ def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
         return _open_file(path, o)
     match _kind(path):
         case "generated":
-            o.reject(
-                path,
-                "a generated sequence",
-                "it knows its own",
-                "fps",
-                "px_per_m",
-                "camera",
-                "person_class",
-                "box_scale",
-            )
+            no = "fps px_per_m camera person_class box_scale"
+            o.reject(path, "a generated sequence", "it knows its own", no)
             return sequence_folder.open_sequence(path, background=o.background)
         case "biwi":
-            o.reject(
-                path,
-                "a BIWI recording",
-                "it is in metres, without pictures",
-                "px_per_m",
-                "camera",
-                "background",
-                "person_class",
-                "box_scale",
-            )
+            no = "px_per_m camera background person_class box_scale"
+            o.reject(path, "a BIWI recording", "it is in metres, without pictures", no)
             return biwi.open_folder(path, fps=o.fps)
         case _:
             return mot_folder.open_folder(

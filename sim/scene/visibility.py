@@ -43,19 +43,11 @@ def measure_visibility(
     box = outline_boxes(ellipses)
     solids = solids_of(scene)
     visibility, truncation, visible_box = sample_visibility(
-        frame_starts(frame),
-        box,
-        np.ascontiguousarray(ellipses.centre),
-        packed_inverse(ellipses.shape),
-        occlusion_distance(camera, pos3, height),
-        np.ascontiguousarray(pos3[:, :2]),
-        np.array(camera.image, dtype=float),
-        camera.kind == "pinhole",
-        np.array(camera.position, dtype=float),
-        unprojection(camera),
-        solids,
-        only_flights(solids.flights),
-    )
+        frame_starts(frame), box, np.ascontiguousarray(ellipses.centre), packed_inverse(ellipses.shape),
+        occlusion_distance(camera, pos3, height), np.ascontiguousarray(pos3[:, :2]),
+        np.array(camera.image, dtype=float), camera.kind == "pinhole", np.array(camera.position, dtype=float),
+        unprojection(camera), solids, only_flights(solids.flights),
+    )  # fmt: skip
     return BodyVisibility(box, visibility, truncation, visible_box)
 
 

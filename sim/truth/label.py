@@ -93,24 +93,14 @@ def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Tr
         camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
     )  # fmt: skip
     return Truth(
-        name=motion.name,
-        fps=motion.fps,
-        length=len(motion.present),
-        px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera),
-        frame=people.frame,
-        id=people.id,
-        group=np.full(len(p), -1, np.int64),
-        pos=motion.pos[t, p],
-        vel=motion.vel[t, p],
-        box=None if seen is None else seen.box,
-        visibility=np.ones(len(p)) if seen is None else seen.visibility,
-        z=people.pos3[:, 2],
-        heading=motion.heading[t, p],
-        height=motion.height[p],
-        truncation=None if seen is None else seen.truncation,
-        visible_box=None if seen is None else seen.visible_box,
+        name=motion.name, fps=motion.fps, length=len(motion.present),
+        px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera), frame=people.frame, id=people.id,
+        group=np.full(len(p), -1, np.int64), pos=motion.pos[t, p], vel=motion.vel[t, p],
+        box=None if seen is None else seen.box, visibility=np.ones(len(p)) if seen is None else seen.visibility,
+        z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
+        truncation=None if seen is None else seen.truncation, visible_box=None if seen is None else seen.visible_box,
         orders=motion.orders,
-    )
+    )  # fmt: skip
 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
@@ -126,13 +116,10 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     ground = tuple(_ground_groups(truth))
     events, orders = _events_in_frames(_events(s, found), motion, found.group, shown)
     return truth.replace(
-        groups=ground,
-        groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
-        labelled=np.ones(truth.length, dtype=np.bool_),
-        events=events,
-        near=_near_in_frames(found.near, shown),
+        groups=ground, groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
+        labelled=np.ones(truth.length, dtype=np.bool_), events=events, near=_near_in_frames(found.near, shown),
         orders=orders,
-    )
+    )  # fmt: skip
 
 
 def _events(s: States, found: GroupsAndEvents) -> list[GroupEvent]:

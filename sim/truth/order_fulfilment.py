@@ -13,7 +13,14 @@ import numpy as np
 
 from scenarios.errors import OrderError
 from sim.elementary import length
-from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY
+from sim.truth.merge_split_rules import (
+    HOLD_TIME,
+    MERGE_DISTANCE,
+    MERGE_VELOCITY,
+    SPLIT_DISTANCE,
+    SPLIT_VELOCITY,
+    separation,
+)
 from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, detect_queues
 from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, States, Truth
 
@@ -144,7 +151,7 @@ def closest(order: Order, s: States, window: slice) -> str:
         )
     parts = order.before if order.kind == "merge" else order.after
     columns = [np.array(part, dtype=np.int64) - 1 for part in parts]
-    gap, difference = _gaps(columns, pos, vel, present, widest=order.kind == "merge")
+    gap, difference = _gaps(columns, pos, vel, widest=order.kind == "merge")
     if not np.isfinite(gap).any():
         return "the parts were never there together"
     k = int(np.nanargmin(gap) if order.kind == "merge" else np.nanargmax(gap))
@@ -157,23 +164,13 @@ def _longest(holds: Bools) -> int:
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
-def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: bool) -> tuple[Array, Array]:
+def _gaps(columns: list[Ints], pos: Array, vel: Array, widest: bool) -> tuple[Array, Array]:
     """Returns distances (T,) and velocity differences (T,) of the part furthest from (`widest`) or nearest to all
     others.
     """
-    gaps, differences = [], []
-    for i, a in enumerate(columns):
-        rest = np.concatenate([c for j, c in enumerate(columns) if j != i]) if len(columns) > 1 else a[:0]
-        d = length(pos[:, a, None] - pos[:, None, rest])
-        gaps.append(np.where(np.isnan(d), np.inf, d).reshape(len(pos), -1).min(axis=1, initial=np.inf))
-        differences.append(length(_mean_velocity(vel, present, a) - _mean_velocity(vel, present, rest)))
-    gap, difference = np.array(gaps), np.array(differences)
+    rests = [np.concatenate([columns[0][:0], *columns[:k], *columns[k + 1 :]]) for k in range(len(columns))]
+    gaps = [separation(pos, vel, a, rest) for a, rest in zip(columns, rests, strict=True)]
+    gap, difference = np.array([g.distance for g in gaps]), np.array([g.velocity_difference for g in gaps])
     gap[np.isinf(gap)] = -np.inf if widest else np.inf
     worst = gap.argmax(axis=0) if widest else gap.argmin(axis=0), np.arange(len(pos))
     return np.where(np.isfinite(gap[worst]), gap[worst], np.nan), difference[worst]
-
-
-def _mean_velocity(vel: Array, present: Bools, columns: Ints) -> Array:
-    n = present[:, columns].sum(axis=1)[:, None]
-    total = np.where(present[:, columns, None], vel[:, columns], 0.0).sum(axis=1)
-    return np.where(n > 0, total / np.maximum(n, 1), np.nan)

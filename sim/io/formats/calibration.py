@@ -46,14 +46,10 @@ def read_tsai(path: Path) -> Camera:
     rotation = _rotation(v["rx"], v["ry"], v["rz"])
     shift = np.array([v["tx"], v["ty"], v["tz"]]) / MM
     camera = Camera(
-        kind="pinhole",
-        image=(round(v["width"]), round(v["height"])),
-        focal_px=(v["sx"] * v["focal"] / v["dpx"], v["focal"] / v["dpy"]),
-        centre_px=(v["cx"] + 0.5, v["cy"] + 0.5),
-        position=-rotation.T @ shift,
-        rotation=rotation,
-        radial=v["kappa1"] * v["focal"] ** 2,
-    )
+        kind="pinhole", image=(round(v["width"]), round(v["height"])),
+        focal_px=(v["sx"] * v["focal"] / v["dpx"], v["focal"] / v["dpy"]), centre_px=(v["cx"] + 0.5, v["cy"] + 0.5),
+        position=-rotation.T @ shift, rotation=rotation, radial=v["kappa1"] * v["focal"] ** 2,
+    )  # fmt: skip
     return require_camera(camera, path)
 
 

@@ -27,6 +27,7 @@ from sim.io.pictures.picture_folder import require_size
 from sim.io.pictures.video_encoding import VideoWriter, write_video
 from sim.io.store import streams
 from sim.io.store.manifest import REDO
+from sim.io.store.seal import file_facts
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95
@@ -73,7 +74,7 @@ class StreamWriter:
         name = streams.file_name(self.stream, self.images, self.pixels.count)
         body = encoded(picture, streams.suffix(self.stream, self.images))
         atomic.write_unsynced(self.folder / name, body)
-        self.files[name] = {"sha256": hashing.file_hash(body), "bytes": len(body)}
+        self.files |= file_facts({name: body})
 
     def __enter__(self) -> StreamWriter:
         self._movie = self._open.__enter__()
@@ -120,7 +121,7 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
     if known and sequence.truth is not None:
         body = pixel_table(sequence.truth, known)
         atomic.write_unsynced(folder / TABLE, body)
-        files[TABLE] = {"sha256": hashing.file_hash(body), "bytes": len(body)}
+        files |= file_facts({TABLE: body})
     pixels = {name: output.pixels.hex() for name, output in outputs.items()}
     return WrittenPictures(wanted, streams.coding(wanted, images), pixels, files)
 

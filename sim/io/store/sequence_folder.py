@@ -34,6 +34,7 @@ from sim.io.store.manifest import (
     read_manifest,
     with_hash,
 )
+from sim.io.store.seal import file_facts
 from sim.io.store.streams import check_streams, file_name
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
 from sim.versions import versions
@@ -117,8 +118,7 @@ def sequence_files(
         files |= truth_files.detection_files(found, sequence.fps, sequence.scene)
     files = dict(sorted(files.items()))
     manifest = _manifest(sequence, found, len(frames), scenario, seed, repeat, pictures)
-    listed = {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in files.items()}
-    listed = dict(sorted((listed | pictures.files).items()))
+    listed = dict(sorted((file_facts(files) | pictures.files).items()))
     return {**files, MANIFEST: tables.json_document(with_hash({**manifest, "files": listed}))}
 
 
