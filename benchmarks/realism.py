@@ -26,8 +26,7 @@ from scipy.stats import wasserstein_distance
 from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER, add_data, add_seeds, new_parser
 from benchmarks.support.tables import head, number, row
 from scenarios.loading.resolve import load, names
-from scenarios.schema.observation import ObservationSpec
-from scenarios.schema.scenario import Scenario
+from scenarios.schema.scenario import ObservationSpec, Scenario
 from sim.crowd.world import run
 from sim.dataset.replay import on_ground, replay
 from sim.io.source import open_source

@@ -9,12 +9,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scenarios.loading.resolve import load
-    from scenarios.loading.sensor_profiles import sensor_settings
+    from scenarios.loading.resolve import load, sensor_settings
 
 __all__ = ["load", "sensor_settings"]
 
-_HOME = {"load": "scenarios.loading.resolve", "sensor_settings": "scenarios.loading.sensor_profiles"}
+_HOME = {"load": "scenarios.loading.resolve", "sensor_settings": "scenarios.loading.resolve"}
 
 
 def __getattr__(name: str) -> Any:

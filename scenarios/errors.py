@@ -9,22 +9,21 @@ from typing import ClassVar
 
 from scenarios.printable import printable, shortened
 
+# the parts of an error, and how many characters of each its line shows at most
 PARTS = {"file": 400, "place": 200, "got": 200, "expected": 400, "remedy": 400}
-"""The parts of an error, and how many characters of each its line shows at most."""
 
-KEPT = 10_000
-"""How many characters of each part an error keeps at most, for `--json`."""
+KEPT = 10_000  # how many characters of each part an error keeps at most, for `--json`
 
 
 class FlockscopeError(Exception):
-    """An error message for users; `str()` is exactly one line. exit_code: 1 unless a subclass says otherwise
-    (InputError: 2).
+    """An error message for users; `str()` is exactly one line.
 
-    - file: the file read or written, "" if there is none. place: the line, key, row or frame in it, "" if there is
-      none.
-    - got: what was found there. expected: what should be there. remedy: what the user can do.
-
-    All are kept as text; a part of more than 10,000 characters is cut in the middle.
+    Args:
+        file: The file read or written, "" if there is none.
+        place: The line, key, row or frame in it, "" if there is none.
+        got: What was found there.
+        expected: What should be there.
+        remedy: What the user can do.
     """
 
     exit_code: ClassVar[int] = 1
@@ -36,12 +35,7 @@ class FlockscopeError(Exception):
         super().__init__(self.line())
 
     def line(self) -> str:
-        """Returns the error as one line: "file: place: got …; expected …; remedy".
-
-        An empty file or place is left out. Runs of white space, also line breaks, become one space; other control
-        characters become escapes. A long part is cut in the middle, so that the line can be read: what was found at
-        200 characters.
-        """
+        """Returns the error as one line: "file: place: got …; expected …; remedy", long parts cut in the middle."""
         file, place, got, expected, remedy = (
             shortened(printable(" ".join(getattr(self, name).split())), longest) for name, longest in PARTS.items()
         )
@@ -49,7 +43,7 @@ class FlockscopeError(Exception):
         return f"{where}got {got}; expected {expected}; {remedy}"
 
     def as_dict(self) -> dict[str, str]:
-        """Returns the error object that `--json` prints, all values as text: file, place, got, expected, remedy."""
+        """Returns the parts of the error by name, as `--json` prints them."""
         return {name: getattr(self, name) for name in PARTS}
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -57,19 +51,13 @@ class FlockscopeError(Exception):
 
 
 class InputError(FlockscopeError):
-    """Wrong input or usage: a command that raises it ends with exit code 2.
-
-    Keyword arguments: file and place ("" by default), got, expected, remedy. `str()` is one line of them.
-    """
+    """Wrong input or usage: a command that raises it ends with exit code 2."""
 
     exit_code: ClassVar[int] = 2
 
 
 class WorkError(FlockscopeError):
-    """The work failed, or a check was not passed: a command that raises it ends with exit code 1.
-
-    Keyword arguments: file and place ("" by default), got, expected, remedy. `str()` is one line of them.
-    """
+    """The work failed, or a check was not passed: a command that raises it ends with exit code 1."""
 
 
 class OrderError(WorkError):

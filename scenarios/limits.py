@@ -10,54 +10,36 @@ import math
 from numbers import Real
 from typing import Any, TypeGuard
 
-TEXT_BYTES = 128 * 2**20
-"""Bytes of a text file of rows."""
-JSON_BYTES = 64 * 2**20
-"""Bytes of a JSON file."""
-TOML_BYTES = 2 * 2**20
-"""Bytes of a TOML file."""
-XML_BYTES = 64 * 2**20
-"""Bytes of an XML file."""
-DEPTH = 32
-"""Tables and lists inside each other in a TOML or JSON file."""
-NESTING = f"at most {DEPTH} tables and lists inside each other"
-"""Words for what DEPTH allows."""
-REPEATS = 10_000
-"""Entries that one row of a suite stands for."""
-INTEGER = 2**63 - 1
-"""Largest whole number in a TOML or JSON file, also with a minus sign."""
+TEXT_BYTES = 128 * 2**20  # bytes of a text file of rows
+JSON_BYTES = 64 * 2**20  # bytes of a JSON file
+TOML_BYTES = 2 * 2**20  # bytes of a TOML file
+XML_BYTES = 64 * 2**20  # bytes of an XML file
+DEPTH = 32  # tables and lists inside each other in a TOML or JSON file
+NESTING = f"at most {DEPTH} tables and lists inside each other"  # words for what DEPTH allows
+REPEATS = 10_000  # entries that one row of a suite stands for
+INTEGER = 2**63 - 1  # largest whole number in a TOML or JSON file, also with a minus sign
 
-FRAMES = 1_000_000
-"""Frames of a sequence: 11 hours at 25 frames per second."""
+FRAMES = 1_000_000  # frames of a sequence: 11 hours at 25 frames per second
+# frames times people of a sequence that is simulated or has labelled groups, whose motion is held as an array
 CELLS = 20_000_000
-"""Frames times people of a sequence that is simulated or has labelled groups, whose motion is held as an array."""
-FRAME_RATES = (0.01, 1000.0)
-"""Least and greatest number of frames per second."""
-PICTURE_SIDE = 16_384
-"""Width or height of a picture, px."""
-PICTURE_PIXELS = 40_000_000
-"""Width times height of a picture, px; 8K has 33 million."""
+FRAME_RATES = (0.01, 1000.0)  # least and greatest number of frames per second
+PICTURE_SIDE = 16_384  # width or height of a picture, px
+PICTURE_PIXELS = 40_000_000  # width times height of a picture, px; 8K has 33 million
+# words for the sizes that `fits_picture` accepts
 PICTURE_SIZES = f"1 to {PICTURE_SIDE:,} px a side, at most {PICTURE_PIXELS:,} px in all"
-"""Words for the sizes that `fits_picture` accepts."""
-SCALES = (0.01, 100_000.0)
-"""Least and greatest image scale, px per m."""
-SAMPLE_BYTES = 2 * 10**9
-"""Bytes of all pictures of a background sample together."""
-COORDINATE = 1e6
-"""Absolute value of a coordinate or length, m or px."""
-DETECTIONS = 5000
-"""Detections or people in one frame."""
-PEOPLE = 5000
-"""People in one scenario."""
+SCALES = (0.01, 100_000.0)  # least and greatest image scale, px per m
+SAMPLE_BYTES = 2 * 10**9  # bytes of all pictures of a background sample together
+COORDINATE = 1e6  # absolute value of a coordinate or length, m or px
+DETECTIONS = 5000  # detections or people in one frame
+PEOPLE = 5000  # people in one scenario
 
 
 def is_number(value: object, low: float = -math.inf, high: float = math.inf) -> TypeGuard[float]:
-    """Return True for a finite real number, of Python or numpy, from `low` to `high`, both included; False for a bool
-    and anything else."""
+    """Returns True for a finite real number, of Python or numpy, from `low` to `high`; a bool is none."""
     number: Any = value
     return isinstance(value, Real) and not isinstance(value, bool) and low <= number <= high and abs(number) < math.inf
 
 
 def fits_picture(width: float, height: float) -> bool:
-    """Returns True for a picture size in px that is read and drawn: sides of 1 to 16,384, at most 40 million in all."""
+    """Returns True for a picture size in px that is read and drawn."""
     return 1 <= width <= PICTURE_SIDE and 1 <= height <= PICTURE_SIDE and width * height <= PICTURE_PIXELS

@@ -23,10 +23,8 @@ Image = NDArray[np.uint8]
 class Frozen:
     """Base of frozen dataclasses whose array fields become read-only and get the declared number type.
 
-    A field declared Array becomes float64, Ints int64, Bools bool, Image uint8; so do the items of a tuple of arrays.
-    None and other values are left as they are. An array that already has the type is not copied: the field is a
-    read-only view, and the original stays writable. An array of another kind of number (floats where ids or flags are
-    declared) keeps its type and raises nothing, so that the check of a tracker's answer can report it.
+    An array that has the type already is not copied: the field is a read-only view. An array of another kind of number,
+    as floats where ids are declared, keeps its type, so that the check of a tracker's answer can report it.
     """
 
     def __post_init__(self) -> None:
@@ -39,16 +37,11 @@ class Frozen:
                 object.__setattr__(self, name, _settled(value, kind))
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with the given fields changed; the original stays as it is. New arrays are converted as on
-        construction, and are read-only. Raises TypeError for an unknown field name.
-        """
+        """Returns a copy with the given fields changed."""
         return replace(self, **changes)  # type: ignore[type-var]
 
     def copy(self) -> Self:
-        """Return a copy whose arrays are its own: who changes the arrays of the original changes nothing in the copy.
-
-        The new arrays are plain numpy arrays, read-only. Fields that are themselves a Frozen are copied likewise.
-        """
+        """Returns a copy whose arrays are its own, read-only."""
         made = object.__new__(type(self))
         for name in _names(type(self)):  # type: ignore[arg-type]
             object.__setattr__(made, name, _own(getattr(self, name)))
@@ -61,11 +54,6 @@ KINDS["Image"] = np.dtype(np.uint8)
 
 @cache
 def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
-    """Return (name, number type, whether a tuple of arrays) of each field that the dataclass `kind` declares as an
-    array.
-
-    Recognised are fields annotated Array, Ints, Bools or Image, or a tuple of these, in the order of declaration.
-    """
     found = []
     for f in fields(kind):
         declared = re.fullmatch(r"(tuple\[)?(Array|Ints|Bools|Image)\b.*", str(f.type))
@@ -75,11 +63,6 @@ def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
 
 
 def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
-    """Return a read-only view of `a`, or a read-only copy converted to the number type `kind`.
-
-    It keeps its number type if numpy's casting rule "same_kind" forbids the conversion (floats to ids). `a` itself
-    stays writable.
-    """
     if a.dtype is not kind and a.dtype != kind and np.can_cast(a.dtype, kind, "same_kind"):
         a = a.astype(kind)
     if a.flags.writeable:
@@ -94,10 +77,6 @@ def _names(kind: Any) -> tuple[str, ...]:
 
 
 def _own(value: Any) -> Any:
-    """Return a copy of an array, of a tuple of arrays or of a Frozen; any other value as it is.
-
-    A copied array is a plain array that is read-only itself, not a read-only view of a writable one.
-    """
     if isinstance(value, np.ndarray):
         made = np.array(value)
         made.flags.writeable = False
@@ -108,12 +87,12 @@ def _own(value: Any) -> Any:
 
 
 def no_ids() -> Ints:
-    """Return an empty array of ids, shape (0,), int64."""
+    """Returns an empty array of ids."""
     return np.zeros(0, np.int64)
 
 
 def repeated_ids(frame: Ints, id: Ints) -> Bools:
-    """Return flags (N,), True for each row that has both the frame and the id of an earlier row. Rows need no order."""
+    """Returns which rows have both the frame and the id of an earlier row (N,). Rows need no order."""
     order = np.lexsort((id, frame))  # stable: equal rows keep their order
     again = np.zeros(len(order), bool)
     again[order[1:]] = (np.diff(frame[order]) == 0) & (np.diff(id[order]) == 0)

@@ -23,16 +23,12 @@ EXACT = 1e-6  # of a step: a frame as near to a step is on it
 
 @dataclass(frozen=True)
 class FrameTimes:
-    """Where the T frames of a camera lie on the clocks: frame f (from 0) at time f / fps.
-
-    tick (T,): last tick of the script at or before the frame, from 0. step (T,): physics steps from there to the last
-    one at or before the frame. share (T,): share of the next step that has passed, 0 to 1.
-    """
+    """Where the T frames of a camera lie on the clocks: frame f (from 0) at time f / fps."""
 
     fps: float
-    tick: Ints
-    step: Ints
-    share: Array
+    tick: Ints  # (T,) last tick of the script at or before the frame, from 0
+    step: Ints  # (T,) physics steps from there to the last one at or before the frame
+    share: Array  # (T,) share of the next step that has passed, 0 to 1
 
     @classmethod
     def of(cls, length: int, fps: float) -> FrameTimes:
@@ -59,10 +55,8 @@ class FrameTimes:
         return np.where(share == 0.0, low, (1.0 - share) * low + share * high)
 
     def between_ticks(self, values: Array, present: Bools) -> Array:
-        """Returns values (C, P, D) of the ticks at the frames, (T, P, D), linear between two ticks.
-
-        Where a person is absent at the next tick, present (C, P), the value of the last one stays.
-        """
+        """Returns values (C, P, D) of the ticks at the frames, (T, P, D), linear between two ticks."""
+        # The value of the last tick stays where a person is absent at the next one.
         k = np.minimum(self.tick, len(values) - 1)
         after = np.minimum(k + 1, len(values) - 1)
         share = ((self.step + self.share) / STEPS)[:, None, None]
@@ -73,14 +67,16 @@ class FrameTimes:
 
 @dataclass(frozen=True)
 class FrameTicks:
-    """Which tick's groups each of T frames shows: the last tick whose nearest frame it is, or before, with the same
-    people present. Converts ticks to frames, both from 0. tick (T,), ascending."""
+    """Which tick's groups each of T frames shows; converts ticks to frames, both from 0. tick (T,): ascending.
+
+    A frame shows the last tick whose nearest frame it is, or before, with the same people present.
+    """
 
     tick: Ints
 
     @classmethod
     def of(cls, length: int, fps: float, rate: float, present: Bools) -> FrameTicks:
-        """Returns it for `length` frames at fps frames/s and C ticks at `rate` per s with people present (C, P)."""
+        """Returns it for `length` frames at fps, and ticks at `rate` per s with people present (C, P)."""
         frame, ticks = np.arange(length), np.arange(len(present))
         if fps == rate:
             return cls(np.minimum(frame, len(ticks) - 1))
@@ -100,7 +96,7 @@ class FrameTicks:
 
 
 def check_stride(stride: object, fps: float) -> None:
-    """Raises InputError if `stride` is no whole number from 1, or leaves a camera of fps frames/s less than 0.01."""
+    """Raises InputError if `stride` is no whole number from 1, or leaves less than 0.01 frames/s."""
     most = int(fps / FRAME_RATES[0])
     if not isinstance(stride, int) or not 1 <= stride <= most:
         raise InputError(
@@ -110,7 +106,7 @@ def check_stride(stride: object, fps: float) -> None:
 
 
 def every_nth(motion: Motion, n: int) -> Motion:
-    """Returns the motion in frames 1, 1 + n, … of a camera, numbered from 1. It is still measured at the same ticks."""
+    """Returns the motion in frames 1, 1 + n, … of a camera, numbered from 1, measured at the same ticks."""
     if n == 1:
         return motion
     kept = {name: getattr(motion, name)[::n] for name in ("pos", "vel", "heading", "present", "intent")}

@@ -28,12 +28,7 @@ NO_CACHE = (
 
 
 def cached_njit(**options: Any) -> Callable[[Any], Any]:
-    """Return a decorator that compiles a function with numba's njit and these options, when it is first called.
-
-    With cache=True the compiled code is stored in the first place that can be written: NUMBA_CACHE_DIR, __pycache__
-    beside the function's file, the user's cache folder, a temporary folder of the user. Without any of them nothing is
-    stored, and one warning says so.
-    """
+    """Returns a decorator: numba's njit, whose cache goes to the first place that can be written."""
 
     def compiled(function: Any) -> Any:
         if not options.get("cache"):
@@ -55,12 +50,10 @@ def cached_njit(**options: Any) -> Callable[[Any], Any]:
 
 
 def _stored(kernel: Any) -> Any:
-    """Return numba's record of the compiled code in the cache; None if that is not cached, or no kernel."""
     return getattr(getattr(kernel, "_cache", None), "_cache_file", None)
 
 
 def _used_by(function: Any) -> str:
-    """Return a hash of what is compiled into a kernel beside its own file: constants, and kernels of other files."""
     used = hashlib.sha256()
     for name, value in sorted(function.__globals__.items()):
         stored = _stored(value)
@@ -82,28 +75,19 @@ else:
 
 @cache
 def _numba_finds_a_place(folder: str) -> bool:
-    """Return True if numba can cache a kernel whose file is in `folder`, there or in the user's cache folder.
-
-    numba takes a user's cache folder that is no absolute path, as without a home, for one in the working directory. It
-    does not count.
-    """
+    # Without a home, numba's cache folder would be one in the working directory.
     users = os.environ.get("XDG_CACHE_HOME", os.path.join(os.path.expanduser("~"), ".cache"))
     places = [os.path.join(folder, "__pycache__"), *([os.path.join(users, "numba")] if os.path.isabs(users) else [])]
     return any(_can_be_written(Path(place)) for place in places)
 
 
 def _can_be_written(folder: Path) -> bool:
-    """Return True if a file can be created in the folder, or in a new one of this path. Nothing is created."""
     existing = next(path for path in (folder, *folder.parents) if path.exists())
     return existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
 
 
 def temporary_cache() -> str | None:
-    """Return the user's own folder for caches among the temporary files, and create it if it is missing.
-
-    None if it cannot be written, or if it is a link or belongs to others or others may write there: caches hold code,
-    so nobody else may put files into it.
-    """
+    """Returns the user's own folder for caches among the temporary files; None if it is not safe."""
     try:
         user = os.getuid() if hasattr(os, "getuid") else None
         folder = Path(tempfile.gettempdir()) / f"flockscope-kernels-{'' if user is None else user}"
@@ -111,6 +95,7 @@ def temporary_cache() -> str | None:
         facts = folder.lstat()
     except OSError:
         return None
+    # Caches hold code: nobody else may put files into the folder.
     own = user is None or (facts.st_uid == user and not facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
     return str(folder) if own and stat.S_ISDIR(facts.st_mode) and _can_be_written(folder) else None
 

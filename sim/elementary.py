@@ -158,7 +158,6 @@ def normal_quantile(u: Any) -> Any:
 
 
 def _ratio(top: tuple[float, ...], below: tuple[float, ...], x: Array) -> Array:
-    """Returns the ratio of two polynomials, given by their coefficients from the highest power down."""
     p, q = 0.0 * x, 0.0 * x
     for a, b in zip(top, below, strict=True):
         p, q = p * x + a, q * x + b

@@ -39,42 +39,31 @@ ROLE = {
 
 
 def rng(seed: int, role: str, *keys: int, repeat: int = 0) -> np.random.Generator:
-    """Return the numpy Generator over `SeedSequence(seed, spawn_key=(ROLE[role], *keys))`.
+    """Returns the generator over `SeedSequence(seed, spawn_key=(ROLE[role], *keys))`; the same arguments, the same
+    numbers.
 
-    The same arguments give a generator of the same numbers. seed: 0 or more. role: a key of ROLE, as "layout",
-    "person", "noise" or "tracker". keys: what the stream belongs to, as a person's id or a frame, each 0 or more, in
-    any number. Streams of equal role and keys are equal, so each use needs keys of its own. repeat:
-    number of the suite entry's copy, from 1; 0 without copies. A repeat other than 0 adds 1,000,000 + repeat as a last
-    key.
-
-    Raises KeyError for an unknown role, ValueError for a negative seed or key.
+    repeat: number of the suite entry's copy, 0 without copies; it is a further key.
     """
     spawn_key = (ROLE[role], *keys) if repeat == 0 else (ROLE[role], *keys, 1_000_000 + repeat)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))
 
 
 def uniforms(r: np.random.Generator, shape: int | tuple[int, ...]) -> Array:
-    """Returns uniforms above 0 and at most 1 (a value may round to 1) of this shape."""
+    """Returns uniforms above 0 and at most 1 of this shape."""
     return np.asarray(r.random(shape) + 2.0**-54)
 
 
 def normals(u: Array) -> Array:
-    """Returns the standard normal quantiles at u, any shape, 0 < u <= 1; always finite, as u = 1 is lowered a little.
-
-    nan stays nan.
-    """
+    """Returns the standard normal quantiles at u, any shape, 0 < u <= 1; always finite."""
     return np.asarray(normal_quantile(np.minimum(u, 1.0 - 2.0**-53)))
 
 
 def autoregression(e: Array, keep: Any) -> Array:
-    """Returns x (K, D) with x_0 = e_0 and x_k = keep x_(k-1) + sqrt(1 - keep²) e_k down the rows of e (K, D).
-
-    keep: correlation of successive rows, 0 to 1; a number or (D,). If e is standard normal, so is x. The sums are made
-    in steps of 1, 2, 4, … rows; a row does not depend on later ones.
-    """
+    """Returns x (K, D) with x_0 = e_0 and x_k = keep x_(k-1) + sqrt(1 - keep²) e_k, for e (K, D)."""
     x = e.copy()
     x[1:] *= np.sqrt(1.0 - keep * keep)
     step = 1
+    # In steps of 1, 2, 4, … rows; a row does not depend on later ones.
     while step < len(x):
         x[step:] = x[step:] + keep * x[:-step]
         keep, step = keep * keep, 2 * step
@@ -82,11 +71,7 @@ def autoregression(e: Array, keep: Any) -> Array:
 
 
 def poisson_quantiles(mean: float, u: Array) -> Ints:
-    """Returns the quantiles (N,) of a Poisson distribution at u (N,), 0 < u <= 1: zeros if the mean is 0.
-
-    A quantile is the smallest number whose cumulative probability is at least u; it is at most mean + 12 sqrt(mean) +
-    20. For a fixed u below 1 it never falls when the mean rises. Raises ValueError for a negative or nan mean.
-    """
+    """Returns the quantiles (N,) of a Poisson distribution at u (N,), 0 < u <= 1."""
     if not mean >= 0:
         raise ValueError(f"a Poisson distribution of mean {mean}")
     k = np.arange(1, int(mean + 12 * np.sqrt(mean) + 20))
@@ -98,10 +83,7 @@ def poisson_quantiles(mean: float, u: Array) -> Ints:
 
 
 def draw(value: Value, r: np.random.Generator) -> float:
-    """Returns the number itself as float, or one draw of the distribution; draws outside its `clip` are drawn again.
-
-    A clip that keeps less than 1 % of the draws was refused when the distribution was made, so this ends.
-    """
+    """Returns the number itself, or one draw of the distribution; draws outside its `clip` are drawn again."""
     if isinstance(value, (int, float)):
         return float(value)
     while True:

@@ -34,8 +34,7 @@ from sim.types import (
 )
 
 if TYPE_CHECKING:
-    from scenarios.schema.observation import ObservationSpec
-    from scenarios.schema.scenario import Scenario
+    from scenarios.schema.scenario import ObservationSpec, Scenario
 
 STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
 
@@ -43,21 +42,24 @@ STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
 def simulate(
     scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[str] = ("left",), stride: int = 1
 ) -> Sequence:
-    """Return the Sequence that a scenario and a seed define: frames, detections of its sensor, and truth for its
-    camera.
+    """Returns the sequence that a scenario and a seed define: frames, detections of its sensor, and truth.
 
-    The motion is simulated at once; detections, truth and pictures are computed when they are first used. repeat:
-    number of the suite entry's copy, 0 without copies. streams: some of "left", "right", "disparity", "ids",
-    "background". "left" and "right" give frames with pictures, drawn while iterating. Any stream gives `background()`
-    and exact pixels (`load_pixels`), whose disparity is None unless "disparity" is among the streams. () draws nothing.
-    stride: 1 or more; of the camera's frames only 1, 1 + stride, … are in the sequence, as they are without it.
+    The motion is simulated at once; detections, truth and pictures are computed when they are first used.
 
-    Raises InputError if the stride leaves less than 0.01 frames/s, if the scenario is impossible (no room for its
-    people, people out of view), if "right" or "disparity" is wanted without a baseline, or if a stream is unknown.
-    Raises ValueError for a negative seed or a distribution without a draw in its clip, WorkError if a position becomes
-    infinite or nan. Later, reading detections raises InputError if `sensor.hide` names an unknown group. Drawing raises
-    InputError for impossible values of light and picture. Reading the truth raises WorkError if an order of the script
-    was not fulfilled.
+    Args:
+        scenario: As `scenarios.load` returns it.
+        seed: 0 or more.
+        repeat: Number of the suite entry's copy, 0 without copies.
+        streams: Some of "left", "right", "disparity", "ids", "background". "left" and "right" give frames with
+            pictures; any of them gives `background()` and exact pixels (`load_pixels`). () draws nothing.
+        stride: Of the camera's frames only 1, 1 + stride, … are in the sequence.
+
+    Returns:
+        The sequence.
+
+    Raises:
+        InputError: The scenario is impossible (no room for its people, people out of view) or a stream is.
+        WorkError: A position is not finite. When the truth is read: an order of the script was not fulfilled.
     """
     from sim.crowd.world import run
 
@@ -73,18 +75,10 @@ def observe(
     streams: Iterable[str] = (),
     stride: int = 1,
 ) -> Sequence:
-    """Return the Sequence that a scenario's camera and sensor make of a Motion, the motion of a whole crowd.
+    """Returns the sequence that a scenario's camera and sensor make of a motion. See `simulate`.
 
-    The camera is placed at once; truth, detections and pictures are computed when they are first used, independently of
-    each other. people: person ids of each group that `sensor.hide` may name, by group name. None derives them from the
-    scenario, which must then be the Scenario that the motion was simulated from; else reading detections with such a
-    `sensor.hide`, or load_people(), raises AssertionError. check: reading the truth raises WorkError if an order of the
-    script was not fulfilled. streams: some of "left", "right", "disparity", "ids", "background": pictures to draw; by
-    default none. stride: as in `simulate`.
-
-    Raises InputError if the stride leaves less than 0.01 frames/s, people leave the view, a stream is unknown, or the
-    camera has no baseline for "right" or "disparity". Reading detections raises InputError if `sensor.hide` names a
-    group without ids. Drawing raises InputError for impossible values of light and picture.
+    people: person ids of each group that `sensor.hide` may name; None: those of the scenario that the motion was
+    simulated from. check: reading the truth raises WorkError if an order of the script was not fulfilled.
     """
     check_stride(stride, motion.fps)
     camera = place_camera(scenario.camera, motion)
@@ -153,10 +147,7 @@ def observe(
 class _Pictures:
     """Draws the requested streams of a simulated sequence.
 
-    renderer: draws the camera's frames. streams: some of "left", "right", "disparity", "ids", "background". stride:
-    number of the camera's frames from one frame of the sequence to the next. State: index (from 1) and exact pixels of
-    the frame that was drawn last, because its pixels are usually read next; 0 and None before, pixels None if they were
-    not drawn.
+    State: index and exact pixels of the frame that was drawn last, because its pixels are usually read next.
     """
 
     def __init__(self, renderer: Renderer, streams: frozenset[str], stride: int) -> None:
@@ -165,12 +156,7 @@ class _Pictures:
         self._last: tuple[int, PixelTruth | None] = (0, None)
 
     def draw(self, index: int) -> RenderedFrame:
-        """Draw frame `index` (from 1): the left and right picture, each None unless requested.
-
-        Its exact pixels are drawn too, and kept for `pixels`, if "left" and one of "ids" and "disparity" are requested,
-        else None. Raises InputError for impossible values of light and picture, or if there is no right camera for
-        "right" or "disparity"; IndexError for a frame that does not exist.
-        """
+        """Draws frame `index` (from 1): the left and right picture, each None unless requested."""
         shot = self._shot(index)
         if not self.has_image:
             return RenderedFrame(right=self.renderer.right(shot) if self.has_right else None)
@@ -180,11 +166,8 @@ class _Pictures:
         return made
 
     def pixels(self, index: int) -> PixelTruth:
-        """Return the exact pixels of frame `index` (from 1); disparity is None unless the stream "disparity" was
+        """Returns the exact pixels of frame `index` (from 1); disparity is None unless the stream "disparity" was
         requested.
-
-        The pixels of the frame drawn last are not drawn again. Raises InputError for impossible values of light and
-        picture, IndexError for a frame that does not exist.
         """
         last, known = self._last
         if known is not None and last == index:
@@ -195,10 +178,8 @@ class _Pictures:
         return 1 + (index - 1) * self.stride
 
     def background(self) -> Image:
-        """Return pictures of the empty scene before frame 1, (50, H, W, 3) BGR uint8, in the order of time, 1 / fps
+        """Returns pictures of the empty scene before frame 1, (50, H, W, 3) BGR uint8, in the order of time, 1 / fps
         apart.
-
-        Raises InputError for impossible values of light and picture.
         """
         return np.stack([self.renderer.background(k) for k in range(BACKGROUNDS)])
 
@@ -223,12 +204,7 @@ def _pictures(
 def named_people(
     scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
 ) -> dict[str, tuple[int, ...]]:
-    """Return the person ids of each group that the script names, by group name.
-
-    These are all groups that the scenario lists, also those that enter later, and the groups that merge orders (`into`)
-    and split orders (`parts`) made. orders: the script's orders; one that never took effect (fired None) makes no
-    group. scene, seed, repeat: those of the simulation. Raises InputError if a group has no free place at its start.
-    """
+    """Returns the person ids of each group that the script names, also those that its orders made."""
     from sim.crowd.population import draw_population
 
     parties = draw_population(scenario, scene, seed, repeat)

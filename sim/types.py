@@ -73,7 +73,7 @@ class Groups(Frozen):
 
     @classmethod
     def none(cls) -> Groups:
-        """Return the Groups of a frame without groups: zero rows, positions with 2 columns."""
+        """Returns the Groups of a frame without groups."""
         two = np.zeros((0, 2))
         return cls(no_ids(), (), two, two, np.zeros((0, 2, 2)), np.zeros(0), ())
 
@@ -245,7 +245,7 @@ class Motion(Frozen):
     measured: States | None = None
 
     def states(self) -> States:
-        """Return the states from which the truth is measured."""
+        """Returns the states from which the truth is measured."""
         if self.measured is not None:
             return self.measured
         return States(self.fps, self.pos, self.vel, self.heading, self.present, self.intent)
@@ -274,7 +274,7 @@ class Near(Frozen):
 
     @classmethod
     def none(cls) -> Near:
-        """Return a Near of zero rows."""
+        """Returns a Near of zero rows."""
         return cls(no_ids(), no_ids(), no_ids(), no_ids())
 
 
@@ -359,29 +359,22 @@ class Truth(Frozen):
     scene: Scene | None = None
 
     def rows(self, index: int) -> slice:
-        """Return the slice of the rows of frame `index` (from 1); an empty slice if that frame has none."""
+        """Returns the slice of the rows of frame `index` (from 1)."""
         low, high = np.searchsorted(self.frame, (index, index + 1))
         return slice(int(low), int(high))
 
     def at(self, index: int) -> FrameTruth:
-        """Return the truth of frame `index`, 1 to `length` (unchecked), without pixels; no rows if nobody is there."""
+        """Returns the truth of frame `index`, 1 to `length`, without pixels."""
         r = self.rows(index)
 
         def cut(a: Array | None) -> Array | None:
             return None if a is None else a[r]
 
         return FrameTruth(
-            index,
-            (index - 1) / self.fps,
-            self.id[r],
-            self.group[r],
-            cut(self.pos),
-            cut(self.vel),
-            cut(self.box),
-            self.visibility[r],
-            None if self.groups is None else self.groups[index - 1],
+            index, (index - 1) / self.fps, self.id[r], self.group[r], cut(self.pos), cut(self.vel), cut(self.box),
+            self.visibility[r], None if self.groups is None else self.groups[index - 1],
             None if self.groups_px is None else self.groups_px[index - 1],
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -416,12 +409,11 @@ class Sequence:
         return self.frames()
 
     def without_pictures(self) -> Iterator[Frame]:
-        """Return a new iterator over Frame, without pictures if `bare` is given. InputError: detections are invalid."""
+        """Returns a new iterator over Frame, without pictures if `bare` is given."""
         return self.frames() if self.bare is None else self.bare()
 
     def frame_truth(self, index: int) -> FrameTruth | None:
-        """Return the truth of frame `index` (from 1), with its pixels if they are known; None without truth. Raises
-        InputError if files are invalid, WorkError if an order of a simulated script was not fulfilled."""
+        """Returns the truth of frame `index` (from 1), with its pixels if they are known."""
         if self.truth is None:
             return None
         here = self.truth.at(index)
@@ -429,8 +421,7 @@ class Sequence:
 
     @property
     def truth(self) -> Truth | None:
-        """The truth, loaded on first use and then kept; None if nothing is labelled. Raises InputError if its files are
-        invalid, WorkError if an order of a simulated script was not fulfilled."""
+        """The truth, loaded on first use and then kept; None if nothing is labelled."""
         if self.load_truth is None:
             return None
         cached: Truth | None = self.__dict__.get("_truth")
@@ -440,8 +431,7 @@ class Sequence:
         return cached
 
     def background(self) -> Image | None:
-        """Return sample pictures (K, H, W, 3) BGR uint8 to train a background model on; None if there are none. Raises
-        InputError if none can be read."""
+        """Returns sample pictures (K, H, W, 3) to train a background model on; None if there are none."""
         return None if self.load_background is None else self.load_background()
 
 
@@ -452,10 +442,8 @@ class Tracker(Protocol):
     needs: tuple[str, ...]
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget all state and start a new sequence. context: what is known of it. seed: for the tracker's random
-        numbers."""
+        """Forgets all state and starts a new sequence. seed: for the tracker's random numbers."""
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Return this tracker's tracks of `frame`, from this and earlier frames only. detections: None without a
-        detector."""
+        """Returns this tracker's tracks of `frame`, from this and earlier frames only."""
         ...

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sim.truth.queue_shapes import MAX_OFFSET, MAX_SPACING, MIN_CROWD_SHARE, MIN_SPACING, MIN_TURN_COSINE
+from sim.truth.queue_detection import MAX_OFFSET, MAX_SPACING, MIN_CROWD_SHARE, MIN_SPACING, MIN_TURN_COSINE
 
 
 def chain(pos):

@@ -2,7 +2,7 @@
 
 Lengths in configs are metres. A tracker that works in the image plane multiplies them by this scale once, in `reset`.
 Rules (docs/reference/formats.md): the camera's scale at the image centre, else the scale that the recording states,
-else the median height of the given boxes of the first frames divided by 1.7 m (sim.scene.box_scale).
+else the median height of the given boxes of the first frames divided by 1.7 m (sim.scene.boxes).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
-from sim.scene.box_scale import scale_of_first_boxes
+from sim.scene.boxes import scale_of_first_boxes
 from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
 
 
@@ -44,7 +44,7 @@ def required(px_per_m: float) -> float:
 
 
 def from_boxes(frames: Iterable[Detections | Tracks | None]) -> ImageScale:
-    """Return the image scale by the heights of the boxes of the first frames (sim.scene.box_scale); nan without a box.
+    """Return the image scale by the heights of the boxes of the first frames (sim.scene.boxes); nan without a box.
 
     frames: detections or tracks of each frame, read to the end. The height is the last of a box's four columns, px.
     None, and frames without boxes, are skipped; so are heights that are nan.

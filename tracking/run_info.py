@@ -93,7 +93,7 @@ def _facts(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, be
 
     begins: the first frame, from 1, from which on only the scale may depend on later frames; None if there is none.
     """
-    from sim.io.store.track_boxes import box_source
+    from sim.io.store.track_files import box_source
 
     begins = None if begins is None else max(begins, scale.frames)
     return {

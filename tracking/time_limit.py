@@ -15,7 +15,7 @@ from scenarios.errors import InputError
 from scenarios.limits import is_number
 from sim.arrays import Frozen
 from sim.types import Context, Detections, Frame, Tracker, Tracks
-from sim.workers.process import RemoteTraceback, WorkerProcess
+from sim.workers.pool import RemoteTraceback, WorkerProcess
 from tracking import tracker_registry
 from tracking.config import Config
 from tracking.image_scale import learned_by

@@ -78,7 +78,7 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
 
     from scenarios.schema.sensor import Sensor
     from sim.detector.sense import sense
-    from sim.scene.box_visibility import with_visibility
+    from sim.scene.boxes import with_visibility
 
     try:
         spec = Sensor.model_validate({**_PERFECT_SENSOR, **_SEES_ALL, **sensor})

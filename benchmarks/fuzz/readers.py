@@ -21,7 +21,7 @@ def _scenario(folder: Path) -> None:
 
 def _simulated(folder: Path) -> None:
     from scenarios import load
-    from scenarios.loading.value_check import most_people
+    from scenarios.loading.checks import most_people
     from sim.sequence import simulate
 
     scenario = load(folder / "scene.toml")

@@ -20,7 +20,7 @@ from itertools import combinations
 import numpy as np
 
 from sim.geometry.polygons import gap_pairs, pack
-from sim.truth.encounters import CROSS_GAP
+from sim.truth.crossing_events import CROSS_GAP
 from sim.types import Array, Groups, Ints, Tracks, Truth
 from tracking.scoring.evaluation import labelled_frames
 from tracking.scoring.group_scores import hull_pairs, matched_groups, shared_members

@@ -1,1 +1,1 @@
-"""Explains a scenario without simulating it: in words, as a plan in characters, as a plan in SVG."""
+"""Explains a scenario without simulating it: in words, and as a plan in SVG."""

@@ -1,5 +1,6 @@
-"""Explains a scenario without simulating it: `text` describes it in words, with a plan in characters; `svg` draws its
-plan and its script (groups that merge, split and queue) as SVG.
+"""Explains a scenario without simulating it: `text` describes it in words, `svg` draws its plan and its script.
+
+The script is the groups that merge, split and queue.
 """
 
 from __future__ import annotations
@@ -9,24 +10,24 @@ from html import escape
 
 from scenarios.drawing import words as describe
 from scenarios.drawing.plan_svg import MARGIN, STYLE, WIDTH, SvgPlan, badge, marker
-from scenarios.drawing.plan_text import character_plan
 from scenarios.drawing.routes import GroupRoute, OrderMark, group_routes, order_marks
 from scenarios.schema.scenario import Scenario
 
+# Of groups: dark enough to read on white, and distinct for colour-blind readers.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa3377", "#8a6d00", "#3d6fd6", "#b2182b", "#4d7c0f", "#6a51a3", "#5c5c5c")
-"""Of groups: dark enough to read on white, and distinct for colour-blind readers."""
-
 ROW = 30.0  # px between the lines of groups in the drawing of the script
 
 
 def text(scenario: Scenario) -> str:
-    """Returns a description of a scenario for people, as lines of text.
-
-    In order: name, about (if any), setting, plan in characters, people, orders (numbered from 1, or "none"), sensor.
-    The scenario must be one that `load` accepts.
-    """
-    lines = [scenario.name, *([scenario.about] if scenario.about else []), "", *describe.setting(scenario), ""]
-    lines += [character_plan(scenario), "", "People"]
+    """Returns a description of a scenario for people, as lines of text: setting, people, orders, sensor."""
+    lines = [
+        scenario.name,
+        *([scenario.about] if scenario.about else []),
+        "",
+        *describe.setting(scenario),
+        "",
+        "People",
+    ]
     wide = max(len(group.id) for group in scenario.group)
     lines += [f"  {group.id:<{wide}}  {describe.people(group)}" for group in scenario.group]
     lines += ["", "Orders"] + ([] if scenario.event else ["  none"])
@@ -36,11 +37,7 @@ def text(scenario: Scenario) -> str:
 
 
 def svg(scenario: Scenario) -> str:
-    """Returns an SVG drawing, as text, of a scenario, which must be one that `load` accepts.
-
-    It has the plan with starts, ways and goals of all groups, and beneath it the script: one line for each group, which
-    joins and divides at the orders, and each order in words. The about line is cut to 140 characters, orders to 128.
-    """
+    """Returns an SVG drawing of a scenario: the plan with starts, ways and goals, and beneath it the script."""
     plan = SvgPlan(scenario.world)
     ways, orders = group_routes(scenario), order_marks(scenario)
     colour = _colours(ways, orders)
@@ -67,11 +64,6 @@ def svg(scenario: Scenario) -> str:
 
 
 def _colours(ways: list[GroupRoute], orders: list[OrderMark]) -> dict[str, str]:
-    """Returns the colour (#rrggbb) of each group name, also of groups that orders make, from ten colours.
-
-    ways: one per entry of `group`. All groups of a `repeat` have the same colour. Entries, then new groups of orders,
-    take the ten colours in turn.
-    """
     named: dict[str, str] = {}
     for k, course in enumerate(ways):
         c = COLOURS[k % len(COLOURS)]
@@ -88,12 +80,6 @@ def _cut(words: str, length: int) -> str:
 def _script(
     ways: list[GroupRoute], orders: list[OrderMark], colour: dict[str, str], top: float
 ) -> tuple[list[str], float]:
-    """Returns the SVG elements of the script, and the y of their lower end, px: lines of groups, then the orders in
-    words.
-
-    ways, orders: groups and orders to draw. colour: #rrggbb by group name; KeyError for a group without one. top: y of
-    the title, px. Words of an order are cut to 128 characters.
-    """
     parts = [f'<text x="{MARGIN}" y="{top:.0f}" style="font-weight:700">Script</text>']
     rows, x0 = {course.id: k for k, course in enumerate(ways)}, MARGIN + 60
     step = min((WIDTH - 2 * MARGIN - 110) / max(len(orders), 1), 170)
@@ -135,12 +121,8 @@ ScriptLine = tuple[str, int, float, float, float]
 def _lines(
     rows: dict[str, int], row_of: dict[str, str], orders: list[OrderMark]
 ) -> tuple[list[ScriptLine], dict[int, list[int]]]:
-    """Returns the lines of groups to draw, and for each order number the rows (0 = top) that the order concerns.
-
-    A line is (group name, row, order number where it starts, order number where it ends, row at its end); numbers count
-    from 1, 0 is the start, fractions lie between two orders. rows: row of each entry of `group`; rows of new groups are
-    added to it. row_of: id of the entry by name of each of its groups. One group of a `repeat` branches off; the line
-    of the others goes on. Raises KeyError for an order of an unknown group.
+    """Returns the lines of groups (name, row, from order, to order, row at its end), and the rows that each order
+    concerns.
     """
     since = dict.fromkeys(rows, 0.0)
     lines: list[ScriptLine] = []
@@ -156,6 +138,7 @@ def _lines(
         for name in mark.before:
             row = rows[row_of.get(name, name)]
             start = since.pop(name) if name in ending else mark.number - 0.4
+            # One group of a `repeat` branches off; the line of the others goes on.
             lines.append((name, row, start, mark.number, home))
         free = (row for row in range(home, 10_000) if row not in taken)
         for name in mark.after:

@@ -20,11 +20,9 @@ text { font: 13px system-ui, sans-serif; fill: #1b1f24 } .small { font-size: 11.
 
 
 class SvgPlan:
-    """Draws in world metres (y up) on a picture in px (y down), 900 px wide; the methods return SVG elements as text.
+    """Draws in world metres (y up) on a picture in px (y down), 900 px wide; methods return SVG elements.
 
-    world: the scenario's, the only argument. State: world; scale, px per m, such that the plan is at most 848 px wide
-    and 620 px high; left, top: px of the world's upper left corner, left such that the plan is in the middle; bottom:
-    lower end of the plan and the line of words beneath it, px.
+    State: world; scale, px per m; left, top: px of the world's upper left corner; bottom: lower end of the plan, px.
     """
 
     def __init__(self, world: WorldSpec) -> None:
@@ -35,26 +33,21 @@ class SvgPlan:
         self.bottom = self.top + world.size[1] * self.scale + 20
 
     def __call__(self, at: XY) -> XY:
-        """Returns a point (x, y) of the world, m, as a point (u, v) of the picture, px."""
+        """Returns a point of the world, m, as a point of the picture, px."""
         return self.left + at[0] * self.scale, self.top + (self.world.size[1] - at[1]) * self.scale
 
     def path(self, points: Iterable[XY], attributes: str) -> str:
-        """Returns an SVG line through points (x, y) of the world, m. attributes: SVG text such as `class="wall"`."""
+        """Returns a line through points of the world. attributes: SVG text such as `class="wall"`."""
         through = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(self, points))
         return f'<polyline points="{through}" {attributes}/>'
 
     def label(self, at: XY, words: str, dx: float = 0, dy: float = 0, attributes: str = "") -> str:
-        """Returns an SVG text at a point (x, y) of the world, m, shifted by dx, dy px. words are escaped, attributes
-        are not.
-        """
+        """Returns a text at a point of the world, shifted by dx, dy px; words are escaped, attributes are not."""
         x, y = self(at)
         return f'<text x="{x + dx:.1f}" y="{y + dy:.1f}" {attributes}>{escape(words)}</text>'
 
     def floor(self) -> list[str]:
-        """Returns SVG elements of the ground: a line for each metre, a frame, and the world's size in words.
-
-        Worlds wider than 40 m in x have a line for each 5 m.
-        """
+        """Returns the ground: a line for each metre (5 m in wide worlds), a frame, and the world's size in words."""
         width, depth = self.world.size
         (x0, y1), (x1, y0) = self((0, 0)), self((width, depth))
         step = 1.0 if width <= 40 else 5.0
@@ -70,7 +63,7 @@ class SvgPlan:
         ]
 
     def scene(self) -> list[str]:
-        """Returns SVG elements of stairs, walls without their doors, labels of doors, pillars and service points."""
+        """Returns stairs, walls without their doors, pillars and service points."""
         parts = [part for stairs in self.world.stairs for part in self._stairs(stairs)]
         parts += [self.path([wall[:2], wall[2:]], 'class="wall"') for wall in walls_without_doors(self.world)]
         parts += [self.label(door.at, "door", 0, -8, 'class="small" text-anchor="middle"') for door in self.world.doors]
@@ -84,10 +77,6 @@ class SvgPlan:
         return parts
 
     def _stairs(self, stairs: StairsSpec) -> list[str]:
-        """Returns SVG elements of a flight of stairs: outline with landing, a line per step, and its rise in words.
-
-        Its foot and head must be different places: else ZeroDivisionError.
-        """
         (fx, fy), (hx, hy) = stairs.foot, stairs.head
         length = math.dist(stairs.foot, stairs.head)
         ex, ey = (hx - fx) / length, (hy - fy) / length
@@ -106,11 +95,7 @@ class SvgPlan:
         ]
 
     def route(self, route: GroupRoute, colour: str) -> list[str]:
-        """Returns SVG elements of a group's way and goal, and a rectangle over the range of the goal if that is drawn
-        at random.
-
-        colour: #rrggbb. The arrow head is a marker of that colour, which the picture must define (`marker`).
-        """
+        """Returns a group's way and goal, and the range of a random goal."""
         end = route.points[-1]
         u, v = self(end)
         return [
@@ -120,10 +105,6 @@ class SvgPlan:
         ]
 
     def _spread(self, at: XY, half: XY, colour: str) -> list[str]:
-        """Returns a rectangle over the range of a random place, as a list of one SVG element; [] if half is (0, 0).
-
-        at: its middle, m. half: half its width and height, m; each half is drawn at least 3 px long. colour: #rrggbb.
-        """
         if half == (0, 0):
             return []
         u, v = self(at)
@@ -134,12 +115,7 @@ class SvgPlan:
         ]
 
     def start(self, route: GroupRoute, colour: str, lift: int = 0) -> list[str]:
-        """Returns SVG elements of a group's start: its people as discs, the range of a random start, and name, copies
-        and mean size.
-
-        The number of discs is the mean size, rounded, 1 to 12. colour: #rrggbb. lift: number of text lines by which the
-        words stand higher.
-        """
+        """Returns a group's start: its people as discs, the range of a random start, name, copies and mean size."""
         at, parts = route.points[0], self._spread(route.points[0], route.spread[0], colour)
         n = min(max(round(route.people), 1), 12)
         reach = 0.0 if n == 1 else 0.75 / (2 * math.sin(math.pi / n))
@@ -155,11 +131,7 @@ class SvgPlan:
         return parts
 
     def mark(self, mark: OrderMark, colour: dict[str, str]) -> list[str]:
-        """Returns SVG elements of an order: the ways that it opens, dashed, with group names, and the places of a
-        queue.
-
-        colour: by group name; the order's first group must be in it, else KeyError.
-        """
+        """Returns an order: the ways that it opens, and the places of a queue. colour: by group name."""
         parts = []
         for arrow in mark.arrows:
             c = colour.get(arrow.id, colour[mark.before[0]])
@@ -175,13 +147,11 @@ class SvgPlan:
         return parts
 
     def numbers(self, orders: list[OrderMark]) -> list[str]:
-        """Returns SVG elements with the number of each order at its place.
-
-        Orders whose places fall into one square of 24 px stand side by side, in the order given.
-        """
+        """Returns the number of each order at its place."""
         parts, used = [], dict[tuple[int, int], int]()
         for mark in orders:
             u, v = self(mark.at)
+            # Orders at nearly one place stand side by side.
             cell = (round(u / 24), round(v / 24))
             used[cell] = used.get(cell, 0) + 1
             parts.append(badge(u + 22 * (used[cell] - 1), v, mark.number))
@@ -189,7 +159,7 @@ class SvgPlan:
 
 
 def badge(x: float, y: float, number: int) -> str:
-    """Returns the SVG elements of an order's number in a black disc around the point (x, y) of the picture, px."""
+    """Returns an order's number in a black disc at (x, y) px."""
     return (
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="10" fill="#1b1f24" stroke="#fff" stroke-width="1.5"/>'
         f'<text x="{x:.1f}" y="{y + 4.3:.1f}" text-anchor="middle" style="fill:#fff;font-weight:700">{number}</text>'
@@ -197,7 +167,7 @@ def badge(x: float, y: float, number: int) -> str:
 
 
 def marker(colour: str) -> str:
-    """Returns the SVG definition of an arrow head in a colour #rrggbb; its id is the colour without #."""
+    """Returns the definition of an arrow head in a colour #rrggbb; its id is the colour without #."""
     return (
         f'<marker id="{colour[1:]}" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="9" markerHeight="9" '
         f'markerUnits="userSpaceOnUse" orient="auto"><path d="M0,0.5 L8,4 L0,7.5 z" fill="{colour}"/></marker>'

@@ -14,31 +14,23 @@ from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOr
 from scenarios.schema.values import Distribution, Point, Value, bounds
 
 XY = tuple[float, float]
-SLOTS = 6
-"""Greatest number of places of a queue that are drawn."""
+SLOTS = 6  # greatest number of places of a queue that are drawn
 
 
 @dataclass(frozen=True)
 class GroupRoute:
-    """The way of one entry of `group`, as far as it is known before the simulation.
+    """The way of one entry of `group`, as far as it is known before the simulation."""
 
-    - id: of the entry. points: start, via points, goal: x, y in m; a distribution is replaced by its mean.
-    - spread: half the range of each point in x and y, m; 0 for a fixed coordinate.
-    - people: mean number of people. repeat: number of such groups.
-    """
-
-    id: str
-    points: tuple[XY, ...]
-    spread: tuple[XY, ...]
-    people: float
-    repeat: int
+    id: str  # of the entry
+    points: tuple[XY, ...]  # start, via points, goal: x, y in m; a distribution is replaced by its mean
+    spread: tuple[XY, ...]  # half the range of each point in x and y, m; 0 for a fixed coordinate
+    people: float  # mean number of people
+    repeat: int  # number of such groups
 
 
 @dataclass(frozen=True)
 class Arrow:
-    """A way that an order opens. id: name of the group that walks it, "served" for groups after a queue. points: x, y
-    in m, in order.
-    """
+    """A way that an order opens."""
 
     id: str
     points: tuple[XY, ...]
@@ -46,29 +38,20 @@ class Arrow:
 
 @dataclass(frozen=True)
 class OrderMark:
-    """An order of the script as drawn on the plan.
+    """An order of the script as drawn on the plan."""
 
-    - number: of the order in the file, from 1. event: the order. at: x, y of where it happens, m.
-    - before, after: names of its groups before and after it; the same for a queue.
-    - arrows: the ways it opens; empty if groups stay or keep their goals. slots: x, y of the places of a queue, m;
-      empty for other orders.
-    """
-
-    number: int
-    event: ScriptOrder
-    at: XY
+    number: int  # of the order in the file, from 1
+    event: ScriptOrder  # the order
+    at: XY  # x, y of where it happens, m
+    # before, after: names of its groups before and after it; the same for a queue
     before: tuple[str, ...]
     after: tuple[str, ...]
-    arrows: tuple[Arrow, ...]
-    slots: tuple[XY, ...] = ()
+    arrows: tuple[Arrow, ...]  # the ways it opens; empty if groups stay or keep their goals
+    slots: tuple[XY, ...] = ()  # x, y of the places of a queue, m; empty for other orders
 
 
 def middle(value: Value) -> float:
-    """Returns the mean of a value, a number or a distribution, moved to the nearest bound of its `clip` if it lies
-    outside.
-
-    The mean is that of the distribution without clip.
-    """
+    """Returns the mean of a value, moved into its `clip`."""
     if not isinstance(value, Distribution):
         return float(value)
     if value.normal is not None:
@@ -84,11 +67,7 @@ def middle(value: Value) -> float:
 
 
 def spread(value: Value) -> float:
-    """Returns half the width of the range in which nearly all draws of a value lie; 0 for a number.
-
-    Half the distance between the bounds, `clip` included; for a normal distribution at most two standard deviations;
-    for exponential and poisson without an upper bound twice `middle`.
-    """
+    """Returns half the width of the range in which nearly all draws of a value lie; 0 for a number."""
     if not isinstance(value, Distribution):
         return 0.0
     low, high = bounds(value)
@@ -99,10 +78,7 @@ def spread(value: Value) -> float:
 
 
 def group_routes(scenario: Scenario) -> list[GroupRoute]:
-    """Returns the ways of all entries of `group`, in order; an entry with `repeat` gives one.
-
-    Points drawn from a distribution are replaced by their means.
-    """
+    """Returns the ways of all entries of `group`, with means for points drawn from a distribution."""
     made = []
     for group in scenario.group:
         points = (group.start, *(stop.at for stop in group.stops), *group.via, group.goal)
@@ -112,11 +88,7 @@ def group_routes(scenario: Scenario) -> list[GroupRoute]:
 
 
 def order_marks(scenario: Scenario) -> list[OrderMark]:
-    """Returns the orders as drawn on the plan, in the order of the file, numbered from 1; empty without orders.
-
-    Merges and splits are taken to happen half-way. Raises KeyError for a merge or split of a group that does not exist
-    at that point of the script.
-    """
+    """Returns the orders as drawn on the plan, numbered from 1."""
     places = {}
     for group in scenario.group:
         start, goal = _at(group.start), _at(group.goal)
@@ -133,12 +105,6 @@ def _mean(points: list[XY]) -> XY:
 
 
 def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> OrderMark:
-    """Returns one order as drawn on the plan.
-
-    number: of the order, from 1. places: start and goal (x, y, m) by name of existing group; it is updated. world: its
-    size (x, y), m; places of a queue outside it are left out, and at most SLOTS (6) are drawn. Raises KeyError for a
-    merge or split of a group that does not exist.
-    """
     if isinstance(event, MergeOrder):
         return _merge(number, event, places)
     if isinstance(event, SplitOrder):
@@ -149,12 +115,6 @@ def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], wor
 
 
 def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
-    """Returns a merge on the plan, at the mean of its groups' half-way points between start and goal.
-
-    number: of the order, from 1. places: start and goal (x, y, m) by group; the merged groups are removed and the new
-    one is added. A new group that stays where the groups meet has no arrow. Raises KeyError for a group that does not
-    exist.
-    """
     ways = [places.pop(name) for name in event.groups]
     meeting = _mean([_mean([start, goal]) for start, goal in ways])
     goal = meeting if isinstance(event.goal, str) else _at(event.goal)
@@ -164,11 +124,6 @@ def _merge(number: int, event: MergeOrder, places: dict[str, tuple[XY, XY]]) -> 
 
 
 def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> OrderMark:
-    """Returns a split on the plan, half-way between the start and goal of its group.
-
-    number: of the order, from 1. places: start and goal (x, y, m) by group; the group is removed and its parts are
-    added. Raises KeyError for a group that does not exist.
-    """
     start, goal = places.pop(event.group)
     at = _mean([start, goal])
     arrows = [Arrow(part.id, (at, *map(_at, part.via), _at(part.goal))) for part in event.parts]
@@ -177,11 +132,6 @@ def _split(number: int, event: SplitOrder, places: dict[str, tuple[XY, XY]]) -> 
 
 
 def _served(event: QueueOrder, names: tuple[str, ...], places: dict[str, tuple[XY, XY]]) -> tuple[Arrow, ...]:
-    """Returns the common way of all groups after a queue, as a tuple of one; () where they go to their own goals.
-
-    names: of the groups. places: start and goal (x, y, m) by group; if the queue has a goal, they become the head of
-    the queue and that goal.
-    """
     if event.goal is None:
         return ()
     goal = _at(event.goal)

@@ -9,11 +9,7 @@ AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
 
 
 def number(value: Value, unit: str = "") -> str:
-    """Returns a value in words, with its unit and, except for uniform and choice, its clip in brackets.
-
-    `1.2` a number, `1.2 ± 0.1` normal (mean, standard deviation), `0 to 5` uniform, `about 3` exponential or Poisson
-    (mean), `1 or 2` choice.
-    """
+    """Returns a value in words: `1.2`, `1.2 ± 0.1` (normal), `0 to 5` (uniform), `about 3`, `1 or 2`, with its clip."""
     tail = f" {unit}" if unit else ""
     if not isinstance(value, Distribution):
         return f"{value:g}{tail}"
@@ -29,9 +25,6 @@ def number(value: Value, unit: str = "") -> str:
 
 
 def _choice(values: tuple[float, ...]) -> str:
-    """Returns the values of a choice in words: `1 or 2`; `1 (67 %) or 2 (33 %)` if some occur more often
-    than others.
-    """
     times = {v: values.count(v) for v in values}
     if len(set(times.values())) == 1:
         return " or ".join(f"{v:g}" for v in times)
@@ -39,23 +32,17 @@ def _choice(values: tuple[float, ...]) -> str:
 
 
 def place(point: Point) -> str:
-    """Returns a point in words, metres without unit, coordinates as by `number`: `(5, 3 to 4)`, `(5 ± 0.1, 1 or 2)`."""
+    """Returns a point in words: `(5, 3 to 4)`."""
     return f"({number(point[0])}, {number(point[1])})"
 
 
 def count(n: Value, one: str, many: str) -> str:
-    """Returns a number or distribution with its noun: `one` (the singular) only for exactly 1, else `many`: `1 person`,
-    `3 people`.
-    """
+    """Returns a number or distribution with its noun: `1 person`, `3 people`."""
     return f"{number(n)} {one if n == 1 else many}"
 
 
 def setting(scenario: Scenario) -> list[str]:
-    """Returns three lines in words: duration and how the script is placed; size and content of the world; camera.
-
-    The first names a turn and a lead that are not 0, and a mirror. The second says "empty" for a world without things.
-    The third says ", placed to see everybody" if neither height nor px_per_m is given, also with a position.
-    """
+    """Returns three lines: duration and placement of the script, the world, the camera."""
     world, camera = scenario.world, scenario.camera
     things = {"wall": world.walls, "door": world.doors, "pillar": world.pillars, "flight of stairs": world.stairs}
     things["service point"] = world.service
@@ -76,11 +63,7 @@ def setting(scenario: Scenario) -> list[str]:
 
 
 def people(group: GroupSpec) -> str:
-    """Returns in words the number of groups, size, start, way, goal, speed and time of entry of an entry of `group`,
-    and what they do at the goal.
-
-    An absent speed, an entry at time 0, an empty way and a single group are left out.
-    """
+    """Returns an entry of `group` in words."""
     words = [count(group.size, "person", "people")]
     words[0] = f"{group.repeat} groups of {words[0]}" if group.repeat > 1 else words[0]
     words.append(f"from {place(group.start)}")
@@ -95,7 +78,6 @@ def people(group: GroupSpec) -> str:
 
 
 def _stop(stop: Stop) -> str:
-    """Returns a stop in words: its place, in brackets how long, and how many members stop unless all do."""
     words = [f"until {', '.join(f'{t:g}' for t in stop.until)} s"] if stop.until else []
     words += [f"for {number(stop.stay, 's')}"] if stop.stay != 0.0 else []
     words += [] if stop.members is None else [f"only {count(stop.members, 'member', 'members')}"]
@@ -103,9 +85,7 @@ def _stop(stop: Stop) -> str:
 
 
 def trigger(when: When) -> str:
-    """Returns in words when an order fires: its trigger (a time, a group's arrival, another order, nearness), and the
-    delay after it unless that is 0.
-    """
+    """Returns when an order fires, in words."""
     if when.time is not None:
         text = f"at {number(when.time, 's')}"
     elif when.reach is not None:
@@ -119,11 +99,7 @@ def trigger(when: When) -> str:
 
 
 def order(event: ScriptOrder) -> str:
-    """Returns in words what an order does: kind, groups before and after, goals; of a queue its place and service time,
-    too.
-
-    A part without a size is "rest". A merge without a goal is "to meet and stand"; a queue without one names none.
-    """
+    """Returns what an order does, in words."""
     if isinstance(event, MergeOrder):
         goal = "to meet and stand" if isinstance(event.goal, str) else f"to {place(event.goal)}"
         return f"merge {' + '.join(event.groups)} → {event.into}, {goal}"
@@ -135,11 +111,7 @@ def order(event: ScriptOrder) -> str:
 
 
 def sensor(scenario: Scenario) -> list[str]:
-    """Returns lines in words about the scenario's sensor: detection and false alarms; noise; visibility; one line per
-    occlusion.
-
-    These are three lines, and then one for each entry of `sensor.hide`.
-    """
+    """Returns lines about the scenario's sensor: detection, noise, visibility, and each occlusion."""
     s = scenario.sensor
     edges = f"{s.noise_px:g} px on the edges of boxes" if s.box_noise is None else "in proportion to boxes"
     error = f"{s.noise_m:g} m on points"

@@ -1,7 +1,8 @@
 """Loads scenarios: `load` returns the checked scenario of a catalogue name or a TOML file.
 
 `resolve` returns the entries of a scenario or a suite (a list of scenarios); each entry is one sequence to make for
-every seed.
+every seed. The profile of a detector, made by `flockscope fit sensor`, is a file with a [sensor] table alone;
+`sensor_settings(path)` returns its keys as settings, for every function that takes settings of a scenario.
 """
 
 from __future__ import annotations
@@ -10,52 +11,98 @@ import os.path
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
 
 from scenarios.errors import InputError
 from scenarios.loading import overrides, suites, toml_files
-from scenarios.loading.geometry_check import check
-from scenarios.loading.toml_files import dump, names, suite_names
+from scenarios.loading.checks import check, check_observation
+from scenarios.loading.toml_files import Table, dump, names, parse, suite_names, toml_value
 from scenarios.loading.validation import validate
-from scenarios.loading.value_check import check_observation
-from scenarios.schema.observation import ObservationSpec
-from scenarios.schema.scenario import Scenario
+from scenarios.schema.scenario import ObservationSpec, Scenario
+from scenarios.schema.sensor import Sensor
+from scenarios.schema.values import Model
 
-__all__ = ["Entry", "dump", "load", "load_observation", "names", "resolve", "suite_names"]
+
+class SensorFile(Model):
+    """The content of a profile file: `schema` (1, may be absent) and the required table `[sensor]`."""
+
+    schema_: Literal[1] = Field(1, alias="schema")
+    sensor: Sensor
+
+
+def sensor_settings(path: str | Path) -> tuple[str, ...]:
+    """Returns the profile of a detector as settings of a scenario.
+
+    Args:
+        path: A TOML file with a [sensor] table.
+
+    Returns:
+        A setting "sensor.key=value" for each key given in the file.
+
+    Raises:
+        InputError: The file does not exist.
+    """
+    return tuple(f"sensor.{key}={toml_value(v)}" for key, v in sensor_table(path).items())
+
+
+def sensor_table(path: str | Path) -> Table:
+    """Returns the keys given in the file's [sensor] table with their values, without defaults."""
+    path = Path(path)
+    if not os.path.exists(path):
+        raise InputError(
+            file=path, got="no such file", expected="a file with a [sensor] table",
+            remedy="check the path, or make one with `flockscope fit sensor`",
+        )  # fmt: skip
+    table = parse(path)
+    validate(table, path, model=SensorFile)
+    given: Table = table["sensor"]
+    return given
+
+
+def dump_sensor(sensor: Sensor, about: str = "") -> str:
+    """Returns the text of a profile file with all keys of a sensor; `about` becomes comment lines at the top."""
+    table = sensor.model_dump(mode="python", exclude_none=True)
+    lines = [f"# {line}".rstrip() for line in about.splitlines()]
+    rows = [f"{key} = {toml_value(v)}" for key, v in table.items() if key != "hide" or v]
+    return "\n".join([*lines, "schema = 1", "", "[sensor]", *rows, ""])
+
+
+__all__ = ["Entry", "dump", "load", "load_observation", "names", "resolve", "sensor_settings", "suite_names"]
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One sequence to make for every seed.
+    """One sequence to make for every seed."""
 
-    - name: unique among the entries of a suite. scenario: what to simulate, checked.
-    - repeat: number of the copy, from 1, where a suite's entry has `repeat`, else 0.
-    - file: the scenario's file, or the suite's file and the entry, for messages; not compared.
-    """
-
-    name: str
-    scenario: Scenario
-    repeat: int = 0
+    name: str  # unique among the entries of a suite
+    scenario: Scenario  # what to simulate, checked
+    repeat: int = 0  # number of the copy, from 1, where a suite's entry has `repeat`, else 0
+    # the scenario's file, or the suite's file and the entry, for messages; not compared
     file: str = field(default="", compare=False)
 
 
 def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
-    """Returns the checked scenario of a catalogue name or a *.toml file (relative to the working folder, else the
-    catalogue).
+    """Loads and checks a scenario.
 
-    `extends` is applied first, then each `key=value` of `set` in turn. Raises InputError for everything that can be
-    found wrong without simulating: an unknown name, an unreadable file, a wrong key or value, a malformed setting, a
-    place in a wall, an order for a group that does not exist.
+    Args:
+        name_or_path: A name of the catalogue, or a *.toml file, sought in the working folder and then in the catalogue.
+        set: Settings "key=value", applied in turn after `extends`.
+
+    Returns:
+        The scenario with all defaults.
+
+    Raises:
+        InputError: Everything that can be found wrong without simulating: an unknown name, an unreadable file, a wrong
+            key or value, a place in a wall, an order for a group that does not exist.
     """
     path = toml_files.find(name_or_path)
     return _build(path, tuple(set))
 
 
 def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
-    """Returns camera, sensor, light and picture of a TOML file, with each `key=value` of `set` applied in turn.
-
-    path None: all defaults. `extends` is not supported: it is an unknown key. Raises InputError if the file does not
-    exist, is not TOML, or a key, value or setting is wrong.
-    """
+    """Returns camera, sensor, light and picture of a TOML file (None: all defaults), with settings applied."""
     if path is not None and not os.path.exists(path):
         raise InputError(
             file=path, got="no such file", expected="a TOML file with [camera]", remedy="check --camera"
@@ -71,11 +118,9 @@ def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) ->
 
 
 def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
-    """Returns the entries, in order, of a *.toml file (scenario or suite) or of a name in the catalogue.
+    """Returns the entries of a name in the catalogue, a *.toml file (scenario or suite), or `suite:NAME`.
 
-    A name that is both a scenario's and a suite's means the scenario; `suite:NAME` means the suite. A scenario gives
-    one entry. Each `key=value` of `set` is applied to each entry, after the entry's own settings. Raises InputError for
-    an unknown name, a wrong suite file, and everything that `load` finds wrong in a scenario.
+    Settings are applied to each entry, after the entry's own.
     """
     settings = tuple(set)
     if name.startswith("suite:"):
@@ -96,15 +141,11 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
 
 
 def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
-    """Returns all entries of a suite file, in order, loaded; settings are applied after each entry's own.
-
-    Copies of an entry are loaded once. Each scenario gets its entry's name. Raises InputError if the suite or a
-    scenario is wrong.
-    """
     loaded: dict[tuple[str, tuple[str, ...]], Scenario] = {}
     entries = []
     for entry in suites.read_entries(path):
         key = (entry.scenario, entry.settings)
+        # Copies of an entry are loaded once.
         if key not in loaded:
             loaded[key] = _load_entry(entry, path, settings)
         scenario = loaded[key].model_copy(update={"name": entry.name})
@@ -113,11 +154,6 @@ def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
 
 
 def _load_entry(entry: suites.SuiteEntry, path: Path, settings: tuple[str, ...]) -> Scenario:
-    """Returns the scenario of an entry of the suite file `path`, with the entry's settings, then `settings`.
-
-    A scenario file is sought beside the suite first, then in the catalogue. Raises InputError, naming the suite and the
-    entry, if there is no such scenario, it is wrong, or it cannot work.
-    """
     try:
         return _build(toml_files.find(entry.scenario, beside=path.parent), entry.settings + settings)
     except InputError as error:
@@ -126,11 +162,6 @@ def _load_entry(entry: suites.SuiteEntry, path: Path, settings: tuple[str, ...])
 
 
 def _build(path: Path, settings: tuple[str, ...]) -> Scenario:
-    """Returns the scenario of a file, with `extends` and then each `key=value` setting applied.
-
-    Raises InputError, naming the file, if it is unreadable, if a key, value or setting is wrong, or if the scenario
-    cannot work.
-    """
     table, places = overrides.apply_settings(toml_files.read(path), settings, path)
     scenario = validate(table, path, places, model=Scenario)
     check(scenario, path)

@@ -32,24 +32,16 @@ EXPECTED = {
 
 @dataclass(frozen=True)
 class SuiteEntry:
-    """One entry of a suite whose scenario is not loaded yet.
+    """One entry of a suite whose scenario is not loaded yet."""
 
-    - name: of the sequence, with -1, -2, … where the entry has `repeat`. scenario: catalogue name or *.toml file.
-    - settings: `key=value` texts. repeat: number of the copy from 1, 0 where the entry has no `repeat`.
-    """
-
-    name: str
-    scenario: str
-    settings: tuple[str, ...]
-    repeat: int
+    name: str  # of the sequence, with -1, -2, … where the entry has `repeat`
+    scenario: str  # catalogue name or *.toml file
+    settings: tuple[str, ...]  # `key=value` texts
+    repeat: int  # number of the copy from 1, 0 where the entry has no `repeat`
 
 
 def find_suite(name: str) -> Path:
-    """Returns the file of a suite, given the path of an existing *.toml file or a name in the catalogue; it is not
-    read.
-
-    Raises InputError for anything else.
-    """
+    """Returns the file of a suite, by name in the catalogue or path."""
     if name.endswith(".toml") and os.path.exists(name):
         return Path(name)
     if name in suite_names():
@@ -58,11 +50,7 @@ def find_suite(name: str) -> Path:
 
 
 def read_entries(path: Path) -> list[SuiteEntry]:
-    """Returns the entries of a suite file, in order, with an entry of `repeat = n` expanded to name-1 … name-n.
-
-    Scenarios are not loaded. Raises InputError if the file cannot be read or is not TOML, has an unknown key, no entry,
-    a wrong value, an entry without scenario, or two entries of one name.
-    """
+    """Returns the entries of a suite file, in order, with an entry of `repeat = n` expanded to name-1 … name-n."""
     table = parse(path)
     for key in table.keys() - {"about", "entry"}:
         raise InputError(
@@ -91,20 +79,11 @@ def read_entries(path: Path) -> list[SuiteEntry]:
 
 
 def about(path: Path) -> str:
-    """Returns the `about` text (what the suite is for) of a suite file; "" if it has none.
-
-    Another value is turned into text. InputError if the file cannot be read or is not TOML.
-    """
+    """Returns what a suite is for; "" if its file does not say."""
     return str(parse(path).get("about", ""))
 
 
 def _expand(entry: Any, place: str, path: Path) -> Iterator[SuiteEntry]:
-    """Yields the one entry, or with `repeat = n` the n entries, that one row of the file `path` stands for.
-
-    An absent name is the scenario's name or its file's stem. The n entries are named NAME-1 … NAME-n and hold their
-    number from 1; an entry without `repeat` has number 0. place: `entry.INDEX`, for messages. Raises InputError if
-    the row is wrong.
-    """
     _check(entry, place, path)
     name = entry.get("name", Path(entry["scenario"]).stem)
     settings = tuple(entry.get("set", ()))
@@ -115,10 +94,6 @@ def _expand(entry: Any, place: str, path: Path) -> Iterator[SuiteEntry]:
 
 
 def _check(entry: Table, place: str, path: Path) -> None:
-    """Raises InputError if an entry is no table, has an unknown key or wrong value, or no `scenario`.
-
-    place: `entry.INDEX`, and path: the suite's file, for messages.
-    """
     if not isinstance(entry, dict):
         raise InputError(file=path, place=place, got=repr(entry), expected="a table", remedy="write { scenario = … }")
     for key, value in entry.items():

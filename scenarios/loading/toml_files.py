@@ -23,8 +23,7 @@ from typing import Any, Protocol
 
 from scenarios.errors import InputError
 from scenarios.limits import TOML_BYTES
-from scenarios.parsing import parse_toml
-from scenarios.regular_file import read_regular
+from scenarios.reading import parse_toml, read_regular
 
 CATALOGUE = Path(__file__).parents[1]
 SUITES = CATALOGUE / "suites"
@@ -34,22 +33,17 @@ Table = dict[str, Any]
 
 
 def names() -> list[str]:
-    """Returns the names (file names without .toml) of the scenarios in the catalogue, sorted; suites are not among
-    them.
-    """
+    """Returns the names of the scenarios in the catalogue, sorted."""
     return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
 
 
 def suite_names() -> list[str]:
-    """Returns the names (file names without .toml) of the suites in the catalogue, sorted."""
+    """Returns the names of the suites in the catalogue, sorted."""
     return sorted(path.stem for path in SUITES.glob("*.toml"))
 
 
 def did_you_mean(word: str, known: list[str]) -> str:
-    """Returns the remedy of an error about an unknown name, as text for users.
-
-    It lists up to three known names that are like the word; all known names if none is; else that there is none.
-    """
+    """Returns the remedy of an error about an unknown name: known names that are like the word, else all."""
     close = difflib.get_close_matches(word, known, n=3, cutoff=0.5)
     if close:
         return "did you mean " + " or ".join(repr(name) for name in close) + "?"
@@ -57,19 +51,13 @@ def did_you_mean(word: str, known: list[str]) -> str:
 
 
 def closest(word: str, known: Iterable[str]) -> str:
-    """Returns the known name most like a word, however unlike, ignoring upper and lower case; "" without
-    known names.
-    """
+    """Returns the known name most like a word, however unlike, in any case; "" without known names."""
     names = {name.casefold(): name for name in known}
     return names[difflib.get_close_matches(word.casefold(), names, 1, 0.0)[0]] if names else ""
 
 
 def find(name: str | Path, beside: Path | None = None) -> Path:
-    """Returns the file of a scenario; it is not read.
-
-    name: a catalogue name, or a path that ends in .toml. The path is sought in the folder `beside` (the working folder
-    if None), then in the catalogue. Raises InputError if there is no such scenario or file.
-    """
+    """Returns the file of a scenario by name or path; a path is sought in `beside`, then in the catalogue."""
     text = str(name)
     if not text.endswith(".toml"):
         path = CATALOGUE / f"{text}.toml"
@@ -87,10 +75,7 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
 
 
 def parse(path: Path) -> Table:
-    """Returns the content of a TOML file, without applying `extends`.
-
-    Raises InputError if the file cannot be read, is no regular file or above 2 MB, is not UTF-8 or is not TOML.
-    """
+    """Returns the content of a TOML file, without applying `extends`."""
     body = read_regular(path, TOML_BYTES, "check the path and its permissions")
     try:
         return parse_toml(body.decode(), path)
@@ -105,12 +90,7 @@ def parse(path: Path) -> Table:
 
 
 def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
-    """Returns the content of a TOML file merged over all files it extends; the key `extends` itself is left out.
-
-    `name` is the file's stem where the file itself has none. chain: the files that extend this one. Raises InputError
-    if a file cannot be found or read or is not TOML, if `extends` is no text, or if files extend each other in a
-    circle.
-    """
+    """Returns the content of a TOML file merged over all files it extends. chain: the files that extend this one."""
     chain = (*chain, path.resolve())
     table = parse(path)
     base = table.pop("extends", None)
@@ -134,11 +114,6 @@ def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
 
 
 def _base(path: Path, base: str) -> Path:
-    """Returns the file that `extends = base` means in the file `path`: beside it, else in the catalogue; it is not
-    read.
-
-    Raises InputError, naming `path`, if there is no such file.
-    """
     try:
         return find(base, beside=path.parent)
     except InputError as error:
@@ -148,11 +123,7 @@ def _base(path: Path, base: str) -> Path:
 
 
 def merge(below: Table, above: Table) -> Table:
-    """Returns a new table: `above`, of the extending file, merged over `below`, of the extended file; changes neither.
-
-    Tables are merged key by key; an empty table changes nothing. Lists of tables that all have an `id` are merged by
-    id; rows with a new id are appended. A distribution, a `when` and any other value replace the value of `below`.
-    """
+    """Returns the table `above` merged over `below`, as the module says."""
     merged = dict(below)
     for key, value in above.items():
         merged[key] = _merge_value(key, below.get(key), value)
@@ -168,9 +139,6 @@ def _merge_value(key: str, below: Any, above: Any) -> Any:
 
 
 def _is_value(key: str, table: Table) -> bool:
-    """True for a table that replaces the base's value as a whole: under the key `when`, or a non-empty table whose keys
-    are all those of a distribution (normal, uniform, exponential, poisson, choice, clip).
-    """
     return key == "when" or (bool(table) and table.keys() <= DISTRIBUTION_KEYS)
 
 
@@ -190,16 +158,13 @@ def _merge_by_id(below: list[Table], above: list[Table]) -> list[Table]:
 
 
 class _Dumps(Protocol):
-    """A pydantic model, as far as `dump` needs it. A protocol, because this module must not import pydantic."""
+    """A pydantic model, as far as `dump` needs it: this module must not import pydantic."""
 
     def model_dump(self, *, mode: str, by_alias: bool, exclude_none: bool) -> dict[str, Any]: ...
 
 
 def dump(scenario: _Dumps) -> str:
-    """Returns a scenario, or another pydantic model of tables, as TOML; equal models give equal bytes.
-
-    All defaults are included, keys that are None are left out. Plain values come first, then a block per table or row.
-    """
+    """Returns a scenario, or another model of tables, as TOML with all defaults; equal models give equal bytes."""
     table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True)
     flat = [(k, v) for k, v in table.items() if not _is_table(v) and not _is_rows(v)]
     blocks = [_lines(dict(flat))]
@@ -224,10 +189,7 @@ def _lines(table: dict[str, Any]) -> str:
 
 
 def toml_value(v: Any) -> str:
-    """Returns a bool, text, number, list, tuple or dict as TOML on one line.
-
-    Keys of dicts are not quoted. None, which TOML does not have, gives the invalid text None.
-    """
+    """Returns a value as TOML on one line; keys of dicts are not quoted."""
     if isinstance(v, bool):
         return str(v).lower()
     if isinstance(v, str):

@@ -24,12 +24,9 @@ M = typing.TypeVar("M", bound=BaseModel)
 
 
 def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None = None, *, model: type[M]) -> M:
-    """Returns the table as a model: a Scenario or one of its tables.
+    """Returns the table as a model; raises InputError for the first problem. Types are strict.
 
-    Types are strict: no text for a number. Numbers beyond 1e6 are refused before all else. Raises InputError with the
-    first problem: the file, the key, what was expected there, and how many more problems there are. file: for the
-    message. places: texts of `--set` by path of keys and indices, as overrides.apply_settings returns them; an error at
-    or below such a path names the setting.
+    places: texts of `--set` by path, as of `apply_settings`; an error at or below such a path names the setting.
     """
     for path, number in _numbers(table):
         if abs(number) > COORDINATE:
@@ -44,7 +41,7 @@ def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None 
 
 
 def _numbers(value: Any, path: KeyPath = ()) -> typing.Iterator[tuple[KeyPath, float]]:
-    """Yields every number in a table with its path; infinite ones and nan are left to the model."""
+    """Yields every finite number in a table with its path."""
     if isinstance(value, dict | list):
         for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _numbers(inner, (*path, key))
@@ -53,23 +50,19 @@ def _numbers(value: Any, path: KeyPath = ()) -> typing.Iterator[tuple[KeyPath, f
 
 
 def _tuples(value: Any) -> Any:
-    """Returns the value with tuples for all lists in it, as pydantic's strict mode requires."""
     if isinstance(value, dict):
         return {key: _tuples(v) for key, v in value.items()}
+    # pydantic's strict mode takes no list for a tuple.
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 
 def input_error(
     error: ValidationError, table: Table, file: object, places: dict[KeyPath, str], model: type[BaseModel] = Scenario
 ) -> InputError:
-    """Returns, without raising it, the InputError for the first problem of a pydantic error, and says how many more
-    there are.
-
-    Unknown keys come first, because a misspelt key explains a missing one. Errors of union branches that do not fit the
-    kind of value are left out. table: what was validated, as which model; file: its file. places: texts of `--set` by
-    path of their keys.
-    """
+    """Returns the error for the first problem that pydantic found, and says how many more there are."""
+    # pydantic reports each branch of a union; those for another kind of value say nothing.
     found = [e for e in error.errors() if _branch_fits(e["loc"], table)] or list(error.errors())
+    # Unknown keys come first, because a misspelt key explains a missing one.
     first = min(found, key=lambda e: (e["type"] != "extra_forbidden", e["type"] == "too_short" and len(found) > 1))
     path = table_path(first["loc"], table) + (("type",) if first["type"].startswith("union_tag") else ())
     got, expected, remedy = _words(first, path, table, model)
@@ -78,17 +71,12 @@ def input_error(
 
 
 def table_path(loc: tuple[int | str, ...], table: Table) -> KeyPath:
-    """Returns a pydantic error location as a path into the table: keys and indices, without the names of union
-    branches.
-    """
+    """Returns a pydantic location as a path into the table, without the names of union branches."""
     return tuple(step for step, _, is_tag in _walk(loc, table) if not is_tag)
 
 
 def _walk(loc: tuple[int | str, ...], table: Any) -> typing.Iterator[tuple[int | str, Any, bool]]:
-    """Yields each step of a pydantic location, the value it starts from, and True if it only names a union branch.
-
-    The value is None below a key or index that the table does not have.
-    """
+    """Yields each step of a pydantic location, the value it starts from, and True if it only names a union branch."""
     here = table
     for k, step in enumerate(loc):
         last = k == len(loc) - 1
@@ -103,15 +91,10 @@ def _walk(loc: tuple[int | str, ...], table: Any) -> typing.Iterator[tuple[int |
 
 
 def _is_branch(step: int | str) -> bool:
-    """True if a step of a pydantic location names a union branch ("float", "Distribution", "tuple[…]"), not a key."""
     return isinstance(step, str) and (step == "float" or "[" in step or step == "Distribution")
 
 
 def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
-    """Returns False if an error at this location is about a union branch for another kind of value than the table has.
-
-    For example the branch for a point [x, y], where the table has a text.
-    """
     for step, value, is_tag in _walk(loc, table):
         if not is_tag or not isinstance(step, str):
             continue
@@ -130,11 +113,6 @@ def _branch_fits(loc: tuple[int | str, ...], table: Table) -> bool:
 
 
 def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> tuple[str, str, str]:
-    """Returns the texts got, expected and remedy for one error of pydantic's list.
-
-    path: of the wrong value in the table; its last step is the unknown or missing key, if it is one. table, model: what
-    was validated, as what; they give the keys to suggest for an unknown one.
-    """
     kind, message = error["type"], str(error["msg"])
     if kind == "extra_forbidden":
         known = known_keys(path[:-1], table, model)
@@ -161,10 +139,6 @@ def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> t
 
 
 def _expectation(message: str) -> str:
-    """Returns what pydantic expected, in words for users, from the message of its error.
-
-    Leading words ("Input should be ", "Value error, ") are cut off, tuples are called lists, and dictionaries tables.
-    """
     for start in ("Input should be ", "Value error, "):
         message = message.removeprefix(start)
     message = re.sub(r"^.* exactly one of (.*), not \[.*\]$", r"exactly one of \1", message)
@@ -172,7 +146,6 @@ def _expectation(message: str) -> str:
 
 
 def _show(value: Any) -> str:
-    """Returns a value as a user writes it in TOML; keys of a table that are None are left out."""
     if isinstance(value, tuple):
         return "[" + ", ".join(map(_show, value)) + "]"
     if isinstance(value, dict):
@@ -182,11 +155,6 @@ def _show(value: Any) -> str:
 
 
 def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
-    """Returns where a path is set, for messages: `--set …` if a setting set it or a table around it, else its dotted
-    key.
-
-    path: keys and indices from 0. places: texts of settings by path. The innermost setting counts.
-    """
     for n in range(len(path), 0, -1):
         if path[:n] in places:
             return place_of(places[path[:n]])
@@ -194,11 +162,7 @@ def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
 
 
 def key_text(path: KeyPath, table: Table) -> str:
-    """Returns a path of keys and indices from 0 as a dotted key for `--set`, as "group.a.size".
-
-    A row that has a text `id` appears by its id, any other row by its index. Steps that the table does not have are
-    kept.
-    """
+    """Returns a path as a dotted key for `--set`; rows with an `id` appear by it."""
     here: Any = table
     steps = []
     for step in path:
@@ -213,12 +177,7 @@ def key_text(path: KeyPath, table: Table) -> str:
 
 
 def known_keys(path: KeyPath, table: Table, form: type[BaseModel] = Scenario) -> list[str]:
-    """Returns the keys that a model knows at a path (keys and indices from 0) of a table; empty where the model has no
-    table there.
-
-    form: model of the whole table. A row of `event` gives the keys of its `type`. Keys have the names used in files
-    (`schema`). Raises KeyError or IndexError if the table does not have the path.
-    """
+    """Returns the keys that a model knows at a path of a table."""
     model: type[BaseModel] | None = form
     here: Any = table
     for step in path:
@@ -234,11 +193,6 @@ def known_keys(path: KeyPath, table: Table, form: type[BaseModel] = Scenario) ->
 
 
 def _event_keys(models: list[type[BaseModel]], path: KeyPath, table: Table) -> list[str]:
-    """Returns the keys known at a path inside a row of `event`, whose model follows from its `type`.
-
-    path: begins with "event" and the index of the row. models: of the kinds of orders; the first if `type` is absent or
-    wrong. Empty where the model has no table there or does not know a key.
-    """
     row = table["event"][path[1]]
     kind = next((m for m in models if row.get("type") in typing.get_args(m.model_fields["type"].annotation)), models[0])
     keys = kind
@@ -252,7 +206,6 @@ def _event_keys(models: list[type[BaseModel]], path: KeyPath, table: Table) -> l
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """Returns the pydantic models inside a type annotation, in order; empty for a plain type."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for inner in typing.get_args(annotation) for model in _models(inner)]

@@ -17,12 +17,7 @@ DOOR_TOLERANCE = 0.05  # m
 
 
 def along(wall: WallSegment, point: FixedPoint) -> FixedPoint:
-    """Returns where a point lies relative to a wall: metres along it from its first end, and metres (≥ 0) from its
-    line.
-
-    wall: x1, y1, x2, y2 of its ends, m. point: x, y, m. The first is negative or beyond the length for points past an
-    end. For a wall of length zero: 0 and the distance from it.
-    """
+    """Returns where a point lies relative to a wall: metres along it from its first end, and metres from its line."""
     x, y = point[0] - wall[0], point[1] - wall[1]
     length = math.dist(wall[:2], wall[2:])
     if length == 0:
@@ -32,22 +27,14 @@ def along(wall: WallSegment, point: FixedPoint) -> FixedPoint:
 
 
 def door_fits(door: DoorSpec, wall: WallSegment) -> bool:
-    """Returns True if the whole opening of a door lies on a wall, its middle at most 0.05 m (DOOR_TOLERANCE) off its
-    line.
-
-    wall: x1, y1, x2, y2 of its ends, m.
-    """
+    """Returns True if the whole opening of a door lies on a wall."""
     s, off = along(wall, door.at)
     length = math.dist(wall[:2], wall[2:])
     return off <= DOOR_TOLERANCE and door.width / 2 <= s + 1e-9 and s + door.width / 2 <= length + 1e-9
 
 
 def walls_without_doors(world: WorldSpec) -> Iterator[WallSegment]:
-    """Yields the pieces of all walls, x1, y1, x2, y2 in m, that remain when the openings of the doors are cut out.
-
-    They come wall by wall, each from its first end. A wall without doors is one piece. A door that does not lie wholly
-    on a wall is not cut out of it. A wall that doors cover wholly gives no piece.
-    """
+    """Yields the pieces of all walls, x1, y1, x2, y2 in m, that remain without the openings of doors."""
     for wall in world.walls:
         length = math.dist(wall[:2], wall[2:])
         ex, ey = ((wall[2] - wall[0]) / length, (wall[3] - wall[1]) / length) if length else (0.0, 0.0)
@@ -61,10 +48,7 @@ def walls_without_doors(world: WorldSpec) -> Iterator[WallSegment]:
 
 
 def clearance(point: FixedPoint, world: WorldSpec) -> tuple[float, str]:
-    """Returns the distance in m from a point (x, y) to the nearest wall or pillar, and words for that obstacle.
-
-    Openings of doors do not count as wall. Negative inside a pillar; inf and "nothing" without walls and pillars.
-    """
+    """Returns the distance in m from a point to the nearest wall or pillar, and words for that obstacle."""
     best = (math.inf, "nothing")
     for wall in walls_without_doors(world):
         s, off = along(wall, point)
@@ -76,11 +60,7 @@ def clearance(point: FixedPoint, world: WorldSpec) -> tuple[float, str]:
 
 
 def queue_places(event: QueueOrder, count: int) -> tuple[FixedPoint, ...]:
-    """Returns the first `count` places (x, y) of a queue, m, head first; they may lie outside the world.
-
-    The head is at `event.at`; the others follow `event.spacing` m apart in direction `event.direction_deg` (0 = +x, 90
-    = +y). count 0: ().
-    """
+    """Returns the first `count` places (x, y) of a queue, m, head first; they may lie outside the world."""
     angle = math.radians(event.direction_deg)
     (x, y), step = event.at, event.spacing
     return tuple((x + k * step * math.cos(angle), y + k * step * math.sin(angle)) for k in range(count))

@@ -12,12 +12,7 @@ from scenarios.schema.values import Distribution, Model, NonNegative, Positive, 
 
 
 class LightSwitch(Model):
-    """A sudden change of brightness, as of a lamp or a cloud.
-
-    - at: start of the change, s, 0 = frame 1. gain: factor of the brightness after it, above 0; those of several
-      switches multiply. Either may be a distribution, drawn once per seed.
-    - ramp: duration of the change from `at` on, s; the logarithm of the factor changes evenly; 0 = at once.
-    """
+    """A sudden change of brightness, as of a lamp or a cloud; those of several switches multiply."""
 
     at: Value = Field(description="time of the change, s")
     gain: Value = Field(description="factor of the brightness from then on; above 0")
@@ -25,17 +20,7 @@ class LightSwitch(Model):
 
 
 class Light(Model):
-    """The light on the scene; it changes pictures only. Brightness changes are relative standard deviations; 0 = none.
-
-    - sun_azimuth_deg (from where the light comes; 0 = from +x, 90 = from +y), sun_elevation_deg (above the ground):
-      degrees. Both may be distributions.
-    - shadow: share of the brightness lost in a cast shadow; 0 = no shadows. penumbra: width of a shadow's soft edge, m.
-    - drift, drift_time: size of slow changes, and time after which their correlation is 0.37, s. flicker: size of
-      changes from frame to frame.
-    - cloud, cloud_size (distance at which the correlation is 0.6, m), cloud_speed (m/s): soft patches that move over
-      the ground, all in one direction, which is drawn per seed.
-    - switch: sudden changes of brightness, empty for none.
-    """
+    """The light on the scene; it changes pictures only."""
 
     sun_azimuth_deg: Value = Field(
         Distribution(uniform=(-180, 180)), description="direction from which the light comes; 0 = from +x, 90 = from +y"
@@ -61,17 +46,8 @@ class Light(Model):
 class Picture(Model):
     """Texture, noise, blur and artefacts; they change pictures only.
 
-    - texture: contrast of the patterns on ground and walls, 0 to 1.
-    - samples: rays along each axis of a pixel whose colours are averaged, in the empty scene, 1 to 4. Patterns are as
-      fine as the distance of the rays, so that more rays show finer grain.
-    - noise: standard deviation per pixel and channel at grey level 128, grey levels. shot: share of its variance that
-      is proportional to the brightness: at level x the variance is noise² (1 - shot + shot x / 128).
-    - blur_px: standard deviation of the blur, px. jpeg: quality 0 to 100; 0 = no compression.
-    - foliage: share of the image covered by moving plants, on the ground only. sway_px, sway_time: standard deviation
-      of their movement, px, and the time after which its correlation is 0.6, s.
-    - right_gain, right_roll_deg, right_down_px: what is wrong with the right picture of a pair, though the calibration
-      does not say so: a factor of its brightness, and how far its content is turned clockwise about the image's centre,
-      degrees, and moved down, px. True disparities are those of the pair without these errors.
+    The noise at grey level x has the variance noise² (1 - shot + shot x / 128). True disparities are those of a pair
+    without the errors right_….
     """
 
     texture: Share = Field(0.5, description="contrast of the patterns on ground and walls")

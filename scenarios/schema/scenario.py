@@ -2,7 +2,9 @@
 
 `flockscope scenarios --schema` and docs/reference/scenario-files.md print the descriptions of the fields. A class whose
 subject has another class in `sim` ends in Spec. Where a value may be a number or a distribution
-(scenarios.schema.values), it is drawn once for each seed."""
+(scenarios.schema.values), it is drawn once for each seed. `flockscope replay` reads a file of the tables camera,
+sensor, light and picture alone (ObservationSpec).
+"""
 
 from __future__ import annotations
 
@@ -33,13 +35,7 @@ SWAY = Distribution(normal=(0.024, 0.007), clip=(0.0, 0.05))
 
 
 class CameraSpec(Model):
-    """Place, direction and lens of the camera; size and rate of its images.
-
-    kind: "pinhole" (perspective) or "top" (orthographic from above). image: width, height, px. fps: frames per second.
-    focal_px: focal length, px, and baseline: distance to the right camera, m, 0 = none (both pinhole). tilt_deg: by how
-    much it looks down, 90 = straight down (pinhole). yaw_deg: 0 looks along +y, 90 along -x. px_per_m (kind top),
-    height above the ground (m) and position (x, y, m): None: chosen so that all people are in view (height of "top":
-    20 m). crop: True accepts people who walk out of view; False: they are an InputError."""
+    """Place, direction and lens of the camera; size and rate of its images."""
 
     kind: Literal["pinhole", "top"] = Field("pinhole", description="perspective, or orthographic from above")
     image: tuple[Side, Side] = Field((640, 480), description="width and height of an image, px")
@@ -63,13 +59,7 @@ class CameraSpec(Model):
 
 
 class CrowdSpec(Model):
-    """How people walk; the defaults are measured values (docs/results/simulation.md).
-
-    free_speed (of a person alone, m/s), spacing between neighbours in a group (m), body height (m): numbers or
-    distributions. slowdown_per_member: n people walk at their mean free speed less this times (n - 1), m/s. sway:
-    amplitude of the sideways movement with each stride at 1.34 m/s, m, a number or distribution. velocity_noise:
-    standard deviations of the wanted velocity along and across its direction, m/s. place_noise: of a walking member's
-    place in the group, forward and sideways, m."""
+    """How people walk; the defaults are measured values (docs/results/simulation.md)."""
 
     free_speed: Value = Field(FREE_SPEED, description="walking speed of a person alone, m/s")
     spacing: Value = Field(SPACING, description="distance between neighbours in a group, m")
@@ -89,10 +79,7 @@ class CrowdSpec(Model):
 
 
 class Stop(Model):
-    """A place on the way, `at` (x, y in m), where a group stands for a while.
-
-    stay: s; 0 without `until` leaves the stop out. until: times, s from the first recorded frame; people wait for the
-    next of them, then for `stay`. members: number of people who stop, None: all; the others walk on."""
+    """A place on the way where a group stands for a while."""
 
     at: Point = Field(description="place, m; a group stands at the free place nearest to it")
     stay: Value = Field(0.0, description="time for which people stand there, s; 0 without `until` leaves the stop out")
@@ -107,12 +94,7 @@ class Stop(Model):
 
 
 class GroupSpec(Model):
-    """A group of people who belong together from the start; a person alone is a group of one.
-
-    id: its name; repeat = n above 1 makes n such groups, id-1 … id-n. size: number of people, rounded, at least 1.
-    start, goal, via (points to pass): in m. stops: before `via`. scatter: m, of members from their places at the start.
-    speed: m/s, None: by `crowd`. enter: time of entry, s, 0 = there from the first frame. at_goal: "stand" there,
-    "leave" the scene or "walk" straight on. Numbers except `repeat` may be distributions."""
+    """A group of people who belong together from the start; a person alone is a group of one."""
 
     id: Name = Field(description="name in the script; repeat = n makes the groups id-1 … id-n")
     size: Value = Field(GROUP_SIZE, description="number of people; rounded, at least 1")
@@ -141,7 +123,7 @@ class GroupSpec(Model):
 
 
 class Reach(Model):
-    """A trigger: the mean place of `group`'s people comes within `radius` m of `at` (x, y, m; None: its goal)."""
+    """A trigger: the mean place of the group's people comes near a place."""
 
     group: Name = Field(description="name of the group")
     at: FixedPoint | None = Field(None, description="the place, m; absent: the group's goal")
@@ -149,11 +131,7 @@ class Reach(Model):
 
 
 class When(Model):
-    """An order fires `delay` s after its trigger: exactly one of the other fields, else pydantic.ValidationError.
-
-    time: s from the first recorded frame. reach: a group comes near a place. distance_lt: of every two of the order's
-    groups the nearest members are closer than this, m. after: id of an earlier order, once its people have been
-    together, apart or in line long enough. The other three are None. The first time that the trigger is met counts."""
+    """An order fires `delay` s after its trigger, exactly one of the other fields, was first met."""
 
     time: Value | None = Field(None, description="the order fires at this time, s")
     reach: Reach | None = None
@@ -167,7 +145,6 @@ class When(Model):
 
     @model_validator(mode="after")
     def _one_trigger(self) -> Self:
-        """Returns the model; raises ValueError unless exactly one of time, reach, distance_lt and after is given."""
         given = [name for name in ("time", "reach", "distance_lt", "after") if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(f"`when` has exactly one of time, reach, distance_lt, after, not {given}")
@@ -175,9 +152,7 @@ class When(Model):
 
 
 class SplitPart(Model):
-    """One part of a group that splits. id: of the new group. goal, via: in m. at_goal: "stand", "leave" or "walk" on.
-
-    size: number of people; None: an equal share of those left over; the first such parts get one more of a rest."""
+    """One part of a group that splits; the first parts without size get one more of a rest."""
 
     id: Name = Field(description="name of the new group")
     size: Annotated[int, Field(ge=1)] | None = Field(
@@ -189,10 +164,7 @@ class SplitPart(Model):
 
 
 class MergeOrder(Model):
-    """An order: the groups named in `groups` (two or more) become the new group `into`. when: its trigger.
-
-    id: of the order. type: "merge". `into` walks past the points `via` to `goal` (m), and there does what `at_goal`
-    says: "stand", "leave", "walk". Goal "meet" ignores both: it stands in conversation where they meet."""
+    """An order: several groups become one."""
 
     id: Name = Field(description="name of the order")
     type: Literal["merge"] = Field(description="several groups become one")
@@ -208,9 +180,7 @@ class MergeOrder(Model):
 
 
 class SplitOrder(Model):
-    """An order: the group named `group` divides into two or more `parts`, each a new group with a goal of its own.
-
-    id: of the order. type: "split". when: its trigger."""
+    """An order: a group divides into two or more parts, each a new group with a goal of its own."""
 
     id: Name = Field(description="name of the order")
     type: Literal["split"] = Field(description="a group divides into parts")
@@ -220,11 +190,7 @@ class SplitOrder(Model):
 
 
 class QueueOrder(Model):
-    """An order: groups line up, are served one group after the other, and walk on. when: its trigger.
-
-    id: of the order. type: "queue". groups: names, or patterns such as `g-*`. at: place of the head, x, y, m.
-    direction_deg: from head to tail, 0 = +x, 90 = +y. spacing: between neighbours, m. service: time per group, s. goal:
-    m, None: each group's own goal. at_goal: there they "stand", "leave" or "walk" on."""
+    """An order: groups line up, are served one group after the other, and walk on."""
 
     id: Name = Field(description="name of the order")
     type: Literal["queue"] = Field(description="groups line up and are served one by one")
@@ -246,13 +212,7 @@ ScriptOrder = Annotated[MergeOrder | SplitOrder | QueueOrder, Field(discriminato
 
 
 class Scenario(Model):
-    """A whole scenario with all defaults, `extends` applied, as stored. Unknown keys raise pydantic.ValidationError.
-
-    schema_: version, 1. name, about: texts. duration: recorded time, warmup: unrecorded time before it, s. mirror: True
-    mirrors the script in x about the world's middle with probability 0.5. turn_deg: then turns it about that middle,
-    counter-clockwise; the world stays. lead: time by which walking groups start further on, at most half-way to their
-    first point, s; negative: further back. world, camera, sensor, light, picture, crowd: their settings. group: at
-    least one. event: the orders, in order; () without a script."""
+    """A whole scenario with all defaults, `extends` applied, as stored."""
 
     schema_: Literal[1] = Field(alias="schema", description="version of the file format")
     name: Name = Field("scenario", description="name of the sequences made from it; absent: the file's name")
@@ -279,16 +239,50 @@ class Scenario(Model):
 
 
 def group_names(group: GroupSpec) -> list[str]:
-    """Returns the names of the groups that an entry of `group` makes, in order.
-
-    It is the id alone for `repeat = 1`, and id-1 … id-n for `repeat = n` above 1.
-    """
+    """Returns the names of the groups that an entry of `group` makes: its id, or id-1 … id-n."""
     return [group.id] if group.repeat == 1 else [f"{group.id}-{k + 1}" for k in range(group.repeat)]
 
 
 def expand(pattern: str, names: list[str]) -> list[str]:
-    """Returns the names of groups that a pattern means: for `g-*` all of `names` that begin with `g-`, in their order,
-    maybe none.
-
-    A pattern without `*` is returned as the only name, whether or not it is in `names`."""
+    """Returns the names that a pattern means: for `g-*` those that begin with `g-`, else the pattern itself."""
     return [n for n in names if n.startswith(pattern[:-1])] if pattern.endswith("*") else [pattern]
+
+
+class ObservationSpec(Model):
+    """Camera, sensor, light and picture, with the keys that they have in a scenario."""
+
+    schema_: Literal[1] = Field(1, alias="schema")
+    camera: CameraSpec = CameraSpec()
+    sensor: Sensor = Sensor()
+    light: Light = Light()
+    picture: Picture = Picture()
+
+
+class ReplayOrigin(Model):
+    """The recording whose motion a replay shows.
+
+    - kind, name: format ("biwi", "mot", …) and name of the recording. real: it shows real people, so nothing may be
+      tuned on it.
+    - people: the recording's ids of persons 1, 2, … of the replay, in this order.
+    - start, duration: the part that is replayed, s. shift: positions in the replay minus those in the recording, x, y,
+      m.
+    - smoothing: movements of the labels that are quicker than this are removed as jitter, s; 0: none.
+    - motion: SHA-256 of the recording's labelled positions, ids and groups.
+    """
+
+    kind: str
+    name: str
+    real: bool
+    people: tuple[int, ...]
+    start: NonNegative
+    duration: Positive
+    smoothing: NonNegative
+    shift: tuple[float, float]
+    motion: str
+
+
+class ReplaySpec(ObservationSpec):
+    """A replay with all defaults filled in, as stored in its scenario.toml."""
+
+    name: str
+    replay: ReplayOrigin

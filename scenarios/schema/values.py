@@ -30,24 +30,13 @@ FixedPoint = tuple[float, float]
 
 
 class Model(BaseModel):
-    """Base class of all tables of scenario files: frozen.
-
-    Unknown keys, infinite numbers and nan raise pydantic.ValidationError.
-    """
+    """Base class of all tables of scenario files: frozen, without unknown keys, infinite numbers and nan."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
 
 class Distribution(BaseModel):
-    """One of five distributions of a number: exactly one of the keys besides `clip` is given, the rest is None.
-
-    - normal: mean, standard deviation (0 or more). uniform: least, greatest. exponential, poisson: mean, above 0.
-    - choice: values of equal probability. clip: least and greatest value kept, both included; draws outside are drawn
-      again; None: all are kept.
-
-    Any other combination, a lower bound above its upper bound, a clip that keeps less than 1 % of the draws, values out
-    of range, or unknown keys raise pydantic.ValidationError.
-    """
+    """One of five distributions of a number: exactly one of the keys besides `clip` is given."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -60,10 +49,6 @@ class Distribution(BaseModel):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        """Returns the model; raises ValueError unless exactly one of normal, uniform, exponential, poisson and choice
-        is given, the bounds of uniform and clip are in order (equal bounds are allowed), and clip keeps at least 1 % of
-        the draws.
-        """
         kinds = [name for name in ("normal", "uniform", "exponential", "poisson", "choice") if getattr(self, name)]
         if len(kinds) != 1:
             raise ValueError(
@@ -95,7 +80,7 @@ class Distribution(BaseModel):
         return min(max((x - low) / (high - low), 0.0), 1.0)
 
     def share_within(self, low: float, high: float) -> float:
-        """Returns the probability that a value drawn within `clip` lies between low and high, both included."""
+        """Returns the probability that a value drawn within `clip` lies between low and high."""
         a, b = (-math.inf, math.inf) if self.clip is None else self.clip
         kept = self._share(a, b)
         return self._share(max(a, low), min(b, high)) / kept
@@ -112,24 +97,19 @@ Point = tuple[Value, Value]
 
 
 def poisson_share(mean: float, k: int) -> float:
-    """Returns the probability that a Poisson distribution of this mean gives at most k; k from -1 on."""
+    """Returns the probability that a Poisson distribution of this mean gives at most k."""
     last = min(k, math.ceil(mean + 40 * math.sqrt(mean) + 40))  # what lies above has no share
     logs = (n * math.log(mean) - mean - math.lgamma(n + 1) for n in range(last + 1))
     return min(1.0, math.fsum(map(math.exp, logs)))
 
 
 def share_within(value: Value, low: float, high: float) -> float:
-    """Returns the probability that a value lies between low and high, both included; 0 or 1 for a number."""
+    """Returns the probability that a value lies between low and high; 0 or 1 for a number."""
     return value.share_within(low, high) if isinstance(value, Distribution) else float(low <= value <= high)
 
 
 def bounds(value: Value) -> tuple[float, float]:
-    """Returns the least and greatest number that a value can take, `clip` included; -inf or inf where there is no
-    bound.
-
-    A number gives itself twice. Without clip, normal gives -inf and inf, exponential and poisson 0 and inf, choice its
-    least and greatest entry. A clip narrows these bounds; a value need not reach them, as with choice or poisson.
-    """
+    """Returns the least and greatest number that a value can take, `clip` included; -inf or inf without one."""
     if not isinstance(value, Distribution):
         return float(value), float(value)
     if value.uniform is not None:
@@ -142,6 +122,6 @@ def bounds(value: Value) -> tuple[float, float]:
 
 
 def fixed(point: Point) -> tuple[float, float] | None:
-    """Returns the point (x, y) if both coordinates are numbers, None if one is a distribution."""
+    """Returns the point if both coordinates are numbers, None if one is a distribution."""
     x, y = point
     return None if isinstance(x, Distribution) or isinstance(y, Distribution) else (float(x), float(y))

@@ -10,17 +10,14 @@ from scenarios.schema.values import FixedPoint, Model, NonNegative, Positive
 
 
 class DoorSpec(Model):
-    """A door: an opening in a wall. at: x, y of its middle, m, on a wall. width: m."""
+    """A door: an opening in a wall."""
 
     at: FixedPoint = Field(description="middle of the opening, m; must lie on a wall")
     width: Positive = Field(1.2, description="m")
 
 
 class StairsSpec(Model):
-    """A flight of stairs; its height rises from 0 at `foot` to `rise` at `head`, the middles of its ends (x, y in m).
-
-    width, rise, landing (length of the level ground behind the head): m. steps: number. slowdown: share of the walking
-    speed kept on the stairs."""
+    """A flight of stairs; its height rises from 0 at `foot` to `rise` at `head`."""
 
     foot: FixedPoint = Field(description="middle of the lowest edge, m")
     head: FixedPoint = Field(description="middle of the highest edge, m")
@@ -34,11 +31,7 @@ class StairsSpec(Model):
 
 
 class WorldSpec(Model):
-    """The immobile parts of the scene, in m; by default an empty world of 16 × 10 m.
-
-    size: extent in x and y, from the origin. walls: x1, y1, x2, y2 of their ends. pillars: x, y, radius. stairs:
-    flights. doors: openings in walls. service: x, y of counters. wall_height, pillar_height: heights of walls and
-    pillars."""
+    """The immobile parts of the scene; by default an empty world."""
 
     size: tuple[Positive, Positive] = Field((16.0, 10.0), description="extent in x and y, m")
     walls: tuple[tuple[float, float, float, float], ...] = Field(

@@ -13,8 +13,7 @@ import numpy as np
 from sim.crowd.forces import END
 from sim.crowd.formation import standing, to_world, walking
 from sim.crowd.group_state import GroupState
-from sim.crowd.population import EnteringGroup, is_free
-from sim.crowd.stops import PlannedStop
+from sim.crowd.population import EnteringGroup, PlannedStop, is_free
 from sim.elementary import length, unit
 from sim.types import Array, Scene
 
@@ -27,25 +26,20 @@ RING, RINGS, ANGLES = 0.6, 5, 8  # m between the rings of places round a stop; r
 
 @dataclass
 class _Errand:
-    """What one group has before it: its stops, in order, the first one being walked to or stood at.
-
-    - looked: time at which it looked for a place at this stop, s; None: not yet. leaves: time at which it walks on from
-      this stop; None while it walks to it. places (n, 2): where its members stand or will stand, m.
-    """
+    """What one group has before it."""
 
     group: EnteringGroup
     stops: list[PlannedStop]
-    looked: float | None = None
-    leaves: float | None = None
-    places: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    looked: float | None = None  # time at which it looked for a place at this stop, s; None: not yet
+    leaves: float | None = None  # time at which it walks on from this stop; None while it walks to it
+    places: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (n, 2) where its members stand or will stand, m
 
 
 class Errands:
     """The stops of the groups of one running simulation; an order of the script ends the stops of its groups.
 
-    - groups: the groups whose ways and places change. scene: its walls and pillars.
-    - errands: by group index, of groups with stops left. stray: time at which each member who stays behind walks on, s,
-      by column.
+    State: errands by group index, of groups with stops left; stray: when each member who stays behind walks on, by
+    column.
     """
 
     def __init__(self, entering: Sequence[EnteringGroup], groups: GroupState, scene: Scene) -> None:
@@ -54,11 +48,11 @@ class Errands:
         self.stray: dict[int, float] = {}
 
     def advance(self, t: float, state: Array) -> bool:
-        """Lets groups stop and walk on at time t, s; returns True if something changed that `GroupState.fill` writes.
+        """Lets groups stop and walk on at time t (s); returns True if something changed for `GroupState.fill`.
 
-        state (P, 4): x, y, vx, vy by column, m, m/s, nan while absent. A group that comes near a stop takes the free
-        place nearest to it. It stands in a circle until its time is over; then it walks on in formation. If only some
-        members stop, these stand where they are, and the others walk on.
+        state (P, 4): x, y, vx, vy by column, nan while absent. A group that comes near a stop takes the free place
+        nearest to it and stands in a circle until its time is over. If only some members stop, these stay where they
+        are.
         """
         if not self.errands and not self.stray:
             return False
@@ -72,7 +66,6 @@ class Errands:
         return changed
 
     def _concerns(self, errand: _Errand, g: int, columns: list[int]) -> bool:
-        """Returns False once the group has no stop left, has ended, or has joined a queue."""
         exists = self.groups.alive.get(errand.group.name) == g
         return bool(errand.stops) and exists and bool((self.groups.queue_of[columns] < 0).all())
 
@@ -118,7 +111,6 @@ class Errands:
         return True
 
     def _walk_on(self, g: int, errand: _Errand, middle: Array) -> None:
-        """Sends a group from its first stop, which it forgets, to the next one or to its goal. middle (2,): m."""
         errand.stops = errand.stops[1:]
         errand.looked, errand.leaves, errand.places = None, None, np.zeros((0, 2))
         via, target, finish = errand.group.leg(errand.stops)
@@ -130,11 +122,7 @@ class Errands:
         return to_world(places, middle, self.groups.arrays.heading[g])
 
     def _free_place(self, g: int, at: Array, columns: list[int], state: Array) -> Array:
-        """Returns the middle (2,), m, nearest to `at` of a free place for a group to stand; `at` if there is none.
-
-        Free: clear of walls, pillars, people of other groups who stand, and places that other groups stop at. state (P,
-        4): x, y, vx, vy, m, m/s. columns: the group's members.
-        """
+        """Returns the place (2,) nearest to `at` where a group can stand clear of all others; `at` if none."""
         others = np.ones(len(state), np.bool_)
         others[columns] = False
         slow = others & (length(state[:, 2:]) < STANDING)

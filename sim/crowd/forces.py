@@ -87,100 +87,78 @@ FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, WIDTH, SLOWDOWN = range(7)
 
 @dataclass(frozen=True, slots=True)
 class Steering:
-    """Parameters of the forces on people; 21 fields, in the order of the slots of the kernels' parameter array.
+    """Parameters of the forces on people, in the order of the slots of the kernels' array (21,)."""
 
-    - relaxation: s, to take up the wanted velocity. cohesion_time: s, to return to one's place in the formation.
-      alignment: rate of taking up the group's mean velocity, 1/s.
-    - separation: repulsion of two members at distance zero, m/s², falling to 0 at separation_range, m. haste: share of
-      the group's speed that a member may add.
-    - turn_time: s, in which a group's heading follows its way. slow_time: s, how early a group slows down before a goal
-      where it stands.
-    - avoid_person, avoid_group: strengths, m², of the power law of the time to collision, between strangers and between
-      whole groups. avoid_time: its time constant, s; collisions beyond four times that are ignored.
-    - person_radius: half the distance that strangers keep, m. person_range, group_range: strangers, and groups, further
-      apart ignore each other, m.
-    - avoid_max: cap of one avoidance force, m/s². shove: repulsion of strangers at distance zero, m/s², falling to 0 at
-      twice person_radius.
-    - wall: repulsion of a wall or pillar at contact (0.2 m from its line or edge), m/s²; it falls to 37 % over
-      wall_range, m.
-    - gather_radius: a group has gathered when all members are this close to their places, m. pass_radius: distance of
-      the group's middle at which a waypoint counts as passed, m; 0.3 × the group's radius is added except at the end.
-      max_acceleration: cap of the sum of all forces, m/s².
-    """
-
+    # s, to take up the wanted velocity
     relaxation: float = 0.5  # s: time in which a person takes up the wanted velocity
+    # s, to return to one's place in the formation
     cohesion_time: float = 1.6  # s: time in which a member returns to its place in the formation
+    # rate of taking up the group's mean velocity, 1/s
     alignment: float = 0.25  # 1/s: rate at which a member takes up the group's mean velocity
+    # repulsion of two members at distance zero, m/s², falling to 0 at separation_range, m
     separation: float = 2.5  # m/s²: repulsion between two members at distance zero
     separation_range: float = 0.6  # m: distance at which that repulsion ends
+    # share of the group's speed that a member may add
     haste: float = 0.15  # share of the group's speed that a member may add to keep its place
+    # s, in which a group's heading follows its way
     turn_time: float = 0.7  # s: time in which a group's heading follows its way
+    # s, how early a group slows down before a goal where it stands
     slow_time: float = 0.9  # s: how early a group slows down before a goal where it stands
+    # avoid_person, avoid_group: strengths, m², of the power law of the time to collision, between strangers and between
+    # whole groups
     avoid_person: float = 1.3  # strength of the power law between strangers
     avoid_group: float = 1.6  # strength of the power law between whole groups
+    # its time constant, s; collisions beyond four times that are ignored
     avoid_time: float = 2.5  # s: time constant of the power law; collisions beyond four times this are ignored
+    # half the distance that strangers keep, m
     person_radius: float = 0.29  # m: half the distance that strangers keep
+    # person_range, group_range: strangers, and groups, further apart ignore each other, m
     person_range: float = 3.5  # m: strangers further apart ignore each other
     group_range: float = 8.0  # m: groups further apart ignore each other
+    # cap of one avoidance force, m/s²
     avoid_max: float = 2.0  # m/s²: cap of each avoidance force
+    # repulsion of strangers at distance zero, m/s², falling to 0 at twice person_radius
     shove: float = 3.0  # m/s²: repulsion between strangers at distance zero
+    # repulsion of a wall or pillar at contact (0.2 m from its line or edge), m/s²; it falls to 37 % over wall_range, m
     wall: float = 4.0  # m/s²: repulsion of a wall or pillar at contact
     wall_range: float = 0.25  # m: distance over which that repulsion falls to 37 %
+    # a group has gathered when all members are this close to their places, m
     gather_radius: float = 0.9  # m: a group has gathered when all members are this close to their places
+    # distance of the group's middle at which a waypoint counts as passed, m; 0.3 × the group's radius is added except
+    # at the end
     pass_radius: float = 0.8  # m: a waypoint counts as passed at this distance
+    # cap of the sum of all forces, m/s²
     max_acceleration: float = 2.2  # m/s²: cap of the sum of all forces
 
     def array(self) -> Array:
-        """Returns the parameters as the kernels take them: float64, shape (21,), one slot per field, in the order of
-        the fields.
-        """
+        """Returns the parameters as the kernels take them, (21,)."""
         return np.array(astuple(self))
 
 
 class GroupArrays(NamedTuple):
-    """State of G groups of people and of the ways they walk. The goal kernels update current, heading, arrived and
-    status.
+    """State of G groups and of the ways they walk. The goal kernels update current, heading, arrived and status."""
 
-    - route (G, W, 2): x, y of each group's waypoints, m. kind (G, W): PASS, NARROW (door), GATHER or END of each
-      waypoint.
-    - length (G,): number of waypoints; later entries of route and kind mean nothing. current (G,): index, from 0, of
-      the waypoint the group is walking to.
-    - speed (G,): m/s. heading (G, 2): unit vector in which the group faces. finish (G,): STAND or LEAVE at the end of
-      the way.
-    - arrived (G,): True once the end of the way is reached.
-    - status (G, 12), rewritten in each step: number of members present; mean position x, y, m; mean velocity x, y, m/s;
-      largest distance of a member from the mean position, and from its place, m; wanted velocity x, y, m/s; 1.0 while
-      other groups avoid this group as a whole, else 0.0; mean of the members' fluctuations of place, m.
-    """
-
-    route: Array
-    kind: Ints
-    length: Ints
-    current: Ints
-    speed: Array
-    heading: Array
-    finish: Ints
+    route: Array  # (G, W, 2) x, y of each group's waypoints, m
+    kind: Ints  # (G, W) PASS, NARROW (door), GATHER or END of each waypoint
+    length: Ints  # (G,) number of waypoints; later entries of route and kind mean nothing
+    current: Ints  # (G,) index, from 0, of the waypoint the group is walking to
+    speed: Array  # (G,) m/s
+    heading: Array  # (G, 2) unit vector in which the group faces
+    finish: Ints  # (G,) STAND or LEAVE at the end of the way
+    # (G,) True once the end of the way is reached. status (G, 12), rewritten in each step: number of members present;
+    # mean position x, y, m; mean velocity x, y, m/s; largest distance of a member from the mean position, and from its
+    # place, m; wanted velocity x, y, m/s; 1.0 while other groups avoid this group as a whole, else 0.0; mean of the
+    # members' fluctuations of place, m.
     arrived: Bools
     status: Array
 
     @classmethod
     def empty(cls, g: int, w: int) -> GroupArrays:
-        """Returns arrays for g groups with room for w waypoints each.
-
-        Every heading is +x, `arrived` is False, everything else is 0: ways of length 0, kind PASS, finish STAND, speed
-        0.
-        """
+        """Returns arrays for g groups with room for w waypoints each."""
         return cls(
-            np.zeros((g, w, 2)),
-            np.zeros((g, w), np.int64),
-            np.zeros(g, np.int64),
-            np.zeros(g, np.int64),
-            np.zeros(g),
-            np.tile([1.0, 0.0], (g, 1)),
-            np.zeros(g, np.int64),
-            np.zeros(g, np.bool_),
-            np.zeros((g, 12)),
-        )
+            np.zeros((g, w, 2)), np.zeros((g, w), np.int64), np.zeros(g, np.int64), np.zeros(g, np.int64), np.zeros(g),
+            np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros((g, 12)),
+        )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:
         """Returns the same arrays with room for at least w waypoints; route and kind are copied if they have less."""
@@ -192,46 +170,36 @@ class GroupArrays(NamedTuple):
 
 
 class PeopleArrays(NamedTuple):
-    """What the kernels know of the N people present, in the order of the physics engine's rows.
+    """What the kernels know of the N people present, in the order of the physics engine's rows."""
 
-    - place (N, 2): place in the formation, m: forward and left of the group's middle.
-    - target (N, 2): x, y of the place in a queue, m; used only for people in mode TO_TARGET.
-    - pace (N,): greatest speed on the way to the target, m/s.
-    - noise (N, 4): fluctuation of the wanted velocity in its direction and to its left, m/s, and of the place in the
-      formation, forward and left, m.
-    - gait (N, 5): cosine and sine of the phase of the strides; velocity of the sway x, y, m/s; amplitude of the sway at
-      1.34 m/s, m. `sway_kernels` updates all but the amplitude.
-    - calm (N, 4): x, y, vx, vy without the velocity of the sway, m, m/s. wanted (N, 2): wanted velocity without its
-      fluctuation, m/s. The goal kernels overwrite both.
-    - tag (N, 4): columns GROUP (index), MODE (IN_GROUP or TO_TARGET), QUEUE (index, -1 in no queue), WAYPOINT (index of
-      the first waypoint that this person has not passed).
-    """
-
-    place: Array
-    target: Array
-    pace: Array
+    place: Array  # (N, 2) place in the formation, m: forward and left of the group's middle
+    target: Array  # (N, 2) x, y of the place in a queue, m; used only for people in mode TO_TARGET
+    pace: Array  # (N,) greatest speed on the way to the target, m/s
+    # (N, 4) fluctuation of the wanted velocity in its direction and to its left, m/s, and of the place in the
+    # formation, forward and left, m
     noise: Array
+    # (N, 5) cosine and sine of the phase of the strides; velocity of the sway x, y, m/s; amplitude of the sway at 1.34
+    # m/s, m. `sway_kernels` updates all but the amplitude.
     gait: Array
-    calm: Array
-    wanted: Array
+    calm: Array  # (N, 4) x, y, vx, vy without the velocity of the sway, m, m/s
+    wanted: Array  # (N, 2) wanted velocity without its fluctuation, m/s. The goal kernels overwrite both.
+    # (N, 4) columns GROUP (index), MODE (IN_GROUP or TO_TARGET), QUEUE (index, -1 in no queue), WAYPOINT (index of the
+    # first waypoint that this person has not passed)
     tag: Ints
 
     @classmethod
     def empty(cls, n: int) -> PeopleArrays:
-        """Returns arrays for n people: pace 1 m/s, all four columns of `tag` -1, everything else 0."""
+        """Returns arrays for n people."""
         two, four = ([np.zeros((n, k)) for _ in range(3)] for k in (2, 4))
         tag = np.full((n, 4), -1, np.int64)
         return cls(two[0], two[1], np.ones(n), four[0], np.zeros((n, 5)), four[1], two[2], tag)
 
 
 class Obstacles(NamedTuple):
-    """What stands still in the scene, in m.
+    """What stands still in the scene, m."""
 
-    - walls (W, 4): x1, y1, x2, y2 of the two ends. pillars (P, 3): x, y of the middle, radius.
-    - stairs (S, 7): x, y of the middle of the foot's edge; unit vector from foot to head x, y; length; width; share of
-      the speed kept on them (0 to 1).
-    """
-
-    walls: Array
-    pillars: Array
+    walls: Array  # (W, 4) x1, y1, x2, y2 of the two ends
+    pillars: Array  # (P, 3) x, y of the middle, radius
+    # (S, 7) x, y of the middle of the foot's edge; unit vector from foot to head x, y; length; width; share of the
+    # speed kept on them (0 to 1)
     stairs: Array

@@ -34,11 +34,12 @@ PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the p
 
 @njit(cache=True, inline="always")
 def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[no-untyped-def]
-    """Returns the avoidance acceleration (fx, fy) in m/s² of one of two discs whose radii add up to `radius` (m). (dx,
-    dy) = own - other position, m; (wx, wy) = own - other velocity, m/s. It is minus the gradient of strength exp(-tau /
-    horizon) / tau² over the relative position, cut to length `cap`, m/s² (Karamouzas 2014, eq. 2-3). tau: time to
-    collision, s; horizon: time constant, s; strength: m². Zero where no collision lies ahead within 4 horizon, where
-    the discs overlap, and below 0.001 m/s of relative speed. *Ours*: tau ≥ 0.05 s."""
+    """Returns the avoidance acceleration (fx, fy), m/s², of one of two discs whose radii add up to `radius`.
+
+    (dx, dy), (wx, wy) = own - other position and velocity. Minus the gradient of strength exp(-tau / horizon) / tau²
+    over the relative position (Karamouzas 2014, eq. 2-3), tau the time to collision, cut to length `cap`. *Ours*: tau ≥
+    0.05 s, and zero for tau > 4 horizon.
+    """
     a = wx * wx + wy * wy
     c = dx * dx + dy * dy - radius * radius
     b = -(dx * wx + dy * wy)
@@ -64,10 +65,7 @@ def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[
 
 @njit(cache=True)
 def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
-    """Overwrite push (G, 2) with each group's acceleration, m/s², from avoiding other groups as discs (radius + person
-    radius). status (G, 12): columns COUNT … AVOIDED; groups with AVOIDED 0 and pairs of single people get 0. rules
-    (21,): Steering.array(). The smaller group of a pair yields more: its share is 2 × the other's size / both sizes'
-    sum."""
+    """Overwrites push (G, 2) with each group's acceleration from avoiding other groups as discs."""
     strength, horizon, radius = rules[AVOID_GROUP], rules[AVOID_TIME], rules[PERSON_RADIUS]
     reach, cap = rules[GROUP_RANGE], rules[AVOID_MAX]
     push[:] = 0.0
@@ -95,6 +93,7 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
             fx, fy = _power_law(dx, dy, wx, wy, size, strength, horizon, cap)
             if fx == 0.0 and fy == 0.0:
                 continue
+            # The smaller group yields more.
             share = 2.0 * status[b, COUNT] / (status[a, COUNT] + status[b, COUNT])
             push[a, 0] += share * fx
             push[a, 1] += share * fy
@@ -104,16 +103,12 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, inline="always")
 def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped-def]
-    """Write to `found` the groups s + 1 … last - 1 that are on collision course with group s; return how many.
-
-    rows (6, G'): number of people, mean x, y (m), mean vx, vy (m/s) and radius (m) of groups, sorted by x. reach:
-    greatest distance of two mean positions, m. radius: added to each disc, m. Two groups of one person each are left
-    out. found: int64, room for last - s - 1; entries behind the number returned mean nothing.
-    """
+    """Writes to `found` the groups s + 1 … last - 1 on collision course with group s; returns how many."""
     count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
     vx, vy, disc = rows[MEAN_VX], rows[MEAN_VY], rows[RADIUS]
     k = 0
     for t in range(s + 1, last):
+        # No branches, so that the compiler can use vector instructions.
         dx, dy = x[s] - x[t], y[s] - y[t]
         wx, wy = vx[s] - vx[t], vy[s] - vy[t]
         size = disc[s] + disc[t] + 2.0 * radius
@@ -127,10 +122,7 @@ def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped
 
 @njit(cache=True, inline="always")
 def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces between persons i and j, m/s², to out (N, 2); (dx, dy) = position i - position j, m; d2 = its
-    square. Same group: linear repulsion up to separation_range; else same queue: likewise up to 0.5 m. Strangers:
-    linear where closer than two person radii, else the power law. j gets the opposite force. state (N, 4): x, y, vx,
-    vy. tag (N, 4): group, mode, queue, waypoint. rules (21,): Steering.array()."""
+    """Adds the forces between persons i and j to out (N, 2); (dx, dy) = position i - position j, d2 its square."""
     if tag[i, GROUP] == tag[j, GROUP]:
         if d2 >= rules[SEPARATION_RANGE] * rules[SEPARATION_RANGE]:
             return
@@ -162,10 +154,8 @@ def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-
 
 @njit(cache=True)
 def _cells(state, reach):  # type: ignore[no-untyped-def]
-    """Sort the people of state (N, 4), columns x, y, vx, vy, into square grid cells at least `reach` m wide.
-
-    Returns order (N,): indices of people, cell after cell, along x first; start (C + 1,): where each of the C cells
-    begins in `order`, then N; the number of cells along x. Up to BRUTE (48) people, also none, share one cell.
+    """Sorts people into grid cells at least `reach` wide; returns order (N,), start of each cell (C + 1,), cells along
+    x.
     """
     n = len(state)
     if n <= BRUTE:
@@ -194,12 +184,7 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, inline="always")
 def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
-    """Append to found[m:] the indices t in first … last - 1 that may act on person s; return the new length.
-
-    rows (4, N): x, y, vx, vy of people, sorted by cell; s and t are columns of it. t counts if its squared distance is
-    below `reach` (m²), and either below `touch` (m²) or on collision course for discs whose radii add up to `radius` m.
-    found: int64, room for m + last - first.
-    """
+    """Appends to found[m:] the people first … last - 1 that may act on person s; returns the new length."""
     x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
     for t in range(first, last):
         dx, dy = x[s] - x[t], y[s] - y[t]
@@ -214,8 +199,7 @@ def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: 
 
 @njit(cache=True)
 def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces between people closer than Steering.person_range to out (N, 2), m/s², each pair once, both
-    directions. state (N, 4): x, y, vx, vy. tag (N, 4): group, mode, queue, waypoint. rules (21,): Steering.array()."""
+    """Adds the forces between people closer than Steering.person_range to out (N, 2), each pair once."""
     n = len(state)
     order, start, nx = _cells(state, rules[PERSON_RANGE])
     reach, radius = rules[PERSON_RANGE] * rules[PERSON_RANGE], 2.0 * rules[PERSON_RADIUS]
@@ -243,9 +227,7 @@ def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
-    """Add the forces of walls (lines) within 1.2 m and pillars (edges) within 6 m of a person's middle to out (N, 2),
-    m/s². They are an exponential repulsion; of pillars the power law, too. state (N, 4): x, y, vx, vy. walls (W, 4):
-    x1, y1, x2, y2. pillars (P, 3): x, y, radius; all in m, m/s. rules (21,): Steering.array()."""
+    """Adds the forces of walls within WALL_REACH and pillars within PILLAR_REACH to out (N, 2)."""
     strength, decay = rules[WALL], rules[WALL_RANGE]
     for i in range(len(state)):
         x, y = state[i, X], state[i, Y]
@@ -278,16 +260,17 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
-    """Add all avoidance accelerations (of people, groups, walls, pillars) to out (N, 2), m/s², then shorten each row of
-    `out` to at most Steering.max_acceleration. `out` holds the accelerations towards goals before. state (N, 4): x, y,
-    vx, vy. tag (N, 4): group, mode, queue, waypoint. status (G, 12): as `drive` left it. walls (W, 4): x1, y1, x2, y2;
-    pillars (P, 3): x, y, radius; m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. People in a queue
-    do not take part in the avoidance of their group as a whole."""
+    """Adds all avoidance accelerations to out (N, 2), and cuts each sum to Steering.max_acceleration.
+
+    state (N, 4), tag (N, 4), status (G, 12), walls (W, 4), pillars (P, 3): columns as in `forces`. rules (21,):
+    Steering.array(). push (G, 2): scratch.
+    """
     _avoid_groups(status, rules, push)
     _pairs(state, tag, rules, out)
     _walls(state, walls, pillars, rules, out)
     cap = rules[MAX_ACCELERATION]
     for i in range(len(state)):
+        # People in a queue do not take part in the avoidance of their group as a whole.
         if tag[i, MODE] == IN_GROUP:
             out[i, X] += push[tag[i, GROUP], 0]
             out[i, Y] += push[tag[i, GROUP], 1]

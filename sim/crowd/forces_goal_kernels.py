@@ -1,6 +1,6 @@
-"""Forces towards goals, as numba kernels: ways of groups, places in formations, doors, queues, stairs.
+"""Forces towards goals, and the sway of strides, as numba kernels: ways of groups, formations, doors, queues, stairs.
 
-`drive` is the entry. sim.crowd.forces names all columns, slots and units.
+`drive` and `sway` are the entries. sim.crowd.forces names all columns, slots and units.
 """
 
 from __future__ import annotations
@@ -8,17 +8,91 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.compiler import njit
+from sim.crowd.forces import (
+    ALIGNMENT,
+    AMPLITUDE,
+    AVOIDED,
+    AXIS_X,
+    AXIS_Y,
+    COHESION_TIME,
+    COS,
+    COUNT,
+    END,
+    FOOT_X,
+    FOOT_Y,
+    GATHER,
+    GATHER_RADIUS,
+    GROUP,
+    HASTE,
+    LENGTH,
+    MAX_OFF_PLACE,
+    MEAN_AHEAD,
+    MEAN_LEFT,
+    MEAN_VX,
+    MEAN_VY,
+    MEAN_X,
+    MEAN_Y,
+    MODE,
+    NARROW,
+    PASS,
+    PASS_RADIUS,
+    RADIUS,
+    RELAXATION,
+    SIN,
+    SLOW_TIME,
+    SLOWDOWN,
+    STAND,
+    STRAY_AHEAD,
+    STRAY_LEFT,
+    SWAY_X,
+    SWAY_Y,
+    TO_TARGET,
+    TURN_TIME,
+    VX,
+    VY,
+    WANDER_ALONG,
+    WANDER_LEFT,
+    WANTED_VX,
+    WANTED_VY,
+    WAYPOINT,
+    WIDTH,
+    GroupArrays,
+    PeopleArrays,
+    X,
+    Y,
+)
 from sim.elementary_kernels import atan2, cos, sin
 
-# isort: off
-# fmt: off
-from sim.crowd.forces import (
-    ALIGNMENT, AVOIDED, AXIS_X, AXIS_Y, COHESION_TIME, COUNT, END, FOOT_X, FOOT_Y, GATHER, GATHER_RADIUS, GROUP,
-    HASTE, LENGTH, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, MODE, NARROW, PASS,
-    PASS_RADIUS, RADIUS, RELAXATION, SLOW_TIME, SLOWDOWN, STAND, STRAY_AHEAD, STRAY_LEFT, SWAY_X, SWAY_Y, TO_TARGET,
-    TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, WAYPOINT, WIDTH, GroupArrays, PeopleArrays,
-    X, Y,
-)
+STRIDES = 0.807  # strides per s at 1 m/s: 0.0064 m of step per step/min (Sekiya & Nagasaki 1998)
+SWAYLESS = 2.70  # m/s: on the line through amplitudes of 0.0350 m at 0.7 m/s and 0.0193 m at 1.6 m/s (Orendurff 2004)
+USUAL_SPEED = 1.34  # m/s: speed to which the amplitude of a person's sway refers
+SLOW = 0.3  # m/s: below, the amplitude falls to 0 with the speed
+PI = 3.141592653589793
+
+
+@njit(cache=True)
+def sway(wanted, gait, dt, out):  # type: ignore[no-untyped-def]
+    """Adds the acceleration by the sway of the strides to out (N, 2), and advances gait (N, 5) by dt (s).
+
+    The sway is A(v) sin(phase) to the left of the wanted velocity (N, 2) of size v. The phase grows by 2 pi STRIDES
+    sqrt(v) per s. A is the person's amplitude at USUAL_SPEED; it falls linearly to 0 at SWAYLESS, and below SLOW with
+    the speed.
+    """
+    for i in range(len(gait)):
+        pace = sqrt(wanted[i, X] * wanted[i, X] + wanted[i, Y] * wanted[i, Y])
+        size = gait[i, AMPLITUDE] * max(0.0, (SWAYLESS - pace) / (SWAYLESS - USUAL_SPEED)) * min(1.0, pace / SLOW)
+        rate = 2.0 * PI * STRIDES * sqrt(pace)
+        half = 0.5 * rate * dt
+        half += half * half * half / 3.0  # the tangent of half the angle by which the phase grows
+        c, s, share = gait[i, COS], gait[i, SIN], 2.0 * half / (1.0 + half * half)
+        gait[i, COS], gait[i, SIN] = c - share * (s + half * c), s + share * (c - half * s)
+        per_speed = size * rate / max(pace, 1e-9)
+        left_x, left_y = -per_speed * wanted[i, Y], per_speed * wanted[i, X]
+        gait[i, SWAY_X], gait[i, SWAY_Y] = left_x * gait[i, COS], left_y * gait[i, COS]
+        out[i, X] += left_x * (gait[i, COS] - c) / dt
+        out[i, Y] += left_y * (gait[i, COS] - c) / dt
+
+
 # fmt: on
 # isort: on
 
@@ -40,10 +114,7 @@ def _length(x, y):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _average(state, noise, tag, status):  # type: ignore[no-untyped-def]
-    """Overwrite status (G, 12): number of members, means of position (m), velocity (m/s) and stray (m) of each group.
-
-    All other columns but AVOIDED become 0, and so do the means of a group without members. Others: as in `drive`.
-    """
+    """Overwrites status (G, 12): number of members, and means of position, velocity and stray of each group."""
     status[:, :AVOIDED] = 0.0
     status[:, MEAN_AHEAD:] = 0.0
     for i in range(len(state)):
@@ -63,12 +134,7 @@ def _average(state, noise, tag, status):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
-    """Raise RADIUS and MAX_OFF_PLACE of each group in status (G, 12) to the largest distance of a member, m.
-
-    RADIUS: from the group's mean position. MAX_OFF_PLACE: from the member's place in the formation, whose middle is the
-    gathering point if the current waypoint is GATHER, else the mean position. state, place, tag: as in `drive`. groups:
-    GroupArrays. Both columns must be 0, and the mean positions set, before the call.
-    """
+    """Raises RADIUS and MAX_OFF_PLACE of each group to the largest distance of a member, m."""
     for i in range(len(state)):
         g = tag[i, GROUP]
         dx, dy = state[i, X] - status[g, MEAN_X], state[i, Y] - status[g, MEAN_Y]
@@ -85,11 +151,7 @@ def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _pass_doors(groups, people, status):  # type: ignore[no-untyped-def]
-    """Advance `groups.current` of each group at a door by one, once every member present has passed the door.
-
-    At a door: the current waypoint is NARROW. A member has passed it if the tag WAYPOINT is above the current waypoint.
-    A group without members stays. Overwrites AVOIDED: 0.0 at a door that a member present has not passed, else 1.0.
-    """
+    """Advances `groups.current` of each group at a door by one, once every member present has passed the door."""
     for g in range(len(status)):
         groups.status[g, AVOIDED] = 1.0
     for i in range(len(people.tag)):
@@ -104,18 +166,7 @@ def _pass_doors(groups, people, status):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
-    """Advance each group on its way by dt (s): updates groups.current, arrived and heading, and the wanted velocity in
-    status.
-
-    - A PASS waypoint is passed within pass_radius + 0.3 × the group's radius; a GATHER one once all members are within
-      gather_radius of their places. At most one is passed in a call. A group has arrived at the end within 0.25 m
-      (STAND) or pass_radius (LEAVE), or when it has gathered at the last waypoint; `arrived` is never reset here.
-    - The heading turns towards the waypoint, but not within 0.3 m of it, while gathering, or after arrival.
-    - Wanted velocity: speed × heading, at most distance / slow_time before an end where the group stands. A group that
-      has arrived and stands drifts back to the end of its way at 0.3 m/s at most.
-
-    status (G, 12), rules (21,): as in `drive`. A group without members or way is left as it is.
-    """
+    """Advances each group on its way by dt (s), and sets its wanted velocity."""
     turn_time, slow_time = rules[TURN_TIME], rules[SLOW_TIME]
     gather, radius = rules[GATHER_RADIUS], rules[PASS_RADIUS]
     for g in range(len(status)):
@@ -139,6 +190,7 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
         pace = groups.speed[g]
         if w == last and kind == END:
             if groups.finish[g] == STAND:
+                # A group slows down before an end where it stands.
                 pace = min(pace, d / slow_time)
                 if d < ARRIVED:
                     groups.arrived[g] = True
@@ -147,6 +199,7 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
         if d > TURN_DISTANCE and kind != GATHER and not groups.arrived[g]:
             _turn(groups.heading, g, dx / d, dy / d, dt / turn_time)
         if groups.arrived[g] and groups.finish[g] == STAND:
+            # It drifts back to the end of its way.
             status[g, WANTED_VX], status[g, WANTED_VY] = dx / slow_time, dy / slow_time
             size = _length(status[g, WANTED_VX], status[g, WANTED_VY])
             if size > STANDING_SPEED:
@@ -158,10 +211,7 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
-    """Turn row g of heading (G, 2), unit vectors, in place towards the unit vector (ex, ey), the shorter way round.
-
-    It turns by `share` of the angle between them, at most the whole angle. Returns nothing.
-    """
+    """Turns row g of heading (G, 2) towards the unit vector (ex, ey) by `share` of the angle between them."""
     hx, hy = heading[g, 0], heading[g, 1]
     angle = atan2(hx * ey - hy * ex, hx * ex + hy * ey) * min(share, 1.0)
     c, s = cos(angle), sin(angle)
@@ -172,15 +222,7 @@ def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _seek(people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
-    """Overwrite out (N, 2) with the acceleration of each person towards its goal, m/s².
-
-    A person in a queue walks to its target, a member at a door to and through the door. A member who gathers walks to
-    its place round the gathering point, any other to its fluctuating place in the moving formation, and then also takes
-    up the group's mean velocity. The wanted speed is capped (stairs lower the cap), then its fluctuations are added.
-    All fluctuations are smaller below 0.3 m/s. Overwrites `people.wanted`, without the fluctuations, and the tag
-    WAYPOINT of people who pass a door. States are those of `people.calm`. people, groups: PeopleArrays, GroupArrays.
-    stairs (S, 7): as in Obstacles. rules (21,): Steering.array().
-    """
+    """Overwrites out (N, 2) with the acceleration of each person towards its goal."""
     state, noise, status = people.calm, people.noise, groups.status
     relax, cohesion, alignment, haste = rules[RELAXATION], rules[COHESION_TIME], rules[ALIGNMENT], rules[HASTE]
     for i in range(len(state)):
@@ -221,6 +263,7 @@ def _seek(people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
             size = limit
         ex, ey = tx / max(size, TINY), ty / max(size, TINY)
         share = min(1.0, size / STANDING_SPEED)
+        # Fluctuations are smaller for people who hardly move.
         tx += share * (noise[i, WANDER_ALONG] * ex - noise[i, WANDER_LEFT] * ey)
         ty += share * (noise[i, WANDER_ALONG] * ey + noise[i, WANDER_LEFT] * ex)
         people.wanted[i, 0], people.wanted[i, 1] = size * ex, size * ey
@@ -230,11 +273,7 @@ def _seek(people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _through_door(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped-def]
-    """Returns the wanted velocity (vx, vy), m/s, of person i at (x, y), m, whose group g is at a door.
-
-    It leads to the first waypoint, from the door on, that the person has not passed (tag WAYPOINT). limit: speed, m/s;
-    DOOR_PACE (0.6) of it behind the door. Within DOOR_DISTANCE (0.45 m) of the door's middle the waypoint is passed.
-    """
+    """Returns the wanted velocity of person i at (x, y), whose group g is at a door."""
     door = groups.current[g]
     w = max(people.tag[i, WAYPOINT], door)
     dx, dy = groups.route[g, w, 0] - x, groups.route[g, w, 1] - y
@@ -248,10 +287,7 @@ def _through_door(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
-    """Returns the share of the walking speed (0 to 1) that is kept at the point (x, y), m.
-
-    It is SLOWDOWN of the first row of stairs (S, 7) that the point lies on, edges included; 1.0 off all stairs.
-    """
+    """Returns the share of the walking speed that is kept at (x, y); 1.0 off all stairs."""
     for k in range(len(stairs)):
         dx, dy = x - stairs[k, FOOT_X], y - stairs[k, FOOT_Y]
         s = dx * stairs[k, AXIS_X] + dy * stairs[k, AXIS_Y]
@@ -263,10 +299,7 @@ def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _mark_avoided(groups):  # type: ignore[no-untyped-def]
-    """Overwrite column AVOIDED of groups.status (G, 12) with 1.0 if others avoid the group as a whole, else 0.0.
-
-    A group with members present, none further than LOOSE (2.2 m) from the mean position, is avoided, but not at a door.
-    """
+    """Sets AVOIDED of groups.status to 1.0 if others avoid the group as a whole, else 0.0."""
     status = groups.status
     for g in range(len(status)):
         together = status[g, COUNT] > 0.0 and status[g, RADIUS] <= LOOSE
@@ -279,12 +312,10 @@ def drive(  # type: ignore[no-untyped-def]
     route, kind, length, current, speed, heading, finish, arrived, status,
     stairs, dt, rules, out,
 ):  # fmt: skip
-    """Overwrite out (N, 2) with the accelerations towards goals, m/s², and advance the groups' ways by dt (s).
+    """Overwrites out (N, 2) with the accelerations towards goals, and advances the groups' ways by dt (s).
 
-    Returns True; False, with nothing written, if |x| + |y| + |vx| + |vy| of a person is nan or at least 1e9. state (N,
-    4): x, y, vx, vy, m, m/s. stairs (S, 7): as in Obstacles. rules (21,): Steering.array(). The others are the fields
-    of PeopleArrays and GroupArrays; numba takes 3 µs to unpack a named tuple. Modifies calm, wanted, current, heading,
-    arrived, status, and the tag WAYPOINT of people who pass a door.
+    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 7): columns as in
+    `forces`. rules (21,): Steering.array(). The others are the fields of PeopleArrays and GroupArrays.
     """
     for i in range(len(state)):
         if not abs(state[i, X]) + abs(state[i, Y]) + abs(state[i, VX]) + abs(state[i, VY]) < 1e9:
@@ -292,6 +323,7 @@ def drive(  # type: ignore[no-untyped-def]
     for i in range(len(state)):
         calm[i, X], calm[i, Y] = state[i, X], state[i, Y]
         calm[i, VX], calm[i, VY] = state[i, VX] - gait[i, SWAY_X], state[i, VY] - gait[i, SWAY_Y]
+    # numba takes 3 µs to unpack a named tuple that is an argument.
     people = PeopleArrays(place, target, pace, noise, gait, calm, wanted, tag)
     groups = GroupArrays(route, kind, length, current, speed, heading, finish, arrived, status)
     _average(calm, noise, tag, status)

@@ -37,25 +37,16 @@ MAX_QUEUE_SPEED = 1.4  # m/s, of people on the way to their place in a queue
 
 
 class GroupState:
-    """The groups of a running simulation, by group index, and their people, by column (column = person id - 1).
+    """The groups of a running simulation, by group index, and their people, by column (person id - 1).
 
-    - alive: index of each existing group by name. arrays: the ways of all groups, as the kernels use them.
-    - by group index, ended groups included: members (columns), spacing (m), goals (point (2,) in m; "stand", "leave" or
-      "walk").
-    - settled: indices of groups that stand in a circle. next_group: index of the next group that an order makes.
-    - by column: group_of (group index), queue_of (order index, -1 in no queue), present, free_speed (m/s), places (P,
-      2) in the formation (forward, left, m), targets (P, 2) in a queue or of people held (x, y, m), held (True: stays
-      behind, at the target), waypoint (index of the first not passed).
-    - slowdown: m/s by which a group is slower for each member after the first. navigator: finds ways round walls.
+    State: alive: index of each existing group by name; arrays: their ways, as the kernels use them. By group index,
+    ended ones included: members, spacing (m), goals (point, "stand", "leave" or "walk"); settled: groups that stand in
+    a circle; next_group. By column: group_of, queue_of (order index, -1 in no queue), present, free_speed, places (P,
+    2) in the formation, targets (P, 2) in a queue or of people held, held, waypoint (the first not passed).
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
-        """Starts with nobody present, the script's groups alive, and all people in no queue.
-
-        entering: groups of the script with their people, in order of their index. new: greatest number of groups that
-        orders may still make. navigator: finds ways round walls. slowdown: m/s by which a group is slower for each
-        member after the first.
-        """
+        """Starts with nobody present; new: greatest number of groups that orders may still make."""
         people = [m for g in entering for m in g.members]
         self.navigator, self.slowdown = navigator, slowdown
         self.arrays = GroupArrays.empty(len(entering) + new, WAY)
@@ -77,15 +68,11 @@ class GroupState:
         self.settled: set[int] = set()
 
     def all_present(self, g: int) -> bool:
-        """Returns True if every member of group index g is in the scene; KeyError for an index without a group."""
+        """Returns True if every member of group g is in the scene."""
         return bool(self.present[self.members[g]].all())
 
     def enter(self, group: EnteringGroup) -> None:
-        """Marks the group's members as present, starts the group's way and sets the members' places in the formation.
-
-        group: as drawn, with start, stops, goal and members. A group whose first stop, or goal, is at most 0.3 m from
-        its start stands in a circle and counts as settled; any other group gets the walking formation.
-        """
+        """Marks the group's members as present, starts its way and sets the members' places."""
         g = group.index
         self.go(g, group.start, *group.leg(group.stops), group.speed)
         columns = self.members[g]
@@ -97,11 +84,7 @@ class GroupState:
         self.places[columns] = places
 
     def remove_leaving(self, columns: Ints) -> list[int]:
-        """Returns the columns (person id - 1) of people who leave now, in the given order, and marks them as absent.
-
-        columns (N,): people present. A person leaves if the group has reached the end of its way and its finish is
-        LEAVE. People in a queue stay. Empty if nobody leaves.
-        """
+        """Returns the columns of people whose group has reached the end of its way and leaves; they are absent now."""
         done = self.arrays.arrived & (self.arrays.finish == LEAVE)
         if not done.any():
             return []
@@ -120,17 +103,15 @@ class GroupState:
         speed: float,
         gather: Array | None = None,
     ) -> None:
-        """Sets the way of group index g from start past the via points to goal, round walls and through doors.
+        """Sets the way of group g from start past the via points to goal, round walls and through doors.
 
-        start, goal, gather (2,) and each of via (2,): m. finish: "stand", "leave" or "walk" (straight on in the
-        direction of the last leg, for 1000 m beyond the goal). speed: m/s. gather: first waypoint, where the group
-        waits for all members; None to start at once. Where no way exists, the group walks straight. The group turns at
-        once to its way, `arrived` becomes False, and its members start at the first waypoint.
+        finish: "stand", "leave" or "walk" on. gather: first waypoint, where the group waits for all members.
         """
         way: list[tuple[Array, int]] = [] if gather is None else [(gather, GATHER)]
         here = start if gather is None else gather
         for target in [*via, goal]:
             found = self.navigator.way(here, target)
+            # Where no way exists, the group walks straight.
             points, narrow = found if found is not None else (target[None], np.zeros(1, dtype=bool))
             way += [(p, NARROW if n else PASS) for p, n in zip(points, narrow, strict=True)]
             here = target
@@ -141,14 +122,7 @@ class GroupState:
         self.write_way(g, way, finish, speed, start)
 
     def write_way(self, g: int, way: list[tuple[Array, int]], finish: str, speed: float, start: Array) -> None:
-        """Overwrites the way of group index g: its waypoints, speed (m/s) and finish; the group starts at the first
-        waypoint.
-
-        way: pairs of a point (2,) in m and a kind (PASS, NARROW, GATHER or END), at least one. finish: "leave" leaves
-        the scene at the end; any other word stands. start (2,): where the group is, m. The heading turns from start to
-        the first waypoint; from a gathering point to the waypoint after it. It stays as it was if these two points
-        coincide. `arrived` becomes False, and the members' waypoints 0.
-        """
+        """Overwrites the way of group g: pairs of a point (2,) and a kind of waypoint, speed and finish."""
         self.arrays = arrays = self.arrays.with_room(len(way))
         for k, (point, kind) in enumerate(way):
             arrays.route[g, k], arrays.kind[g, k] = point, kind
@@ -163,12 +137,7 @@ class GroupState:
         self.waypoint[self.members[g]] = 0
 
     def new_group(self, name: str, columns: list[int], spacing: float) -> int:
-        """Makes a group of the people in these columns, takes them out of queues, and returns the new group's index.
-
-        name: of the group in the script. spacing: m between neighbours. The group has no way, goal or places yet. The
-        old groups keep their entries in `alive` and `members`; the caller removes them from `alive`. More groups than
-        `new` of the constructor are not refused here; giving one a way raises IndexError.
-        """
+        """Makes a group of the people in these columns, takes them out of queues, and returns its index."""
         g = self.next_group
         self.next_group += 1
         self.alive[name], self.members[g], self.spacing[g] = g, sorted(columns), spacing
@@ -177,29 +146,16 @@ class GroupState:
         return g
 
     def walking_speed(self, columns: list[int]) -> float:
-        """Returns the speed in m/s of a group of the people in these columns, at least one.
-
-        It is the mean of their free speeds minus `slowdown` for each member after the first, at least 0.3 m/s.
-        """
+        """Returns the speed of a group of the people in these columns, m/s."""
         return walking_speed(list(self.free_speed[columns]), self.slowdown)
 
     def take_places(self, columns: list[int], places: Array, middle: Array, g: int, pos: Array) -> None:
-        """Gives each of the people in these n columns one of the places of group index g, in `places` of this object.
-
-        The sum of the squared distances that they have to walk is least. places (n, 2): forward, left of the group's
-        middle, m. middle (2,), pos (n, 2): the group's middle and the people's positions in the world, m, in the order
-        of columns. The group's heading is used. Raises ValueError if a position is nan.
-        """
+        """Gives each of these people one of the `places` (n, 2) of group g, so that they walk least."""
         points = to_world(places, middle, self.arrays.heading[g])
         self.places[columns] = places[assign(pos, points)]
 
     def settle_arrived(self, state: Array) -> bool:
-        """Gives the members of existing groups that have just arrived and stand the places of a circle; returns True if
-        there was one.
-
-        state (P, 4): x, y, vx, vy of each person by column, m, m/s; nan while absent. Members who are absent get no
-        place. The groups' indices join `settled`, so this happens once for each group until it walks on.
-        """
+        """Gives groups that have just arrived and stand the places of a circle; returns True if one had."""
         changed = False
         arrived = self.arrays.arrived & (self.arrays.finish == STAND)
         for g in self.alive.values():
@@ -212,11 +168,7 @@ class GroupState:
         return changed
 
     def fill(self, people: PeopleArrays, columns: Ints) -> None:
-        """Overwrites place, target, pace and tag of `people` (N rows) with the state of the people in columns (N,).
-
-        Its noise, gait and calm are left as they are. The mode in the tag is TO_TARGET for people in a queue or held,
-        else IN_GROUP. The pace to a place in a queue is the group's speed, at most 1.4 m/s.
-        """
+        """Overwrites place, target, pace and tag of `people` (N rows) with the state of the people in columns (N,)."""
         queue = self.queue_of[columns]
         people.place[:] = self.places[columns]
         people.target[:] = self.targets[columns]

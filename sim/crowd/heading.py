@@ -16,14 +16,10 @@ TURN_TIME = 0.3  # s
 
 
 def facings(pos: Array, vel: Array, present: Bools, intent: Ints, rate: float) -> Array:
-    """Returns the vector in which each person faces at each tick, shape (C, P, 2), nan while absent.
+    """Returns the vector in which each person faces at each tick (C, P, 2), nan while absent.
 
-    pos, vel (C, P, 2): x, y in m and m/s. present (C, P): flags. intent (C, P): group index, -1 while absent. rate:
-    ticks per s. A person at WALKING_SPEED (0.25 m/s) or faster turns to the velocity, a slower one to the middle of the
-    group. A slow person who is alone, or exactly in the middle, keeps the direction. In each tick the vector moves by
-    the share 1 / (rate TURN_TIME), at most 1, towards the wanted unit vector; TURN_TIME is 0.3 s. A person who enters
-    for the first time faces the wanted direction at once, +x if there is none. A person who returns goes on from the
-    last direction.
+    pos, vel (C, P, 2), present (C, P), intent (C, P): group index. rate: ticks per s. In each tick the vector moves by
+    the share 1 / (rate TURN_TIME) towards the wanted unit vector.
     """
     out = np.full((*present.shape, 2), np.nan)
     facing = np.zeros((present.shape[1], 2))
@@ -44,16 +40,12 @@ def facings(pos: Array, vel: Array, present: Bools, intent: Ints, rate: float) -
 
 
 def headings(facing: Array) -> Array:
-    """Returns the directions (...) of vectors (..., 2), radians counter-clockwise from +x; nan stays nan."""
+    """Returns the directions (...) of vectors (..., 2), radians counter-clockwise from +x."""
     return np.asarray(atan2(facing[..., 1], facing[..., 0]))
 
 
 def _towards_group(pos: Array, intent: Ints, slow: Bools, facing: Array) -> Array:
-    """Returns vectors (K, 2), not of unit length, from the K slow people to the middle of their group, m.
-
-    A person who is alone gets the present facing. pos (P, 2): x, y in m. intent (P,): group index, -1 while absent.
-    slow (P,): flags of the K people, all present. facing (P, 2): vector in which each person faces now.
-    """
+    """Returns vectors (K, 2) from the slow people to the middle of their group; alone: the present facing."""
     here = intent >= 0
     groups = np.where(here, intent, 0)
     n = int(groups.max()) + 1

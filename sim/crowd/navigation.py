@@ -17,13 +17,9 @@ CLEARANCE = 0.6  # m kept from a wall's end on the way round it
 
 
 def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Array]:
-    """Returns the walls (W, 2, 2) with the doors' openings cut out, and the openings (D, 2, 2): two ends x, y each, in
-    m.
+    """Returns the walls (W, 2, 2) with the doors' openings cut out, and the openings (D, 2, 2), m.
 
-    walls (N, 2, 2): both ends, m. doors: middle (2,) and width of each, m. Doors are cut one by one, each out of the
-    wall nearest to it (of equally near ones the first). Its opening ends at the wall's ends. The pieces of a cut wall
-    come after all uncut walls; pieces without length are dropped. Raises ValueError if there are doors but no walls
-    left. That every door lies on its wall is not checked.
+    doors: middle (2,) and width of each; a door is cut out of the wall nearest to it.
     """
     pieces = [np.asarray(w, dtype=float) for w in walls]
     openings = []
@@ -42,11 +38,7 @@ def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Ar
 
 
 def scene_of(world: WorldSpec) -> Scene:
-    """Returns the world of a scenario as the arrays of a Scene, in m; its walls leave out the openings of doors.
-
-    Absent things give empty arrays. Cut walls come after uncut ones. Raises ValueError if the world has doors but no
-    walls.
-    """
+    """Returns the world of a scenario as the arrays of a Scene, m."""
     walls = np.array(world.walls, dtype=float).reshape(-1, 2, 2)
     doors = [(np.array(d.at, dtype=float), d.width) for d in world.doors]
     pieces, openings = cut_walls(walls, doors)
@@ -66,18 +58,13 @@ def scene_of(world: WorldSpec) -> Scene:
 
 
 def _distance(point: Array, wall: Array) -> float:
-    """Returns the distance in m of a point (2,) from the nearest point of a wall (2, 2), two ends x, y in m."""
     along = wall[1] - wall[0]
     s = np.clip(dot(point - wall[0], along) / max(float(dot(along, along)), 1e-12), 0, 1)
     return float(length(point - wall[0] - s * along))
 
 
 def blocked(a: Array, b: Array, walls: Array) -> Bools:
-    """Returns for each segment from a to b whether it crosses a wall, shape (...), bool.
-
-    a, b (..., 2): ends, m. walls (W, 2, 2): two ends each, m. Touching a wall with an end is no crossing, nor is
-    running along it. Without walls, and for nan, the answer is False.
-    """
+    """Returns which segments from a to b (..., 2) cross a wall (W, 2, 2); touching it with an end is no crossing."""
     if not len(walls):
         return np.zeros(a.shape[:-1], dtype=np.bool_)
     p, q = walls[:, 0], walls[:, 1]
@@ -93,15 +80,10 @@ def blocked(a: Array, b: Array, walls: Array) -> Bools:
 
 
 class Navigator:
-    """Finds the shortest ways round walls and through doors in one scene; made from a Scene.
+    """Finds the shortest ways round walls and through doors in one scene.
 
-    - nodes (N, 2), m: x, y of the middles of all doors, then points CLEARANCE (0.6 m) beyond the ends of walls, inside
-      the world and clear of walls.
-    - edges (N, N), m: distances between nodes, inf where a wall or door lies between.
-    - walls, doors, closed (…, 2, 2), m: wall pieces, door openings, and both together; two ends x, y each. size (2,):
-      of the world, m.
-
-    Doors block segments like walls, so every way through a door leads over its middle.
+    nodes (N, 2): middles of doors, then points beyond the ends of walls. edges (N, N): distances, inf where a wall or
+    door lies between. Doors block segments like walls, so every way through a door leads over its middle.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -113,11 +95,6 @@ class Navigator:
         self.edges = self._lengths(self.nodes, self.nodes)
 
     def _wall_ends(self) -> Array:
-        """Returns points (K, 2), m, 0.6 m (CLEARANCE) beyond both ends of each wall: all first ends, then all second
-        ends.
-
-        Points outside the world, and points within 0.54 m of a wall or door, are left out.
-        """
         along = self.walls[:, 1] - self.walls[:, 0]
         along = along / length(along)[:, None]
         ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
@@ -126,20 +103,12 @@ class Navigator:
         return np.asarray(ends[inside & np.array(free, dtype=bool)])
 
     def _lengths(self, a: Array, b: Array) -> Array:
-        """Returns the distances (A, B) in m from points a (A, 2) to points b (B, 2); inf where a wall or door lies
-        between.
-        """
         d = length(a[:, None] - b[None])
         hidden = blocked(np.repeat(a[:, None], len(b), 1), np.repeat(b[None], len(a), 0), self.closed)
         return np.asarray(np.where(hidden, np.inf, d))
 
     def way(self, start: Array, goal: Array) -> tuple[Array, Bools] | None:
-        """Returns the points (K, 2) in m to walk to, in order, the goal last, and flags (K,): True for points that
-        belong to a door.
-
-        start, goal (2,): m; the start is not among the points. If nothing lies between, the goal is the only point. A
-        door gives two points: its middle, and one BEHIND (0.7 m) beyond it. Returns None if walls leave no way.
-        """
+        """Returns the points (K, 2) to walk to, the goal last, and which belong to a door; None if there is no way."""
         ends = np.stack([start, goal])
         if not blocked(ends[:1], ends[1:], self.closed)[0]:
             return ends[1:], np.zeros(1, dtype=np.bool_)
@@ -156,6 +125,7 @@ class Navigator:
         for k in path:
             way.append(points[k])
             narrow.append(k < len(self.doors))
+            # A second point beyond the door, where nobody touches the wall any more.
             if narrow[-1]:
                 way.append(points[k] + self._beyond_door(k, points[k] - here))
                 narrow.append(True)
@@ -163,22 +133,13 @@ class Navigator:
         return np.array(way), np.array(narrow)
 
     def _beyond_door(self, door: int, way: Array) -> Array:
-        """Returns the vector (2,), 0.7 m (BEHIND) long, across door number `door`, to the side that the vector way (2,)
-        leads to.
-
-        For a way along the door it points to the right of the direction from the door's first to its second end.
-        """
         along = self.doors[door, 1] - self.doors[door, 0]
         across = np.array([-along[1], along[0]]) / length(along)
         return np.asarray(BEHIND * across * (1.0 if dot(across, way) > 0 else -1.0))
 
 
 def _dijkstra(lengths: Array, start: int, goal: int) -> list[int] | None:
-    """Returns the shortest path from node `start` to another node `goal`: node indices without the start, the goal
-    last.
-
-    lengths (N, N): edge lengths, inf = no edge. None if there is no path.
-    """
+    """Returns the shortest path as node indices without the start; None if there is none."""
     n = len(lengths)
     far, before, done = np.full(n, np.inf), np.full(n, -1), np.zeros(n, dtype=bool)
     far[start] = 0.0

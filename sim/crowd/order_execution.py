@@ -1,44 +1,210 @@
-"""Carries out the orders of the script while the simulation runs: fires merges, splits and queues, serves queues.
+"""Carries out the orders of the script while the simulation runs: when they fire, what they do, how queues are served.
 
 Orders change who belongs to which group, ways, places and targets (GroupState). They never touch a position, a velocity
-or a force. Whether an order came true is checked later, by sim.truth.order_fulfilment.
+or a force. For the trigger `after` they are also examined for having come true; the truth of a sequence is measured
+later, from its motion, by sim.truth.order_fulfilment. Groups join a queue at the tail in the order in which they reach
+it; the members of a group stay together and are served as one.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
-from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder
+from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder, expand
 from sim.clock import SCRIPT_RATE, FrameTimes
 from sim.crowd.forces import GATHER
 from sim.crowd.formation import divide, meeting_point, part_sizes, standing, walking
 from sim.crowd.group_state import GroupState
 from sim.crowd.population import ScriptPlacement, draw_point
-from sim.crowd.queue_service import ServiceQueue
-from sim.crowd.triggers import PendingOrder, concerned, rule_holds
-from sim.elementary import unit
+from sim.elementary import length, unit
 from sim.rng import draw, rng
+from sim.truth.merge_split_rules import Separation, separation
+from sim.truth.order_fulfilment import RULE_TIME
+from sim.truth.queue_detection import QUEUE_PEOPLE
 from sim.types import Array, Order
+
+JOIN_RADIUS = 0.5  # m from the first free place: a group has joined
+SERVED_RADIUS = 0.35  # m from the head's place: service can begin
+
+
+@dataclass
+class ServiceQueue:
+    """One queue at a service point. Groups are given by index; a group is served as a whole."""
+
+    head: Array
+    along: Array  # (2,) unit vector from head to tail
+    spacing: float  # between neighbouring places, m
+    # service time in s of each group, by group index. State: joined: groups in the queue, head first.
+    service: dict[int, float]
+    joined: list[int] = field(default_factory=list)
+    coming: list[int] = field(default_factory=list)  # groups on their way to it
+    # time at which the group at the head is done, s; None while no group is being served
+    busy_until: float | None = None
+
+    def slot(self, k: int) -> Array:
+        """Returns the place (2,) with index k in the queue; 0 is the head's."""
+        return self.head + k * self.spacing * self.along
+
+    def remove(self, g: int) -> None:
+        """Takes group g out of the queue, if it is in it, as when it merges; its service ends."""
+        if self.joined[:1] == [g]:
+            self.busy_until = None
+        self.joined = [other for other in self.joined if other != g]
+        self.coming = [other for other in self.coming if other != g]
+
+    def advance(self, t: float, members: dict[int, list[int]], pos: Array) -> tuple[dict[int, Array], list[int]]:
+        """Advances the queue to time t (s): ends and begins service, and lets groups join at the tail.
+
+        Returns the place of each person by column, and the group that was served, in a list. members: columns of each
+        group; those of a group still coming are sorted, nearest to the head first. pos (P, 2): m.
+        """
+        done = self._serve(t, members, pos)
+        tail = sum(len(members[g]) for g in self.joined)
+        self.coming.sort(key=lambda g: (float(np.min(length(pos[members[g]] - self.slot(tail)))), g))
+        slots: dict[int, Array] = {}
+        k = 0
+        for g in self.joined:
+            k = self._give_slots(g, k, members, slots)
+        while self.coming and self._has_reached(self.coming[0], k, members, pos):
+            self.joined.append(self.coming.pop(0))
+            k = self._give_slots(self.joined[-1], k, members, slots)
+        for g in self.coming:
+            members[g].sort(key=lambda c: (float(length(pos[c] - self.head)), c))
+            k = self._give_slots(g, k, members, slots)
+        return slots, done
+
+    def _give_slots(self, g: int, k: int, members: dict[int, list[int]], slots: dict[int, Array]) -> int:
+        """Writes the places of a group's members from index k on; returns the next free index."""
+        for column in members[g]:
+            slots[column] = self.slot(k)
+            k += 1
+        return k
+
+    def _has_reached(self, g: int, k: int, members: dict[int, list[int]], pos: Array) -> bool:
+        return bool(np.min(length(pos[members[g]] - self.slot(k))) < JOIN_RADIUS)
+
+    def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
+        """Returns the group whose service ends by time t, in a list; begins the service of the next."""
+        if not self.joined:
+            return []
+        first = self.joined[0]
+        if self.busy_until is None:
+            if length(pos[members[first][0]] - self.head) < SERVED_RADIUS:
+                self.busy_until = t + self.service[first]
+            return []
+        if t < self.busy_until:
+            return []
+        self.busy_until = None
+        return [self.joined.pop(0)]
+
+
+IN_PLACE = 0.4  # m from the own place in a queue
+EPS = 1e-9  # s
+
+
+@dataclass
+class PendingOrder:
+    """One order of the script and what became of it. Times count from the first recorded frame, s."""
+
+    order: MergeOrder | SplitOrder | QueueOrder
+    index: int  # in the file, from 0;
+    delay: float  # s between trigger and firing;
+    time: float  # of a `time` trigger, s, else inf
+    # (2,) place of a `reach` trigger in the world, m; None: the group's goal, or no such trigger
+    reach_at: Array | None = None
+    fired: int | None = None  # tick of the script, from 0, at which it fired, None: not yet
+    # time at which the trigger (the order's condition for firing) was first met, s; None: not yet
+    met_at: float | None = None
+    true_at: float | None = None  # time at which it had held long enough, s; None: not yet
+    # s for which the order's rule (people are together, apart or in line, as ordered) has held without a break
+    held_for: float = 0.0
+    # before, after: columns (person id - 1) of the people of each group before and after the order; empty until it
+    # fires. Times count from the first recorded frame.
+    before: tuple[tuple[int, ...], ...] = field(default=())
+    after: tuple[tuple[int, ...], ...] = field(default=())
+
+    def is_due(self, t: float, state: Array, groups: GroupState, come_true: set[str]) -> bool:
+        """Returns True if the order fires at time t (s): `delay` after its trigger was first met.
+
+        state (P, 4): x, y, vx, vy by column. come_true: ids of the orders that have come true.
+        """
+        names = concerned(self.order, list(groups.alive))
+        # An order waits until every group that it concerns exists and is wholly in the scene.
+        if not all(n in groups.alive and groups.all_present(groups.alive[n]) for n in names):
+            return False
+        if self.met_at is None and self._is_met(t, state, groups, names, come_true):
+            self.met_at = t
+        return self.met_at is not None and t >= self.met_at + self.delay - EPS
+
+    def _is_met(self, t: float, state: Array, groups: GroupState, names: list[str], come_true: set[str]) -> bool:
+        when = self.order.when
+        if when.time is not None:
+            return t >= self.time - EPS
+        if when.after is not None:
+            return when.after in come_true
+        if when.distance_lt is not None:
+            gaps = _separations(state, [groups.members[groups.alive[n]] for n in names])
+            return bool(gaps) and bool(max(gap.distance[0] for gap in gaps) < when.distance_lt)
+        assert when.reach is not None
+        g = groups.alive.get(when.reach.group)
+        if g is None or not groups.all_present(g):
+            return False
+        at = groups.goals[g][0] if self.reach_at is None else self.reach_at
+        middle = state[groups.members[g], :2].mean(axis=0)
+        return bool(length(middle - at) < when.reach.radius)
+
+    def watch(self, t: float, holds: bool) -> None:
+        """Notes whether the order's rule `holds` at this tick; sets true_at once it has held for its time."""
+        self.held_for = self.held_for + 1 / SCRIPT_RATE if holds else 0.0
+        if self.held_for >= RULE_TIME[self.order.type] - EPS:
+            self.true_at = t
+
+
+def concerned(order: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> list[str]:
+    """Returns the names of the groups that an order concerns; `g-*` stands for all existing names with `g-`."""
+    if isinstance(order, SplitOrder):
+        return [order.group]
+    return list(dict.fromkeys(n for pattern in order.groups for n in expand(pattern, alive)))
+
+
+def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
+    """Returns True if the rule of an order that has fired holds at this tick.
+
+    state (P, 4): x, y, vx, vy by column, nan while absent. targets (P, 2): places in the queue.
+    """
+    order = pending.order
+    if isinstance(order, QueueOrder):
+        columns = list(pending.after[0])
+        off = length(state[columns, :2] - targets[columns])
+        return bool(np.sum(off < IN_PLACE) >= min(QUEUE_PEOPLE, len(columns)))
+    parts = [list(p) for p in (pending.before if isinstance(order, MergeOrder) else pending.after)]
+    if not all(np.isfinite(state[p]).all() for p in parts):
+        return False
+    gaps = _separations(state, parts)
+    if isinstance(order, MergeOrder):
+        # A chain of parts is together although its ends are far apart.
+        return sum(bool(gap.merge_rule()[0]) for gap in gaps) >= len(parts) - 1
+    return all(bool(gap.split_rule()[0]) for gap in gaps)
+
+
+def _separations(state: Array, parts: list[list[int]]) -> list[Separation]:
+    """Returns how far apart the people of each pair of parts (columns) are."""
+    pos, vel = state[None, :, :2], state[None, :, 2:]
+    return [separation(pos, vel, np.array(a), np.array(b)) for k, a in enumerate(parts) for b in parts[k + 1 :]]
 
 
 def groups_made(scenario: Scenario) -> int:
-    """Returns an upper bound of the number of new groups that the orders of a scenario make; 0 without orders.
-
-    A merge counts 1 and a split its parts. A queue makes none but counts 1, too.
-    """
+    """Returns an upper bound of the number of new groups that the orders of a scenario make."""
     return sum(len(e.parts) if isinstance(e, SplitOrder) else 1 for e in scenario.event)
 
 
 class OrderExecution:
     """Carries out the orders of one scenario on the groups of a running simulation.
 
-    - groups: the groups whose members, ways and places the orders change. placement: turn and mirror of the script.
-    - pending: all orders, in the order of the file, fired or not. come_true: ids of orders whose rule has held long
-      enough (people are together, apart or in line, as ordered).
-    - queues: the opened queues, by index (from 0) of their order in the file.
-    - seed, repeat (the suite entry's copy, 0 for none): keys of the random draws of times, goals and service times.
-
-    Construction takes scenario, groups, placement, seed and repeat, and draws each order's delay and time.
+    State: pending: all orders, fired or not; come_true: ids of orders whose rule has held long enough; queues: the
+    opened ones, by index of their order in the file.
     """
 
     def __init__(
@@ -53,23 +219,15 @@ class OrderExecution:
         return rng(self.seed, role, *keys, repeat=self.repeat)
 
     def _pending(self, order: MergeOrder | SplitOrder | QueueOrder, k: int) -> PendingOrder:
-        """Returns the order with index k (from 0) in the file, ready to wait for its trigger; its delay and time are
-        drawn, s.
-
-        The time is inf unless the trigger is `time`.
-        """
         when = order.when
         time = np.inf if when.time is None else draw(when.time, self._rng("event", k, 1))
         at = None if when.reach is None or when.reach.at is None else self.placement.point(np.array(when.reach.at))
         return PendingOrder(order, k, draw(when.delay, self._rng("event", k, 0)), time, at)
 
     def advance(self, tick: int, t: float, state: Array) -> bool:
-        """Fires orders that are due at time t (s), serves queues, and lets groups that have arrived stand in a circle.
+        """Fires orders that are due at tick and time t (s), serves queues, and lets arrived groups settle.
 
-        tick: of the script, from 0; in the warm-up nothing fires. state (P, 4): x, y, vx, vy by
-        column, m, m/s, nan while absent. Orders are taken in the order of the file. From the tick after firing, an
-        order's rule is examined until it has held long enough; then its id joins come_true. Returns False only if
-        nothing has changed that `GroupState.fill` writes. It is always True once a queue has opened.
+        state (P, 4): x, y, vx, vy by column, nan while absent. Returns True if something changed for `GroupState.fill`.
         """
         changed = bool(self.queues)
         for pending in self.pending:
@@ -80,8 +238,8 @@ class OrderExecution:
                 pending.watch(t, rule_holds(pending, state, self.groups.targets))
                 if pending.true_at is not None:
                     self.come_true.add(pending.order.id)
-        for k, queue in self.queues.items():
-            self._serve(k, queue, t, state)
+        for queue in self.queues.values():
+            self._serve(queue, t, state)
         return self.groups.settle_arrived(state) or changed
 
     def _fire(self, pending: PendingOrder, tick: int, state: Array) -> None:
@@ -95,13 +253,6 @@ class OrderExecution:
             self._line_up(pending, order)
 
     def _merge(self, pending: PendingOrder, order: MergeOrder, state: Array) -> None:
-        """Makes one new group of the merging groups, which cease to exist; it gathers where they meet.
-
-        Then it stands there in a circle (goal "meet"), or walks to the order's goal. It is no faster than its slowest
-        parent; a walking group also no faster than its members' mean free speed less the slowdown. Its spacing is the
-        mean of the parents'. state (P, 4): x, y, vx, vy by column, m, m/s. Sets pending.before and pending.after
-        (columns).
-        """
         groups, arrays = self.groups, self.groups.arrays
         parents = [self._end(name) for name in order.groups]
         parts = [list(groups.members[g]) for g in parents]
@@ -109,6 +260,7 @@ class OrderExecution:
         columns = sorted(c for part in parts for c in part)
         pending.after = (tuple(columns),)
         g = groups.new_group(order.into, columns, float(np.mean([groups.spacing[p] for p in parents])))
+        # No faster than the slowest parent: nobody runs to a merge.
         pace = min(float(arrays.speed[p]) for p in parents)
         r = self._rng("event", pending.index, 2)
         middles = np.array([state[c, :2].mean(axis=0) for c in parts])
@@ -128,21 +280,13 @@ class OrderExecution:
         groups.take_places(columns, places, meeting, g, state[columns, :2])
 
     def _end(self, name: str) -> int:
-        """Ends a group, which also leaves its queue, and returns its index; the caller makes new groups of its
-        people.
-        """
         g = self.groups.alive.pop(name)
+        # A group that is in a queue leaves it.
         for queue in self.queues.values():
             queue.remove(g)
         return g
 
     def _split(self, pending: PendingOrder, order: SplitOrder, state: Array) -> None:
-        """Divides a group, which ceases to exist, into the order's parts and gives each part a way to its own goal.
-
-        Each member joins the part in whose goal's direction it is furthest ahead, as far as the parts' sizes allow.
-        state (P, 4): x, y, vx, vy by column, m, m/s. Each part keeps the group's heading and spacing. Sets
-        pending.before and pending.after (columns).
-        """
         groups = self.groups
         parent = self._end(order.group)
         columns = groups.members[parent]
@@ -162,16 +306,11 @@ class OrderExecution:
             groups.goals[g] = (goal, part.at_goal)
             groups.go(g, here, via, goal, part.at_goal, groups.walking_speed(own))
             groups.take_places(own, walking(len(own), groups.spacing[g]), here, g, state[own, :2])
+            # A part turns to its goal, as people do, and does not jump round.
             groups.arrays.heading[g] = groups.arrays.heading[parent]
         pending.after = tuple(after)
 
     def _line_up(self, pending: PendingOrder, order: QueueOrder) -> None:
-        """Opens a queue and sends the order's groups to it.
-
-        Draws each group's service time (s). Overwrites where each group goes afterwards, if the order has a goal.
-        Without one, groups keep their own. A group that is in another queue leaves that one. Sets
-        pending.before (columns of each group) and pending.after (all columns as one part).
-        """
         groups = self.groups
         queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
         for queue in self.queues.values():
@@ -194,13 +333,7 @@ class OrderExecution:
                 finish if order.goal is None else order.at_goal,
             )
 
-    def _serve(self, k: int, queue: ServiceQueue, t: float, state: Array) -> None:
-        """Advances a queue to time t (s): sets the target place of each person in it, and sends served groups to their
-        goals.
-
-        A served group leaves the queue and walks on in formation. k: index of the queue's order. state (P, 4): x, y,
-        vx, vy by column, m, m/s.
-        """
+    def _serve(self, queue: ServiceQueue, t: float, state: Array) -> None:
         groups = self.groups
         slots, done = queue.advance(t, groups.members, state[:, :2])
         for column, slot in slots.items():
@@ -214,12 +347,7 @@ class OrderExecution:
             groups.places[columns] = walking(len(columns), groups.spacing[g])
 
     def record(self, frames: FrameTimes) -> tuple[Order, ...]:
-        """Returns all orders of the script, in the order of the file, with the person ids (column + 1) of each group
-        before and after.
-
-        `fired` is the nearest of the frames, from 1. Of an order that never fired `fired` and `time` are None, and
-        before and after are empty.
-        """
+        """Returns all orders of the script with the frame at which each fired, and its people before and after."""
 
         def ids(parts: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
             return tuple(tuple(c + 1 for c in part) for part in parts)

@@ -1,4 +1,4 @@
-"""Draws who takes part: groups with sizes, starts and goals, and each person's height, speed, gait and fluctuations.
+"""Draws who takes part: groups with sizes, starts, stops and goals, and each person's height, speed and gait.
 
 Every person draws from streams of their own, so one person more changes nobody else. A start from a distribution is
 drawn again, for this group alone, until the group has room there.
@@ -6,19 +6,48 @@ drawn again, for this group alone, until the group has room there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, group_names
+from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names
 from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
-from sim.crowd.stops import PlannedStop, draw_stops
 from sim.elementary import dot, exp, length, unit
 from sim.rng import autoregression, draw, normals, rng, uniforms
 from sim.types import Array, Scene
+
+
+@dataclass(frozen=True)
+class PlannedStop:
+    """One stop of one group, drawn."""
+
+    at: Array  # (2,) place in the world, m
+    stay: float  # s
+    until: tuple[float, ...]  # times, s after the first recorded frame, ascending; may be empty
+    members: tuple[int, ...]  # numbers of the members who stop, from 0, ascending; at least one
+    whole: bool  # True if all members stop
+
+    def end(self, t: float) -> float:
+        """Returns when people who arrive at time t walk on, s; inf if never."""
+        return next((u for u in self.until if u >= t), np.inf) + self.stay if self.until else t + self.stay
+
+
+def draw_stops(
+    stops: tuple[Stop, ...], size: int, place: Callable[[Point], Array], r: np.random.Generator
+) -> list[PlannedStop]:
+    """Returns the stops of a group of `size` people; place: gives a point of the script in the world."""
+    planned = []
+    for stop in stops:
+        at, stay = place(stop.at), max(0.0, draw(stop.stay, r))
+        wanted = size if stop.members is None else min(round(draw(stop.members, r)), size)
+        if wanted > 0 and (stay > 0 or stop.until):
+            who = range(size) if wanted == size else sorted(r.permutation(size)[:wanted].tolist())
+            planned.append(PlannedStop(at, stay, tuple(sorted(stop.until)), tuple(who), wanted == size))
+    return planned
+
 
 BODY_RADIUS = 0.20  # m, in the physics
 START_GAP = 0.55  # m between people of different groups at the start
@@ -31,30 +60,20 @@ PLACE_TIME = 10.0  # s, correlation time of the fluctuation of the place in the 
 
 @dataclass(frozen=True)
 class ScriptPlacement:
-    """How a seed places a whole script in the world.
+    """How a seed places a whole script in the world."""
 
-    - middle (2,): middle of the world, m, about which the script is turned.
-    - turn: angle in radians, counter-clockwise. flip: -1.0 mirrors x before the turn, 1.0 does not.
-    - lead: s by which all walking groups start further along their way; negative: further back.
-    """
-
-    middle: Array
-    turn: float
-    flip: float
-    lead: float = 0.0
+    middle: Array  # (2,) middle of the world, m, about which the script is turned
+    turn: float  # angle in radians, counter-clockwise
+    flip: float  # -1.0 mirrors x before the turn, 1.0 does not
+    lead: float = 0.0  # s by which all walking groups start further along their way; negative: further back
 
     def point(self, p: Array) -> Array:
-        """Returns where a point p (2,) of the script, m, lies in the world (2,), m: mirrored in x about the world's
-        middle if flip is -1, then turned about it."""
+        """Returns where a point (2,) of the script lies in the world: mirrored if flip is -1, then turned."""
         d = (p - self.middle) * np.array([self.flip, 1.0])
         return self.middle + self.vector(d, flip=False)
 
     def vector(self, d: Array, *, flip: bool = True) -> Array:
-        """Returns a direction d (2,) of the script as a direction (2,) of the world: mirrored in x if `self.flip` is
-        -1, then turned; the length is kept.
-
-        The argument flip=False leaves out the mirror.
-        """
+        """Returns a direction (2,) of the script in the world; flip=False leaves out the mirror."""
         if flip:
             d = d * np.array([self.flip, 1.0])
         c, s = unit(self.turn)
@@ -63,65 +82,47 @@ class ScriptPlacement:
 
 @dataclass
 class Person:
-    """One person of a crowd.
+    """One person of a crowd."""
 
-    - column: in the arrays of a Motion, from 0; the person's id is column + 1.
-    - key: (entry of the scenario's `group` list, its copy, member), each from 0; keys the person's random streams.
-    - free_speed: walking speed alone, m/s. height: of the body, m.
-    - sway: amplitude of the sideways movement with each stride at 1.34 m/s, m. phase: of the strides at first, rad.
-    """
-
-    column: int
+    column: int  # in the arrays of a Motion, from 0; the person's id is column + 1
+    # (entry of the scenario's `group` list, its copy, member), each from 0; keys the person's random streams
     key: tuple[int, ...]
-    free_speed: float
-    height: float
-    sway: float
-    phase: float
+    free_speed: float  # walking speed alone, m/s
+    height: float  # of the body, m
+    sway: float  # amplitude of the sideways movement with each stride at 1.34 m/s, m
+    phase: float  # of the strides at first, rad
 
 
 @dataclass
 class EnteringGroup:
-    """One group of the script, as it enters the scene.
+    """One group of the script, as it enters the scene."""
 
-    - name: in the script. index: among all groups, from 0 (-1 until it has room). members: its people, in order.
-    - start: the group's middle as it enters; goal (2,), via (each (2,)): points in the world, m. pos (n, 2): where the
-      members start, m.
-    - speed: of the group, m/s. spacing: between neighbours, m. enter: time of entry, s after the first recorded frame
-      (0: there from the start of the warm-up; negative: in the warm-up).
-    - finish: at the goal "stand", "leave" the scene or "walk" on. stops: before `via`.
-    """
-
-    name: str
-    index: int
-    members: list[Person]
-    start: Array
+    name: str  # in the script
+    index: int  # among all groups, from 0 (-1 until it has room)
+    members: list[Person]  # its people, in order
+    start: Array  # the group's middle as it enters; goal (2,), via (each (2,)): points in the world, m
     goal: Array
     via: list[Array]
-    speed: float
-    spacing: float
+    speed: float  # of the group, m/s
+    spacing: float  # between neighbours, m
+    # time of entry, s after the first recorded frame (0: there from the start of the warm-up; negative: in the warm-up)
     enter: float
-    finish: str
-    stops: list[PlannedStop] = field(default_factory=list)
-    pos: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    finish: str  # at the goal "stand", "leave" the scene or "walk" on
+    stops: list[PlannedStop] = field(default_factory=list)  # before `via`
+    pos: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (n, 2) where the members start, m
 
     @property
     def walks(self) -> bool:
-        """True if the first stop, without stops the goal, is more than STANDING_DISTANCE (0.3 m) from the start."""
+        """True if the first stop, else the goal, is more than STANDING_DISTANCE from the start."""
         return bool(length(self.leg(self.stops)[1] - self.start) > STANDING_DISTANCE)
 
     def leg(self, stops: Sequence[PlannedStop]) -> tuple[list[Array], Array, str]:
-        """Returns points to pass (each (2,), m), end (2,), m, and finish of the way to the first of the stops that are
-        left; without stops, of the way to the goal."""
+        """Returns points to pass, end and finish of the way to the first of the stops, else to the goal."""
         return ([], stops[0].at, "stand") if stops else (self.via, self.goal, self.finish)
 
 
 def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacement:
-    """Returns the turn, mirror and lead that a seed draws for the script of a scenario.
-
-    The turn is `turn_deg` in radians. If the scenario has `mirror`, the script is mirrored with probability 0.5.
-    repeat: number of the suite entry's copy, 0 for none; a further random key. Raises ValueError if the seed is
-    negative.
-    """
+    """Returns the turn, mirror and lead that a seed draws for the script of a scenario."""
     r = rng(seed, "layout", repeat=repeat)
     turn = draw(scenario.turn_deg, r) / 180 * np.pi
     flip = -1.0 if scenario.mirror and r.random() < 0.5 else 1.0
@@ -129,10 +130,7 @@ def script_placement(scenario: Scenario, seed: int, repeat: int) -> ScriptPlacem
 
 
 def draw_point(point: Point, placement: ScriptPlacement, r: np.random.Generator) -> Array:
-    """Returns a point of the script in the world (2,), m: drawn, then mirrored and turned by `placement`.
-
-    Each coordinate that is a distribution is drawn from r; x first.
-    """
+    """Returns a point of the script in the world (2,): drawn, then mirrored and turned."""
     return placement.point(np.array([draw(point[0], r), draw(point[1], r)]))
 
 
@@ -154,10 +152,7 @@ class _Draws:
 def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) -> list[EnteringGroup]:
     """Returns all groups of the script with their members, in the order of the file.
 
-    Columns of people count from 0 through all groups. Members stand in formation at the group's start. Groups with
-    entry time 0 need room among each other, groups that enter later do not; all must be clear of walls and pillars.
-    seed, repeat: random keys. Raises InputError if a group has no free place at its start: a start of two numbers is
-    tried once, a drawn one TRIES (400) times. Raises ValueError if the seed is negative.
+    Raises InputError if a group has no free place at its start.
     """
     draws = _Draws(scenario, scene, script_placement(scenario, seed, repeat), seed, repeat)
     taken: list[Array] = []
@@ -176,12 +171,7 @@ def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) ->
 
 
 def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int], column: int) -> EnteringGroup:
-    """Draws a group and its members, without its start, its `pos` and its index.
-
-    draws: gives the random streams. spec: its entry in the scenario. name: of the group. key: index of the entry and of
-    the copy, from 0. column: of the first member. The size is rounded, at least 1 person; the entry time is not before
-    the warm-up. An absent speed follows from the members' free speeds.
-    """
+    """Draws a group and its members, without its start, `pos` and index. key: of its entry and copy."""
     r = draws.rng("group", *key, 0)
     crowd = draws.scenario.crowd
     size = max(1, round(draw(spec.size, r)))
@@ -202,24 +192,12 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
 
 
 def walking_speed(free: list[float], slowdown: float) -> float:
-    """Returns the speed of a group in m/s: the mean of its members' free speeds minus slowdown × (n - 1), at least 0.3.
-
-    free: free speeds of the n ≥ 1 members, m/s. slowdown: m/s for each member after the first.
-    """
+    """Returns the speed of a group, m/s: its members' mean free speed less `slowdown` for each after the first."""
     return max(MIN_SPEED, float(np.mean(free)) - slowdown * (len(free) - 1))
 
 
 def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[int, int], taken: list[Array]) -> None:
-    """Sets group.start and group.pos so that the members stand clear of walls, pillars and, at entry time 0, of
-    `taken`.
-
-    The group faces its first stop, via point or goal; the script's +x if it starts there. `scatter` (m) moves each
-    member off its place in the formation, in any direction, at least 0.4 m from all mates. The script's `lead` (s)
-    moves the start of a group that walks by lead × speed in that direction, at most half-way; a negative lead moves it
-    back without limit. key: index of the entry `spec` and of its copy. taken: positions (n, 2), m, of the people of
-    each earlier group with entry time 0. draws: random streams. A drawn or scattered start is drawn up to TRIES (400)
-    times, a fixed one tried once. Raises InputError if no try finds room.
-    """
+    """Sets group.start and group.pos so that the members stand clear; raises InputError if no try finds room."""
     placement = draws.placement
     drawn = spec.scatter != 0.0 or any(isinstance(v, Distribution) for v in spec.start)
     r = draws.rng("group", *key, 1)
@@ -230,6 +208,7 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
         way = first - group.start
         far = float(length(way))
         heading = way / far if far > 1e-6 else placement.vector(np.array([1.0, 0.0]))
+        # At most half-way to the first goal.
         lead = min(placement.lead * group.speed, far / 2)
         group.start = group.start + lead * heading * (far > STANDING_DISTANCE)
         group.pos = to_world(walking(len(group.members), group.spacing), group.start, heading)
@@ -248,24 +227,19 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
 
 
 def scattered(n: int, scatter: Value, r: np.random.Generator) -> Array:
-    """Returns how far n people start from their places, (n, 2): x, y in m; lengths drawn, directions uniform."""
+    """Returns how far n people start from their places, (n, 2)."""
     far = np.array([draw(scatter, r) for _ in range(n)])
     return np.asarray(far[:, None] * unit(2 * np.pi * r.random(n)))
 
 
 def _apart(pos: Array) -> bool:
-    """Returns True if no two of the places pos (n, 2), m, are nearer than two body radii."""
+    # Nobody is too near to themselves.
     gap = length(pos[:, None] - pos[None]) + 10 * np.eye(len(pos))
     return bool((gap >= 2 * BODY_RADIUS).all())
 
 
 def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
-    """Returns True if all of pos (n, 2), m, n ≥ 1, are 0.55 m clear of the taken places and 0.2 m clear of walls and
-    pillars.
-
-    Distances are measured from the points to places, wall lines and pillar edges; exactly that far is clear. taken:
-    places (K, 2), m, of each earlier group; may be empty.
-    """
+    """Returns True if pos (n, 2) are START_GAP clear of the taken places and BODY_RADIUS clear of walls and pillars."""
     if taken:
         others = np.concatenate(taken)
         if np.min(length(pos[:, None] - others[None])) < START_GAP:
@@ -280,13 +254,10 @@ def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
 
 
 def fluctuations(crowd: CrowdSpec, people: Sequence[Person], frames: int, fps: float, seed: int, repeat: int) -> Array:
-    """Returns how wanted velocities and places fluctuate, shape (frames, P, 4): columns of `PeopleArrays.noise`.
+    """Returns how wanted velocities and places fluctuate, (frames, P, 4): columns of `PeopleArrays.noise`.
 
-    Each of the P people draws from a random stream of its own, keyed by seed, Person.key and repeat. An
-    Ornstein-Uhlenbeck process per column, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) s n_k, with
-    a = exp(-1 / (fps T)), standard normal n_k and u_0 = s n_0. The standard deviations s are those of `crowd`. The
-    correlation time T is WANDER_TIME (1 s) for velocities, PLACE_TIME (10 s) for places. Raises ValueError if the seed
-    is negative.
+    An Ornstein-Uhlenbeck process per column, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) s n_k,
+    with a = exp(-1 / (fps T)), standard normal n_k and u_0 = s n_0. The standard deviations s are those of `crowd`.
     """
     keep = exp(-1 / (fps * np.array([WANDER_TIME, WANDER_TIME, PLACE_TIME, PLACE_TIME])))
     out = np.empty((frames, len(people), 4))

@@ -43,10 +43,7 @@ WRITE = pymunk.batch.BodyFields.FORCE
 
 
 def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | None = None) -> Motion:
-    """Returns the whole motion of a scenario for a seed, without the warm-up. repeat: number of the suite entry's copy,
-    a further random key; 0 for none. steering: None for the default parameters. Raises InputError if a group has no
-    free place at its start, ValueError if the seed is negative, WorkError if a position or velocity is not
-    finite."""
+    """Returns the whole motion of a scenario for a seed, without the warm-up."""
     world = World(scenario, seed, repeat, steering or Steering())
     return world.run()
 
@@ -55,13 +52,13 @@ def accelerate(
     state: Array, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles,
     dt: float, rules: Array, push: Array, out: Array,
 ) -> bool:  # fmt: skip
-    """Overwrites out (N, 2) with the accelerations of all people, m/s², cut to max_acceleration, and advances the
-    groups' ways and people's strides by dt (s). state (N, 4): x, y, vx, vy in m, m/s. obstacles: walls, pillars and
-    stairs, m. rules (21,): Steering.array(). push (G, 2): scratch, overwritten. Modifies `groups`, and gait, calm,
-    wanted and tags of `people`. Returns True. Returns False, with nothing written, if a state is not below 1e9."""
+    """Overwrites out (N, 2) with the accelerations of all people, and advances ways and strides by dt (s).
+
+    state (N, 4): x, y, vx, vy. rules (21,): Steering.array(). push (G, 2): scratch. Returns False, with nothing
+    written, if a state is not below 1e9.
+    """
     from sim.crowd.forces_avoidance_kernels import avoid
-    from sim.crowd.forces_goal_kernels import drive
-    from sim.crowd.sway_kernels import sway
+    from sim.crowd.forces_goal_kernels import drive, sway
 
     if not drive(state, *people, *groups, obstacles.stairs, dt, rules, out):
         return False
@@ -73,15 +70,11 @@ def accelerate(
 class World:
     """The running simulation of one scenario and seed; it can be run once. Column = person id - 1.
 
-    - scenario, seed, repeat; scene; rules: steering parameters; obstacles; push: scratch; members: all people by
-      column; entering: all groups; waiting: those not entered yet; groups, orders, errands: the script.
-    - `space`, `bodies` (by column): of the physics. state (N, 4): x, y, vx, vy, m, m/s, and `people`: of the N people
-      present, whose columns are `columns`. gait (P, 5): as in PeopleArrays, by column. force: x, y, m/s², of the N
-      people, then zeros for static bodies. states (P, 4), group_of (P,): at the present tick, by column, nan and -1
-      while absent. between (STEPS + 1, P, 4): states from the present tick to the next one, step by step, before people
-      come and go there; None if all frames lie on ticks.
-
-    Construction raises InputError if a group finds no room.
+    State: `space`, `bodies` (by column): of the physics. state (N, 4): x, y, vx, vy, and `people`: of the N people
+    present, whose columns are `columns`. gait (P, 5): as in PeopleArrays, by column. force: of the N people, then zeros
+    for static bodies. states (P, 4), group_of (P,): at the present tick, by column, nan and -1 while absent. between
+    (STEPS + 1, P, 4): states from the present tick to the next, step by step, before people come and go there; None if
+    all frames lie on ticks.
     """
 
     def __init__(self, scenario: Scenario, seed: int, repeat: int, steering: Steering) -> None:
@@ -113,8 +106,7 @@ class World:
         self._read_buffer, self._write_buffer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
 
     def run(self) -> Motion:
-        """Returns the Motion of duration × fps frames (rounded, at least 1) after the warm-up. Raises WorkError if a
-        position or velocity is not finite."""
+        """Returns the Motion after the warm-up; raises WorkError if a position or velocity is not finite."""
         fps, duration = self.scenario.camera.fps, self.scenario.duration
         count = max(1, math.ceil(duration * SCRIPT_RATE - 1e-9))
         frames = FrameTimes.of(max(1, round(duration * fps)), fps)
@@ -133,9 +125,9 @@ class World:
         return self._motion(ticks, shown, frames)
 
     def ticks(self, length: int) -> Iterator[tuple[Array, Ints]]:
-        """Yields the states at `length` ticks of the script after the warm-up, the first at time 0: states (P, 4): x,
-        y, vx, vy in m, m/s; group indices (P,). By column; nan and -1 while absent. The next tick overwrites both.
-        While iterating it raises WorkError if a state is not finite."""
+        """Yields the states (P, 4) and group indices (P,) at `length` ticks after the warm-up; the next overwrites
+        both.
+        """
         warm = round(self.scenario.warmup * SCRIPT_RATE)
         noise = fluctuations(self.scenario.crowd, self.members, warm + length, SCRIPT_RATE, self.seed, self.repeat)
         for tick in range(-warm, length):
@@ -154,8 +146,6 @@ class World:
                 yield self.states, self.group_of
 
     def _advance(self, noise: Array) -> None:
-        """Simulates the time to the next tick; noise (P, 4): as in PeopleArrays, by column. Does nothing while nobody
-        is present. Raises WorkError if a state is not finite."""
         n = len(self.columns)
         if self.between is not None:
             self.between[:] = np.nan
@@ -179,30 +169,21 @@ class World:
         self.gait[self.columns] = self.people.gait
 
     def _blown_up(self) -> WorkError:
-        """Returns, without raising it, the WorkError for a position or velocity that is not finite."""
         return WorkError(
-            file=self.scenario.name,
-            place=f"seed {self.seed}",
-            got="a position or velocity that is not finite",
-            expected="finite motion",
-            remedy="report the scenario and seed as a bug",
-        )
+            file=self.scenario.name, place=f"seed {self.seed}", got="a position or velocity that is not finite",
+            expected="finite motion", remedy="report the scenario and seed as a bug",
+        )  # fmt: skip
 
     def _read(self) -> Array:
-        """Returns x, y, vx, vy (rows, 4), m, m/s, of all bodies, static ones last: a view that the next read
-        overwrites."""
         self._read_buffer.clear()
         pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
         return np.frombuffer(self._read_buffer.float_buf()).reshape(-1, 4)
 
     def _come_and_go(self, t: float, first: bool) -> None:
-        """Removes people who leave at time t (s, negative in the warm-up) and adds groups whose entry time has come;
-        `first`: first frame of the warm-up. In that frame groups with entry time 0 come, even without room. A walking
-        one starts back on its way by speed × warm-up time, if `_way_back_is_free`. A group that enters at another time
-        waits while people stand at its place; groups that enter in one frame are not checked against each other.
-        Walking groups enter at their speed, others at rest."""
+        """Removes people who leave at time t (s, negative in the warm-up), and adds groups that enter."""
         gone = self.groups.remove_leaving(self.columns)
         coming = [g for g in self.waiting if g.enter <= t or (first and g.enter == 0)]
+        # A group waits while people stand at its place.
         coming = [group for group in coming if first or self._has_room(group)]
         if not gone and not coming:
             return
@@ -213,6 +194,7 @@ class World:
             self.waiting.remove(group)
             self.groups.enter(group)
             heading = self.groups.arrays.heading[group.index]
+            # A walking group starts back on its way, so that it is at its start when the recording begins.
             start_back = first and group.enter == 0 and self._way_back_is_free(group, heading)
             back = self.scenario.warmup * group.speed * heading if start_back else 0.0
             velocity = group.speed * heading if group.walks else heading * 0
@@ -221,23 +203,18 @@ class World:
         self._map_rows()
 
     def _way_back_is_free(self, group: EnteringGroup, heading: Array) -> bool:
-        """Returns True if the group walks along heading (2,), the scene has no pillar, and no member's straight way
-        back during the warm-up crosses a wall; doorways are free."""
         if not group.walks:
             return False
         back = group.pos - self.scenario.warmup * group.speed * heading
         return not blocked(group.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
 
     def _has_room(self, group: EnteringGroup) -> bool:
-        """True if everyone present is more than 0.44 m (centre to centre) from every place where the group enters."""
         if not len(self.state):
             return True
         d = length(group.pos[:, None] - self.state[None, :, :2])
         return bool(d.min() > ENTRY_GAP * BODY_RADIUS)
 
     def _body(self, pos: Array, velocity: Array) -> pymunk.Body:
-        """Adds a 1 kg disc of radius 0.2 m to the space, at pos (2,), m, with velocity (2,), m/s; returns its body. It
-        does not rotate and has no friction."""
         body = pymunk.Body(1.0, float("inf"))
         body.position = float(pos[0]), float(pos[1])
         body.velocity = float(velocity[0]), float(velocity[1])
@@ -247,8 +224,7 @@ class World:
         return body
 
     def _map_rows(self) -> None:
-        """Rebuilds columns, state, force and people after bodies came or went, in the physics engine's order. Sets all
-        of states to nan and group_of to -1. Raises AssertionError if static bodies do not come last."""
+        """Rebuilds columns, state, force and people after bodies came or went, in the physics engine's order."""
         self._read_buffer.clear()
         pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._read_buffer)
         ids = np.frombuffer(self._read_buffer.int_buf(), dtype=np.uintp)
@@ -264,12 +240,10 @@ class World:
         self._fill_people()
 
     def _fill_people(self) -> None:
-        """Copies places, targets, pace and tags of the people present from `groups` to `people`, and their gait."""
         self.groups.fill(self.people, self.columns)
         self.people.gait[:] = self.gait[self.columns]
 
     def _motion(self, ticks: _Record, shown: _Record, frames: FrameTimes) -> Motion:
-        """Returns the Motion of the recorded frames, with headings, body sizes and the script's orders."""
         height = np.array([m.height for m in self.members])
         pos, vel = ticks.state[..., :2], ticks.state[..., 2:]
         present = np.isfinite(pos[..., 0])
@@ -279,32 +253,22 @@ class World:
         state, intent = shown.state[:count], shown.intent[:count]
         there = np.isfinite(state[..., 0])
         if self.between is None:
+            # All frames lie on ticks.
             heading = measured.heading[:count]
         else:
             heading = np.where(there, headings(frames.between_ticks(facing, present)), np.nan)
         return Motion(
-            name=self.scenario.name,
-            seed=self.seed,
-            repeat=self.repeat,
-            fps=self.scenario.camera.fps,
-            pos=state[..., :2],
-            vel=state[..., 2:],
-            heading=heading,
-            present=there,
-            intent=intent,
-            height=height,
-            width=SHOULDER_SHARE * height,
-            depth=DEPTH_SHARE * height,
-            free_speed=np.array([m.free_speed for m in self.members]),
-            scene=self.scene,
-            orders=self.orders.record(frames),
-            measured=measured,
-        )
+            name=self.scenario.name, seed=self.seed, repeat=self.repeat, fps=self.scenario.camera.fps,
+            pos=state[..., :2], vel=state[..., 2:], heading=heading, present=there, intent=intent, height=height,
+            width=SHOULDER_SHARE * height, depth=DEPTH_SHARE * height,
+            free_speed=np.array([m.free_speed for m in self.members]), scene=self.scene,
+            orders=self.orders.record(frames), measured=measured,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Record:
-    """State (K, P, 4): x, y, vx, vy in m, m/s, and group index (K, P) of the people at K times; nan, -1: absent."""
+    """State (K, P, 4) and group index (K, P) of the people at K times; nan, -1: absent."""
 
     state: Array
     intent: Ints
@@ -315,9 +279,6 @@ class _Record:
 
 
 def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
-    """Returns the walls (W, 4): x1, y1, x2, y2, pillars (P, 3): x, y, radius, and stairs (S, 7) of a scene for the
-    kernels, in m. Columns of stairs: foot x, y; unit vector from foot to head x, y; length; width; share of the speed
-    kept on them."""
     stairs = np.zeros((len(scene.stairs), 7))
     for row, s, spec in zip(stairs, scene.stairs, scenario.world.stairs, strict=True):
         along = s.head - s.foot
@@ -327,7 +288,6 @@ def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
 
 
 def _space(scene: Scene) -> pymunk.Space:
-    """Returns a new physics space that holds the walls (0.02 m half width) and pillars of a scene, without friction."""
     space = pymunk.Space()
     space.collision_slop = 0.005
     space.collision_bias = OVERLAP_LEFT

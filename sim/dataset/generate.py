@@ -1,4 +1,4 @@
-"""Generate a dataset: simulate every entry with every seed on any number of workers, and store the sequences.
+"""Datasets: simulates every entry, or replays every recording, with every seed, and stores the sequences.
 
 A sequence folder appears complete or not at all, so an interrupted command can be run again: stored sequences are kept.
 The stored bytes depend on scenario, seed and versions only, not on the workers.
@@ -7,46 +7,44 @@ The stored bytes depend on scenario, seed and versions only, not on the workers.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypedDict, Unpack
+from typing import Any, TypedDict, Unpack, cast
 from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from scenarios.loading.resolve import Entry
+from scenarios.loading.toml_files import dump
+from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
-from sim.dataset.sequence_job import SequenceJob, lost_job, plan_jobs, run_job, stored_manifest
-from sim.dataset.splits import split_of
-from sim.io.files.atomic import PARTIAL, remove_partials, write_file
-from sim.io.files.lock import lock_folder
+from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
+from sim.dataset.sequence_job import SequenceJob, is_stored, lost_job, plan_jobs, run_job, stored_manifest
+from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
+from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
+from sim.io.files.output_paths import output_path, output_paths
+from sim.io.store import sequence_folder
 from sim.io.store.manifest import MANIFEST
 from sim.io.store.streams import check_streams
+from sim.types import Camera, Sequence
 from sim.workers.start import WorkerOptions, start_workers
 
-LEFT_OUT = 0.05
-"""Greatest share of sequences that may be left out because an order of their script did not come true."""
+LEFT_OUT = 0.05  # greatest share of sequences that may be left out because an order of their script did not come true
 QUEUED_JOBS = 100  # jobs that wait at a cluster's scheduler, beside one for each worker
 ONE_WORKER = WorkerOptions()
-Progress = Callable[[int, int, str], None]
-"""Called as progress(sequences done, sequences in all, name of the last one)."""
+Progress = Callable[[int, int, str], None]  # called as progress(sequences done, sequences in all, name of the last one)
 
 
 class Stored(TypedDict, total=False):
-    """What is stored of each sequence.
+    """What is stored of each sequence: pictures ("left", "right", "disparity", "ids"), file type, every N-th frame."""
 
-    streams: pictures ("left", "right", "disparity", "ids", "background"; () for none). images: their file type, "jpg",
-    "png" or "mp4". stride: N stores every N-th frame of the camera only: 1, 1 + N, …, as they are without it, and
-    numbered from 1.
-    """
-
-    streams: Iterable[str]
-    images: str
+    streams: Iterable[str]  # pictures ("left", "right", "disparity", "ids", "background"; () for none)
+    images: str  # their file type, "jpg", "png" or "mp4"
+    # N stores every N-th frame of the camera only: 1, 1 + N, …, as they are without it, and numbered from 1
     stride: int
 
 
 class Folders(list[Path]):
-    """The folders of the sequences made. left_out: by name, the error of each sequence whose script did not come
-    true."""
+    """The folders of the sequences made; `left_out` has the error of each whose script did not come true, by name."""
 
     def __init__(self, folders: Iterable[Path], left_out: dict[str, OrderError]) -> None:
         super().__init__(folders)
@@ -63,27 +61,27 @@ def generate(
     progress: Progress | None = None,
     **stored: Unpack[Stored],
 ) -> Folders:
-    """Write OUT/flockscope-<split>/<name>-s<seed>/ for every entry and seed, and OUT/seqmaps; returns the sequence
-    folders.
+    """Simulates every entry with every seed, and stores each sequence as OUT/flockscope-<split>/<name>-s<seed>/.
 
-    The folders come in the order of entries, all seeds of an entry together; no entries give []. Stored sequences of
-    the same scenario, seed, version and pictures are kept if all their files are intact, else made again.
+    Stored sequences of the same scenario, seed, version and pictures are kept if all their files are intact. The lists
+    in OUT/seqmaps are for TrackEval.
 
-    entries: resolved entries, or names of scenarios, suites or TOML files. set: "key=value" settings for entries given
-    by name. seeds: inside one split (train from 0, val from 10,000, test from 20,000, fit from 30,000, demo from
-    40,000). workers: by default this process. The workers of a cluster must share the folder `out` under the same path.
-    progress: called as progress(sequences done, sequences in all, name of the last one) after each, failed ones
-    included. stored: streams, images, stride (`Stored`); left jpg pictures of all frames by default.
+    Args:
+        entries: Resolved entries, or names of scenarios, suites or TOML files.
+        seeds: Inside one split: train from 0, val from 10,000, test from 20,000, fit from 30,000, demo from 40,000.
+        out: The folder of the dataset.
+        set: "key=value" settings for entries given by name.
+        workers: By default this process. Those of a cluster must share the folder `out` under the same path.
+        progress: Called as progress(sequences done, sequences in all, name of the last one) after each.
+        **stored: Streams, images, stride (`Stored`); left jpg pictures of all frames by default.
 
-    A sequence is left out if an order of its script did not come true; the result's `left_out` holds the reasons. If
-    that happens to more than 5 % of the sequences, it is an error.
+    Returns:
+        The folders, in the order of entries, all seeds of an entry together. `left_out` has the errors of those whose
+        script did not come true.
 
-    Raises InputError before anything is simulated if an option or scenario is wrong, two entries share a name, a folder
-    holds another sequence, or another process writes to `out`. If sequences fail, the others are made, and then an
-    error is raised with the text of the first failure and the number of failures: InputError if all failures are
-    InputErrors, else WorkError. It is a WorkError, too, if a sequence that a worker made is not found here. An error
-    that would hit every sequence, as a full disk, ends the work at once. Also raises as `start_workers`: InputError for
-    a wrong address of a cluster, WorkError if the cluster does not answer or workers are lost.
+    Raises:
+        InputError: An argument is wrong, a folder holds another sequence, or all failures are InputErrors.
+        WorkError: Sequences failed, more than 5 % were left out, or workers were lost. The other sequences are made.
     """
     if workers.count < 1:
         raise InputError(place="workers", got=workers.count, expected="1 or more", remedy="correct --workers")
@@ -117,7 +115,6 @@ def generate(
 def _storing(
     jobs: list[SequenceJob], streams: Iterable[str] = ("left",), images: str = "jpg", stride: int = 1
 ) -> list[SequenceJob]:
-    """Return the jobs with what they store (`Stored`). Raises InputError for wrong values."""
     pictures = check_streams(streams, images)
     for job in jobs:
         check_stride(stride, job.entry.scenario.camera.fps)
@@ -134,14 +131,6 @@ def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]
 def _run_jobs(
     jobs: list[SequenceJob], workers: WorkerOptions, done: Callable[[SequenceJob], None]
 ) -> dict[str, FlockscopeError]:
-    """Run all jobs, or those up to the first fatal error; returns the errors by sequence name, in the order of the
-    jobs.
-
-    workers: which workers to use, never more than jobs. done: called with each finished job, also a failed one, but not
-    with the job of the fatal error. Jobs without error have no entry. Raises as `start_workers`: InputError for a wrong
-    address of a cluster, WorkError if it does not answer. Raises WorkError if the workers are lost, and InputError or
-    WorkError if the marker file that a cluster needs cannot be written.
-    """
     errors: dict[str, FlockscopeError] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
         marked = _with_marker(jobs) if jobs and workers.cluster is not None else jobs
@@ -155,12 +144,7 @@ def _run_jobs(
 
 
 def _with_marker(jobs: list[SequenceJob]) -> list[SequenceJob]:
-    """Write an empty marker file into OUT and return the jobs with that file as their `marker`; needs at least one job.
-
-    OUT is the folder above that of the jobs' split. A worker starts such a job only if it sees the file, so that it
-    writes to the same file system. remove_partials deletes the file. Raises InputError if it cannot be written,
-    WorkError if the disk is full, IndexError without jobs.
-    """
+    # A worker starts a job only if it sees this file: else it would write to another file system.
     marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
     write_file(marker, b"")
     return [replace(job, marker=marker) for job in jobs]
@@ -186,13 +170,7 @@ def _not_visible(job: SequenceJob) -> WorkError:
 
 
 def write_seqmap(root: Path, split: str) -> set[str]:
-    """Write ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of sequences; returns the names in it.
-
-    After a first line "name" it lists, sorted, every folder below ROOT/flockscope-<split> that has a manifest.json;
-    folders whose names begin with a dot are left out. The manifests are not read. Without such a folder no file is
-    written and the result is empty; an existing file stays. Raises InputError if the file cannot be written, WorkError
-    if the disk is full.
-    """
+    """Writes ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of complete sequences; returns their names."""
     folder = root / f"flockscope-{split}"
     complete = sorted(p.parent.name for p in folder.glob(f"*/{MANIFEST}") if not p.parent.name.startswith("."))
     if complete:
@@ -201,17 +179,77 @@ def write_seqmap(root: Path, split: str) -> set[str]:
 
 
 def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
-    """Return one error for all failures of `total` jobs, given by sequence name; `errors` has at least one entry.
-
-    A single error is returned unchanged. Otherwise the result has the text of the first error, the number of further
-    errors and up to five of their names. Its type is that of the errors if all have the same, else WorkError.
-    """
     first, *_ = errors.values()
     if len(errors) == 1:
         return first
     others = ", ".join(list(errors)[1:6]) + (", …" if len(errors) > 6 else "")
+    # One text for all failures: that of the first, and the names of some others.
     kind = type(first) if len({type(e) for e in errors.values()}) == 1 else WorkError
     return kind(
         file=first.file, place=first.place, got=f"{first.got} (and {len(errors) - 1} more of {total}: {others})",
         expected=first.expected, remedy=first.remedy + ("" if len(errors) == total else "; the others are kept"),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """Options that all replays of a dataset share."""
+
+    view: ObservationSpec  # camera, sensor, light and picture, with the frame rate
+    cut: Cut = WHOLE  # the part of each recording to replay, default all
+    # camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an error for
+    # others
+    calibration: Camera | str | Path | None = None
+    # pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none
+    streams: tuple[str, ...] = ("left",)
+    images: str = "jpg"  # their file type, "jpg", "png" or "mp4"
+
+
+def store_replays(
+    sources: Iterable[Sequence], options: ReplayOptions, seeds: range, out: str | Path, progress: Progress | None = None
+) -> list[Path]:
+    """Stores a replay of every source with every seed, as `generate` does; returns the folders.
+
+    The first error ends the work; replays stored before it are kept. Recordings of real motion need seeds from 20,000
+    on.
+    """
+    recordings, split, root = list(sources), split_of(seeds), Path(out)
+    folder = root / f"flockscope-{split}"
+    _check(recordings, folder, options.cut, seeds, split)
+    options = replace(options, streams=tuple(check_streams(options.streams, options.images)))
+    made: list[Path] = []
+    with lock_folder(root):
+        remove_partials(root, folder, root / "seqmaps")
+        try:
+            for recording in recordings:
+                for seed in seeds:
+                    made.append(_store(recording, options, seed, folder))
+                    if progress is not None:
+                        progress(len(made), len(recordings) * len(seeds), made[-1].name)
+        finally:
+            remove_partials(root, folder)
+            write_seqmap(root, split)
+    return made
+
+
+def _check(recordings: list[Sequence], folder: Path, cut: Cut, seeds: range, split: str) -> None:
+    output_paths(folder, [replay_name(recording.name, cut) for recording in recordings], source="recordings")
+    if split in TUNING_SPLITS and any(is_real(recording) for recording in recordings):
+        raise InputError(
+            place="--seeds", got=f"{seeds.start} ({split})", expected="seeds from 20000 (test) on, for real motion",
+            remedy="choose other seeds: nothing is tuned on recordings",
+        )  # fmt: skip
+
+
+def _store(recording: Sequence, options: ReplayOptions, seed: int, folder: Path) -> Path:
+    sequence, form = resolve_replay(
+        recording, options.view, seed, cut=options.cut, calibration=options.calibration, streams=options.streams
+    )  # fmt: skip
+    entry = Entry(form.name, cast(Any, form))
+    job = SequenceJob(output_path(folder, form.name, f"-s{seed:05d}"), entry, seed, options.streams, options.images)
+    if not is_stored(job):
+        sequence_folder.write_sequence(
+            job.folder, replace(sequence, name=job.name), scenario=dump(form), seed=seed, streams=options.streams,
+            images=options.images, keep=lambda: is_stored(job),
+        )  # fmt: skip
+    return job.folder

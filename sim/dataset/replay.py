@@ -17,7 +17,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load_observation
-from scenarios.schema.observation import ObservationSpec, ReplayOrigin, ReplaySpec
+from scenarios.schema.scenario import ObservationSpec, ReplayOrigin, ReplaySpec
 from sim.crowd.heading import facings, headings
 from sim.dataset.splits import is_real
 from sim.dataset.trajectories import Trajectories, nearest_row, resample
@@ -34,14 +34,10 @@ FLAT = ("caviar",)  # recordings whose image, divided by its scale, is taken as 
 
 @dataclass(frozen=True)
 class Cut:
-    """The part of a recording to replay.
+    """The part of a recording to replay."""
 
-    start: s after the recording's frame 1, 0 or more. duration: s; None means to the recording's end. A duration beyond
-    the end is cut off there.
-    """
-
-    start: float = 0.0
-    duration: float | None = None
+    start: float = 0.0  # s after the recording's frame 1, 0 or more
+    duration: float | None = None  # s; None means to the recording's end. A duration beyond the end is cut off there.
 
 
 WHOLE = Cut()
@@ -56,22 +52,24 @@ def replay(
     calibration: Camera | str | Path | None = None,
     streams: Iterable[str] = ("left",),
 ) -> Sequence:
-    """Return the labelled people of a recording as a simulated sequence: real motion, seen by our camera and sensor.
+    """Returns the labelled people of a recording as a simulated sequence: real motion, seen by our camera and sensor.
 
-    source: a sequence with truth, or the path of one. camera: an ObservationSpec (camera, sensor, light, picture) or
-    its TOML file; None for the default. seed: for bodies, looks and sensor. cut: the part to replay; default all.
-    calibration: camera, or file of a camera, of a recording that has boxes but no ground positions; it maps the boxes'
-    feet to the ground. streams: pictures as for sim.simulate, some of "left", "right", "disparity", "ids",
-    "background". The ground is moved so that the least x and y are 1 m, unless a simulated source has a scene, which is
-    then kept. The result's `source["origin"]` describes the recording. Without group labels in the recording, the
-    result's truth has no group labels either.
+    The ground is moved so that the least x and y are 1 m, unless a simulated source has a scene, which is then kept.
 
-    Raises InputError if the source is invalid, holds several sequences, has no labelled people or no way to positions
-    on the ground; if a calibration is given for labels that are on the ground, is invalid or has another aspect ratio
-    than the recording; if the cut is outside the recording, longer than an hour, or empty of people; if `camera` is
-    invalid, people leave its view (unless its camera.crop is true), a stream is unknown, or "right" or "disparity" is
-    wanted without a baseline. Raises ValueError for a negative seed. Reading detections raises InputError if the sensor
-    is to hide a group by name, since replays have none.
+    Args:
+        source: A sequence with truth, or the path of one.
+        camera: Camera, sensor, light and picture, or their TOML file.
+        seed: For bodies, looks and sensor.
+        cut: The part to replay.
+        calibration: Camera, or its file, of a recording with boxes alone: maps the boxes' feet to the ground.
+        streams: Pictures: some of "left", "right", "disparity", "ids", "background".
+
+    Returns:
+        The sequence; `source["origin"]` describes the recording.
+
+    Raises:
+        InputError: The source has no labelled people or no way to the ground, the cut is outside it, or people leave
+            the camera's view.
     """
     from sim.io.source import open_source
 
@@ -95,17 +93,14 @@ def resolve_replay(
     calibration: Camera | str | Path | None = None,
     streams: Iterable[str] = (),
 ) -> tuple[Sequence, ReplaySpec]:
-    """Return (replay, specification): the sequence that `replay` returns for this source, and the ReplaySpec that
-    describes it.
+    """Returns the sequence that `replay` returns, and the ReplaySpec that describes it.
 
-    The specification has all defaults filled in. It takes the place of the scenario in stored files and hashes. source:
-    a sequence with truth. view: camera, sensor, light and picture. seed, cut, calibration: as for `replay`. streams:
-    pictures, by default none. Raises InputError as `replay`, for instance for a source without labelled people or
-    ground positions, a cut outside the recording, or people outside the camera's view; ValueError for a negative seed.
+    The latter, with all defaults, takes the place of the scenario in stored files and hashes.
     """
     truth = _labels(source)
     places = on_ground(truth, source, _calibrated(calibration, source))
     moving = _moving(places, truth, source, view.camera.fps, cut)
+    # A simulated scene stays where it is; recordings may have any origin.
     low, whole = np.nanmin(moving.pos, axis=(0, 1)), source.scene if not is_real(source) else None
     shift = np.zeros(2) if whole is not None else MARGIN - low
     origin = _origin(source, truth, places, moving, cut, view.camera.fps, shift)
@@ -131,15 +126,10 @@ def _labels(source: Sequence) -> Truth:
 
 
 def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None) -> Array:
-    """Return the positions on the ground (R, 2) m, x and y, of the R rows of a truth, nan where unknown.
+    """Returns the positions (R, 2) m of the rows of a truth, nan where unknown.
 
-    They are the truth's own positions if it has some. Otherwise they are the feet of its boxes (middle of the lower
-    edge; of the box for a camera of kind "top"), projected with `calibration` or, if that is None, the source's camera
-    onto the ground z = 0. Without a camera, a CAVIAR recording gives the boxes' centres divided by the image scale
-    px_per_m, with y upwards.
-
-    Raises InputError if none of these is known, or if a calibration is given for a truth with positions. Raises
-    AssertionError for a truth with neither positions nor boxes.
+    They are its own, or the feet of its boxes as seen by the calibration or the source's camera, or, of CAVIAR, the
+    boxes' centres over the image scale.
     """
     if truth.pos is not None:
         if calibration is not None:
@@ -175,12 +165,6 @@ def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Ca
 
 
 def _moving(places: Array, truth: Truth, source: Sequence, fps: float, cut: Cut) -> Trajectories:
-    """Return the trajectories of the people of `source` in the cut, resampled at `fps` frames/s.
-
-    places (R, 2) m: ground positions of the rows of `truth`, rows with nan are ignored. A cut beyond the recording's
-    end is shortened. Raises InputError if the cut begins before 0 s or after the end, is shorter than a frame, lasts
-    more than an hour, or has nobody in it.
-    """
     file, whole = source.source.get("path", source.name), (truth.length - 1) / truth.fps
     last = whole if cut.duration is None else min(whole, cut.start + cut.duration - 1 / fps)
     if not 0 <= cut.start <= last <= cut.start + LONGEST:
@@ -205,16 +189,11 @@ def _origin(
     labels = {"frame": truth.frame, "id": truth.id, "group": truth.group, "places": places, "fps": truth.fps}
     first = source.source.get("origin") or {}  # of a replay of a replay
     return ReplayOrigin(
-        kind=str(first.get("kind", source.source.get("kind", "unknown"))),
-        name=str(first.get("name", source.name)),
-        real=is_real(source),
-        people=tuple(int(one) for one in moving.id),
-        start=cut.start,
-        duration=round(len(moving.present) / fps, 6),
-        smoothing=moving.smoothing,
-        shift=(float(shift[0]), float(shift[1])),
-        motion=canonical_hash(labels),
-    )
+        kind=str(first.get("kind", source.source.get("kind", "unknown"))), name=str(first.get("name", source.name)),
+        real=is_real(source), people=tuple(int(one) for one in moving.id), start=cut.start,
+        duration=round(len(moving.present) / fps, 6), smoothing=moving.smoothing,
+        shift=(float(shift[0]), float(shift[1])), motion=canonical_hash(labels),
+    )  # fmt: skip
 
 
 def _motion(moving: Trajectories, truth: Truth, name: str, fps: float, cut: Cut, seed: int, shift: Array) -> Motion:
@@ -222,45 +201,27 @@ def _motion(moving: Trajectories, truth: Truth, name: str, fps: float, cut: Cut,
     pos = moving.pos + shift
     height = _heights(moving.id, truth, seed)
     return Motion(
-        name=name,
-        seed=seed,
-        repeat=0,
-        fps=fps,
-        pos=pos,
-        vel=moving.vel,
-        heading=headings(facings(pos, moving.vel, moving.present, intent, fps)),
-        present=moving.present,
-        intent=intent,
-        height=height,
-        width=SHOULDER_SHARE * height,
-        depth=DEPTH_SHARE * height,
+        name=name, seed=seed, repeat=0, fps=fps, pos=pos, vel=moving.vel,
+        heading=headings(facings(pos, moving.vel, moving.present, intent, fps)), present=moving.present, intent=intent,
+        height=height, width=SHOULDER_SHARE * height, depth=DEPTH_SHARE * height,
         free_speed=np.nanmedian(np.linalg.norm(moving.vel, axis=2), axis=0),
         scene=Scene(np.nanmax(pos, axis=(0, 1)) + MARGIN),
-    )
+    )  # fmt: skip
 
 
 def _intent(moving: Trajectories, truth: Truth, fps: float, cut: Cut) -> Ints:
-    """Return the number of the group that each person is meant to be in, (T, P): frame × person of `moving`, from frame
-    1.
-
-    It is the group in the person's row of `truth` that is nearest in time, of two equally near ones the earlier. A
-    person alone gets a number of its own, above all groups; -1 while absent. fps: frames/s of `moving`. cut: its start
-    in s is the time of frame 1.
-    """
+    """Returns the group that each person is meant to be in, (T, P), by the label nearest in time; -1 while absent."""
     t = cut.start + np.arange(len(moving.present)) / fps
     label = truth.group[nearest_row(truth.frame, truth.id, moving.id, truth.fps, t)]
+    # A person alone is a group of its own, numbered above all others.
     alone = int(truth.group.max(initial=0)) + 1 + np.arange(len(moving.id))
     return np.where(moving.present, np.where(label >= 0, label, alone), -1).astype(np.int64)
 
 
 def _heights(people: Ints, truth: Truth, seed: int) -> Array:
-    """Return the body heights (P,) m of `people`, ids (P,) of the truth.
-
-    A person's height is that of its first row in the truth. Where it is unknown (nan, or no heights in the truth), it
-    is drawn as in simulated crowds, from seed and id. Raises ValueError for a negative seed or id.
-    """
     from scenarios.schema.scenario import CrowdSpec
 
+    # As in simulated crowds, where the recording does not tell.
     drawn = [draw(CrowdSpec().height, rng(seed, "person", int(one))) for one in people]
     if truth.height is None:
         return np.array(drawn)
@@ -269,25 +230,13 @@ def _heights(people: Ints, truth: Truth, seed: int) -> Array:
 
 
 def replay_name(name: str, cut: Cut) -> str:
-    """Return the replay's name: `name` of the recording with "-" for every character other than letters, digits, "_",
-    "." and "-".
-
-    "replay-" is put in front if it does not begin with a letter. "-t<start in s>" is appended if the cut begins after 0
-    s.
-    """
+    """Returns the replay's name: that of the recording with harmless characters, and the start of the cut."""
     clean = "".join(c if c.isalnum() or c in "_.-" else "-" for c in name)
     clean = clean if clean[:1].isalpha() else f"replay-{clean}"
     return f"{clean}-t{cut.start:g}" if cut.start else clean
 
 
 def _without_groups(sequence: Sequence) -> Callable[[], Truth]:
-    """Return a function that loads the sequence's truth without groups, for a recording without group labels.
-
-    In that truth everybody is alone (group -1); groups, groups_px, events and near (pairs of strangers who came near
-    each other) are None, and no frame counts as labelled. The function raises AssertionError for a sequence without
-    truth, else what loading the truth raises.
-    """
-
     def truth() -> Truth:
         assert sequence.load_truth is not None
         found = sequence.load_truth()

@@ -15,32 +15,55 @@ from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading.resolve import Entry
-from sim.dataset.setting_differences import setting_differences
+from scenarios.loading.toml_files import Table
+from scenarios.printable import shortened
 from sim.io.files.output_paths import output_path, output_paths
-from sim.io.files.side_files import is_side_file
+from sim.io.files.own_files import is_side_file
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
-from sim.io.store.manifest_check import check_manifest
+from sim.io.store.manifest import MANIFEST, check_manifest, damaged_files, identity, is_own_sequence, read_manifest
+
+MOST = 3  # differences that are named; the others are counted
+LONGEST = 40  # characters of a value
+
+
+def setting_differences(stored: Table, wanted: Table) -> str:
+    """Returns the settings that differ between two scenarios, as "camera.fps 10 → 5, duration 20 → 30"."""
+    before, after = (dict(_flat("", table)) for table in (stored, wanted))
+    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
+    words = [f"{key} {_value(before, key)} → {_value(after, key)}" for key in keys[:MOST]]
+    return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
+
+
+def _flat(prefix: str, value: Any) -> list[tuple[str, Any]]:
+    if isinstance(value, dict):
+        dot = "." if prefix else ""
+        return [pair for key, inner in value.items() for pair in _flat(f"{prefix}{dot}{key}", inner)]
+    if isinstance(value, list) and any(isinstance(inner, dict) for inner in value):
+        return [pair for k, inner in enumerate(value) for pair in _flat(f"{prefix}[{k}]", inner)]
+    return [(prefix, value)]
+
+
+def _value(settings: Table, key: str) -> str:
+    value = settings.get(key, "none")
+    return shortened(str(value).removesuffix(".0") if isinstance(value, float) else str(value), LONGEST)
+
 
 MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
 
 
 @dataclass(frozen=True)
 class SequenceJob:
-    """One sequence to make.
+    """One sequence to make."""
 
-    folder: where it is stored; its last part is the sequence's name. entry: the scenario to simulate. seed: the random
-    seed. streams: pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none. images:
-    their file type, "jpg", "png" or "mp4". stride: N stores every N-th frame of the camera. marker: a file that a
-    worker must see before it starts, because it would otherwise write to another file system; None for local workers.
-    """
-
-    folder: Path
-    entry: Entry
-    seed: int
+    folder: Path  # where it is stored; its last part is the sequence's name
+    entry: Entry  # the scenario to simulate
+    seed: int  # the random seed
+    # pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none
     streams: tuple[str, ...] = ()
-    images: str = "jpg"
-    stride: int = 1
+    images: str = "jpg"  # their file type, "jpg", "png" or "mp4"
+    stride: int = 1  # N stores every N-th frame of the camera
+    # a file that a worker must see before it starts, because it would otherwise write to another file system; None for
+    # local workers
     marker: Path | None = None
 
     @property
@@ -51,34 +74,20 @@ class SequenceJob:
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """How a job ended.
+    """How a job ended."""
 
-    error: the error, None if the sequence is stored. fatal: True if every other job would fail in the same way, as with
-    a full disk.
-    """
-
-    error: FlockscopeError | None = None
-    fatal: bool = False
+    error: FlockscopeError | None = None  # the error, None if the sequence is stored
+    fatal: bool = False  # True if every other job would fail in the same way, as with a full disk
 
 
 def plan_jobs(entries: list[Entry], seeds: range, folder: Path) -> list[SequenceJob]:
-    """Return one job per entry and seed, all seeds of the first entry first; the jobs store no pictures.
-
-    folder: OUT/flockscope-<split>; each job's folder is <entry>-s<seed, at least 5 digits> in it. No entries give no
-    jobs. Raises InputError if two entries would share a folder.
-    """
+    """Returns one job per entry and seed, without pictures, all seeds of the first entry first."""
     output_paths(folder, [e.name for e in entries], source="entries")
     return [SequenceJob(output_path(folder, e.name, f"-s{seed:05d}"), e, seed) for e in entries for seed in seeds]
 
 
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
-    """Return the manifest in the job's folder; None if the folder or its manifest is missing.
-
-    The files are not compared with the manifest. Raises InputError for an invalid manifest, which does not tell what
-    the folder holds, and if the folder holds another sequence, that is, if the manifest differs in scenario, seed,
-    repeat, schema, engine, streams, file type or stride; the error names what differs. Also raises InputError if the
-    folder is a file or holds something else than a sequence, or a stream or the file type of the job is unknown.
-    """
+    """Returns the manifest in the job's folder, None without one; raises InputError if it is another sequence's."""
     from scenarios.loading.resolve import dump
 
     if not job.folder.exists():
@@ -95,6 +104,7 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
     try:
         manifest = check_manifest(path, read_manifest(job.folder))
     except InputError as error:
+        # An invalid manifest does not tell what the folder holds.
         remedy = "delete that folder, or choose another --out"
         raise InputError(**{**error.as_dict(), "remedy": remedy}) from None
     scenario = dump(job.entry.scenario)
@@ -111,13 +121,8 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
 
 
 def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str, Any]) -> str:
-    """Return what differs between the stored sequence and the job's, as "camera.fps 10 → 5, seed 1 → 2".
-
-    different: wanted values of the fields of `manifest` that differ. Settings are named if the stored scenario.toml is
-    readable; else the field "scenario_hash" stands for them.
-    """
     from scenarios.loading.toml_files import dump, parse
-    from scenarios.parsing import parse_toml
+    from scenarios.reading import parse_toml
 
     settings = ""
     if "scenario_hash" in different:
@@ -130,30 +135,18 @@ def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str
 
 
 def _word(value: Any) -> str:
-    """Return a field of a manifest as a word: a list with commas, "none" for None and an empty list."""
     text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
     return "none" if value is None or not text else text
 
 
 def is_stored(job: SequenceJob) -> bool:
-    """Return True if the folder holds the job's sequence and every file has the hash that its manifest names.
-
-    Returns False if the folder or a valid manifest is missing, or a file is missing or altered. Files that the manifest
-    does not name are ignored. Raises InputError if the folder holds another sequence, or a stream or the file type of
-    the job is unknown.
-    """
+    """Returns True if the folder holds the job's sequence, and every file has the hash of its manifest."""
     manifest = stored_manifest(job)
     return manifest is not None and next(damaged_files(job.folder, manifest), None) is None
 
 
 def simulate_and_store(job: SequenceJob) -> None:
-    """Simulate the job's scenario and write its folder, replacing a damaged one.
-
-    If another process has stored the same sequence meanwhile, that one stays. Raises InputError (impossible scenario or
-    pictures, another sequence in the folder) or WorkError (unfulfilled order), with the scenario's file in the error.
-    Any other exception becomes a WorkError. An InputError or WorkError that an OSError caused, as a full disk, is
-    raised unchanged.
-    """
+    """Simulates the job's scenario and writes its folder, replacing a damaged one."""
     from scenarios.loading.resolve import dump
     from sim.sequence import simulate
 
@@ -165,6 +158,7 @@ def simulate_and_store(job: SequenceJob) -> None:
             streams=job.streams, images=job.images, keep=lambda: is_stored(job),
         )  # fmt: skip
     except FlockscopeError as error:
+        # A full disk: it would hit every other job, too.
         if isinstance(error.__cause__, OSError):
             raise
         raise type(error)(**{**error.as_dict(), "file": entry.file or error.file or job.name}) from error
@@ -176,12 +170,7 @@ def simulate_and_store(job: SequenceJob) -> None:
 
 
 def run_job(job: SequenceJob) -> JobOutcome:
-    """Make the job's sequence unless it is already stored undamaged; returns how that ended.
-
-    InputError and WorkError are returned in the JobOutcome, not raised. The outcome is fatal if an OSError caused the
-    error, as a full disk or a marker file that the worker cannot see within 5 s. The fatal error of a job with a marker
-    names the worker's machine.
-    """
+    """Makes the job's sequence unless it is stored undamaged; errors are in the outcome, not raised."""
     try:
         if job.marker is not None:
             _wait_for_marker(job.marker)
@@ -196,9 +185,7 @@ def run_job(job: SequenceJob) -> JobOutcome:
 
 
 def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
-    """Return the outcome of a job that killed too many workers: a copy of `error` with the job's name as file, not
-    fatal.
-    """
+    """Returns the outcome of a job that killed too many workers."""
     return JobOutcome(WorkError(**{**error.as_dict(), "file": job.name}))
 
 

@@ -9,23 +9,17 @@ from __future__ import annotations
 from scenarios.errors import InputError
 from sim.types import Sequence
 
+# (name, first seed, seed after the last)
 SPLITS = (("train", 0, 10_000), ("val", 10_000, 20_000), ("test", 20_000, 30_000), ("fit", 30_000, 40_000))
-"""(name, first seed, seed after the last)."""
 
 DEMO = ("demo", 40_000, 2**63)
-TUNING_SPLITS = ("train", "val")
-"""Splits on which parameters may be chosen; replays of recordings are refused there."""
+TUNING_SPLITS = ("train", "val")  # splits on which parameters may be chosen; replays of recordings are refused there
 
-SIMULATED = ("simulated", "generated", "replayed")
-"""Values of `Sequence.source["kind"]` that are no recordings."""
+SIMULATED = ("simulated", "generated", "replayed")  # values of `Sequence.source["kind"]` that are no recordings
 
 
 def split_of(seeds: range) -> str:
-    """Return the name of the split that holds all seeds: "train", "val", "test", "fit" or "demo".
-
-    The splits begin at the seeds 0, 10,000, 20,000, 30,000 and 40,000; "demo" has all from there on. Raises InputError
-    if the range is empty, has a negative seed, or crosses the border between two splits.
-    """
+    """Returns the name of the split that holds all seeds; raises InputError if they are in two splits, or none."""
     if len(seeds) == 0 or min(seeds) < 0:
         raise InputError(
             place="seeds", got=f"{seeds.start}:{seeds.stop}", expected="a:b with 0 <= a < b", remedy="correct --seeds"
@@ -42,10 +36,6 @@ def split_of(seeds: range) -> str:
 
 
 def is_real(sequence: Sequence) -> bool:
-    """Return True if the sequence shows real motion: a recording, or a replay of a recording.
-
-    Decided by `sequence.source`: its "origin" (of a replay) says whether it is real. Without one, a "kind" other than
-    "simulated", "generated" and "replayed" is a recording. A sequence with neither counts as simulated.
-    """
+    """Returns True if the sequence shows real motion: a recording, or a replay of a recording."""
     kind, origin = sequence.source.get("kind"), sequence.source.get("origin")
     return bool(origin["real"]) if origin is not None else kind is not None and kind not in SIMULATED

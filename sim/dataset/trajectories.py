@@ -23,18 +23,14 @@ GAP = 2.0  # s without label after which a person counts as absent
 
 @dataclass(frozen=True)
 class Trajectories:
-    """Resampled motion of P people in T frames.
+    """Resampled motion of P people in T frames."""
 
-    id (P,): person ids, ascending; column k belongs to id[k]. pos (T, P, 2): x, y in m, and vel (T, P, 2): m/s, the
-    derivative of the smoothed positions; both nan while absent. present (T, P): True while present. smoothing: the
-    chosen time constant tau in s; faster motion was removed.
-    """
-
-    id: Ints
+    id: Ints  # (P,) person ids, ascending; column k belongs to id[k]
+    # (T, P, 2) x, y in m, and vel (T, P, 2): m/s, the derivative of the smoothed positions; both nan while absent
     pos: Array
     vel: Array
-    present: Bools
-    smoothing: float
+    present: Bools  # (T, P) True while present
+    smoothing: float  # the chosen time constant tau in s; faster motion was removed
 
 
 Curve = Callable[[Array], Array]
@@ -42,13 +38,10 @@ Segment = tuple[int, Array, Curve, Curve]
 
 
 def resample(frame: Ints, id: Ints, pos: Array, rate: float, fps: float, first: float, last: float) -> Trajectories:
-    """Return the smoothed motion of labelled people at times first, first + 1/fps, … up to and including last (s).
+    """Returns the smoothed motion of labelled people at the times first, first + 1/fps, … last (s).
 
-    frame (from 1), id (R,), pos (R, 2) m, finite: labelled rows in any order, each id once in a frame. rate: label
-    frames per second; frame 1 is time 0. A person is absent in gaps of more than 2 s between labels, before the first
-    and after the last label. Segments with a single label are dropped, and so are people who are absent at all of the
-    times. Without rows the result has no people. One smoothing time serves all people: the smallest of 0.05 to 1 s
-    (TIMES) that keeps the 99 % quantile of accelerations within 2.5 m/s²; 1 s if none does.
+    frame (from 1), id (R,), pos (R, 2) m: labelled rows in any order, each id once in a frame. rate: label frames per
+    s. People are absent in gaps of more than 2 s, and before and after their labels.
     """
     t = first + np.arange(int(np.floor((last - first) * fps + 1e-6)) + 1) / fps
     for tau in TIMES:
@@ -70,12 +63,6 @@ def _inside(times: Array, t: Array) -> Bools:
 
 
 def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: float) -> list[Segment]:
-    """Return the gap-free segments of the person with id `one`, smoothed with time constant `tau` (s).
-
-    Each segment is (id, times of its labels in s, position as a function of time, velocity as a function of time).
-    frame (from 1), id (R,), pos (R, 2) m: all labelled rows. rate: label frames per second. A gap is more than 2 s.
-    Segments with a single label are left out.
-    """
     from scipy.interpolate import CubicSpline
 
     rows = np.flatnonzero(id == one)
@@ -83,6 +70,7 @@ def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: flo
     cuts = np.flatnonzero(np.diff(frame[rows]) > GAP * rate) + 1
     made: list[Segment] = []
     for part in np.split(rows, cuts):
+        # A single label tells no motion.
         if len(part) >= 2:
             times = (frame[part] - 1) / rate
             f = CubicSpline(times, smoothing_spline(times, pos[part], tau**4 * rate), bc_type="natural")
@@ -91,10 +79,7 @@ def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: flo
 
 
 def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
-    """Return the smoothing spline f (N, 2) at its knots t (N,): the minimum of Σ |y - f|² + weight ∫ |f''|².
-
-    t (N,): ascending times, no two equal. y (N, 2): finite values at t. weight: 0 or more; 0 returns y; a large one
-    gives a straight line. Fewer than 3 rows are returned unchanged, as `y` itself. f is a natural cubic spline.
+    """Returns the natural cubic spline f (N, 2) at its knots t (N,) that minimises Σ |y - f|² + weight ∫ |f''|².
 
     Reinsch (1967): f = y - weight Q γ with (R + weight Qᵀ Q) γ = Qᵀ y. γ (N - 2,) is f'' at the inner knots. Qᵀ forms
     differences of slopes at the inner knots; R holds the integrals of products of hat functions there.
@@ -120,10 +105,7 @@ def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
 
 
 def _acceleration(segments: list[Segment], fps: float) -> float:
-    """Return the 99 % quantile of the segments' accelerations in m/s², sampled `fps` times per s; 0 without segments.
-
-    An acceleration is the length of the difference of two successive velocities times fps. One 0 is always among them.
-    """
+    """Returns the 99 % quantile of the accelerations, m/s²."""
     size = [np.zeros(1)]
     for _, times, _, velocity in segments:
         t = np.arange(times[0], times[-1], 1 / fps)
@@ -132,11 +114,10 @@ def _acceleration(segments: list[Segment], fps: float) -> float:
 
 
 def nearest_row(frame: Ints, id: Ints, people: Ints, rate: float, t: Array) -> Ints:
-    """Return for each time and person the index of the person's label row that is nearest in time, shape (T, P).
+    """Returns the label row that is nearest in time, for each time t (T,) s and person (P,): (T, P).
 
-    frame (from 1), id (R,): the label rows, in any order. people (P,): ids, each of which must have a row (else
-    IndexError). rate: label frames per second; frame 1 is time 0. t (T,): times in s. Of two equally near rows the
-    earlier one is taken.
+    frame (from 1), id (R,): the label rows. rate: label frames per s. Of two equally near rows the earlier one is
+    taken.
     """
     out = np.zeros((len(t), len(people)), np.int64)
     for column, one in enumerate(people):

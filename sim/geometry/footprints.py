@@ -26,22 +26,15 @@ FLAT = 1e-9  # rad: a narrower cone is a rounding error, and its vertex lies on 
 
 
 def footprint_hull(pos: Array) -> Array:
-    """Return the convex hull (V, 2), x and y in m, counter-clockwise, of the footprints of N people at pos (N, 2) m.
-
-    A footprint is a regular 16-gon on a circle of 0.25 m round the person; one person has 16 vertices. (0, 2) if nobody
-    is given. Positions must not be nan: the result then has no meaning.
-    """
+    """Returns the hull (V, 2) of the footprints of N people at pos (N, 2); (0, 2) of nobody."""
     pos = np.asarray(pos, float).reshape(-1, 2)
     return footprint_hulls(pos, np.array([len(pos)]))[0]
 
 
 def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
-    """Return a list of one convex hull (V, 2) in m per group, counter-clockwise: the hull of its members' footprints.
+    """Returns the hull (V, 2) of the footprints of each group, counter-clockwise.
 
-    A footprint is a regular 16-gon on a circle of 0.25 m round the person. pos (R, 2) m holds the members of group 0,
-    then those of group 1, and so on; count (G,) is the number of members of each group. The hull of a group without
-    members is (0, 2). Positions must not be nan. Raises IndexError if the counts add up to more than R; further rows
-    are ignored.
+    pos (R, 2) m: the members of group 0, then those of group 1, …; count (G,): how many each has. None may be nan.
     """
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
     for groups, members in _groups_of_equal_size(pos, count):
@@ -51,11 +44,9 @@ def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
 
 
 def position_hulls(pos: Array, count: Ints) -> list[Array]:
-    """Return a list of one convex hull (V, 2) in m per group, counter-clockwise: the hull of its members' positions.
+    """Returns the hull (V, 2) of the positions of each group, counter-clockwise; a vertex may be repeated.
 
-    pos (R, 2) m holds the members of group 0, then those of group 1, and so on; count (G,) is the number of members of
-    each group. A vertex may be repeated, the first one as the last. A group without members has (0, 2). Positions must
-    not be nan. Raises IndexError if the counts add up to more than R; further rows are ignored.
+    pos (R, 2), count (G,): as of `footprint_hulls`.
     """
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
     for groups, members in _groups_of_equal_size(pos, count):
@@ -65,11 +56,7 @@ def position_hulls(pos: Array, count: Ints) -> list[Array]:
 
 
 def _groups_of_equal_size(pos: Array, count: Ints) -> Iterator[tuple[Ints, Array]]:
-    """Yield groups of equal size n together: their indices (K,), from 0 on, and members' positions (K, n, 2) in m.
-
-    K is at most CHUNK (512). Smaller groups come first; groups without members are left out. pos (R, 2) m: the members
-    of group 0, then those of group 1, and so on; count (G,): number of members of each group.
-    """
+    """Yields up to CHUNK groups of equal size n: their indices (K,), and members' positions (K, n, 2)."""
     first = np.cumsum(count) - count
     for n in np.unique(count[count > 0]):
         every = np.flatnonzero(count == n)
@@ -79,16 +66,9 @@ def _groups_of_equal_size(pos: Array, count: Ints) -> Iterator[tuple[Ints, Array
 
 
 def _gift_wrap(pos: Array) -> tuple[Array, Array, Array]:
-    """Return the convex hulls of G sets of n points, pos (G, n, 2) in m, by gift wrapping all sets in step; n is at
-    least 1.
-
-    Returns vertices (G, V, 2) in m, counter-clockwise, the angle at which each vertex's normal cone (directions in
-    which it is the furthest point) begins (G, V) rad, and the width of that cone (G, V) rad; V = n + 1. Padding
-    vertices repeat the last vertex and have width 0. Each walk round a hull begins where the normal cone of footprint
-    vertex 0 begins, at -π/16, so that no footprint cone lies across both ends of the walk. The walk ends at its first
-    vertex.
-    """
+    """Returns the hulls of sets pos (G, n, 2): vertices (G, V, 2), where their normal cones begin, and their widths."""
     rows, n = np.arange(len(pos)), pos.shape[1]
+    # The walk begins where the cone of footprint vertex 0 does, so that no footprint cone lies across both its ends.
     now = dot(pos, unit(CONES[0])).argmax(axis=1)
     facing = np.full(len(pos), CONES[0] + np.pi / 2)  # direction of the edge that arrives at `now`
     turned = np.zeros(len(pos))
@@ -113,13 +93,7 @@ def _gift_wrap(pos: Array) -> tuple[Array, Array, Array]:
 
 
 def _minkowski_sums(p: Array, start: Array, width: Array) -> list[Array]:
-    """Return a list of G arrays (V, 2) in m, counter-clockwise: hulls of footprints, each a hull p plus the 16-gon
-    FOOTPRINT.
-
-    Such a Minkowski sum has the vertices p_i + q_k, of vertex i of the hull and k of the 16-gon, whose normal cones
-    share an angle, in the order of that angle. p (G, V, 2) m, start (G, V) rad and width (G, V) rad are the result of
-    `_gift_wrap`: vertices of the hulls of positions, and where the normal cone of each begins and how wide it is.
-    """
+    """Returns each hull plus the footprint: the vertices p_i + q_k whose normal cones share an angle, by angle."""
     after = (CONES - start[..., None]) % (2 * np.pi)  # (G, V, 16): angle from the start of p_i's cone to that of q_k's
     before = 2 * np.pi - after
     begins_inside = after < width[..., None]

@@ -14,12 +14,9 @@ from sim.types import Array
 
 
 def convex_hulls(sets: Sequence[Array]) -> tuple[Array, ...]:
-    """Return the convex hull of each set of points (K, 2), as one array of vertices (V, 2) per set, in the order of the
-    sets.
+    """Returns the convex hull (V, 2) of each set of points (K, 2), counter-clockwise from the leftmost point.
 
-    Vertices are counter-clockwise from the leftmost point, the lowest of several. Points on an edge and repeated points
-    are dropped: points on one line give its two ends. But a set of one point repeated gives that point twice. The hull
-    of an empty set, and of a set that contains a nan, has shape (0, 2). Without sets the result is ().
+    Points on an edge are dropped. The hull of an empty set, and of one with a nan, is (0, 2).
     """
     count = np.array([len(points) for points in sets], np.int64)
     if not count.any():
@@ -37,13 +34,9 @@ def _turns_left(a, b, c):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def monotone_chains(points, cuts):  # type: ignore[no-untyped-def]
-    """Return the hulls of G point sets by Andrew's monotone chain: vertices (V, 2) one hull after the other, and ends
-    (G,).
+    """Returns the vertices (V, 2) of G hulls one after the other, and ends (G,) of each.
 
-    ends[g] is the row behind the last vertex of hull g; hull g begins at ends[g - 1], hull 0 at 0. Each hull is
-    counter-clockwise from its leftmost point, the lowest of several, without points on its edges. Set g is
-    points[cuts[g]:cuts[g + 1]] and must be sorted by x, then y. points (N, 2), cuts (G + 1,). An empty set and a set
-    with a nan have no vertices. A set of one point repeated gives that point twice.
+    points (N, 2): set g is points[cuts[g]:cuts[g + 1]], sorted by x, then y.
     """
     out = np.empty((2 * len(points) + 2, 2))
     ends = np.empty(len(cuts) - 1, np.int64)

@@ -21,25 +21,18 @@ CHUNK = 4096  # pairs per pass: their arrays stay in the cache
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PackedPolygons:
-    """N convex polygons in arrays of equal width, for the `*_pairs` functions; len() gives N.
+    """N convex polygons in arrays of equal width, for the `*_pairs` functions; len() gives N."""
 
-    vertex (N, V, 2): x, y, in any unit; the last vertex of each polygon is repeated up to V. box (N, 4): min x, min y,
-    max x, max y. Both are nan for a polygon without vertices. area (N,): signed, negative if the vertices are
-    clockwise, 0 without vertices or with a nan.
-    """
-
-    vertex: Array
-    box: Array
-    area: Array
+    vertex: Array  # (N, V, 2) x, y, in any unit; the last vertex of each polygon is repeated up to V
+    box: Array  # (N, 4) min x, min y, max x, max y. Both are nan for a polygon without vertices.
+    area: Array  # (N,) signed, negative if the vertices are clockwise, 0 without vertices or with a nan
 
     def __len__(self) -> int:
         return len(self.vertex)
 
 
 def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
-    """Return PackedPolygons of N polygons (V, 2), each padded to the most vertices of any, to at least `width` and 1.
-
-    A polygon without vertices becomes nan: it overlaps nothing, and its distance to anything is nan. N may be 0."""
+    """Returns N polygons (V, 2) in arrays of equal width, at least `width`; one without vertices becomes nan."""
     count = np.array([len(p) for p in polygons], np.int64)
     flat = np.concatenate([*(np.asarray(p, float).reshape(-1, 2) for p in polygons), [[np.nan, np.nan]]])
     first = np.cumsum(count) - count
@@ -49,18 +42,13 @@ def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
 
 
 def pack_padded(vertex: Array) -> PackedPolygons:
-    """Return PackedPolygons of vertices (N, V, 2) padded by repeating the last of each; ValueError if V is 0. A polygon
-    with a nan vertex has a nan box and area 0."""
+    """Returns the polygons of vertices (N, V, 2) padded by repeating the last of each."""
     box = np.concatenate([vertex.min(axis=1), vertex.max(axis=1)], axis=1)
     return PackedPolygons(vertex, box, np.nan_to_num(_shoelace(vertex)))
 
 
 def _shoelace(vertex: Array) -> Array:
-    """Return the signed area (N,) of polygons with vertices (N, V, 2): positive if counter-clockwise, nan with a nan
-    vertex.
-
-    It is computed relative to the first vertex, so that it is exact far from the origin, too.
-    """
+    """Returns the signed area (N,), relative to the first vertex, so that it is exact far from the origin, too."""
     p = vertex - vertex[:, :1]
     return np.asarray(0.5 * _cross(p, np.roll(p, -1, axis=1)).sum(axis=1))
 
@@ -71,18 +59,12 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def area(polygon: Array) -> float:
-    """Return the signed area of one polygon (V, 2): negative if clockwise, 0 with fewer than 3 vertices, nan with a
-    nan."""
+    """Returns the signed area of one polygon (V, 2): negative if clockwise."""
     return float(_shoelace(np.asarray(polygon, float)[None])[0]) if len(polygon) > 2 else 0.0
 
 
 def convex_hull(points: Array) -> Array:
-    """Return the convex hull (V, 2) of points (N, 2), counter-clockwise, by Andrew's monotone chain.
-
-    The first vertex is the leftmost point, the lowest of several. Repeated points and points on an edge are dropped:
-    points on one line give its two ends, one point gives itself, no points give (0, 2). With a nan the result has no
-    meaning.
-    """
+    """Returns the convex hull (V, 2) of points (N, 2), counter-clockwise from the leftmost, without points on edges."""
     rows = sorted(set(map(tuple, np.asarray(points, float).tolist())))
     if len(rows) < 3:
         return np.array(rows, float).reshape(-1, 2)
@@ -91,10 +73,7 @@ def convex_hull(points: Array) -> Array:
 
 
 def _chain(rows: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    """Return the lower half of the convex hull of points (x, y) sorted by x, then y, with its first and last point.
-
-    Points on the line between two others are dropped. Points sorted the other way round give the upper half. There must
-    be no equal points."""
+    """Returns the lower half of the convex hull of points sorted by x, then y."""
     kept: list[tuple[float, ...]] = []
     for x, y in rows:
         while len(kept) > 1:
@@ -107,13 +86,7 @@ def _chain(rows: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
 
 
 def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Return the area (K,) that polygons a[i[k]] and b[j[k]] have in common; 0 if either is empty, clockwise or has no
-    area.
-
-    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. Both polygons must be convex. The common
-    part is the convex hull of the ends of a's edges clipped to b (Cyrus & Beck) and of the vertices of b inside a.
-    Sorting these points by angle round their mean orders them. A point counted twice, or off by a rounding error,
-    changes the area by a rounding error; clipping edge by edge does not promise that where edges coincide."""
+    """Returns the area (K,) that convex polygons a[i[k]] and b[j[k]] have in common; 0 for one without area."""
     common = np.zeros(len(i))
     near = (a.box[i, :2] < b.box[j, 2:]).all(axis=1) & (b.box[j, :2] < a.box[i, 2:]).all(axis=1)
     possible = np.flatnonzero(near & (a.area[i] > 0) & (b.area[j] > 0))
@@ -124,10 +97,6 @@ def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -
 
 
 def _common_area(a: Array, b: Array) -> Array:
-    """Return the common area (K,) of convex polygons a (K, V, 2) and b (K, W, 2), pair by pair; 0 if they are apart.
-
-    Both must be counter-clockwise and have area. Points closer to an edge than 1e-9 of the polygons' size count as on
-    it."""
     origin = a[:, :1]
     a, b = a - origin, b - origin
     size = np.abs(np.concatenate([a, b], axis=1)).max(axis=(1, 2))
@@ -135,16 +104,16 @@ def _common_area(a: Array, b: Array) -> Array:
     enter, leave = _clip(a, b, slack)
     edge = np.roll(a, -1, axis=1) - a
     inside = (_left_of_edges(b, a) >= -slack).all(axis=1)
+    # The common part is the hull of the ends of a's edges clipped to b (Cyrus & Beck) and of the vertices of b inside
+    # a. Sorted by angle, a point counted twice or off by a rounding error changes the area by a rounding error;
+    # clipping edge by edge does not promise that where edges coincide.
     points = np.concatenate([a + enter[..., None] * edge, a + leave[..., None] * edge, b], axis=1)
     valid = np.concatenate([enter <= leave, enter <= leave, inside], axis=1)
     return _area_by_angle(points, valid)
 
 
 def _left_of_edges(points: Array, polygon: Array) -> Array:
-    """Return (K, V, N): distance of each of N points to the left of each of V edges, times the edge's length.
-
-    points (K, N, 2), polygon (K, V, 2): edge v leads from vertex v to the next. Negative to the right of an edge.
-    """
+    """Returns the distance (K, V, N) of N points to the left of V edges, times the edge's length."""
     edge = np.roll(polygon, -1, axis=1) - polygon
     offset = _cross(polygon, edge)  # cross(e, p - a) = cross(e, p) + cross(a, e)
     return (
@@ -155,12 +124,7 @@ def _left_of_edges(points: Array, polygon: Array) -> Array:
 
 
 def _clip(a: Array, b: Array, slack: Array) -> tuple[Array, Array]:
-    """Return where each edge of a (K, V, 2) enters and leaves b (K, W, 2), two arrays (K, V), as shares of the edge's
-    length.
-
-    0 is an edge's first vertex, 1 its second; enter is at least 0, leave at most 1. Polygons are counter-clockwise.
-    slack (K, 1, 1): of edge length times distance, within which a point is on an edge. enter > leave: none inside b.
-    """
+    """Returns where each edge of a enters and leaves b, (K, V) each, as shares of it; enter > leave: none inside b."""
     start = _left_of_edges(a, b)
     change = np.roll(start, -1, axis=2) - start
     parallel = np.abs(change) <= slack
@@ -172,10 +136,6 @@ def _clip(a: Array, b: Array, slack: Array) -> tuple[Array, Array]:
 
 
 def _area_by_angle(points: Array, valid: Bools) -> Array:
-    """Return the area (K,) of convex polygons, each with the vertices of points (K, N, 2) where valid (K, N), in any
-    order.
-
-    0 with fewer than three valid points."""
     n = valid.sum(axis=1)
     middle = np.where(valid[..., None], points, 0.0).sum(axis=1) / np.maximum(n, 1)[:, None]
     arm = points - middle[:, None]
@@ -190,12 +150,7 @@ def _area_by_angle(points: Array, valid: Bools) -> Array:
 
 
 def iou_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Return the intersection over union (K,), 0 to 1, of a[i[k]] and b[j[k]]; 0 if either is empty, clockwise or has
-    no area.
-
-    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. Polygons with equal vertices, packed to
-    equal width, give exactly 1.
-    """
+    """Returns the intersection over union (K,) of a[i[k]] and b[j[k]]; exactly 1 for equal polygons of equal width."""
     common = intersection_pairs(a, b, i, j)
     union = a.area[i] + b.area[j] - common
     iou = np.where(common > 0, np.minimum(common / np.where(union > 0, union, 1.0), 1.0), 0.0)
@@ -205,22 +160,16 @@ def iou_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
 
 
 def iou_matrix(a: Sequence[Array], b: Sequence[Array]) -> Array:
-    """Return the intersection over union (N, M), 0 to 1, of each of N polygons in a with each of M polygons in b.
-
-    A polygon is an array (V, 2), convex and counter-clockwise. The value is 0 if either is empty, clockwise or has no
-    area, and exactly 1 for equal polygons. N or M may be 0."""
+    """Returns the intersection over union (N, M) of convex polygons (V, 2), each of a with each of b."""
     i, j = (g.ravel() for g in np.indices((len(a), len(b))))
     width = max((len(p) for p in (*a, *b)), default=1)
     return iou_pairs(pack(a, width), pack(b, width), i, j).reshape(len(a), len(b))
 
 
 def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Return the distance (K,) between convex polygons a[i[k]] and b[j[k]]: 0 where they overlap or touch; nan for an
-    empty one.
-
-    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. Both must be counter-clockwise. At least
-    one polygon of a pair must have area: two without may get 0 although they are apart. For them use
-    `edge_distance_pairs`."""
+    """Returns the distance (K,) between convex polygons a[i[k]] and b[j[k]], of which one has area; nan for an empty
+    one.
+    """
     gap = np.empty(len(i))
     for low in range(0, len(i), CHUNK):
         part = slice(low, low + CHUNK)
@@ -229,11 +178,10 @@ def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
 
 
 def edge_distance_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Return the least distance (K,) from a vertex of either polygon, a[i[k]] or b[j[k]], to an edge of the other.
+    """Returns the least distance (K,) from a vertex of either polygon to an edge of the other.
 
-    i, j (K,): rows of a and of b, from 0 on; IndexError if one does not exist. It is the distance between the polygons
-    unless they overlap; then it may be above 0. nan where one has no vertices. It is cheaper than `gap_pairs`, and
-    polygons need no area: one vertex is a point, two are a segment.
+    It is the distance unless they overlap; nan where one has no vertices. Cheaper than `gap_pairs`; polygons need no
+    area.
     """
     least = np.empty(len(i))
     for low in range(0, len(i), CHUNK):
@@ -247,25 +195,17 @@ def _edge_distance(a: Array, b: Array) -> Array:
 
 
 def _gap(a: Array, b: Array) -> Array:
-    """Return the distance (K,) between polygons a (K, V, 2) and b (K, W, 2), of which one has area; nan with a nan
-    vertex.
-
-    It is 0 unless an edge of one polygon has the whole other one on its outer side (separating axes).
-    """
     least = _edge_distance(a, b)
+    # Separating axes: polygons are apart if one is wholly outside an edge of the other.
     apart = _outside_an_edge(b, a) | _outside_an_edge(a, b)
     return np.where(apart | np.isnan(least), least, 0.0)
 
 
 def _outside_an_edge(points: Array, polygon: Array) -> Bools:
-    """Return True (K,) where all points (K, N, 2) are on the outer side of one edge of the counter-clockwise polygon
-    (K, V, 2)."""
     return np.asarray((_left_of_edges(points, polygon).max(axis=2) < 0).any(axis=1))
 
 
 def _distance_to_edges(points: Array, polygon: Array) -> Array:
-    """Return the least distance (K,) from any of the points (K, N, 2) to any edge of the polygon (K, V, 2); nan with a
-    nan."""
     # x and y apart: numpy sums over an axis of length two slowly.
     ex, ey = (np.roll(polygon[..., k], -1, axis=1)[..., None] - polygon[..., k, None] for k in (0, 1))
     ax, ay = (points[:, None, :, k] - polygon[..., k, None] for k in (0, 1))
@@ -276,20 +216,13 @@ def _distance_to_edges(points: Array, polygon: Array) -> Array:
 
 
 def polygon_gap(a: Array, b: Array) -> float:
-    """Return the distance between convex, counter-clockwise polygons (V, 2) and (W, 2): 0 where they overlap or touch;
-    nan if one is empty.
-
-    At least one of them must have area: two without may get 0 although they are apart."""
+    """Returns the distance between two convex polygons, of which one has area; nan if one is empty."""
     none = np.zeros(1, np.int64)
     return float(gap_pairs(pack([a]), pack([b]), none, none)[0])
 
 
 def contains(polygon: Array, points: Array, dilate: float = 0.0) -> Bools:
-    """Return True (N,) for the points (N, 2) in the convex polygon (V, 2), on its edge, or at most `dilate` away from
-    it.
-
-    False for a nan point. A polygon without vertices contains nothing. One that is clockwise, or has one or two
-    vertices, contains only points at most `dilate` from an edge or vertex, and nothing if `dilate` is 0 or less."""
+    """Returns which points (N, 2) are in the convex polygon (V, 2), on its edge, or at most `dilate` away."""
     points = np.asarray(points, float).reshape(-1, 2)
     if not len(polygon):
         return np.zeros(len(points), bool)

@@ -11,11 +11,7 @@ from sim.compiler import njit
 
 @njit(cache=True, error_model="numpy")
 def find_root(parent: Ints, k: int) -> int:
-    """Return the root of element k in a union-find forest, the element that stands for all elements joined with k.
-
-    parent (M,) int64 holds the parent of each element, 0 to M - 1; a root is its own parent. The call changes `parent`:
-    it shortens the path from k to the root (path halving).
-    """
+    """Returns the root of element k in a forest of parents (M,), and shortens the path to it (path halving)."""
     while parent[k] != k:
         parent[k] = parent[parent[k]]
         k = parent[k]

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
-from scenarios.regular_file import is_present, require_regular
-from sim.io.files.side_files import is_hidden
+from scenarios.reading import is_present, require_regular
+from sim.io.files.own_files import is_hidden
 from sim.io.formats import biwi, caviar, mot_folder, video
 from sim.io.formats.box_columns import BoxScale, parse_box_scale
 from sim.io.formats.calibration import read_calibration
@@ -40,21 +40,24 @@ def open_source(
     person_class: int | None = None,
     box_scale: str | None = None,
 ) -> list[Sequence]:
-    """Return the Sequences at a path: those of a folder sorted by path, subfolders before files; one for a single
-    recording.
+    """Opens a path that holds sequences or recordings, in any known format.
 
-    path: a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video, or a
-    folder that holds some of these at most 3 levels down (names that begin with a dot are skipped; so are MOT texts).
-    fps: frames per second; px_per_m: image scale; camera: calibration or the path of its file. These three replace what
-    a recording lacks or states; None: as the recording states, else unknown. images False leaves out the pictures of
-    MOTChallenge folders; other formats ignore it. background: frames for background models, "first:N" or "spread:N";
-    None: spread:50, or the stored empty frames of a generated sequence. person_class: class of people in MOTChallenge
-    texts that have classes; None: 1, with a warning about others. box_scale: factor of the boxes of a MOTChallenge text
-    or det/det.txt, "X" or "X,Y", if they are not in pixels of the pictures; None: 1.
+    Args:
+        path: A generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video, or a
+            folder with some of these (but no MOT texts) at most 3 levels down. Hidden names are skipped.
+        fps: Frames per second, in place of those that the recording states.
+        px_per_m: Image scale, px per m.
+        camera: Calibration, or the path of its file.
+        images: False leaves out the pictures of MOTChallenge folders.
+        background: Frames for background models, "first:N" or "spread:N"; None: spread:50, or the stored empty frames.
+        person_class: Class of people in MOTChallenge texts that have classes; None: 1, with a warning about others.
+        box_scale: Factor of the boxes of MOTChallenge texts that are not in pixels of the pictures, "X" or "X,Y".
 
-    Raises InputError if the path does not exist or holds no known format, a file is invalid, or an option is wrong or
-    has no effect on the format. Generated sequences reject fps, px_per_m and camera. Warns about recordings without a
-    frame rate. Truth and pictures are read later and may then raise InputError.
+    Returns:
+        The Sequences: of a folder sorted by path, subfolders first. Truth and pictures are read later.
+
+    Raises:
+        InputError: There is nothing known at the path, a file is invalid, or an option is wrong or has no effect.
     """
     path = Path(path)
     for option, value, (low, high) in (("--fps", fps, FRAME_RATES), ("--px-per-m", px_per_m, SCALES)):
@@ -84,10 +87,7 @@ def open_source(
 
 
 def _distinct(sequences: list[Sequence]) -> list[Sequence]:
-    """Return the sequences, those MOTChallenge folders named for the folder whose seqinfo.ini has the name of another.
-
-    Warns about them.
-    """
+    # MOTChallenge folders may share a name in seqinfo.ini; their folders do not.
     count = Counter(s.name for s in sequences)
     answers = []
     for each in sequences:
@@ -103,18 +103,12 @@ def _distinct(sequences: list[Sequence]) -> list[Sequence]:
 
 
 def holds_sequences(folder: Path) -> bool:
-    """Return True if there is a sequence or recording in a folder or at most 3 levels below it, as `open_source` finds
-    them."""
+    """Returns True if `open_source` finds a sequence or recording in the folder."""
     return bool(_find(folder, DEPTH))
 
 
 def sequence_folders(path: Path, kind: str) -> list[Path]:
-    """Return the sequence folders at a path or at most 3 levels below it, sorted by path.
-
-    kind: "generated", "biwi" or "mot"; all must be of it. Folders inside a sequence folder, and names that begin with a
-    dot, are not searched. Raises InputError if there is none (as for a path that is no folder), if one is of another
-    kind, or if there is a video or CAVIAR file among them.
-    """
+    """Returns the sequence folders at a path or at most 3 levels below it, sorted; all must be of `kind`."""
     found = _find(path, DEPTH) if path.is_dir() else []
     other = next((p for p in found if p.is_file() or _kind(p) != kind), None)
     if not found or other is not None:
@@ -125,39 +119,27 @@ def sequence_folders(path: Path, kind: str) -> list[Path]:
 
 
 def split_and_name(folder: Path) -> str:
-    """Return <split>/<name>, the last two parts of a sequence folder's absolute path, without looking at the disk.
-
-    ".." in the path is resolved, so that the way to a folder does not change its name; symbolic links are not.
-    """
+    """Returns <split>/<name>, the last two parts of a sequence folder's absolute path."""
+    # ".." is resolved and links are not: the way to a folder does not change its name.
     return "/".join(Path(os.path.abspath(folder)).parts[-2:])
 
 
 @dataclass(frozen=True)
 class RecordingOptions:
-    """The user's options for a recording; None: not given.
+    """The user's options for a recording; None: not given."""
 
-    fps: frames per second. px_per_m: image scale. camera: its calibration. images: False leaves out the pictures of
-    MOTChallenge folders, True is the default. background: which frames are the sample for background models.
-    person_class: the class of people in MOTChallenge texts. box_scale: factors of x and y of the boxes of these.
-    """
+    fps: float | None  # frames per second
+    px_per_m: float | None  # image scale
+    camera: Camera | None  # its calibration
+    images: bool  # False leaves out the pictures of MOTChallenge folders, True is the default
+    background: BackgroundChoice | None  # which frames are the sample for background models
+    person_class: int | None = None  # the class of people in MOTChallenge texts
+    box_scale: BoxScale | None = None  # factors of x and y of the boxes of these
 
-    fps: float | None
-    px_per_m: float | None
-    camera: Camera | None
-    images: bool
-    background: BackgroundChoice | None
-    person_class: int | None = None
-    box_scale: BoxScale | None = None
-
-    def reject(self, path: Path, kind: str, why: str, *names: str) -> None:
-        """Raise InputError if any of the options `names` (fields of this class but `images`) is given, else do nothing.
-
-        path, kind: the source and what it is, as "a BIWI recording". why: why the options have no effect on it. All
-        three are for the error.
-        """
-        given = [
-            f"--{name.removeprefix('person_').replace('_', '-')}" for name in names if getattr(self, name) is not None
-        ]
+    def reject(self, path: Path, kind: str, why: str, names: str) -> None:
+        """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect."""
+        found = [name for name in names.split() if getattr(self, name) is not None]
+        given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
         if given:
             remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
             raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
@@ -167,19 +149,14 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     suffix, o = path.suffix.lower(), options
     if suffix == ".xml":
         o.reject(
-            path,
-            "a CAVIAR recording",
-            "its truth is in the image, without pictures",
-            "camera",
-            "background",
-            "person_class",
-            "box_scale",
-        )
+            path, "a CAVIAR recording", "its truth is in the image, without pictures",
+            "camera background person_class box_scale",
+        )  # fmt: skip
         return caviar.open_file(path, fps=o.fps, px_per_m=o.px_per_m)
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, o)
     if suffix in video.SUFFIXES:
-        o.reject(path, "a video", "it has no text", "person_class", "box_scale")
+        o.reject(path, "a video", "it has no text", "person_class box_scale")
         return video.open_video(
             path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, background=o.background or video.ANY
         )
@@ -201,12 +178,6 @@ def _kind(folder: Path) -> str | None:
 
 
 def _find(folder: Path, depth: int) -> list[Path]:
-    """Return sequence folders, videos and CAVIAR files at or below a folder, down to `depth` levels, sorted in each
-    folder.
-
-    A folder that is a sequence itself gives only itself. Subfolders come before files; hidden and side files are
-    skipped.
-    """
     if _kind(folder) is not None:
         return [folder]
     if depth == 0:
@@ -227,28 +198,12 @@ def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
         return _open_file(path, o)
     match _kind(path):
         case "generated":
-            o.reject(
-                path,
-                "a generated sequence",
-                "it knows its own",
-                "fps",
-                "px_per_m",
-                "camera",
-                "person_class",
-                "box_scale",
-            )
+            no = "fps px_per_m camera person_class box_scale"
+            o.reject(path, "a generated sequence", "it knows its own", no)
             return sequence_folder.open_sequence(path, background=o.background)
         case "biwi":
-            o.reject(
-                path,
-                "a BIWI recording",
-                "it is in metres, without pictures",
-                "px_per_m",
-                "camera",
-                "background",
-                "person_class",
-                "box_scale",
-            )
+            no = "px_per_m camera background person_class box_scale"
+            o.reject(path, "a BIWI recording", "it is in metres, without pictures", no)
             return biwi.open_folder(path, fps=o.fps)
         case _:
             return mot_folder.open_folder(

@@ -29,35 +29,25 @@ MATERIALS = 0  # key of the random role "texture"; people have the keys from 1 o
 
 @dataclass(frozen=True)
 class PixelGeometry:
-    """What each pixel's centre shows of the empty scene.
+    """What each pixel's centre shows of the empty scene."""
 
-    depth (H, W)      float32: m along the optical axis; inf for sky
-    kind (H, W)       uint8: NOTHING (sky), GROUND, WALL, PILLAR, TREAD or RISER of `sim.scene.raycast`
-    place (H, W, 3)   float32: x, y, z in m in the world; 1e9 for sky
-    """
-
-    depth: Floats
-    kind: NDArray[np.uint8]
-    place: Floats
+    depth: Floats  # (H, W) float32: m along the optical axis; inf for sky
+    kind: NDArray[np.uint8]  # (H, W) uint8: NOTHING (sky), GROUND, WALL, PILLAR, TREAD or RISER of `sim.scene.raycast`
+    place: Floats  # (H, W, 3) float32: x, y, z in m in the world; 1e9 for sky
 
 
 @dataclass(frozen=True)
 class EmptyScene:
-    """The painted empty scene, float32; per pixel the mean of `picture.samples` rays each way, at least 2 at edges.
+    """The painted empty scene, float32; per pixel the mean of `picture.samples` rays each way, at least 2 at edges."""
 
-    colour (H, W, 3)   BGR in grey levels, 0 or more, not clipped at 255; lit, without plants' sway and noise
-    direct (H, W)      share of direct sun in the pixel's light, 0 to 1; 0 for sky and where a solid thing hides the sun
-    plants (H, W)      share of the pixel that shows plants, 0 to 1
-    """
-
-    colour: Floats
+    colour: Floats  # (H, W, 3) BGR in grey levels, 0 or more, not clipped at 255; lit, without plants' sway and noise
+    # (H, W) share of direct sun in the pixel's light, 0 to 1; 0 for sky and where a solid thing hides the sun
     direct: Floats
-    plants: Floats
+    plants: Floats  # (H, W) share of the pixel that shows plants, 0 to 1
 
 
 def trace_geometry(camera: Camera, scene: Scene) -> PixelGeometry:
-    """Return the PixelGeometry of the empty scene: depth (m), kind of surface and place (m) that the centre of each
-    pixel shows. Lens distortion is ignored."""
+    """Returns what the centre of each pixel shows of the empty scene."""
     from sim.render.background_kernels import trace_pixels
 
     width, height = camera.image
@@ -78,13 +68,10 @@ def paint_empty_scene(
     repeat: int = 0,
     samples: int = 1,
 ) -> EmptyScene:
-    """Return the EmptyScene: colours, shares of sun and of plants in the empty scene under steady light, with unmoved
-    plants.
+    """Returns the empty scene under steady light, with unmoved plants.
 
-    light: direction of the sun, shadow share and penumbra are used. texture: contrast of the patterns, 0 to 1. plants:
-    the Foliage, None for none. seed, repeat (number of the suite entry's copy, 0 without copies): name the random
-    stream of colours, width of the paving slabs and patterns. samples: rays along each axis of a pixel. Lens distortion
-    is ignored. Raises ValueError for a negative seed.
+    texture: contrast of the patterns, 0 to 1. samples: rays along each axis of a pixel. seed, repeat: name the random
+    stream of colours, slabs and patterns.
     """
     from sim.render.background_kernels import paint_pixels
 

@@ -32,11 +32,7 @@ POINT, NORMAL, SPARE, BLOCKED = range(4)  # rows of the scratch `more`
 
 @njit(cache=True)
 def _tint(base, brightness, warmth, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to a palette colour base (3,), BGR, made brighter and warmer by these shares; colours are not below
-    0.
-
-    brightness: 0.1 raises all three by 10 %. warmth: 0.1 raises red and lowers blue by 10 %. Returns nothing.
-    """
+    """Sets out (3,) to a palette colour, BGR, made brighter and warmer by these shares."""
     out[0] = base[0] * max(0.0, 1 + brightness - warmth)
     out[1] = base[1] * max(0.0, 1 + brightness)
     out[2] = base[2] * max(0.0, 1 + brightness + warmth)
@@ -44,16 +40,9 @@ def _tint(base, brightness, warmth, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _ground(x, y, size, footprint, style, palette, key, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to the colour (BGR, grey levels) of the ground at (x, y) m under full light.
-
-    It is paving (without slabs if their width is 0) up to about 1 m outside the world, which reaches from (0, 0) to
-    `size`. There a ragged border begins the grass. Plants grow over both. Returns two values: True if the ground is
-    grass, False for paving; and the share covered by plants, 0 to 1. size (2,): of the world, m. footprint: size of the
-    pixel on the ground, m. style (4,): contrast, slab width (m), key of the plant pattern, level above which plants
-    grow (inf: no plants). palette (6, 3): BGR of paving, grass, bricks, stone, steps, sky. key: whole number that names
-    the patterns.
-    """
+    """Sets out (3,) to the colour of the ground at (x, y) m; returns (is it grass, share covered by plants)."""
     contrast, slab = style[CONTRAST], style[SLAB_WIDTH]
+    # A ragged border, about 1 m outside the world, between paving and grass.
     outside = max(max(-x, x - size[0]), max(-y, y - size[1])) - 1.0 + 0.3 * value_noise(x, y, key + 90)
     patches = value_noise(0.31 * x, 0.31 * y, key + 20) + 0.6 * value_noise(0.9 * x + 7.3, 0.9 * y, key + 21)
     warmth = contrast * 0.06 * value_noise(0.5 * x, 0.5 * y + 3.1, key + 22)
@@ -75,13 +64,7 @@ def _ground(x, y, size, footprint, style, palette, key, out):  # type: ignore[no
 
 @njit(cache=True)
 def _upright(kind, along, z, footprint, contrast, palette, key, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to the colour (BGR, grey levels) of a wall (bricks with a darker skirting), or of a pillar or step
-    (stone).
-
-    kind: WALL, PILLAR, TREAD or RISER; others count as TREAD. along, z: place on the surface, m. footprint: size of the
-    pixel on the surface, m. contrast: 0 to 1. palette (6, 3): BGR of paving, grass, bricks, stone, steps, sky. key: of
-    the patterns. Returns nothing.
-    """
+    """Sets out (3,) to the colour of a wall, pillar or step at a place (along, z) m on its surface."""
     fine = grain(along, z, key + 60, footprint, 0.6)
     if kind == WALL:
         tile = slabs(along, z, 0.5, 0.25, 0.012, key + 61, footprint)
@@ -95,12 +78,7 @@ def _upright(kind, along, z, footprint, contrast, palette, key, out):  # type: i
 
 @njit(cache=True)
 def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to the colour (BGR, grey levels) of the sky in direction d (3,): clouded, brighter towards the
-    horizon.
-
-    d: in the world, of any length above 0, not below the horizon. key: of the clouds. palette (6, 3): its last row, the
-    sky's colour, counts. Returns nothing.
-    """
+    """Sets out (3,) to the colour of the sky in direction d (3,), which is not below the horizon."""
     length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     up = max(d[2] / length, 0.0)
     x, y = d[0] / (d[2] + 0.1 * length), d[1] / (d[2] + 0.1 * length)
@@ -110,16 +88,12 @@ def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[no-untyped-def]
-    """Return the share, 0 to 1, of four points across the penumbra from which no solid thing hides the sun.
-
-    point, normal (3,): place in m and unit normal of the surface. sun (3,): unit vector to the sun. penumbra: width of
-    a shadow's soft edge, m. solids: a `raycast.Solids` (walls, pillars, stairs). spare (3,) or longer, hit (6,):
-    scratch, overwritten. The points lie 0.35 penumbra off along x and along y. 1 without solids.
-    """
+    """Returns the share of four points across the penumbra from which no solid thing hides the sun."""
     if len(solids.walls) + len(solids.pillars) + len(solids.flights) == 0:
         return 1.0
     share = 0.0
     for k in range(4):
+        # A little off the surface, which would else hide itself.
         spare[0] = point[0] + 1e-4 * normal[0] + penumbra * ((k % 2) - 0.5) * 0.7
         spare[1] = point[1] + 1e-4 * normal[1] + penumbra * ((k // 2) - 0.5) * 0.7
         spare[2] = point[2] + 1e-4 * normal[2]
@@ -130,12 +104,9 @@ def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[n
 
 @njit(cache=True)
 def trace_pixels(origin, direction, solids, depth, kind, place):  # type: ignore[no-untyped-def]
-    """Set depth (H, W), kind (H, W) and place (H, W, 3) to what the centre of each pixel shows of the empty scene.
+    """Sets depth (H, W), kind (H, W) and place (H, W, 3) to what the centre of each pixel shows.
 
-    origin, direction (3, 3): of the camera's PixelRays; times (u, v, 1) they give the origin and the direction of a
-    ray. The centre of the pixel in column i and row j has u = i + 0.5, v = j + 0.5 px. solids: a `raycast.Solids`.
-    depth is in m along the optical axis, inf for sky. kind is NOTHING (sky), GROUND, WALL, PILLAR, TREAD or RISER.
-    place is x, y, z in m in the world; that of sky is 1e9. Returns nothing.
+    origin, direction (3, 3): of PixelRays. Sky has depth inf and place 1e9.
     """
     height, width = depth.shape
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
@@ -153,15 +124,10 @@ def trace_pixels(origin, direction, solids, depth, kind, place):  # type: ignore
 def _point_colour(  # type: ignore[no-untyped-def]
     x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, out
 ):
-    """Set out (3,) to the colour (BGR, grey levels) seen through the image point (x, y) px, shaded by solid things and
-    hazy.
+    """Sets out (3,) to the colour seen through the image point (x, y) px, shaded by solid things and hazy.
 
-    Returns the share of direct sun in its light, the share covered by plants (both 0 to 1), and a whole number that is
-    equal for points of one surface lit alike. For sky they are 0, 0, 0. o, d (3,), hit (6,), more (4, 6): scratch,
-    overwritten. (0, 0) px is the upper left corner of the image. Haze begins at a depth of 25 m; there is none from
-    above. rays: origin and direction, each (3, 3), of PixelRays. The other arguments are as for `paint_pixels`: scale
-    (px per m at 1 m depth, or minus px per m from above), sun (3,), shadow (share), penumbra (m), solids, size (2,) m,
-    style (4,), palette (6, 3), key.
+    Returns the share of direct sun in its light, the share covered by plants, and a whole number that is equal for
+    points of one surface lit alike. Arguments as of `paint_pixels`; o, d (3,), hit (6,), more (4, 6): scratch.
     """
     at_pixel(rays[0], x, y, o)
     at_pixel(rays[1], x, y, d)
@@ -175,6 +141,7 @@ def _point_colour(  # type: ignore[no-untyped-def]
         point[k], normal[k] = o[k] + t * d[k], hit[NORMAL_X + k]
     slope = abs(d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2])
     slope /= np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    # There is no haze from above.
     distance = t if scale > 0 else 1.0
     footprint = distance / abs(scale) / np.sqrt(max(slope, 0.02))
     index, grass, plants = int(hit[HIT_INDEX]), False, 0.0
@@ -201,11 +168,9 @@ def _mean_of_rays(  # type: ignore[no-untyped-def]
     u, v, many, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c, colour,
     direct, plants,
 ):  # fmt: skip
-    """Set colour, direct and plants of the pixel in column u and row v to the means over many x many rays, spread
-    evenly over the pixel.
+    """Sets colour, direct and plants of the pixel (u, v) to the means over many x many rays spread over it.
 
-    Returns a whole number that is equal for pixels whose last ray meets the same surface, lit alike. c (3,): scratch.
-    The other arguments are as for `_point_colour` and `paint_pixels`.
+    Returns the surface of the last ray as `_point_colour` does. Arguments as of `paint_pixels`; c (3,): scratch.
     """
     share, surface = 1.0 / (many * many), 0
     colour[v, u], direct[v, u], plants[v, u] = 0.0, 0.0, 0.0
@@ -225,16 +190,11 @@ def _mean_of_rays(  # type: ignore[no-untyped-def]
 def paint_pixels(  # type: ignore[no-untyped-def]
     rays, samples, scale, sun, shadow, penumbra, solids, size, style, palette, key, colour, direct, plants
 ):
-    """Set colour (H, W, 3) BGR in grey levels, direct (H, W), the share of direct sun, and plants (H, W), the share of
-    plants.
+    """Sets colour (H, W, 3) BGR, and the shares direct (H, W) of sun and plants (H, W), of samples x samples rays.
 
-    A pixel takes the mean of samples x samples rays, and patterns are no finer than the distance of these. With one ray
-    per pixel, pixels that differ from a neighbour in surface or sunlight take the mean of 2 x 2. rays: origin and
-    direction, each (3, 3), of PixelRays. scale: px per m at a depth of 1 m, or minus px per m for a camera from above.
-    sun (3,): unit vector to the sun. shadow: the sun's share of the light, 0 to 1. penumbra: width of a shadow's soft
-    edge, m. solids: a `raycast.Solids`. size (2,) m: of the world. style (4,): contrast (0 to 1), slab width (m), key
-    of the plant pattern, level above which plants grow (inf: no plants). palette (6, 3): BGR of paving, grass, bricks,
-    stone, steps, sky. key: of the random patterns. Returns nothing.
+    rays: origin and direction, each (3, 3), of PixelRays. scale: px per m at a depth of 1 m, or minus px per m for a
+    camera from above. sun (3,): unit vector to the sun. shadow: the sun's share of the light. penumbra: m. size (2,) m:
+    of the world. style (4,): slots CONTRAST …. palette (6, 3): rows GREY …. key: of the random patterns.
     """
     height, width = direct.shape
     o, d, hit, more, c = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), np.empty((4, HIT_SLOTS)), np.empty(3)
@@ -251,6 +211,7 @@ def paint_pixels(  # type: ignore[no-untyped-def]
         for u in range(width):
             here = surface[v, u]
             if (
+                # Only edges need more rays: pixels that differ from a neighbour in surface or sunlight.
                 here == surface[max(v - 1, 0), u]
                 and here == surface[min(v + 1, height - 1), u]
                 and here == surface[v, max(u - 1, 0)]

@@ -26,10 +26,7 @@ LONGEST = 3 * PICTURE_SIDE  # numbers that a row may need: 3 colours, the widest
 
 
 def blur_weights(sd: float) -> NDArray[np.float32]:
-    """Return the weights (2 r + 1,) float32, sum 1, of a Gaussian blur with a standard deviation of `sd` px, 0 or more.
-
-    The radius r is 3 sd, rounded up. The result is [1] if sd is 0.
-    """
+    """Returns the weights (2 r + 1,), sum 1, of a Gaussian blur of standard deviation `sd` px; r = 3 sd, rounded up."""
     radius = int(np.ceil(3 * sd))
     x = np.arange(-radius, radius + 1)
     weights = np.exp(-0.5 * (x / sd) ** 2) if radius else np.ones(1)
@@ -38,22 +35,13 @@ def blur_weights(sd: float) -> NDArray[np.float32]:
 
 @cache
 def _normals() -> NDArray[np.float32]:
-    """Return the pool (POOL + LONGEST,) float32 of standard normals; its first LONGEST numbers are repeated at the end.
-
-    It is the same for all seeds, and kept: do not change it. POOL is 2^20. LONGEST is 3 x 16384, the numbers that a row
-    of the widest image needs.
-    """
+    # The same for all seeds; the first numbers are repeated, so that no row ends beyond the pool.
     normals = rng(0, "noise").standard_normal(POOL, dtype=np.float32)
     return np.concatenate([normals, normals[:LONGEST]])
 
 
 def noise_pool(sd: float, unit: float) -> NDArray[np.int16]:
-    """Return a pool (POOL + LONGEST,) int16 of normal numbers with standard deviation `sd` grey levels, times `unit`.
-
-    POOL is 2^20, LONGEST 3 x 16384: a row of the widest image. unit: canvas value of one grey level. The numbers are
-    rounded, and clipped to the range of int16. The underlying normal numbers are the same for all seeds; sd 0 gives
-    zeros.
-    """
+    """Returns the pool (POOL + LONGEST,) of normal numbers of `sd` grey levels, times `unit`, rounded to int16."""
     return np.asarray(np.clip(np.rint(_normals() * np.float32(sd * unit)), -32768, 32767), np.int16)
 
 
@@ -63,11 +51,8 @@ def _offsets_of_frames(rows: int, seed: int, side: int, draw: int, repeat: int) 
 
 
 def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) -> Ints:
-    """Return the index in the noise pool, 0 to POOL - 1, at which the noise of each image row begins: (rows,) int64.
+    """Returns where in the pool the noise of each image row begins: (rows,).
 
-    side: 0 the left camera, 1 the right one. frame: number of the frame, from 1, plus BACKGROUNDS (50), so that
-    background images have 1 to 50. seed, repeat (number of the suite entry's copy, 0 without copies): name the random
-    stream. The result is a view of kept numbers: do not change it. Raises ValueError if seed, side or frame is
-    negative.
+    side: 0 the left camera, 1 the right one. frame: number from 1 plus BACKGROUNDS; background images have 1 to 50.
     """
     return np.asarray(_offsets_of_frames(rows, seed, side, frame // FRAMES_PER_DRAW, repeat)[frame % FRAMES_PER_DRAW])

@@ -17,15 +17,14 @@ ONE, GREY = np.float32(1.0), np.float32(1.0 / (MID_GREY * UNIT))
 
 @njit(cache=True)
 def _add_line(line, weight, many, out):  # type: ignore[no-untyped-def]
-    """Add weight times the first `many` numbers of line to out (many,), in place."""
+    """Adds weight times the first `many` numbers of line to out."""
     for i in range(many):
         out[i] += weight * np.float32(line[i])
 
 
 @njit(cache=True)
 def _blur_five_lines(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-untyped-def]
-    """Set out (many,) to the blur of radius 2, the usual one: w a + x b + y c + x d + w e for five lines a to e
-    (many,)."""
+    """Sets out to the blur of radius 2, the usual one: w a + x b + y c + x d + w e."""
     for i in range(many):
         out[i] = (
             w * (np.float32(a[i]) + np.float32(e[i])) + x * (np.float32(b[i]) + np.float32(d[i])) + y * np.float32(c[i])
@@ -33,13 +32,9 @@ def _blur_five_lines(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-unty
 
 
 @njit(cache=True)
+# At MID_GREY the noise has the standard deviation of the pool: read + slope x is 1 there.
 def _with_noise(x, grain, read, slope):  # type: ignore[no-untyped-def]
-    """Return the grey level (uint8, 0 to 255) of canvas value x (grey level times UNIT = 64) with noise.
-
-    x: 0 or more. The noise is grain * sqrt(read + slope x). grain: a number of the noise pool, in canvas values. read:
-    share of its variance that does not depend on x. slope: increase of that share per canvas value. The level is
-    rounded and clipped.
-    """
+    """Returns the grey level of canvas value x with the noise grain * sqrt(read + slope x)."""
     x = (x + np.float32(grain) * np.sqrt(read + slope * x)) * SCALE + HALF
     x = x if x > LOW else LOW
     return np.uint8(np.int32(x if x < HIGH else HIGH))
@@ -47,11 +42,7 @@ def _with_noise(x, grain, read, slope):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _show_line(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
-    """Set out (many,) uint8 to gain times a line of canvas values plus noise, as grey levels, clipped to 0 … 255.
-
-    grain (many,): numbers of the noise pool. gain: one number. shot: share of the noise's variance that grows with
-    brightness, 0 to 1. The noise has the standard deviation of the pool at grey level 128.
-    """
+    """Sets out to gain times a line of canvas values plus noise, as grey levels."""
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
         out[i] = _with_noise(np.float32(line[i]) * gain, grain[i], read, slope)
@@ -59,12 +50,7 @@ def _show_line(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-d
 
 @njit(cache=True)
 def _show_line_by_gains(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
-    """Set out (many,) uint8 to a line of canvas values times gain (many,) plus noise, as grey levels, clipped to 0 …
-    255.
-
-    grain (many,): numbers of the noise pool. shot: share of the noise's variance that grows with brightness, 0 to 1.
-    The noise has the standard deviation of the pool at grey level 128.
-    """
+    """Sets out to a line of canvas values times gain (many,) plus noise, as grey levels."""
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
         out[i] = _with_noise(np.float32(line[i]) * gain[i], grain[i], read, slope)
@@ -72,12 +58,7 @@ def _show_line_by_gains(line, gain, grain, shot, many, out):  # type: ignore[no-
 
 @njit(cache=True)
 def brightness_row(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
-    """Set the first 3 W numbers of out to the brightness of image row v, three equal numbers per pixel, linear between
-    nodes.
-
-    nodes (J, I): brightness at every `step`-th pixel, at least 2 x 2; the first node is at (0, 0) px. width: W, px.
-    Pixels to the right of the last node are not set; rows below the last are extrapolated. Returns nothing.
-    """
+    """Sets out to the brightness of image row v, three equal numbers per pixel, linear between nodes (J, I)."""
     y = (v + np.float32(0.5)) / np.float32(step)
     j = min(int(y), nodes.shape[0] - 2)
     b = np.float32(y - j)
@@ -91,12 +72,7 @@ def brightness_row(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _blur_block(canvas, top, left, rows, cols, weights, edge, wide, out):  # type: ignore[no-untyped-def]
-    """Set out (rows, cols * 3) to the blur of the block of rows x cols px at row `top`, column `left` of a canvas.
-
-    out: float32 canvas values, not rounded. The block must lie in the image and have at most TILE_H = 8 rows. canvas
-    (H, W * 3) int16, not changed; pixels beyond its edges repeat the edge. weights (2 r + 1,): the same across and
-    down. edge, wide: scratch, overwritten: a padded line, and lines blurred across. Returns nothing.
-    """
+    """Sets out (rows, 3 cols) to the blur of a block of at most TILE_H rows; edge, wide: scratch."""
     height, width = canvas.shape[0], canvas.shape[1] // 3
     radius, many = len(weights) // 2, 3 * cols
     inner = left >= radius and left + cols + radius <= width
@@ -128,11 +104,7 @@ def _blur_block(canvas, top, left, rows, cols, weights, edge, wide, out):  # typ
 
 @njit(cache=True)
 def _scratch(radius, width):  # type: ignore[no-untyped-def]
-    """Return scratch arrays for `_blur_block` in an image `width` px wide: edge, wide, and TILE_H lines for its result.
-
-    radius: of the blur, px. Shapes: (3 (width + 2 radius),) int16; (8 + 2 radius, 3 width) and (8, 3 width) float32.
-    Their contents are not set.
-    """
+    """Returns scratch for `_blur_block`: a padded line, lines blurred across, and TILE_H lines for its result."""
     return (
         np.empty(3 * (width + 2 * radius), np.int16),
         np.empty((TILE_H + 2 * radius, 3 * width), np.float32),
@@ -142,10 +114,7 @@ def _scratch(radius, width):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def blur_all(canvas, weights, out):  # type: ignore[no-untyped-def]
-    """Set out (H, W * 3) int16 to the blur of the whole canvas (H, W * 3) int16 with weights (2 r + 1,), rounded.
-
-    Pixels beyond the image's edges repeat the edge. The canvas is not changed. Returns nothing.
-    """
+    """Sets out (H, 3 W) int16 to the blur of the whole canvas (H, 3 W) int16, whose edges repeat."""
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)
     for top in range(0, height, TILE_H):
@@ -158,15 +127,11 @@ def blur_all(canvas, weights, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offsets, out):  # type: ignore[no-untyped-def]
-    """Set out (H, W * 3) uint8 to the image: the blurred canvas times brightness, plus noise, rounded, clipped to 0 …
-    255.
+    """Sets out (H, 3 W) uint8 to the image: the blurred canvas times brightness, plus noise, clipped to 0 … 255.
 
-    canvas (H, W * 3) int16, grey levels times UNIT = 64: the sharp scene, of which only dirty tiles and their
-    surroundings are read. empty (H, W * 3) int16: the blurred empty scene, for clean tiles. dirty (rows, columns): 1
-    for tiles (8 rows x 16 columns of px) to blur anew. weights (2 r + 1,): of the blur. nodes (J, I): brightness at
-    every `step`-th pixel, or (1, 1) if it is the same everywhere. noise (n,) int16: pool of normal numbers in canvas
-    values; row v reads it from offsets[v] on. shot: share of the noise's variance that grows with brightness, 0 to 1;
-    at grey level 128 the noise has the standard deviation of the pool. Returns nothing.
+    canvas (H, 3 W) int16: the sharp scene. empty (H, 3 W) int16: the blurred empty scene, for clean tiles. dirty: tiles
+    to blur anew. nodes (J, I): brightness at every `step`-th pixel, (1, 1) if it is the same everywhere. noise: the
+    pool, which row v reads from offsets[v] on. shot: share of the noise's variance that grows with brightness.
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)

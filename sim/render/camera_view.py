@@ -31,10 +31,7 @@ OCCLUDER = -2  # id of walls and pillars in id maps
 class CameraView:
     """The empty scene as one camera sees it; each part is computed when first needed, and kept.
 
-    Parts: depth, kind and place of each pixel, colours, ids, and canvases (working images) to draw on; also brightness
-    and wind in the image at any time. width, height: of the image, px. rays: the camera's lines of sight. solids:
-    walls, pillars and stairs. motion gives scene and seed, picture blur and patterns. plants is None without plants.
-    Canvases that were given back are kept for the next frame.
+    State: canvases that were given back, for the next frame. plants is None without plants.
     """
 
     def __init__(
@@ -47,11 +44,7 @@ class CameraView:
         self._spare: list[FrameCanvas] = []
 
     def take_canvas(self) -> FrameCanvas:
-        """Return a FrameCanvas that shows the empty scene, not shaded, all tiles clean: one given back before, or a new
-        one.
-
-        The caller may draw on it, and gives it back with `return_canvas`.
-        """
+        """Returns a canvas of the empty scene to draw on, all tiles clean; give it back with `return_canvas`."""
         if self._spare:
             return self._spare.pop()
         size = self.height, self.width
@@ -59,10 +52,7 @@ class CameraView:
         return FrameCanvas(self.empty_canvas.copy(), self.geometry.depth.copy(), np.zeros(size, np.uint8), dirty)
 
     def return_canvas(self, canvas: FrameCanvas) -> None:
-        """Restore the dirty tiles of a canvas to the empty scene, and keep it for a later `take_canvas`.
-
-        The canvas must come from this view, and the caller must not use it any more. Returns nothing.
-        """
+        """Restores a canvas of this view to the empty scene, and keeps it for a later `take_canvas`."""
         from sim.render.canvas_kernels import restore
 
         flat = self.height, 3 * self.width
@@ -72,28 +62,23 @@ class CameraView:
 
     @cached_property
     def geometry(self) -> PixelGeometry:
-        """The PixelGeometry of the empty scene: depth, kind of surface and place seen at the centre of each pixel."""
+        """What the centre of each pixel shows of the empty scene."""
         return trace_geometry(self.camera, self.motion.scene)
 
     @cached_property
     def empty_scene(self) -> EmptyScene:
-        """The painted EmptyScene under steady light, with unmoved plants: colour, shares of sun and of plants.
-
-        The first access raises ValueError if the Motion's seed is negative.
-        """
+        """The painted empty scene."""
         m, p = self.motion, self.picture
         return paint_empty_scene(self.camera, m.scene, self.light, p.texture, self.plants, m.seed, m.repeat, p.samples)
 
     @cached_property
     def empty_canvas(self) -> NDArray[np.int16]:
-        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), not blurred, rounded, clipped
-        at 32767."""
+        """Colours (H, W, 3) of the empty scene as canvas values, not blurred."""
         return np.asarray(np.clip(np.rint(self.empty_scene.colour * np.float32(UNIT)), 0, MOST), np.int16)
 
     @cached_property
     def blurred_canvas(self) -> NDArray[np.int16]:
-        """Colours (H, W, 3) BGR of the empty scene as int16: grey levels times UNIT (64), blurred by `picture.blur_px`,
-        rounded."""
+        """Colours (H, W, 3) of the empty scene as canvas values, blurred."""
         from sim.render.blur_noise_kernels import blur_all
 
         out, flat = np.empty_like(self.empty_canvas), (self.height, 3 * self.width)
@@ -106,35 +91,29 @@ class CameraView:
         return np.where(solid, OCCLUDER, 0).astype(np.int64) if solid.any() else None
 
     def empty_ids(self) -> NDArray[np.int64]:
-        """Return a new id map (H, W) int64 of the empty scene: OCCLUDER (-2) where a wall or pillar shows, else 0."""
+        """Returns a new id map (H, W) of the empty scene: OCCLUDER where a wall or pillar shows, else 0."""
         return np.zeros((self.height, self.width), np.int64) if self._occluders is None else self._occluders.copy()
 
     @cached_property
     def level(self) -> bool:
-        """True if the image shows nothing but level ground and sky, so that shadows fall only on z = 0."""
+        """Returns True if the image shows nothing but level ground and sky, so that shadows fall only on z = 0."""
         return bool(((self.geometry.kind == GROUND) | (self.geometry.kind == NOTHING)).all())
 
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:
-        """Ground points (J * I, 2), x and y in m, at every 16th pixel, and the half size (J * I,) in m of the ground
-        that the 16 px around each cover.
-
-        The J rows of I nodes run from (0, 0) px to the image's edges or beyond. The half size is measured along the
-        view, where the ground is seen at a slant. A node that sees no ground has the place of the camera and the half
-        size inf; fields smoothed by it vanish there.
-        """
+        """Ground points (J * I, 2) m at every 16th pixel, and the half size (J * I,) m of what 16 px cover there."""
         u, v = np.meshgrid(*(np.arange(-(-n // NODE_STEP) + 1) * float(NODE_STEP) for n in (self.width, self.height)))
         uv1 = np.stack([u.ravel(), v.ravel(), np.ones(u.size)])
         o, d = self.rays.origin @ uv1, self.rays.direction @ uv1
         down = d[2] < 0
         t = np.where(down, -o[2] / np.where(down, d[2], -1.0), 0.0)
         per_px = (t if self.camera.kind == "pinhole" else 1.0) / abs(signed_scale(self.camera))
+        # Along the view, where the ground is seen at a slant. Fields vanish where no ground is seen (inf).
         slope = np.abs(d[2]) / np.linalg.norm(d, axis=0)
         spread = np.where(down, 0.5 * NODE_STEP * per_px / np.maximum(slope, 1e-9), np.inf)
         return (o + t * d)[:2].T, spread
 
     def _grid(self, field: Array) -> NDArray[np.float32]:
-        """Return the values `field` (J * I,) at the nodes, every 16th pixel, as a float32 grid (J, I), row by row."""
         return field.reshape(-(-self.height // NODE_STEP) + 1, -1).astype(np.float32)
 
     @cached_property
@@ -142,11 +121,9 @@ class CameraView:
         return self.light.clouds.sampled(*self._nodes)
 
     def brightness(self, t: float, key: int) -> NDArray[np.float32]:
-        """Return the brightness at time t (s) at the nodes (J, I), which are 16 px apart: factors above 0, about 1.
+        """Returns the brightness at time t (s) at the nodes (J, I), or (1, 1) if it is the same everywhere.
 
-        It is (1, 1) if the brightness is the same everywhere, without clouds. Nodes that see no ground have no clouds.
-        t is 0 at frame 1. key: frame number from 1 plus BACKGROUNDS (50); it names the random stream of the flicker.
-        Raises ValueError for a negative key if there is flicker.
+        key: frame number from 1 plus BACKGROUNDS; it names the random stream of the flicker.
         """
         gain = self.light.gain(t, key)
         if self.light.clouds.amplitude == 0:
@@ -161,20 +138,14 @@ class CameraView:
         return across, down
 
     def wind(self, t: float) -> NDArray[np.float32]:
-        """Return the sway of plants at time t (s) at the nodes, (2, J, I): px across, px down. Nodes are 16 px apart.
-
-        t is 0 at frame 1. A node that sees no ground has the wind of the ground under the camera. Raises AssertionError
-        if the view has no plants.
-        """
+        """Returns the sway of plants at time t (s) at the nodes, (2, J, I): px across, px down."""
         assert self.plants is not None
         strength = self.plants.strength(t)
         return np.stack([self._grid(strength * field.at(t)) for field in self._sway])
 
     @cached_property
     def plant_runs(self) -> Ints:
-        """Runs of pixels that show plants, (S, 3) int64: row, first column, last column + 1.
-
-        Sorted by row, then column; (0, 3) without plants."""
+        """Runs of pixels that show plants, (S, 3): row, first column, last column + 1, sorted."""
         shown = np.pad(self.empty_scene.plants > 0, ((0, 0), (1, 1))).astype(np.int8)
         row, edge = np.nonzero(np.diff(shown, axis=1))
         return np.column_stack([row[::2], edge[::2], edge[1::2]])

@@ -22,16 +22,11 @@ RUN_ROW, RUN_FIRST, RUN_END = range(3)  # columns of runs of pixels: row, first 
 
 @dataclass(frozen=True, eq=False)
 class FrameCanvas:
-    """What one frame of one view is drawn on; at first the empty scene. The arrays are changed by drawing.
+    """What one frame of one view is drawn on; at first the empty scene. The arrays are changed by drawing."""
 
-    colour (H, W, 3)        int16, BGR: grey levels times UNIT (64)
-    depth (H, W)            float32: m along the optical axis, inf for sky
-    shaded (H, W)           uint8: 255 times the share of the direct sun that people's shadows take
-    dirty (rows, columns)   uint8: 1 for tiles (8 rows x 16 columns of px) in which any of these changed, or
-                            that have a change of colour within the radius of the blur
-    """
-
-    colour: NDArray[np.int16]
-    depth: NDArray[np.float32]
-    shaded: NDArray[np.uint8]
+    colour: NDArray[np.int16]  # (H, W, 3) int16, BGR: grey levels times UNIT (64)
+    depth: NDArray[np.float32]  # (H, W) float32: m along the optical axis, inf for sky
+    shaded: NDArray[np.uint8]  # (H, W) uint8: 255 times the share of the direct sun that people's shadows take
+    # (rows, columns) uint8: 1 for tiles (8 rows x 16 columns of px) in which any of these changed, or that have a
+    # change of colour within the radius of the blur
     dirty: NDArray[np.uint8]

@@ -15,10 +15,7 @@ from sim.scene.body import XX, XY, YY
 
 @njit(cache=True, error_model="numpy")
 def ellipse_row(y, a, b, d):  # type: ignore[no-untyped-def]
-    """Return the ends x0 <= x1 of row y of the ellipse a x² + 2 b x y + d y² <= 1, measured from its centre.
-
-    The result is (1, -1), x0 > x1, if the row misses the ellipse, if a is not above 0, or for nan.
-    """
+    """Returns the ends x0 <= x1 of row y of the ellipse a x² + 2 b x y + d y² <= 1; (1, -1) if it is missed."""
     root = b * b * y * y - a * (d * y * y - 1.0)
     if not (root >= 0.0 and a > 0.0):
         return 1.0, -1.0
@@ -28,12 +25,9 @@ def ellipse_row(y, a, b, d):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def outline_columns(v, i, e, middle, inverse, width):  # type: ignore[no-untyped-def]
-    """Return the first column and the last column + 1 of image row v whose pixel centres lie in an outline and in the
-    image.
+    """Returns the first column and the last + 1 of row v in the outline of part e of person i; equal if none.
 
-    The outline is the ellipse of part e (0 body, 1 head) of person i (row from 0). middle (N, 2, 2): centres u, v in
-    px. inverse (N, 2, 3): entries 11, 12, 22 of the inverse shape matrices, 1/px². width: of the image, px. The two
-    numbers are equal if there are no such pixels, or for nan.
+    middle (N, 2, 2) px, inverse (N, 2, 3) 1/px²: centres and packed inverse shapes of the outlines.
     """
     x0, x1 = ellipse_row(v + 0.5 - middle[i, e, 1], inverse[i, e, XX], inverse[i, e, XY], inverse[i, e, YY])
     if x0 > x1:
@@ -44,12 +38,7 @@ def outline_columns(v, i, e, middle, inverse, width):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def mark_dirty(dirty, v, left, right, margin, height, width):  # type: ignore[no-untyped-def]
-    """Set to 1 the tiles of `dirty` that hold columns left … right - 1 of row v, or pixels at most `margin` px away
-    from them.
-
-    dirty (rows, columns): one number per tile of 8 rows x 16 columns of px. height, width: of the image, px. Nothing is
-    marked if right <= left. Returns nothing.
-    """
+    """Marks the tiles of columns left … right - 1 of row v, and of pixels at most `margin` px away."""
     if right > left:
         first, last = max(left - margin, 0) // TILE_W, (min(right + margin, width) - 1) // TILE_W
         for r in range(max(v - margin, 0) // TILE_H, min(v + margin, height - 1) // TILE_H + 1):
@@ -65,12 +54,7 @@ def _copy(line, many, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def restore(dirty, empty_colour, empty_depth, colour, depth, shaded):  # type: ignore[no-untyped-def]
-    """Restore the dirty tiles of a canvas to the empty scene, set `shaded` to 0 there, and mark all tiles clean, in
-    place.
-
-    dirty (rows, columns): 1 for tiles (8 rows x 16 columns of px) that changed. empty_colour, colour (H, W * 3).
-    empty_depth, depth, shaded (H, W). Clean tiles are not touched. Returns nothing.
-    """
+    """Restores the dirty tiles of a canvas to the empty scene, and marks all tiles clean."""
     height, width = depth.shape
     for j in range(dirty.shape[0]):
         last = 0

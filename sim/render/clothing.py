@@ -24,12 +24,9 @@ CUT_SHARES = (0.45, 0.06, 0.05, 0.1, 0.24, 0.1)  # of the cuts PLAIN … DRESS i
 
 
 def clothing_atlas(people: int, seed: int, repeat: int = 0) -> NDArray[np.uint8]:
-    """Return the texture pages (P, 2, texels) uint8 of people 1 … P (`people`): second axis body, head.
+    """Returns the texture pages (P, 2, texels) of people 1 … P: body, head.
 
-    A page has texels = UP * (ROUND + 1) * 3 numbers: UP (64) rows from the ground upwards, ROUND (64) columns round the
-    body, the first repeated at the end, and B, G, R. Row p of the result is the person of id p + 1. One person more
-    changes no other person's page. seed, repeat (number of the suite entry's copy, 0 without copies): name the random
-    streams. Raises ValueError for a negative seed.
+    A page has UP rows from the ground upwards, ROUND + 1 columns round the body (the first repeated), and B, G, R.
     """
     from sim.render.clothing_kernels import ROUND, UP, draw_page
 

@@ -20,11 +20,7 @@ FINE = 3  # samples each way per texel
 
 @njit(cache=True)
 def _head(across, along, up, style):  # type: ignore[no-untyped-def]
-    """Return the row of the colour table (HAIR or SKIN) and the shade, a factor up to 1, at a point of a head.
-
-    across: -1 left to 1 right. along: 1 front, -1 back. up: -1 to 1. style (6,): only its slot HAIRLINE counts, the
-    height of the hair's edge. Hair is on top and behind, down to the hairline; the face has darker eyes and chin.
-    """
+    """Returns the colour's row (HAIR or SKIN) and the shade at a point of a head."""
     if up > style[HAIRLINE] - 0.5 * max(along, 0.0) + 0.5 or (along < 0.15 and up > -0.75):
         return HAIR, 1.0
     eyes = along > 0.6 and abs(up - 0.1) < 0.12 and 0.15 < abs(across) < 0.6
@@ -33,14 +29,7 @@ def _head(across, along, up, style):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _body(across, along, up, round_, style, key):  # type: ignore[no-untyped-def]
-    """Return the row of the colour table (SHOES, TROUSERS, SHIRT, SECOND or SKIN) and the shade, a factor up to 1, at a
-    point of a body.
-
-    across: -1 left to 1 right. along: 1 front, -1 back. up: -1 at the ground, 1 at the neck. round_: turn round the
-    body in [0, 4). style (6,): slots CUT (kind of garment), COUNT (of stripes or patches), HEM (height of the shirt's
-    lower edge), HAIRLINE (not used), LEG_GAP (darkness between the legs), ARM (distance across at which the arms
-    begin). key: of the pattern of patches.
-    """
+    """Returns the colour's row (SHOES … SKIN) and the shade at a point of a body; round_: turn round it in [0, 4)."""
     cut, hem, count, arm = int(style[CUT]), style[HEM], style[COUNT], style[ARM]
     if up < -0.9:
         return SHOES, 1.0
@@ -64,12 +53,10 @@ def _body(across, along, up, round_, style, key):  # type: ignore[no-untyped-def
 
 @njit(cache=True)
 def draw_page(style, key, colours, part, out):  # type: ignore[no-untyped-def]
-    """Set out (UP, ROUND, 3), 64 x 64 texels, to the colours (BGR, grey levels) of a body or head, not clipped to 255.
+    """Sets out (UP, ROUND, 3) to the colours of a body or head (`part`), not clipped to 255.
 
-    part: BODY_PART (0) or HEAD_PART (1). style (6,): slots CUT, COUNT (of stripes or patches), HEM, HAIRLINE, LEG_GAP,
-    ARM. key: of its random patterns. colours (6, 3): BGR of shoes, trousers, shirt, second colour, skin, hair. Row j of
-    a page runs over the height up = -1 … 1. Column i runs over the turn round_ = 0 … 4: right side, front, left side,
-    back, right side. Each texel is a mean of 3 x 3 samples. Returns nothing.
+    style (6,): slots CUT …. colours (6, 3): rows SHOES …. key: of the random patterns. Columns turn from the right side
+    over the front to the left side and the back.
     """
     out[:] = 0.0
     for j in range(UP * FINE):

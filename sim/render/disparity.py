@@ -14,12 +14,7 @@ from sim.types import Array, Ints
 
 
 def empty_scene_disparities(left: CameraView, right: CameraView) -> Array:
-    """Return the disparities (H, W) in px of the empty scene between the two views of a pair, at the left view's
-    pixels.
-
-    A disparity is u_left - u_right, above 0. It is nan for sky and for points that the right camera does not see:
-    beyond the left edge of its image, or hidden by a solid thing.
-    """
+    """Returns the disparities (H, W) px of the empty scene between two views, at the left view's pixels."""
     from sim.render import disparity_kernels as kernels
 
     out = np.empty((left.height, left.width))
@@ -38,13 +33,9 @@ def frame_disparities(
     in_left: ProjectedPeople,
     in_right: ProjectedPeople,
 ) -> Array:
-    """Return the disparities u_left - u_right (H, W) in px of a frame with N people, at the left view's pixels, as a
-    new array.
+    """Returns the disparities (H, W) px of a frame with people, at the left view's pixels.
 
-    nan for sky and for points that the right camera does not see, as people, walls or the image's edge hide them. empty
-    (H, W) px: disparities of the empty scene. canvas: the left view's, with people drawn; its depth is used. ids (H,
-    W): person id where a person is visible in the left view. people: the people of the frame. in_left, in_right: the
-    same people as each camera sees them.
+    empty (H, W): those of the empty scene. canvas: the left view's, with people drawn. ids (H, W): the people it shows.
     """
     from sim.render import disparity_kernels as kernels
 
@@ -58,5 +49,4 @@ def frame_disparities(
 
 
 def _scale(left: CameraView, right: CameraView) -> float:
-    """Return the left view's horizontal focal length (px) times the distance of the two views' cameras (m), in px m."""
     return left.camera.focal_px[0] * float(np.linalg.norm(right.camera.position - left.camera.position))

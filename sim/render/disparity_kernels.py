@@ -20,12 +20,9 @@ SAME = 1e-3  # m: a point in front by less than this counts as the same point
 
 @njit(cache=True, error_model="numpy")
 def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # type: ignore[no-untyped-def]
-    """Set out (H, W) px to the disparities u_left - u_right of the empty scene, scale / depth, at the left camera's
-    pixels.
+    """Sets out (H, W) to the disparities scale / depth of the empty scene, at the left camera's pixels.
 
-    nan for sky and for points that the right camera does not see: left of its image, or more than 1 mm behind a solid
-    thing. depth (H, W) m: of the left view, inf for sky. scale: focal length times baseline, px m. origin, direction
-    (3, 3): PixelRays of the right camera. solids: a `raycast.Solids`. Returns nothing.
+    depth (H, W) m: of the left view. scale: px m. origin, direction (3, 3): PixelRays of the right camera.
     """
     height, width = depth.shape
     any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
@@ -44,12 +41,7 @@ def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # ty
 
 @njit(cache=True, error_model="numpy")
 def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-def]
-    """Return True if the right camera's ray at u = x px meets part e of person i in front of depth z (m), by over 1 mm.
-
-    start, step (N, 2, 3, 3): the right camera's matrices of ray origins and directions in the part's axes. row (6,):
-    what the image row adds to the ray's origin (first three) and direction (last three). e: 0 body, 1 head. Pixel
-    centres are at whole numbers plus 0.5.
-    """
+    """Returns True if the right camera's ray at u = x px meets part e of person i before depth z (m)."""
     a = b = c = 0.0
     for k in range(3):
         p, d = start[i, e, k, 0] * x + row[k], step[i, e, k, 0] * x + row[3 + k]
@@ -62,14 +54,7 @@ def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-de
 
 @njit(cache=True, error_model="numpy")
 def _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, solids, out):  # type: ignore[no-untyped-def]
-    """Set out (H, W) px to the disparity at the pixels that show one of N people; other pixels are left. Returns
-    nothing.
-
-    nan where the point is outside the right image, or solid things hide it from the right camera. depth (H, W) m, ids
-    (H, W) and bounds (N, 4): of the left image, with people. Columns of bounds: first row, last row + 1, first column,
-    last column + 1. id (N,): person ids. scale: focal length times baseline, px m. right_depth (H, W) m: of the empty
-    scene in the right view. origin, direction (3, 3): PixelRays of the right camera. solids: a `raycast.Solids`.
-    """
+    """Sets out (H, W) to the disparity at the pixels of people; nan where the right camera does not see the point."""
     width = depth.shape[1]
     any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
@@ -94,20 +79,17 @@ def _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, s
 def add_people(  # type: ignore[no-untyped-def]
     depth, ids, bounds, id, scale, start, step, middle, inverse, nearest, right_depth, origin, direction, solids, out
 ):
-    """Add N people to out (H, W) px, on entry the disparities of the empty scene, at the left camera's pixels.
+    """Adds N people to out (H, W), on entry the disparities of the empty scene, at the left camera's pixels.
 
-    Pixels that show people get their disparity; pixels that people hide from the right camera become nan. depth (H, W)
-    m, ids (H, W), bounds (N, 4) (first row, last row + 1, first column, last column + 1), id (N,): of the left image,
-    with people. scale: focal length times baseline, px m. The rest is the right camera's. start, step (N, 2, 3, 3):
-    matrices of ray origins and directions in the axes of body and head. middle (N, 2, 2) px, inverse (N, 2, 3): centres
-    and packed inverse shapes of the outlines; a part with a nan outline hides nothing. nearest (N, 2) m: least depths
-    of the parts. right_depth (H, W) m: of the empty scene. origin, direction (3, 3): PixelRays. solids: a
-    `raycast.Solids`. Returns nothing.
+    depth (H, W) m, ids (H, W), bounds (N, 4), id (N,): of the left image, with people. scale: px m. The rest is the
+    right camera's: start, step (N, 2, 3, 3), middle (N, 2, 2) px, inverse (N, 2, 3), nearest (N, 2) m: of bodies and
+    heads; right_depth (H, W) m: of the empty scene; origin, direction (3, 3): PixelRays.
     """
     height, width = depth.shape
     row = np.empty(6)
     _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, solids, out)
     for i in range(len(id)):
+        # Pixels that a person hides from the right camera become nan.
         for e in range(2):
             mu, mv, most = middle[i, e, 0], middle[i, e, 1], scale / nearest[i, e]
             a, b, c = inverse[i, e, XX], inverse[i, e, XY], inverse[i, e, YY]

@@ -29,33 +29,21 @@ PLACE, ACROSS, DOWN, STRENGTH = range(4)  # keys of the random role "wind"
 
 @dataclass(frozen=True, eq=False)
 class Foliage:
-    """The plants of a sequence, and the wind that moves them.
+    """The plants of a sequence, and the wind that moves them."""
 
-    key     key (whole number) of the random pattern `texture_kernels.plant_pattern`
-    level   plants grow where the pattern is above it, no unit
-    sway    two random fields over ground and time: movement in px across and px down at a strength of 1
-    gusts   field, the same everywhere: natural logarithm of the wind's strength, plus 0.25
-    """
-
-    key: int
-    level: float
+    key: int  # key (whole number) of the random pattern `texture_kernels.plant_pattern`
+    level: float  # plants grow where the pattern is above it, no unit
+    # two random fields over ground and time: movement in px across and px down at a strength of 1
     sway: tuple[PlaneWaves, PlaneWaves]
-    gusts: PlaneWaves
+    gusts: PlaneWaves  # field, the same everywhere: natural logarithm of the wind's strength, plus 0.25
 
     def strength(self, t: float) -> float:
-        """Return the wind's strength at time t (s), a factor above 0 on the plants' sway; t is 0 at frame 1. Its mean
-        square over time is 1."""
+        """Returns the wind's strength at time t (s), a factor on the sway; its mean square over time is 1."""
         return float(np.exp(self.gusts.at_origin(t) - GUST**2))
 
 
 def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repeat: int = 0) -> Foliage | None:
-    """Return the plants of this seed; None if their share is 0, or if no ground in view is near enough to show leaves.
-
-    `picture.foliage` gives the share of this camera's image that plants cover. They cover less if less ground is near
-    enough. Places outside the world are preferred. repeat: number of the suite entry's copy, 0 without copies.
-
-    Raises InputError if the drawn share is not between 0 and 1, ValueError if the seed is negative.
-    """
+    """Returns the plants of this seed; None if their share is 0, or no ground in view is near enough."""
     source = rng(seed, "wind", PLACE, repeat=repeat)
     share = draw(picture.foliage, source)
     if not 0 <= share <= 1:
@@ -73,6 +61,7 @@ def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repea
     rays, size = pixel_rays(camera), np.array(scene.size, dtype=float)
     scale = picture.samples * signed_scale(camera)  # leaves show farther away
     sample_plants((rays.origin, rays.direction), scale, SAMPLE_STEP, solids_of(scene), size, key, pattern, cover)
+    # The level above which plants cover the wanted share of the image.
     order = np.argsort(-pattern, axis=None, kind="stable")
     covered = np.cumsum(cover.ravel()[order])
     if covered[-1] == 0:

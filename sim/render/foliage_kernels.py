@@ -18,14 +18,9 @@ from sim.scene.raycast_kernels import at_pixel, first_hit
 
 @njit(cache=True)
 def sample_plants(rays, scale, step, solids, size, key, pattern, cover):  # type: ignore[no-untyped-def]
-    """Set pattern (J, I) and cover (J, I) to samples of the plant pattern, one in the middle of each `step` x `step` px
-    of an image.
+    """Sets pattern and cover (J, I) to the plant pattern and its share of a pixel, at every `step`-th pixel.
 
-    pattern: `plant_pattern` (no unit; plants grow where it is high) on level ground, -inf elsewhere. cover: share of
-    the pixel, 0 to 1, that plants would cover if they grew everywhere; 0 where leaves are too far away to show, and off
-    the ground. rays: origin and direction, each (3, 3), of PixelRays. scale: px per m at a depth of 1 m, or minus px
-    per m for a camera from above. solids: a `raycast.Solids`. size (2,) m: of the world. key: of the pattern. Returns
-    nothing.
+    Off the ground they are -inf and 0. rays, scale, size, key: as of `paint_pixels`.
     """
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
     for j in range(pattern.shape[0]):
@@ -44,11 +39,7 @@ def sample_plants(rays, scale, step, solids, size, key, pattern, cover):  # type
 
 @njit(cache=True)
 def _interpolate(nodes, x, y, k):  # type: ignore[no-untyped-def]
-    """Return the value of nodes[k] at column x and row y of its grid, bilinear between the nodes.
-
-    nodes (K, J, I): K grids of J rows and I columns, at least 2 x 2. x, y: in node steps from 0; beyond the last node
-    the value is extrapolated.
-    """
+    """Returns the value of nodes[k] at column x and row y of its grid, bilinear between the nodes."""
     i, j = min(int(x), nodes.shape[2] - 2), min(int(y), nodes.shape[1] - 2)
     a, b = x - i, y - j
     low = nodes[k, j, i] * (1 - a) + nodes[k, j, i + 1] * a
@@ -57,13 +48,10 @@ def _interpolate(nodes, x, y, k):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def sway(empty, share, runs, nodes, step, colour, dirty, margin):  # type: ignore[no-untyped-def]
-    """Draw plants where wind has moved them: colour at pixel p becomes `empty` at p - share(p) * wind(p), bilinear.
+    """Draws plants where wind has moved them: colour at pixel p becomes `empty` at p - share(p) * wind(p), bilinear.
 
-    colour, empty (H, W, 3) int16: canvas to draw on and that of the empty scene. share (H, W): share of each pixel that
-    shows plants. runs (S, 3): row, first column, last column + 1 of the pixels that show plants; no others are drawn.
-    nodes (2, J, I): wind, px across and px down, at every `step`-th pixel. dirty (rows, columns): tiles (8 rows x 16
-    columns of px), set to 1 up to `margin` px round the runs. Places outside the image are moved to its edge. Returns
-    nothing.
+    colour, empty (H, W, 3): canvases. share (H, W): of plants. runs (S, 3): pixels with plants. nodes (2, J, I): wind,
+    px, at every `step`-th pixel.
     """
     height, width = share.shape
     for s in range(len(runs)):

@@ -25,35 +25,24 @@ SUN, DRIFT, FLICKER, SWITCH, CLOUD = range(5)  # keys of the random role "light"
 
 @dataclass(frozen=True)
 class Illumination:
-    """The light of one sequence. Logarithms are natural ones; times count from frame 1.
+    """The light of one sequence. Logarithms are natural ones; times count from frame 1."""
 
-    sun (3,)       unit vector to the sun, x, y, z
-    shadow         the sun's share of the light on level ground, 0 to 1; 0: people cast no shadows
-    penumbra       width of a shadow's soft edge, m
-    drift          random field: slow changes of the logarithm of brightness, the same everywhere
-    clouds         random field: patches of the logarithm of brightness that move over the ground
-    flicker        standard deviation of the logarithm of brightness from frame to frame
-    switches       sudden changes: (start s, end s, gain) each; gain is the factor of brightness from the end on
-    seed, repeat   seed and number of the suite entry's copy (0: none); they name the random stream of the flicker
-    """
-
-    sun: Array
-    shadow: float
-    penumbra: float
-    drift: PlaneWaves
-    clouds: PlaneWaves
-    flicker: float
+    sun: Array  # (3,) unit vector to the sun, x, y, z
+    shadow: float  # the sun's share of the light on level ground, 0 to 1; 0: people cast no shadows
+    penumbra: float  # width of a shadow's soft edge, m
+    drift: PlaneWaves  # random field: slow changes of the logarithm of brightness, the same everywhere
+    clouds: PlaneWaves  # random field: patches of the logarithm of brightness that move over the ground
+    flicker: float  # standard deviation of the logarithm of brightness from frame to frame
+    # sudden changes: (start s, end s, gain) each; gain is the factor of brightness from the end on
     switches: tuple[tuple[float, float, float], ...]
+    # seed, repeat : seed and number of the suite entry's copy (0: none); they name the random stream of the flicker
     seed: int
     repeat: int
 
     def gain(self, t: float, key: int) -> float:
-        """Return the factor of brightness at time t (s), clouds left out: about 1 before any switch, always above 0.
+        """Returns the factor of brightness at time t (s), clouds left out, about 1 before any switch.
 
-        It combines drift, flicker and switches. t is 0 at frame 1. key: frame number from 1 plus BACKGROUNDS (50), 0 or
-        more; it names the random stream of the flicker. The logarithm of a switch's gain rises linearly from its start
-        to its end; a switch without duration acts at once. Raises ValueError for a negative key or seed if there is
-        flicker.
+        key: frame number from 1 plus BACKGROUNDS; it names the random stream of the flicker.
         """
         log = self.drift.at_origin(t)
         if self.flicker > 0:
@@ -65,13 +54,7 @@ class Illumination:
 
 
 def draw_illumination(light: Light, seed: int, repeat: int = 0) -> Illumination:
-    """Return the Illumination that a scenario's light settings and this seed give; the same arguments give the same
-    light.
-
-    repeat: number of the suite entry's copy, 0 without copies. Raises InputError if a drawn value is impossible: the
-    sun's elevation not in (0°, 90°], a negative cloud, or a switch gain that is not above 0. Raises ValueError for a
-    negative seed.
-    """
+    """Returns the light that a scenario's settings and this seed give."""
     source = rng(seed, "light", SUN, repeat=repeat)
     azimuth, elevation = (np.deg2rad(draw(v, source)) for v in (light.sun_azimuth_deg, light.sun_elevation_deg))
     if not 0 < elevation <= np.pi / 2 + 1e-9:

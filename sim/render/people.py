@@ -20,62 +20,42 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class DrawnPeople:
-    """N people of one frame, or of several frames one after the other.
+    """N people of one frame, or of several frames one after the other."""
 
-    id (N,)             person id = column of the Motion (from 0) + 1
-    pos3 (N, 3)         feet: x, y, z in m
-    height (N,)         body height, m
-    shapes              Ellipsoids of body and head in the world: centres (N, 2, 3) m and shape matrices (N, 2, 3, 3) m²
-    half (N, 2, 3)      half axes of body and head in m: across, along the heading, up
-    turn (N, 3, 3)      rotation from the world to a person's own axes: across (to the right), along the heading, up
-    """
-
-    id: Ints
-    pos3: Array
-    height: Array
+    id: Ints  # (N,) person id = column of the Motion (from 0) + 1
+    pos3: Array  # (N, 3) feet: x, y, z in m
+    height: Array  # (N,) body height, m
+    # Ellipsoids of body and head in the world: centres (N, 2, 3) m and shape matrices (N, 2, 3, 3) m²
     shapes: Ellipsoids
-    half: Array
+    half: Array  # (N, 2, 3) half axes of body and head in m: across, along the heading, up
+    # (N, 3, 3) rotation from the world to a person's own axes: across (to the right), along the heading, up
     turn: Array
 
 
 @dataclass(frozen=True, eq=False)
 class ImageOutlines:
-    """Ellipses of N people in the image, two each; the second axis is body, head.
+    """Ellipses of N people in the image, two each; the second axis is body, head."""
 
-    middle (N, 2, 2)    centres, u and v in px; nan if not wholly in front of the camera
-    inverse (N, 2, 3)   inverse shapes in 1/px²: matrix entries 11, 12, 22; nan likewise
-    bounds (N, 4)       first row, last row + 1, first column, last column + 1 of the pixels that either ellipse may
-                        cover, clipped to the image; no rows or no columns if an ellipse is nan or outside
-    """
-
-    middle: Array
-    inverse: Array
+    middle: Array  # (N, 2, 2) centres, u and v in px; nan if not wholly in front of the camera
+    inverse: Array  # (N, 2, 3) inverse shapes in 1/px²: matrix entries 11, 12, 22; nan likewise
+    # (N, 4) first row, last row + 1, first column, last column + 1 of the pixels that either ellipse may cover, clipped
+    # to the image; no rows or no columns if an ellipse is nan or outside
     bounds: Ints
 
 
 @dataclass(frozen=True, eq=False)
 class ProjectedPeople:
-    """N people as one camera sees them; the second axis is body, head. u, v are in px; pixel centres are at whole
-    numbers plus 0.5.
+    """N people as one camera sees them; the second axis is body, head."""
 
-    start (N, 2, 3, 3)     times (u, v, 1): origin of a pixel's ray in the part's axes, where it is a ball of radius 1
-    step (N, 2, 3, 3)      times (u, v, 1): direction of that ray, depth 1 m per unit
-    outlines               ImageOutlines of body and head
-    nearest_depth (N, 2)   m along the optical axis: no point of the part is nearer; negative behind the camera
-    """
-
+    # (N, 2, 3, 3) times (u, v, 1): origin of a pixel's ray in the part's axes, where it is a ball of radius 1
     start: Array
-    step: Array
-    outlines: ImageOutlines
-    nearest_depth: Array
+    step: Array  # (N, 2, 3, 3) times (u, v, 1): direction of that ray, depth 1 m per unit
+    outlines: ImageOutlines  # ImageOutlines of body and head
+    nearest_depth: Array  # (N, 2) m along the optical axis: no point of the part is nearer; negative behind the camera
 
 
 def people_of_frames(motion: Motion, first: int, last: int) -> tuple[DrawnPeople, Ints]:
-    """Return the people of frames first … last - 1 (frames from 1 on), one frame after the other, each sorted by id.
-
-    Also returns the row at which each frame begins, and the number of rows at the end: (last - first + 1,). A frame in
-    which nobody is present has no rows. first: at least 1. Frames behind the Motion's last are left out of both.
-    """
+    """Returns the people of frames first … last - 1 (from 1), each sorted by id, and the row where each begins."""
     present = motion.present[first - 1 : last - 1]
     t, p = np.nonzero(present)
     pos3, shapes = bodies_at(motion, t + first - 1, p)
@@ -89,10 +69,7 @@ def people_of_frames(motion: Motion, first: int, last: int) -> tuple[DrawnPeople
 
 
 def take_rows(value: T, rows: slice) -> T:
-    """Return a copy of a dataclass with these rows of all its arrays, those of nested dataclasses included.
-
-    value: every field must be an array or such a dataclass. The arrays of the copy are views of the given ones.
-    """
+    """Returns a copy of a dataclass with these rows of all its arrays, those of nested dataclasses included."""
     kept = {
         f.name: v[rows] if isinstance(v := getattr(value, f.name), np.ndarray) else take_rows(v, rows)
         for f in fields(value)  # type: ignore[arg-type]
@@ -101,10 +78,7 @@ def take_rows(value: T, rows: slice) -> T:
 
 
 def project_people(camera: Camera, rays: PixelRays, people: DrawnPeople) -> ProjectedPeople:
-    """Return N people as this camera sees them, with rays in the axes of their parts, outlines and nearest depths.
-
-    rays: the camera's own PixelRays. Outlines are nan where a body or head is not wholly in front of a pinhole camera.
-    """
+    """Returns N people as this camera, with its own rays, sees them."""
     to_ball = people.turn[:, None] / people.half[..., None]
     start = to_ball @ rays.origin
     start[..., 2] -= np.einsum("npij,npj->npi", to_ball, people.shapes.centre)
@@ -117,23 +91,14 @@ def project_people(camera: Camera, rays: PixelRays, people: DrawnPeople) -> Proj
 
 
 def image_outlines(camera: Camera, ellipses: Outlines) -> ImageOutlines:
-    """Return the ImageOutlines of N people: centres, packed inverse shapes, and the pixel bounds of both ellipses
-    together.
-
-    ellipses: Outlines of body and head in px. The bounds are clipped to the image, and empty if either ellipse is nan.
-    """
+    """Returns the outlines of N people, with the pixel bounds of body and head together."""
     half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
     bounds = pixel_bounds(camera, (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1))
     return ImageOutlines(ellipses.centre, packed_inverse(ellipses.shape), bounds)
 
 
 def pixel_bounds(camera: Camera, low: Array, high: Array) -> Ints:
-    """Return the bounds (N, 4) int64 of the pixels touched by boxes from low (N, 2) to high (N, 2), clipped to the
-    image.
-
-    low, high: u, v in px of the upper left and lower right corner. Columns: first row, last row + 1, first column, last
-    column + 1. A nan box, or one outside the image, has no rows or no columns (first equals end).
-    """
+    """Returns the bounds (N, 4) of the pixels touched by boxes from low (N, 2) to high (N, 2) px; empty for nan."""
     size = np.array(camera.image, dtype=float)
     low, high = (np.clip(np.nan_to_num(edge), 0, size) for edge in (low, high))
     edges = np.stack([np.floor(low[:, 1]), np.ceil(high[:, 1]), np.floor(low[:, 0]), np.ceil(high[:, 0])], axis=1)

@@ -23,13 +23,7 @@ FEET, WAIST, HEAD = range(3)  # columns of `sunlit`
 
 @njit(cache=True, error_model="numpy")
 def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
-    """Set ray (3, 4) to the rays of image row v in the own axes of part e of person i, where the part is a ball of
-    radius 1.
-
-    Rows of ray: across, along, up. Columns: origin at u = 0 (the left edge), its change per column, direction at u = 0,
-    its change per column. start, step (N, 2, 3, 3): matrices of ray origins and directions. e: 0 body, 1 head. Returns
-    nothing.
-    """
+    """Sets ray (3, 4) to the rays of image row v in the own axes of part e of person i, a ball of radius 1."""
     for k in range(3):
         ray[k, P_AT_0] = start[i, e, k, 1] * (v + 0.5) + start[i, e, k, 2]
         ray[k, P_PER_COLUMN] = start[i, e, k, 0]
@@ -39,12 +33,7 @@ def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
-    """Set t (many,) to the depths in m at which the rays of a row's pixels meet a ball of radius 1 round the origin.
-
-    ray (3, 4): rows are the part's axes x, y, z; columns are ray origin at u = 0 (the left edge), its change per
-    column, direction at u = 0, its change per column. left: column of the first of `many` pixels. A ray that misses the
-    ball gets the depth of its nearest point. Returns nothing.
-    """
+    """Sets t (many,) to the depths m at which a row's rays meet the unit ball; a miss gives its nearest point."""
     px0, px1, dx0, dx1 = ray[X, P_AT_0], ray[X, P_PER_COLUMN], ray[X, D_AT_0], ray[X, D_PER_COLUMN]
     py0, py1, dy0, dy1 = ray[Y, P_AT_0], ray[Y, P_PER_COLUMN], ray[Y, D_AT_0], ray[Y, D_PER_COLUMN]
     pz0, pz1, dz0, dz1 = ray[Z, P_AT_0], ray[Z, P_PER_COLUMN], ray[Z, D_AT_0], ray[Z, D_PER_COLUMN]
@@ -62,14 +51,11 @@ def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
 def _texture_and_light(  # type: ignore[no-untyped-def]
     ray, left, many, t, half, sun, shadow, sunlit, head, place, across, up, light
 ):
-    """Set where on a texture page the points at depths t (many,) m are, and how they are lit. Returns nothing.
+    """Sets where on a texture page the points at depths t (many,) are, and how they are lit.
 
-    place (many,): index of the lower left of four texels in the page, row by row of 65 texels (3 numbers each). across,
-    up (many,), 0 to 1: how far beyond that texel the point is. light (many,): brightness times UNIT = 64. ray (3, 4):
-    rows are the part's axes; columns are ray origin at u = 0 (the left edge), its change per column, direction at u =
-    0, its change per column. left: column of the first pixel. half (3,) m: half axes. sun (3,): unit vector to the sun,
-    in own axes. shadow: the sun's share of the light. sunlit (3,): share of the sun at feet, waist and head. head: True
-    for a head. Numbers are float32, exact to 1e-4 of a page.
+    place (many,): index of the lower left of four texels; across, up (many,): how far beyond it; light (many,):
+    brightness times UNIT. half (3,) m: half axes. sun (3,): in own axes. sunlit (3,): columns FEET …. Float32, exact to
+    1e-4 of a page.
     """
     f = np.float32
     px0, px1 = f(ray[X, P_AT_0]), f(ray[X, P_PER_COLUMN])
@@ -79,6 +65,7 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
     pz0, pz1 = f(ray[Z, P_AT_0]), f(ray[Z, P_PER_COLUMN])
     dz0, dz1 = f(ray[Z, D_AT_0]), f(ray[Z, D_PER_COLUMN])
     h0, h1, h2 = f(1.0 / half[0]), f(1.0 / half[1]), f(1.0 / half[2])
+    # Lambert's law for the sun; the sky's light comes more from above than from the side.
     low_sun = shadow / max(sun[2], 0.3)
     s0, s1, s2 = f(sun[0] * low_sun), f(sun[1] * low_sun), f(sun[2] * low_sun)
     waist, above, below = f(sunlit[WAIST]), f(sunlit[HEAD] - sunlit[WAIST]), f(sunlit[FEET] - sunlit[WAIST])
@@ -110,19 +97,12 @@ def draw_people(  # type: ignore[no-untyped-def]
     order, start, step, half, middle, inverse, bounds, id, sun, shadow, sunlit, pages, atlas,
     shade, label, depth, ids, colour, dirty, margin, amodal,
 ):  # fmt: skip
-    """Draw N people by depth, in this `order` of rows; from near to far is fastest, the result does not depend on it.
+    """Draws N people by depth, in this `order` of rows, of which only the speed depends.
 
-    start, step (N, 2, 3, 3): matrices of ray origins and directions in the axes of body and head. half (N, 2, 3) m:
-    half axes. middle (N, 2, 2) px, inverse (N, 2, 3) 1/px²: centres and packed inverse shapes of the outlines. bounds
-    (N, 4): first row, last row + 1, first column, last column + 1 of each person's pixels. id (N,): person ids. sun (N,
-    3): unit vector to the sun in each person's axes. shadow: the sun's share of the light. sunlit (N, 3): share of the
-    sun at feet, waist and head. pages (N,): index of each person's page in the atlas (P, 2, texels) uint8, BGR.
-
-    depth (H, W) m: on entry that of the empty scene, on return that of everything; points at depth 0 or less are not
-    drawn. Changed tiles, with a margin in px, are set to 1 in dirty (rows, columns). With `label`, ids (H, W) gets the
-    person's id where a person is visible, and amodal (N,) is raised by the pixels of each silhouette in the image. With
-    `shade`, colour (H, W, 3) int16 is drawn. Light is the sky's, more from above than from the side, and the sun's by
-    Lambert's law. Returns nothing.
+    start, step (N, 2, 3, 3), half (N, 2, 3) m, middle (N, 2, 2) px, inverse (N, 2, 3), bounds (N, 4): see
+    `sim.render.people`. sun (N, 3): in own axes. sunlit (N, 3): columns FEET …. pages (N,): of the atlas. depth (H, W)
+    m, dirty: of the canvas. With `label`, ids (H, W) gets the ids of visible people, and amodal (N,) is raised by the
+    pixels of whole silhouettes. With `shade`, colour (H, W, 3) is drawn.
     """
     height, width = depth.shape
     t, ray = np.empty(width), np.empty((3, 4))

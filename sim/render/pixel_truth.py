@@ -13,14 +13,9 @@ from sim.types import Array, Bools, Camera, Ints, Motion, PixelTruth
 
 
 def pixel_truth(ids: Ints, bounds: Ints, id: Ints, amodal: Ints, disparity: Array | None) -> PixelTruth:
-    """Return the PixelTruth of an id map, with visible pixels, box and connected region of each of N people, in the
-    order of id.
+    """Returns the PixelTruth of an id map (H, W): visible pixels, box and connected region of N people.
 
-    ids (H, W): person id where a person is visible, 0 or negative elsewhere. id (N,): of the people; every positive id
-    in the map must be among them. bounds (N, 4): first row, last row + 1, first column, last column + 1 outside which
-    each person is not visible. amodal (N,): pixels of the whole silhouettes in the image. disparity (H, W) px is passed
-    through, None included. A person without visible pixels has count 0, a nan box (left, top, width, height in px) and
-    region number -1.
+    bounds (N, 4): outside which nobody is visible. id (N,). amodal (N,): pixels of the whole silhouettes.
     """
     from sim.render.pixel_truth_kernels import count_pixels
 
@@ -34,20 +29,12 @@ def pixel_truth(ids: Ints, bounds: Ints, id: Ints, amodal: Ints, disparity: Arra
 
 
 def modal_mask(pixels: PixelTruth, person: int) -> Bools:
-    """Return the mask (H, W), True at the pixels in which the person with this id (from 1 on) is visible.
-
-    All False if the person is hidden or absent.
-    """
+    """Returns the mask (H, W) of the pixels in which a person is visible."""
     return np.asarray(pixels.ids == person)
 
 
 def amodal_mask(motion: Motion, camera: Camera, index: int, person: int) -> Bools:
-    """Return the mask (H, W), True at the pixels that would show a person if nothing hid that person in frame `index`.
-
-    index: from 1 on. person: id, from 1 on. All False if the person is absent in that frame, or outside the image. A
-    body or head that is not wholly in front of the camera is left out. Raises IndexError for a frame behind the last or
-    an id above the number of people; 0 and negative numbers are not refused, but count from the end.
-    """
+    """Returns the mask (H, W) of the pixels that would show a person if nothing hid them in frame `index` (from 1)."""
     t, p = np.array([index - 1]), np.array([person - 1])
     width, height = camera.image
     mask = np.zeros((height, width), np.bool_)

@@ -16,13 +16,11 @@ LEFT, RIGHT, TOP, BOTTOM = range(4)  # columns of `edges`
 
 @njit(cache=True, error_model="numpy")
 def count_pixels(ids, bounds, id, row_of, count, edges, blob):  # type: ignore[no-untyped-def]
-    """Count the visible pixels of each of N people in an id map (H, W), and find who touch in the image.
+    """Counts the visible pixels of N people in an id map (H, W), and finds who touch in the image.
 
-    bounds (N, 4): first row, last row + 1, first column, last column + 1 outside which person id (N,) is not visible.
-    row_of (max id + 1,): row of each id in `id`. Three arrays are set. count (N,), 0 on entry: visible pixels. edges
-    (N, 4): first column, last column + 1, first row, last row + 1 of them; without any W, 0, H, 0. blob (N,): number of
-    the connected region from 0 on, -1 if nothing is visible. People are in one region if a pixel of one is an
-    8-neighbour of a pixel of the other. Regions are numbered by their first person's row. Returns nothing.
+    bounds (N, 4): outside which nobody is visible. row_of: row of each id. count (N,), 0 on entry: visible pixels.
+    edges (N, 4): columns LEFT …. blob (N,): number of the connected region, by its first person's row; -1 if nothing is
+    visible.
     """
     height, width = ids.shape
     parent = np.arange(len(id))

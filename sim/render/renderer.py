@@ -2,7 +2,8 @@
 
 A frame starts from the empty scene (`sim.render.background`). Wind moves its plants, shadows darken it, and people are
 drawn over it by depth. The result is blurred, multiplied by the brightness of the moment, given noise and, if the
-scenario wants it, compressed as JPEG."""
+scenario wants it, compressed as JPEG. The people of up to 16 consecutive frames are computed at once, which is faster.
+"""
 
 from __future__ import annotations
 
@@ -18,26 +19,84 @@ from sim.render.blur_noise import blur_weights, noise_offsets, noise_pool
 from sim.render.camera_view import NODE_STEP, CameraView
 from sim.render.canvas import UNIT, FrameCanvas
 from sim.render.clothing import clothing_atlas
-from sim.render.compression import compressed
 from sim.render.disparity import empty_scene_disparities, frame_disparities
 from sim.render.foliage import Foliage, grow_plants
-from sim.render.frame_batch import FrameBatch, PeopleInView
 from sim.render.illumination import Illumination, draw_illumination
-from sim.render.people import DrawnPeople
+from sim.render.people import DrawnPeople, ProjectedPeople, people_of_frames, project_people, take_rows
 from sim.render.pixel_truth import pixel_truth
+from sim.render.shadows import PeopleShadows, people_shadows, sunlit_shares
 from sim.scene import camera as cameras
-from sim.types import BACKGROUNDS, Camera, Frame, Image, Motion, PixelTruth
+from sim.types import BACKGROUNDS, Array, Camera, Frame, Image, Motion, PixelTruth
 
 if TYPE_CHECKING:
     from scenarios.schema.picture import Light, Picture
+
+
+def compressed(image: Image, quality: int) -> Image:
+    """Returns the image (H, W, 3) uint8, BGR, after JPEG compression with this quality, 1 (worst) to 100."""
+    import cv2
+
+    code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    return np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
+
+
+FRAMES = 16  # frames of a batch
+
+
+@dataclass(frozen=True, eq=False)
+class PeopleInView:
+    """N people of one or more frames as one camera view sees them."""
+
+    projected: ProjectedPeople  # ProjectedPeople: rays in the axes of body and head, outlines in px
+    shadows: PeopleShadows | None  # PeopleShadows; None if the light casts none
+    # (N, 3) 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing, as a wall, hides it
+    sunlit: Array
+
+
+class FrameBatch:
+    """The people of up to 16 consecutive frames of a Motion, among them frame `index`; batches begin at 1, 17, 33, ….
+
+    State: all people of the batch, and what each view sees of them, computed when first asked for.
+    """
+
+    def __init__(self, motion: Motion, light: Illumination, index: int) -> None:
+        self.first = index - (index - 1) % FRAMES
+        self.light = light
+        last = min(self.first + FRAMES, len(motion.present) + 1)
+        self._people, self._starts = people_of_frames(motion, self.first, last)
+        self._views: dict[int, PeopleInView] = {}
+
+    def __contains__(self, index: int) -> bool:
+        return index in range(self.first, self.first + FRAMES)
+
+    def _rows(self, index: int) -> slice:
+        k = index - self.first
+        return slice(int(self._starts[k]), int(self._starts[k + 1]))
+
+    def people(self, index: int) -> DrawnPeople:
+        """Returns the people of frame `index`, sorted by id."""
+        return take_rows(self._people, self._rows(index))
+
+    def in_view(self, view: CameraView, side: int, index: int) -> PeopleInView:
+        """Returns the people of frame `index` as a view sees them; `side` always names the same view."""
+        if side not in self._views:
+            light, people = self.light, self._people
+            shadows = None
+            if light.shadow > 0:
+                shadows = people_shadows(view.camera, people, light.sun, light.penumbra, view.level)
+            lit = sunlit_shares(view.solids, people, light.sun)
+            self._views[side] = PeopleInView(project_people(view.camera, view.rays, people), shadows, lit)
+        whole, rows = self._views[side], self._rows(index)
+        shadows = None if whole.shadows is None else take_rows(whole.shadows, rows)
+        return PeopleInView(take_rows(whole.projected, rows), shadows, whole.sunlit[rows])
+
 
 LEFT, RIGHT, MISALIGNED = 0, 1, 2  # views; the last: the right camera as it is, if it is not as calibrated
 
 
 @dataclass(frozen=True, eq=False)
 class RenderedFrame:
-    """The requested parts of one frame, None if not requested: image (the camera's own) and right (the right camera's),
-    both (H, W, 3) uint8 BGR; pixels, which person each pixel of `image` shows."""
+    """The parts of one frame that were asked for; the others are None."""
 
     image: Image | None = None
     right: Image | None = None
@@ -45,12 +104,11 @@ class RenderedFrame:
 
 
 class Renderer:
-    """Draws the frames of one Motion as one camera, or a stereo pair, sees them. Frames count from 1.
+    """Draws the frames of one Motion, from 1, as one camera, or a stereo pair, sees them.
 
-    The constructor raises InputError if the camera's lens distorts (radial not 0). light, picture: settings as in a
-    scenario; their random values are drawn with the Motion's seed; a negative seed raises ValueError when the first
-    frame is drawn. State: everything that is the same in all frames, computed when first needed; and the people of the
-    batch of up to 16 frames drawn last."""
+    State: everything that is the same in all frames, computed when first needed, and the people of the batch of frames
+    drawn last. Random values of light and picture are drawn with the Motion's seed.
+    """
 
     def __init__(self, motion: Motion, camera: Camera, light: Light, picture: Picture) -> None:
         if camera.radial != 0:
@@ -63,29 +121,23 @@ class Renderer:
 
     @cached_property
     def illumination(self) -> Illumination:
-        """The Illumination of this seed; InputError if a draw is impossible."""
+        """The light of this seed."""
         return draw_illumination(self.light, self.motion.seed, self.motion.repeat)
 
     @cached_property
     def left_view(self) -> CameraView:
-        """The CameraView of the empty scene as the camera itself sees it; computed once.
-
-        Raises InputError if the drawn light or share of plants is impossible."""
+        """The empty scene as the camera sees it."""
         return CameraView(self.camera, self.motion, self.illumination, self.picture, self._plants)
 
     @cached_property
     def right_view(self) -> CameraView:
-        """The CameraView of the empty scene from the right camera as calibrated, `baseline` m to the right.
-
-        Raises InputError if there is no right camera (kind "top", or a baseline of 0) or the drawn light or share of
-        plants is impossible."""
+        """The empty scene as the right camera sees it, as calibrated."""
         self.check_pair()
         right = cameras.right_camera(self.camera)
         return CameraView(right, self.motion, self.illumination, self.picture, self._plants)
 
     @cached_property
     def _shown_right_view(self) -> CameraView:
-        """The CameraView from the right camera as it is, turned and moved; raises InputError as `right_view`."""
         roll, down = np.radians(self.picture.right_roll_deg), self.picture.right_down_px
         if roll == 0 and down == 0:
             return self.right_view
@@ -93,7 +145,7 @@ class Renderer:
         return CameraView(right, self.motion, self.illumination, self.picture, self._plants)
 
     def check_pair(self) -> None:
-        """Raise InputError if there is no right camera: kind "top", or a baseline of 0. Returns nothing."""
+        """Raises InputError if there is no right camera: kind "top", or a baseline of 0."""
         if not self.camera.baseline > 0 or self.camera.kind != "pinhole":
             raise InputError(
                 place="camera.baseline", got=f"{self.camera.kind}, baseline {self.camera.baseline:g}",
@@ -118,7 +170,6 @@ class Renderer:
 
     @property
     def _margin(self) -> int:
-        """The distance in px over which the blur spreads a pixel; 0 without blur."""
         return len(self._weights) // 2
 
     @cached_property
@@ -126,43 +177,26 @@ class Renderer:
         return empty_scene_disparities(self.left_view, self.right_view)
 
     def frame(self, index: int) -> Image:
-        """Return the image (H, W, 3) uint8 BGR of frame `index`, from 1 on; the same index gives the same image.
-
-        Raises IndexError for frame 0 or one behind the last, InputError if the drawn light or share of plants is
-        impossible."""
+        """Returns the image (H, W, 3) of frame `index`, from 1."""
         return self._draw(index, LEFT, shade=True, label=False)[0]
 
     def right(self, index: int) -> Image:
-        """Return the right camera's image (H, W, 3) uint8, BGR, of frame `index`, from 1 on.
-
-        Raises InputError if there is no right camera (kind "top", or baseline 0) or drawn light or plants are
-        impossible, IndexError for frame 0 or one behind the last."""
+        """Returns the right camera's image (H, W, 3) of frame `index`, from 1."""
         return self._draw(index, RIGHT, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
-        """Return the PixelTruth of frame `index`, from 1 on; its disparities are None unless `disparity` is True.
-
-        Raises InputError if disparities are asked for without a right camera, or the drawn light or plants are
-        impossible; IndexError for frame 0 or one behind the last."""
+        """Returns the PixelTruth of frame `index`, from 1, with disparities if asked for."""
         truth = self._draw(index, LEFT, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth
 
     def draw(self, index: int, *, right: bool = False, pixels: bool = False, disparity: bool = False) -> RenderedFrame:
-        """Return the left image of frame `index` (from 1 on) and the parts asked for; parts not asked for are None.
-
-        right: the right camera's image. pixels: the pixel truth. disparity: disparities in the pixel truth; no effect
-        without `pixels`. Raises InputError if `right` or disparities are asked for and there is no right camera (kind
-        "top", or a baseline of 0), or the drawn light or plants are impossible; IndexError for frame 0 or one behind
-        the last."""
+        """Returns the left image of frame `index` (from 1) and the parts asked for."""
         image, truth = self._draw(index, LEFT, shade=True, label=pixels, disparity=disparity and pixels)
         return RenderedFrame(image, self.right(index) if right else None, truth)
 
     def background(self, k: int) -> Image:
-        """Return image k = 0 … 49 (BACKGROUNDS is 50), (H, W, 3) uint8, BGR, of the scene without people.
-
-        Its time is (k - BACKGROUNDS) / fps s, before frame 1. Other k are not refused, except that k < -1 raises
-        ValueError. Raises InputError if the drawn light or plants are impossible."""
+        """Returns image k = 0 … 49 (H, W, 3) of the scene without people, before frame 1."""
         view, index = self.left_view, k - BACKGROUNDS + 1
         canvas = self._moved_canvas(view, index)
         image = self._finish(view, canvas, index, LEFT)
@@ -178,8 +212,6 @@ class Renderer:
         return self._last_batch
 
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
-        """Return a canvas of the empty scene in `view` with its plants, if any, where the wind of frame `index` (from
-        1) moves them."""
         canvas = view.take_canvas()
         if view.plants is not None:
             from sim.render.foliage_kernels import sway
@@ -193,12 +225,6 @@ class Renderer:
     def _draw(
         self, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
-        """Return the image (H, W, 3) uint8 of one view of frame `index` (from 1) and its pixel truth; side: LEFT or
-        RIGHT.
-
-        shade: draw the image; else it has shape (0, 0, 3). label: make the pixel truth; else it is None. disparity:
-        with disparities; no effect without `label`. Raises InputError if the right view is needed and there is none, or
-        drawn light or plants are impossible; IndexError if there is no such frame."""
         view, batch = self._shown_right_view if side else self.left_view, self._batch(index)
         number = MISALIGNED if side and view is not self.right_view else side
         people, seen = batch.people(index), batch.in_view(view, number, index)
@@ -244,11 +270,6 @@ class Renderer:
         shade: bool,
         label: bool,
     ) -> None:
-        """Draw N people, `seen` by this view, on a canvas by depth; the canvas is changed.
-
-        With `shade`, colours are drawn. With `label`, ids (H, W) gets the person's id where one is visible, and amodal
-        (N,) is raised by the pixels of each whole silhouette in the image. Else the two are left as they are.
-        """
         from sim.render.people_kernels import draw_people
 
         here, light = seen.projected, self.illumination
@@ -260,8 +281,6 @@ class Renderer:
         )  # fmt: skip
 
     def _finish(self, view: CameraView, canvas: FrameCanvas, index: int, side: int) -> Image:
-        """Return the image (H, W, 3) uint8 of a view's canvas: blurred, times brightness, with noise, as JPEG if
-        wanted."""
         from sim.render.blur_noise_kernels import finish_image
 
         image = np.empty((view.height, view.width, 3), np.uint8)
@@ -279,10 +298,20 @@ class Renderer:
 def make_renderer(
     motion: Motion, camera: Camera, light: Light | None = None, picture: Picture | None = None
 ) -> Renderer:
-    """Return a Renderer of a Motion as this camera sees it; light and picture as in a scenario, defaults if None.
+    """Returns a Renderer of a Motion as this camera sees it.
 
-    Raises InputError if the camera's lens distorts (radial not 0). Impossible drawn values of light and plants raise
-    InputError or ValueError only when the first frame is drawn."""
+    Args:
+        motion: Positions of people over time, and the scene.
+        camera: A camera without lens distortion.
+        light: As in a scenario; None: the default.
+        picture: As in a scenario; None: the default.
+
+    Returns:
+        The renderer; it draws a frame when asked for.
+
+    Raises:
+        InputError: The lens distorts.
+    """
     from scenarios.schema.picture import Light, Picture
 
     return Renderer(motion, camera, light or Light(), picture or Picture())
@@ -291,10 +320,6 @@ def make_renderer(
 def render(
     motion: Motion, camera: Camera, index: int, light: Light | None = None, picture: Picture | None = None
 ) -> Frame:
-    """Return frame `index` (from 1 on) as a Frame with the left image, without right image and detections.
-
-    light, picture: as in a scenario, defaults if None. For many frames, keep one `make_renderer`. Raises InputError if
-    the lens distorts (radial not 0) or drawn light or plants are impossible, IndexError for frame 0 or one behind the
-    last, ValueError for a negative seed."""
+    """Returns frame `index` (from 1) with the left image alone; `make_renderer` is faster for many."""
     image = make_renderer(motion, camera, light, picture).frame(index)
     return Frame(index, (index - 1) / motion.fps, image)

@@ -21,26 +21,20 @@ LIT_HEIGHTS = (0.12, 0.5, 0.95)  # of the height: feet (they stand a step deep i
 
 @dataclass(frozen=True, eq=False)
 class PeopleShadows:
-    """Shadows of N people on the ground at their feet, two each; the second axis is body, head.
+    """Shadows of N people on the ground at their feet, two each; the second axis is body, head."""
 
-    shape (N, 2, 3)    inverse of each shadow ellipse's 2 x 2 shape matrix, 1/m²: entries 11, 12, 22, in x and y
-    softness (N, 2)    half the penumbra's width over the geometric mean of the ellipse's half axes, no unit
-    outlines           ImageOutlines of the shadows with their soft edges, and of the pixels on which they can fall
-    """
-
-    shape: Array
-    softness: Array
+    shape: Array  # (N, 2, 3) inverse of each shadow ellipse's 2 x 2 shape matrix, 1/m²: entries 11, 12, 22, in x and y
+    softness: Array  # (N, 2) half the penumbra's width over the geometric mean of the ellipse's half axes, no unit
+    # ImageOutlines of the shadows with their soft edges, and of the pixels on which they can fall
     outlines: ImageOutlines
 
 
 def people_shadows(camera: Camera, people: DrawnPeople, sun: Array, penumbra: float, level: bool) -> PeopleShadows:
-    """Return the PeopleShadows of N people as a camera sees them: shapes on the ground, softness and outlines in the
-    image.
+    """Returns the shadows of N people as a camera sees them.
 
     An ellipsoid with centre c and shape S casts on the plane at height z an ellipse with centre c - s (c_z - z)/s_z and
     shape P S Pᵀ. Here s is the unit vector `sun` (3,) to the sun, e_z the upward unit vector, and P = I - s e_zᵀ/s_z.
-    The sun must stand above the horizon. penumbra: width of the soft edge, m. level: True if shadows can fall on level
-    ground only. Else the bounds also cover walls and stairs up to the height of the head.
+    penumbra: m. level: True if shadows can fall on level ground only.
     """
     along = np.eye(3) - np.outer(sun / sun[2], [0.0, 0.0, 1.0])
     shape = along @ people.shapes.shape @ along.T
@@ -56,13 +50,6 @@ def people_shadows(camera: Camera, people: DrawnPeople, sun: Array, penumbra: fl
 
 
 def _bounds_up_to_head(camera: Camera, people: DrawnPeople, sun: Array, flat: Array) -> Ints:
-    """Return the bounds (N, 4) of all pixels on which a shadow can fall, from the lower of feet and z = 0 up to the
-    head.
-
-    Columns: first row, last row + 1, first column, last column + 1, clipped to the image. sun (3,): unit vector to the
-    sun. flat (N, 2, 3, 3): shapes of the shadows with soft edges, m². The bounds are the whole image for a person whose
-    shadow may reach behind the camera.
-    """
     half = np.sqrt(np.diagonal(flat, axis1=2, axis2=3))[..., :2]
     low_z, high_z = np.minimum(people.pos3[:, 2], 0.0), people.pos3[:, 2] + people.height
     corners = []
@@ -74,16 +61,13 @@ def _bounds_up_to_head(camera: Camera, people: DrawnPeople, sun: Array, flat: Ar
             here = middle + half * side
             corners.append(np.concatenate([here, np.broadcast_to(z[:, None, None], (*here.shape[:2], 1))], axis=2))
     uv = project(camera, np.stack(corners, axis=1).reshape(-1, 3))[0].reshape(len(people.id), 16, 2)
+    # A shadow that reaches behind the camera may be anywhere in the image.
     behind = np.asarray(np.isnan(uv).any(axis=(1, 2)))[:, None]
     return pixel_bounds(camera, np.where(behind, 0.0, uv.min(axis=1)), np.where(behind, camera.image, uv.max(axis=1)))
 
 
 def sunlit_shares(solids: Solids, people: DrawnPeople, sun: Array) -> Array:
-    """Return (N, 3) floats: 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing hides
-    it.
-
-    sun (3,): unit vector to the sun. People hide nobody here. All are 1 without solids.
-    """
+    """Returns (N, 3): 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing hides it."""
     lit = np.ones((len(people.id), 3))
     if not any(len(part) for part in solids if isinstance(part, np.ndarray)):
         return lit

@@ -15,13 +15,7 @@ from sim.scene.body import BODY_PART, HEAD_PART, XX, XY, YY
 
 @njit(cache=True, error_model="numpy")
 def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: ignore[no-untyped-def]
-    """Raise shade (many,) to 255 times the share of the sun that one body part takes at places (many, 3) x, y, z in m.
-
-    A value that is higher already is kept. The direction to the sun is (sx, sy, 1). centre (3,) m: of the ellipsoid.
-    shape (3,): inverse shape of its shadow, entries 11, 12, 22, 1/m². softness: half the penumbra over the geometric
-    mean of the shadow's half axes; 0 gives a sharp edge. Places at or above the height of the centre stay unshaded.
-    Returns nothing.
-    """
+    """Raises shade (many,) to 255 times the share of the sun that one body part takes at places (many, 3) m."""
     f = np.float32
     x, y, z, a, b, c = f(centre[0]), f(centre[1]), f(centre[2]), f(shape[XX]), f(2 * shape[XY]), f(shape[YY])
     slope_x, slope_y, zero, one, most = f(sx), f(sy), f(0.0), f(1.0), f(255.0)
@@ -40,16 +34,11 @@ def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: i
 def draw_shadows(  # type: ignore[no-untyped-def]
     place, direct, bounds, flat, middle, inverse, centre, shape, sun, softness, shaded, colour, dirty, margin
 ):
-    """Darken colour (H, W, 3) int16 where N people stand before the sun; of several shadows, the darkest counts.
+    """Darkens colour (H, W, 3) where N people stand before the sun; of several shadows, the darkest counts.
 
-    place (H, W, 3) m and direct (H, W), the sun's share of the light: of the empty scene. bounds (N, 4) (first row,
-    last row + 1, first column, last column + 1): pixels on which each person's shadow can fall. flat: True if only
-    level ground is in view. Then the shadow of part e (0 body, 1 head) has the outline middle (N, 2, 2) px, inverse (N,
-    2, 3) 1/px²; else these are not used. centre (N, 2, 3) m: of the ellipsoids. shape (N, 2, 3): inverse shapes of the
-    shadows, entries 11, 12, 22, 1/m². softness (N, 2): half the penumbra over the geometric mean of the shadow's half
-    axes. sun (3,): vector to the sun, above the horizon. shaded (H, W) uint8: on entry 0, on return 255 times the share
-    of the sun that is gone. Tiles (8 rows x 16 columns of px) with changes, or at most `margin` px away, are set to 1
-    in dirty. Returns nothing.
+    place (H, W, 3) m, direct (H, W): of the empty scene. bounds (N, 4), middle (N, 2, 2) px, inverse (N, 2, 3), shape
+    (N, 2, 3), softness (N, 2): of PeopleShadows. flat: True if only level ground is in view. centre (N, 2, 3) m: of the
+    ellipsoids. shaded (H, W): on return 255 times the share of the sun that is gone.
     """
     height, width = direct.shape
     sx, sy = sun[0] / sun[2], sun[1] / sun[2]

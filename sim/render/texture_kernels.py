@@ -19,7 +19,7 @@ COS, SIN = np.cos(0.7), np.sin(0.7)  # each octave is turned against the one bef
 
 @njit(cache=True)
 def lattice_value(i, j, key):  # type: ignore[no-untyped-def]
-    """Return a number in [-1, 1) that depends on the integers i, j and key only, by multiply-and-shift hashing."""
+    """Returns a number in [-1, 1) that depends on the integers i, j and key only, by multiply-and-shift hashing."""
     h = (i * 0x9E3779B1 + j * 0x85EBCA77 + key * 0xC2B2AE3D) & MASK
     h = ((h ^ (h >> 15)) * 0x2C1B3C6D) & MASK
     h = ((h ^ (h >> 12)) * 0x297A2D39) & MASK
@@ -28,10 +28,7 @@ def lattice_value(i, j, key):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def value_noise(x, y, key):  # type: ignore[no-untyped-def]
-    """Return value noise at (x, y), given in wavelengths: in [-1, 1), continuous in value and slope.
-
-    Its standard deviation is about 0.4. key: another key gives another pattern.
-    """
+    """Returns value noise at (x, y), given in wavelengths: in [-1, 1), continuous in value and slope."""
     i, j = int(np.floor(x)), int(np.floor(y))
     a, b = x - i, y - j
     a, b = a * a * (3 - 2 * a), b * b * (3 - 2 * b)
@@ -42,22 +39,13 @@ def value_noise(x, y, key):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def contrast_kept(wavelength, footprint):  # type: ignore[no-untyped-def]
-    """Return the share, 0 to 1, of a pattern's contrast that pixels of this footprint keep.
-
-    wavelength: of the pattern, m. footprint: size of a pixel on the surface, m, above 0. The share is 0 below two
-    pixels per wavelength, 1 above five, linear between.
-    """
+    """Returns the share, 0 to 1, of a pattern's contrast that pixels of this footprint keep."""
     return min(max((wavelength / footprint - 2.0) / 3.0, 0.0), 1.0)
 
 
 @njit(cache=True)
 def grain(x, y, key, footprint, coarsest):  # type: ignore[no-untyped-def]
-    """Return noise at (x, y) m, of standard deviation about 0.5 where no scale is lost.
-
-    It has equal contrast at each of up to nine scales, from `coarsest` m down to the pixel, each 0.45 of the one
-    before. footprint: size of a pixel on the surface, m, above 0. It is 0 if even the coarsest scale is finer than two
-    pixels. key: first of nine keys (whole numbers) of the pattern.
-    """
+    """Returns noise at (x, y) m, of standard deviation about 0.5 where no scale is lost."""
     total, wavelength = 0.0, coarsest
     x, y = x / coarsest, y / coarsest
     for octave in range(9):
@@ -72,12 +60,9 @@ def grain(x, y, key, footprint, coarsest):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def slabs(x, y, width, depth, joint, key, footprint):  # type: ignore[no-untyped-def]
-    """Return the brightness at (x, y) m of slabs in a running bond: a value in [-1, 1] by slab, down to -1.5 in the
-    joints.
+    """Returns the brightness at (x, y) m of slabs in a running bond: in [-1, 1] by slab, down to -1.5 in the joints.
 
-    width, depth: of a slab along x and y; joint: width of a joint; m, above 0. Every second row is shifted by half a
-    slab. footprint: size of a pixel on the surface, m; the contrast vanishes as slabs get finer than two pixels. key:
-    of the slabs' brightness.
+    width, depth, joint, footprint: m.
     """
     row = np.floor(y / depth)
     shift = (int(row) % 2) * 0.5 * width
@@ -92,11 +77,7 @@ def slabs(x, y, width, depth, joint, key, footprint):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def plant_pattern(x, y, size, key):  # type: ignore[no-untyped-def]
-    """Return the pattern at (x, y) m that decides where plants grow: they grow where it is above a level.
-
-    size (2,) m: of the world, which begins at (0, 0). The pattern, from -2.5 to 2.5, is raised by up to 1 outside the
-    world and lowered by up to 1 inside, so that plants grow outside first. key: of the pattern.
-    """
+    """Returns the pattern at (x, y) m: plants grow where it is above a level, first outside the world."""
     outside = max(max(-x, x - size[0]), max(-y, y - size[1]))
     patches = value_noise(0.4 * x, 0.4 * y, key) + 0.5 * value_noise(1.1 * x, 1.1 * y, key + 1)
     return patches + min(max(outside, -1.0), 1.0)
@@ -104,11 +85,6 @@ def plant_pattern(x, y, size, key):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def plant_cover(x, y, size, key, level, footprint):  # type: ignore[no-untyped-def]
-    """Return the share, 0 to 1, of a pixel at (x, y) m that shows plants, which grow where `plant_pattern` is above
-    `level`.
-
-    size (2,) m: of the world. key: of the pattern. footprint: size of the pixel on the ground, m. The share is 0 where
-    the footprint is so large that leaves are finer than pixels.
-    """
+    """Returns the share of a pixel at (x, y) m that shows plants; 0 where leaves are finer than pixels."""
     near = min(max(2.0 * contrast_kept(0.3, footprint) - 0.5, 0.0), 1.0)
     return near * min(max((plant_pattern(x, y, size, key) - level) / 0.1 + 0.5, 0.0), 1.0)

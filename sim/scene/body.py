@@ -28,18 +28,12 @@ XX, XY, YY = 0, 1, 2  # entries of a symmetric 2 x 2 matrix packed by `packed_in
 
 @dataclass(frozen=True)
 class BodyPart:
-    """One ellipsoid (body or head) of a person of height 1; all numbers are shares without unit.
+    """One ellipsoid (body or head) of a person of height 1; all numbers are shares without unit."""
 
-    centre   height of its centre above the ground, share of the person's height
-    across   half axis to the right; share of the height for HEAD, of the person's width for BODY
-    along    half axis along the heading; share of the height for HEAD, of the person's depth for BODY
-    up       half axis upwards, share of the height
-    """
-
-    centre: float
-    across: float
-    along: float
-    up: float
+    centre: float  # height of its centre above the ground, share of the person's height
+    across: float  # half axis to the right; share of the height for HEAD, of the person's width for BODY
+    along: float  # half axis along the heading; share of the height for HEAD, of the person's depth for BODY
+    up: float  # half axis upwards, share of the height
 
 
 BODY = BodyPart(centre=0.44, across=0.5, along=0.5, up=0.44)
@@ -48,22 +42,15 @@ HEAD = BodyPart(centre=0.93, across=0.045, along=0.057, up=0.07)
 
 @dataclass(frozen=True)
 class Ellipsoids:
-    """Bodies and heads of N people in the world, as ellipsoids (X - centre)ᵀ shape⁻¹ (X - centre) <= 1.
+    """Bodies and heads of N people in the world, as ellipsoids (X - centre)ᵀ shape⁻¹ (X - centre) <= 1."""
 
-    centre (N, 2, 3)     x, y, z in m; the second axis is body, head
-    shape (N, 2, 3, 3)   symmetric matrices in m², the squared half axes turned by the heading
-    """
-
-    centre: Array
-    shape: Array
+    centre: Array  # (N, 2, 3) x, y, z in m; the second axis is body, head
+    shape: Array  # (N, 2, 3, 3) symmetric matrices in m², the squared half axes turned by the heading
 
 
 @dataclass(frozen=True)
 class Outlines:
     """Silhouettes of N people in an image, as ellipses (u - centre)ᵀ shape⁻¹ (u - centre) <= 1, two each.
-
-        centre (N, 2, 2)     u, v in px; the second axis is body, head
-        shape (N, 2, 2, 2)   symmetric matrices in px²
 
     An ellipse is nan if its ellipsoid is not wholly in front of the camera.
     """
@@ -74,25 +61,18 @@ class Outlines:
 
 @dataclass(frozen=True)
 class RecordedBodies:
-    """B bodies of a Motion, one row per person and frame, sorted by frame, then id.
+    """B bodies of a Motion, one row per person and frame, sorted by frame, then id."""
 
-    frame (B,)     frame number, from 1 on
-    id (B,)        person id = column of the Motion + 1
-    pos3 (B, 3)    feet: x, y, z in m
-    shapes         Ellipsoids of body and head, B rows
-    """
-
-    frame: Ints
-    id: Ints
-    pos3: Array
-    shapes: Ellipsoids
+    frame: Ints  # (B,) frame number, from 1 on
+    id: Ints  # (B,) person id = column of the Motion + 1
+    pos3: Array  # (B, 3) feet: x, y, z in m
+    shapes: Ellipsoids  # Ellipsoids of body and head, B rows
 
 
 def half_axes(height: Array, width: Array | None = None, depth: Array | None = None) -> Array:
-    """Return the half axes (N, 2, 3) in m of N people: second axis body, head; last axis across, along the heading, up.
+    """Returns the half axes (N, 2, 3) m of N people: body, head; across, along the heading, up.
 
-    height, width, depth (N,) m: of the whole person. width None: SHOULDER_SHARE (0.27) of the height. depth None:
-    DEPTH_SHARE (0.16) of the height. Width and depth change the body only, not the head.
+    height, width, depth (N,): m; None: of the usual proportions. Width and depth change the body only.
     """
     width = SHOULDER_SHARE * height if width is None else width
     depth = DEPTH_SHARE * height if depth is None else depth
@@ -105,11 +85,7 @@ def half_axes(height: Array, width: Array | None = None, depth: Array | None = N
 def ellipsoids(
     pos3: Array, heading: Array, height: Array, width: Array | None = None, depth: Array | None = None
 ) -> Ellipsoids:
-    """Return the Ellipsoids, body and head, of N upright people.
-
-    pos3 (N, 3) m: feet. heading (N,) rad: direction faced, 0 along +x, counter-clockwise. height, width, depth (N,) m;
-    width None stands for 0.27 of the height, depth None for 0.16 of it. A nan in pos3 or heading gives nan.
-    """
+    """Returns body and head of N upright people. pos3 (N, 3): feet. heading (N,). Others: as of `half_axes`."""
     half = half_axes(height, width, depth)
     c, s = cos(heading), sin(heading)
     a = half * half
@@ -124,13 +100,9 @@ def ellipsoids(
 
 
 def bodies_at(motion: Motion, t: Ints, p: Ints) -> tuple[Array, Ellipsoids]:
-    """Return the feet (N, 3), x, y, z in m, and the Ellipsoids of N people of a Motion.
+    """Returns the feet (N, 3) and the shapes of N people of a Motion, on the ground of its scene.
 
-    t (N,): time rows of the Motion, from 0 on (frame - 1). p (N,): columns of the Motion, from 0 on (id - 1). The feet
-    are on the ground of the scene, stairs included. A person who is absent at that time has nan x and y, z = 0 and a
-    nan ellipsoid.
-
-    Raises IndexError for a row or column that the Motion does not have; negative ones count from the end.
+    t (N,): frame - 1. p (N,): id - 1. Absent people are nan.
     """
     xy = motion.pos[t, p]
     pos3 = np.column_stack([xy, height_at(motion.scene, xy)])
@@ -138,21 +110,13 @@ def bodies_at(motion: Motion, t: Ints, p: Ints) -> tuple[Array, Ellipsoids]:
 
 
 def recorded_bodies(motion: Motion) -> RecordedBodies:
-    """Return the bodies of all people in all frames in which they are present, as RecordedBodies sorted by frame, then
-    id.
-
-    Frames count from 1; a person's id is the column of the Motion + 1. It has no rows if nobody is ever present.
-    """
+    """Returns the bodies of all people in all frames in which they are present."""
     t, p = np.nonzero(motion.present)
     return RecordedBodies(t + 1, p + 1, *bodies_at(motion, t, p))
 
 
 def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
-    """Return the exact ellipse in the image of each ellipsoid, as Outlines in px with the same N rows.
-
-    Kind "pinhole": an ellipse is nan where the ellipsoid is not wholly in front of the camera; lens distortion is
-    ignored. Kind "top": ellipses do not depend on the depth. Ellipses are not clipped to the image.
-    """
+    """Returns the exact ellipse in the image of each ellipsoid, without lens distortion."""
     R = camera.rotation
     c = turned(R, people.centre - camera.position)
     S = product(product(R, people.shape), R.T)
@@ -169,10 +133,7 @@ def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
 
 
 def outline_boxes(ellipses: Outlines) -> Array:
-    """Return the boxes (N, 4), left, top, width, height in px, each round the ellipses of body and head of one person.
-
-    Boxes are amodal (hidden parts included) and not clipped to the image. A row is nan if either ellipse is nan.
-    """
+    """Returns the boxes (N, 4) px round body and head, hidden parts included, not clipped to the image."""
     half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
     low, high = (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1)
     return np.concatenate([low, high - low], axis=1)
@@ -181,31 +142,20 @@ def outline_boxes(ellipses: Outlines) -> Array:
 def person_boxes(
     camera: Camera, pos3: Array, heading: Array, height: Array, width: Array | None = None, depth: Array | None = None
 ) -> Array:
-    """Return the boxes (N, 4), left, top, width, height in px, round body and head of N people in the camera's image.
-
-    pos3 (N, 3) m: feet. heading (N,) rad: direction faced, 0 along +x, counter-clockwise. height, width, depth (N,) m;
-    width None stands for 0.27 of the height, depth None for 0.16 of it. Boxes are amodal (hidden parts included) and
-    not clipped. A row is nan if the person is not wholly in front of a pinhole camera. Lens distortion is ignored.
-    """
+    """Returns the boxes (N, 4) px round N people in the camera's image. Arguments as of `ellipsoids`."""
     return outline_boxes(outlines(camera, ellipsoids(pos3, heading, height, width, depth)))
 
 
 def packed_inverse(shape: Array) -> Array:
-    """Return the inverses of symmetric matrices E (..., 2, 2) as (..., 3): their entries 11, 12, 22 (slots XX, XY, YY).
-
-    A nan matrix gives nan. A singular one gives inf or nan, with a numpy warning.
-    """
+    """Returns the inverses of symmetric matrices (..., 2, 2) as (..., 3): entries XX, XY, YY."""
     a, b, d = shape[..., 0, 0], shape[..., 0, 1], shape[..., 1, 1]
     return np.asarray(np.stack([d, -b, a], axis=-1) / (a * d - b * b)[..., None])
 
 
 def contour(ellipses: Outlines, points: int = 16) -> Array:
-    """Return points on the outlines of N people, (N, 2 * points, 2), u and v in px: first those of the body, then the
-    head's.
+    """Returns points on the outlines of N people, (N, 2 * points, 2) px: first the body's, then the head's.
 
-    An ellipse with centre m and shape E has the points m + L (cos, sin) with L Lᵀ = E, at `points` evenly spaced angles
-    from 0 on. The points of a nan ellipse are nan. They are not clipped to the image, and points of the head may lie in
-    the body.
+    An ellipse with centre m and shape E has the points m + L (cos, sin) with L Lᵀ = E.
     """
     angle = 2 * np.pi * np.arange(points) / points
     circle = unit(angle)
@@ -219,13 +169,10 @@ def contour(ellipses: Outlines, points: int = 16) -> Array:
 
 
 def occlusion_distance(camera: Camera, pos3: Array, height: Array) -> Array:
-    """Return a distance (N,) in m that orders people from near to far: of two on one line of sight, the nearer hides.
+    """Returns a distance (N,) m that orders people: of two on one line of sight, the nearer hides.
 
-    Kind "pinhole": the horizontal distance from the camera to the body's axis; a ray meets upright bodies in this
-    order, whatever the camera's tilt. Kind "top": height of the camera minus that of the top of the head; negative for
-    a head above the camera.
-
-    pos3 (N, 3) m: feet. height (N,) m: body heights.
+    The horizontal distance from a pinhole camera: a ray meets upright bodies in this order, whatever the tilt. pos3 (N,
+    3): feet. height (N,).
     """
     if camera.kind == "top":
         return np.asarray(camera.position[2] - pos3[:, 2] - height)

@@ -2,19 +2,55 @@
 
 World: x right, y away, z up (m). Camera: x right, y down, z forward; x_cam = R (X - C) with rotation R and the camera's
 position C. Pinhole: u = fx x/z + cx, v = fy y/z + cy with focal lengths fx, fy and image centre cx, cy in px. Top
-(orthographic, R looks down): u = s x + cx, v = s y + cy, s = px_per_m. The lens of a pinhole camera may distort
-(`radial`, of calibrated recordings): `sim.scene.lens` then changes x/z, y/z before they become px.
-`sim.scene.camera_placement` finds where a scenario's camera stands.
+(orthographic, R looks down): u = s x + cx, v = s y + cy, s = px_per_m.
+
+The lens of a pinhole camera may distort (`radial` = k, of calibrated recordings; Tsai). In units of the focal length,
+from the image centre, it shows at the distorted point x, |x| = r, what an ideal lens shows at y = x (1 + k r²). Given
+|y| = q, the distorted radius r is the root of r + k r³ = q that continues r = 0: r = 2/√(3k) sinh(asinh(3/2 q √(3k))/3)
+for k > 0. For k < 0 sin and asin with √(-3k) replace sinh and asinh; points with q > 2/(3 √(-3k)) are not shown at all.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sim.elementary import PI, length, product, sin, turned, unit
-from sim.scene import lens
+from sim.elementary import PI, atan2, dot, exp, length, log, product, sin, turned, unit
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera
+
+
+def undistort(x: Array, k: float) -> Array:
+    """Returns the ideal points y = x (1 + k |x|²) of distorted points x (N, 2)."""
+    if k == 0.0:
+        return x
+    return np.asarray(x * (1.0 + k * dot(x, x)[:, None]))
+
+
+def distort(y: Array, k: float) -> Array:
+    """Returns the distorted points x (N, 2) of ideal points y (N, 2); nan where the lens does not show the point."""
+    if k == 0.0:
+        return y
+    root = np.sqrt(3.0 * abs(k))
+    q = length(y)[:, None]
+    known = np.isfinite(q)
+    x = np.where(known, 1.5 * q * root, 0.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        if k > 0:
+            e = exp(log(x + np.sqrt(x * x + 1.0)) / 3)  # asinh and sinh
+            third = (e - 1.0 / e) / 2
+        else:
+            third = sin(atan2(x, np.sqrt(1.0 - x * x)) / 3)
+        r = np.where(x < 0.02, q, third * 2 / root)
+        for _ in range(3):  # Newton's steps, where the closed form would lose digits
+            r = np.where(x < 0.5, r - (r + k * r * r * r - q) / (1.0 + 3.0 * k * r * r), r)
+        return np.asarray(y * np.where(known, np.where(q > 0, r / q, 1.0), np.nan))
+
+
+def undistort_jacobian(x: Array, k: float) -> Array:
+    """Returns the derivative (N, 2, 2) of `undistort` at x (N, 2): (1 + k |x|²) I + 2 k x xᵀ."""
+    r2 = dot(x, x)
+    return np.asarray((1.0 + k * r2)[:, None, None] * np.eye(2) + 2.0 * k * x[:, :, None] * x[:, None, :])
+
 
 STEEP_DEG = 70.0  # a camera tilted more than this foreshortens an upright person to a dot
 FARTHEST = 10_000.0  # m: ground further away counts as not seen
@@ -22,56 +58,38 @@ NEAREST_DEPTH = 0.05  # m: points at this depth or nearer are not projected
 
 
 def camera_rotation(tilt: float, yaw: float) -> Array:
-    """Return the rotation matrix (3, 3) from world to camera; its rows are the camera's right, down and forward axes.
-
-    tilt: angle in rad by which the camera looks down; negative looks up. yaw: rad; 0 looks along world +y, positive
-    turns left. x_camera = rotation (X - position).
-    """
+    """Returns the rotation (3, 3) from world to camera: rows right, down, forward. tilt, yaw: rad."""
     (ct, st), (cy, sy) = unit(tilt), unit(yaw)
     return np.array([[cy, sy, 0.0], [st * sy, -st * cy, -ct], [-sy * ct, cy * ct, -st]])
 
 
 def project(camera: Camera, xyz: Array) -> tuple[Array, Array]:
-    """Return image points (N, 2), u right and v down in px, and depths (N,) in m of world points xyz (N, 3) in m.
+    """Returns image points (N, 2) px and depths (N,) m of world points xyz (N, 3); not clipped to the image.
 
-    The depth is measured along the optical axis and is negative behind the camera. Kind "top": the image point does not
-    depend on the depth, and exists behind the camera, too. Kind "pinhole": the image point is nan where the depth is at
-    most NEAREST_DEPTH (0.05 m), and where a lens with radial < 0 does not show the point. Points outside the image are
-    not clipped. A nan in a row of xyz makes that row's point and depth nan.
+    nan for a pinhole camera where the depth is at most NEAREST_DEPTH, or the lens does not show the point.
     """
     x = turned(camera.rotation, np.asarray(xyz, dtype=float) - camera.position)
     depth = x[:, 2]
     if camera.kind == "top":
         return x[:, :2] * camera.px_per_m + camera.centre_px, depth
     z = np.where(depth > NEAREST_DEPTH, depth, np.nan)
-    return lens.distort(x[:, :2] / z[:, None], camera.radial) * camera.focal_px + camera.centre_px, depth
+    return distort(x[:, :2] / z[:, None], camera.radial) * camera.focal_px + camera.centre_px, depth
 
 
 def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
-    """Return the lines of sight of image points uv (N, 2) px in the world: origins (N, 3) in m and directions (N, 3).
-
-    The point origin + s direction has the depth s (m) along the optical axis; a direction is not a unit vector. Kind
-    "pinhole": every origin is the camera's position, and lens distortion is undone. Kind "top": origins differ, all
-    directions are the forward axis. One of the two arrays is read-only (one row repeated). uv may lie outside the
-    image.
-    """
+    """Returns the lines of sight of image points uv (N, 2) px: origins and directions (N, 3) of depth 1."""
     uv = np.asarray(uv, dtype=float)
     if camera.kind == "top":
         across = (uv - camera.centre_px) / camera.px_per_m
         origin = camera.position + turned(camera.rotation[:2].T, across)
         return origin, np.broadcast_to(camera.rotation[2], origin.shape)
     x = np.ones((len(uv), 3))
-    x[:, :2] = lens.undistort((uv - camera.centre_px) / camera.focal_px, camera.radial)
+    x[:, :2] = undistort((uv - camera.centre_px) / camera.focal_px, camera.radial)
     return np.broadcast_to(camera.position, x.shape), turned(camera.rotation.T, x)
 
 
 def to_ground(camera: Camera, uv: Array, z: float = 0.0) -> Array:
-    """Return the points (N, 2), x and y in m, of the plane at height z (m) that are seen at image points uv (N, 2) px.
-
-    A row is nan where the line of sight does not meet the plane in front of the camera: at and above the horizon, or
-    for a plane above a camera that looks down; also where uv is nan. Lens distortion is undone. Walls and stairs are
-    ignored. uv may lie outside the image.
-    """
+    """Returns the points (N, 2) m of the plane at height z (m) that are seen at uv (N, 2) px; nan where none is."""
     origin, direction = rays(camera, uv)
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (z - origin[:, 2]) / direction[:, 2]
@@ -80,12 +98,7 @@ def to_ground(camera: Camera, uv: Array, z: float = 0.0) -> Array:
 
 
 def foot_points(box: Array, z: Array, camera: Camera) -> Array:
-    """Return the ground points (R, 2), x and y in m, of people with boxes (R, 4), left, top, width, height in px.
-
-    A person stands where the middle of the box's lower edge is seen; for a camera of kind "top", where the box's middle
-    is seen. z (R,) m: height of the ground at each person. A row is nan where the line of sight meets no ground of that
-    height in front of the camera, as above the horizon, and for a nan box or z.
-    """
+    """Returns the ground points (R, 2) m of people with boxes (R, 4) px, on ground of height z (R,) m."""
     origin, direction = rays(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]))
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (z - origin[:, 2]) / direction[:, 2]
@@ -94,18 +107,14 @@ def foot_points(box: Array, z: Array, camera: Camera) -> Array:
 
 
 def standing_share(camera: Camera | None) -> float:
-    """Return the share of a box's height, from its top, at which a person stands: 0.5 for kind "top", else 1."""
+    """Returns the share of a box's height, from its top, at which a person stands."""
     return 0.5 if camera is not None and camera.kind == "top" else 1.0
 
 
 def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
-    """Return the derivative of `to_ground` at image points uv (N, 2) px, d(x, y)/d(u, v), as (N, 2, 2) in m/px.
+    """Returns the derivative of `to_ground` at image points uv (N, 2), d(x, y)/d(u, v), (N, 2, 2) m/px.
 
-    Rows are x, y on the plane at height z (m); columns are u, v. Kind "pinhole": the ray X = O + s D has origin O and
-    direction D; it meets the plane at s = (z - O_z)/D_z. Then dX = s dD + D ds and ds = -s dD_z/D_z. Kind "top": the
-    same read-only matrix in every row, for any z.
-
-    Special case: the matrix is nan where the line of sight does not meet the plane, at and above the horizon.
+    The ray X = O + s D meets the plane at s = (z - O_z)/D_z. Then dX = s dD + D ds and ds = -s dD_z/D_z.
     """
     origin, direction = rays(camera, uv)
     if camera.kind == "top":
@@ -113,7 +122,7 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     focal = np.array(camera.focal_px)
     bend = np.eye(2)[None]
     if camera.radial:
-        bend = lens.undistort_jacobian((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
+        bend = undistort_jacobian((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
     step = product(np.swapaxes(bend / focal, 1, 2), camera.rotation[:2])  # dD/du, dD/dv as rows
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (z - origin[:, 2]) / direction[:, 2]
@@ -125,16 +134,12 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
 
 
 def right_camera(camera: Camera) -> Camera:
-    """Return the right camera of a stereo pair: a copy of `camera`, moved by its `baseline` (m) along its own x axis.
-
-    The copy stands where `camera` does if the baseline is 0. Kind "top" is not refused.
-    """
+    """Returns the right camera of a stereo pair, moved by its baseline along its own x axis."""
     return camera.replace(position=camera.position + camera.baseline * camera.rotation[0])
 
 
 def misaligned(camera: Camera, roll: float, down: float) -> Camera:
-    """Return a copy of a pinhole camera whose image is turned clockwise by `roll` (rad) about its centre, then moved
-    down by `down` px."""
+    """Returns a pinhole camera whose image is turned clockwise by `roll` (rad), then moved down by `down` px."""
     c, s = unit(roll)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return camera.replace(
@@ -143,25 +148,16 @@ def misaligned(camera: Camera, roll: float, down: float) -> Camera:
 
 
 def disparity(camera: Camera, depth: Array) -> Array:
-    """Return the disparity u_left - u_right = f B / z in px for depths z (m) of any shape; zeros for kind "top".
-
-    f is the horizontal focal length in px, B the camera's baseline in m. A depth of 0 gives inf or nan, with a numpy
-    warning.
-    """
+    """Returns the disparity f B / z in px for depths z (m) of any shape."""
     if camera.kind == "top":
         return np.zeros_like(depth)
     return np.asarray(camera.focal_px[0] * camera.baseline / depth)
 
 
 def px_per_m_at_centre(camera: Camera) -> float:
-    """Return the scale of the image, px per m, at the ground point seen in the image centre.
+    """Returns the scale of the image, px per m, at the ground point seen in the image centre.
 
-    Kind "top": px_per_m. Kind "pinhole": the distance in px between foot and top of an upright line of PERSON_HEIGHT
-    (1.7 m) there, over PERSON_HEIGHT. If the camera is tilted more than STEEP_DEG (70°), it is the vertical focal
-    length over the depth of that point.
-
-    If the centre shows no ground within 10 km, the point is taken halfway between two rows: the first below the centre
-    that shows ground, and the lower edge of the image. If no row shows ground, the point is 10 m ahead of the camera.
+    For a pinhole camera that of an upright person there. Without ground in the centre, the point is lower in the image.
     """
     if camera.kind == "top":
         return camera.px_per_m
@@ -170,23 +166,19 @@ def px_per_m_at_centre(camera: Camera) -> float:
         foot = _low_ground(camera)
     base = np.array([*foot, 0.0])
     uv, depth = project(camera, np.stack([base, base + np.array([0.0, 0.0, PERSON_HEIGHT])]))
+    # Seen from above, an upright person is a dot.
     if -camera.rotation[2, 2] > float(sin(STEEP_DEG / 180.0 * PI)):
         return float(camera.focal_px[1] / depth[0])
     return float(length(uv[1] - uv[0]) / PERSON_HEIGHT)
 
 
 def shows_ground(camera: Camera, ground: Array) -> Bools:
-    """Return flags (...,), True for the points on the ground (..., 2), m, that are within 10 km of the camera; nan is
-    not."""
+    """Returns which points on the ground (..., 2) are within 10 km of the camera."""
     return np.asarray(length(ground - camera.position[:2]) < FARTHEST)
 
 
 def _low_ground(camera: Camera) -> Array:
-    """Return a ground point (2,), x and y in m, that the camera sees below its image centre, in the centre's column.
-
-    It is seen halfway between the first row below the centre that shows ground and the lower edge of the image. If no
-    row shows ground, it is the point 10 m ahead of the camera, in the direction of its forward axis.
-    """
+    """Returns a ground point (2,) that the camera sees below its image centre, else one 10 m ahead of it."""
     u, bottom = camera.centre_px[0], float(camera.image[1])
     v = np.linspace(camera.centre_px[1], bottom, 129)
     ground = to_ground(camera, np.column_stack([np.full_like(v, u), v]))

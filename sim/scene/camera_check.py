@@ -23,14 +23,7 @@ DOWN = 0.99  # least downward part of the forward axis of a camera of kind "top"
 
 
 def require_camera(camera: Camera, file: object = "", place: str = "") -> Camera:
-    """Return the camera unchanged if it can be used; raise InputError otherwise.
-
-    file, place: for the message. Refused are an image that is empty or above 40 million px; focal lengths of another
-    order than the image, or that differ by more than a factor of 2; an image centre far outside; a lens that folds the
-    image; a rotation that is none (rows not orthonormal) or mirrors; a camera at or below the ground (z = 0); a
-    scale in the image centre outside 0.01 to 100,000 px per m; a camera whose image shows no ground in its centre or
-    lower half within 10 km.
-    """
+    """Returns the camera unchanged if it can be used; raises InputError otherwise."""
     for key, good, got, expected in _facts(camera):
         if not good:
             where = f"{place}: {key}" if place else key
@@ -39,7 +32,6 @@ def require_camera(camera: Camera, file: object = "", place: str = "") -> Camera
 
 
 def _facts(camera: Camera) -> list[tuple[str, bool, str, str]]:
-    """Return (key, whether it is right, what was found, what is expected) of each fact, up to the first wrong one."""
     found: list[tuple[str, bool, str, str]] = []
     for check in (_image, _lens, _rotation, _position, _scale, _ground):
         fact = check(camera)
@@ -99,7 +91,6 @@ def _scale(camera: Camera) -> tuple[str, bool, str, str]:
 
 
 def _ground(camera: Camera) -> tuple[str, bool, str, str]:
-    """The ground must be seen somewhere between the middle row and the lower edge, or in the image centre."""
     w, h = camera.image
     u, v = (a.ravel() for a in np.meshgrid([0.0, w / 2, w], np.linspace(h / 2, h, 5)))
     ground = to_ground(camera, np.concatenate([np.c_[u, v], [camera.centre_px]]))

@@ -23,16 +23,7 @@ CENTRE_X, CENTRE_Y, RADIUS = range(3)  # columns of Solids.pillars
 
 
 class Solids(NamedTuple):
-    """The solid things of a scene, as the kernels take them; lengths in m.
-
-    walls (W, 4)     x1, y1, x2, y2 of each wall's line on the ground
-    wall_height      of all walls
-    pillars (P, 3)   x, y, radius
-    pillar_height    of all pillars
-    flights (S, 9)   stairs: foot x, foot y (middle of the edge), unit axis x, unit axis y (from foot to head), length,
-                     half width, rise of all steps together (negative if they go down), number of steps, landing
-                     (length of the level part behind the head)
-    """
+    """The solid things of a scene, as the kernels take them; lengths in m. Columns of flights: see `terrain`."""
 
     walls: Array
     wall_height: float
@@ -43,47 +34,33 @@ class Solids(NamedTuple):
 
 @dataclass(frozen=True)
 class PixelRays:
-    """Lines of sight of a camera: image point (u, v) px looks from origin @ (u, v, 1) along direction @ (u, v, 1).
-
-    origin (3, 3)      its product is a point of the world, x, y, z in m
-    direction (3, 3)   its product is a vector in the world, with depth 1 along the optical axis; not a unit vector
-    """
+    """Lines of sight of a camera: image point (u, v) px looks from origin @ (u, v, 1) along direction @ (u, v, 1)."""
 
     origin: Array
     direction: Array
 
 
 def solids_of(scene: Scene) -> Solids:
-    """Return the walls, pillars and stairs of a scene as Solids for the kernels, with 0 rows where there are none."""
+    """Returns the walls, pillars and stairs of a scene for the kernels."""
     walls = np.array(scene.walls, dtype=float).reshape(-1, 4)
     pillars = np.array(scene.pillars, dtype=float)
     return Solids(walls, float(scene.wall_height), pillars, float(scene.pillar_height), flight_rows(scene))
 
 
 def only_flights(flights: Array) -> Solids:
-    """Return Solids with these flights of stairs (S, 9), rows of `terrain.flight_rows`, without walls and pillars."""
+    """Returns these flights of stairs (S, 9) without walls and pillars."""
     return Solids(np.zeros((0, 4)), 0.0, np.zeros((0, 3)), 0.0, flights)
 
 
 def unprojection(camera: Camera) -> Array:
-    """Return the matrix Rᵀ K⁻¹ (3, 3) that maps (u, v, 1), u and v in px, to the direction of the line of sight in the
-    world.
-
-    R is the camera's rotation (world to camera), K its matrix of focal lengths and image centre. The direction has
-    depth 1 along the optical axis. For pinhole cameras only; kind "top" is not refused, but the result has no meaning.
-    Lens distortion is ignored.
-    """
+    """Returns Rᵀ K⁻¹ (3, 3) of a pinhole camera, which maps (u, v, 1) px to the direction of sight, of depth 1."""
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     inverse = np.array([[1 / fx, 0, -cx / fx], [0, 1 / fy, -cy / fy], [0, 0, 1]])
     return product(camera.rotation.T, inverse)
 
 
 def pixel_rays(camera: Camera) -> PixelRays:
-    """Return the lines of sight of a camera, pinhole or from above, as two matrices that act on (u, v, 1); see
-    PixelRays.
-
-    Lens distortion is ignored.
-    """
+    """Returns the lines of sight of a camera, without lens distortion."""
     origin, direction = np.zeros((3, 3)), np.zeros((3, 3))
     origin[:, 2] = camera.position
     if camera.kind == "pinhole":
@@ -96,9 +73,5 @@ def pixel_rays(camera: Camera) -> PixelRays:
 
 
 def signed_scale(camera: Camera) -> float:
-    """Return the image scale as the kernels take it; its sign tells the kind of camera.
-
-    Kind "pinhole": the horizontal focal length in px, which is px per m at a depth of 1 m. Kind "top": minus px_per_m,
-    the scale at any depth.
-    """
+    """Returns px per m at a depth of 1 m, or minus px per m for a camera from above."""
     return float(camera.focal_px[0]) if camera.kind == "pinhole" else -camera.px_per_m

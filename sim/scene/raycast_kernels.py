@@ -40,12 +40,7 @@ TINY = 1e-9
 
 @njit(cache=True)
 def at_pixel(field, u, v, out):  # type: ignore[no-untyped-def]
-    """Set out (3,) to field (3, 3) times (u, v, 1): the origin (m) or the direction of the ray through image point (u,
-    v) px.
-
-    field: `origin` or `direction` of a PixelRays. The centre of the pixel in column i, row j is (i + 0.5, j + 0.5).
-    Returns nothing.
-    """
+    """Sets out (3,) to field (3, 3) times (u, v, 1): origin or direction of the ray through image point (u, v)."""
     for k in range(3):
         out[k] = field[k, 0] * u + field[k, 1] * v + field[k, 2]
 
@@ -58,12 +53,7 @@ def _set_hit(hit, kind, normal_x, normal_y, normal_z, index, place):  # type: ig
 
 @njit(cache=True)
 def _hit_wall(o, d, wall, height, hit, best, index):  # type: ignore[no-untyped-def]
-    """Return the t at which the ray o + t d meets one wall if that is above 1e-9 and below `best`, else `best`.
-
-    o, d (3,): origin in m and direction. wall (4,): x1, y1, x2, y2 in m; it is an upright rectangle from z = 0 to
-    `height` (m). best: t of the nearest hit so far. Only a new hit sets hit (6,): WALL, the unit normal x, y, z towards
-    the ray's origin, `index`, and the distance along the wall from (x1, y1) in m. A ray parallel to the wall misses it.
-    """
+    """Returns the t at which the ray o + t d meets one wall (4,) if below `best`, and sets hit; else `best`."""
     ex, ey = wall[X2] - wall[X1], wall[Y2] - wall[Y1]
     cross = d[0] * ey - d[1] * ex
     if cross == 0.0:
@@ -82,15 +72,10 @@ def _hit_wall(o, d, wall, height, hit, best, index):  # type: ignore[no-untyped-
 
 @njit(cache=True)
 def _hit_pillar(o, d, pillar, height, hit, best, index):  # type: ignore[no-untyped-def]
-    """Return the t at which the ray o + t d meets one pillar if that is above 1e-9 and below `best`, else `best`.
-
-    o, d (3,): origin in m and direction. pillar (3,): x, y, radius in m; it stands from z = 0 to `height` (m). Its top
-    is hit from above only, its side from outside only. best: t of the nearest hit so far. Only a new hit sets hit (6,):
-    PILLAR, the unit normal x, y, z, `index`, and a place in m: on the side the arc from the +x direction, from -π to π
-    times the radius; on the top 0.
-    """
+    """Returns the t at which the ray o + t d meets one pillar (3,) if below `best`, and sets hit; else `best`."""
     px, py, r = o[0] - pillar[CENTRE_X], o[1] - pillar[CENTRE_Y], pillar[RADIUS]
     a, b, c = d[0] * d[0] + d[1] * d[1], px * d[0] + py * d[1], px * px + py * py - r * r
+    # The top is hit from above only, the side from outside only.
     if d[2] < 0.0:
         t = (height - o[2]) / d[2]
         x, y = px + t * d[0], py + t * d[1]
@@ -110,23 +95,14 @@ def _hit_pillar(o, d, pillar, height, hit, best, index):  # type: ignore[no-unty
 
 @njit(cache=True)
 def step_height(flight, along):  # type: ignore[no-untyped-def]
-    """Return the height in m of the drawn step at a point `along` m from the foot of a flight of stairs.
-
-    flight (9,): a row of `terrain.flight_rows`. Up to the first riser, half a step from the foot, it is 0. From the
-    last riser on it is the flight's whole rise, negative for a flight that goes down.
-    """
+    """Returns the height in m of the drawn step at a point `along` m from the foot of a flight (9,)."""
     n = flight[STEPS]
     return flight[RISE] / n * min(max(np.floor(along / flight[LENGTH] * n + 0.5), 0.0), n)
 
 
 @njit(cache=True)
 def _in_flight_axes(o, d, flight):  # type: ignore[no-untyped-def]
-    """Return a ray's origin along and across a flight of stairs in m, then its direction along and across, four
-    numbers.
-
-    o, d (3,): origin and direction in the world. flight (9,): a row of `terrain.flight_rows`. Along counts from the
-    foot to the head, across from the middle line to the left.
-    """
+    """Returns a ray's origin along and across a flight, then its direction along and across."""
     ux, uy = flight[AXIS_X], flight[AXIS_Y]
     x, y = o[0] - flight[FOOT_X], o[1] - flight[FOOT_Y]
     return x * ux + y * uy, y * ux - x * uy, d[0] * ux + d[1] * uy, d[1] * ux - d[0] * uy
@@ -134,22 +110,14 @@ def _in_flight_axes(o, d, flight):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _set_flight_hit(hit, kind, flight, along, across, up, index, place):  # type: ignore[no-untyped-def]
-    """Set hit (6,): kind (TREAD or RISER), the normal in the world, `index` of the flight, and `place` in m.
-
-    along, across, up: the unit normal's parts along the flight, across it to the left, and upwards. flight (9,): a row
-    of `terrain.flight_rows`. Returns nothing.
-    """
+    """Sets hit (6,); along, across, up: the unit normal's parts in the axes of the flight."""
     ux, uy = flight[AXIS_X], flight[AXIS_Y]
     _set_hit(hit, kind, along * ux - across * uy, along * uy + across * ux, up, index, place)
 
 
 @njit(cache=True)
 def _clip_interval(o, d, low, high, first, last):  # type: ignore[no-untyped-def]
-    """Return the ends of the part of first <= t <= last in which low <= o + t d <= high, as two numbers.
-
-    o, d: one coordinate of a ray's origin and direction. low and high are first widened by 1e-9 on each side. Nothing
-    is left if the first number returned is above the second; (1, 0) is returned if d is 0 and o is out of range.
-    """
+    """Returns the ends of the part of first <= t <= last in which low <= o + t d <= high; crossed if none."""
     low, high = low - TINY, high + TINY
     if d == 0.0:
         return (first, last) if low <= o <= high else (1.0, 0.0)
@@ -159,14 +127,7 @@ def _clip_interval(o, d, low, high, first, last):  # type: ignore[no-untyped-def
 
 @njit(cache=True)
 def _hit_flight(o, d, flight, hit, best, index):  # type: ignore[no-untyped-def]
-    """Return the t at which the ray o + t d first meets one flight of stairs if it is above 1e-9 and below `best`, else
-    `best`.
-
-    o, d (3,): origin in m and direction. flight (9,): a row of `terrain.flight_rows`; its treads, risers, two sides and
-    back can be hit. best: t of the nearest hit so far. Only a new hit sets hit (6,): TREAD or RISER (for sides and
-    back, too), the unit normal x, y, z, `index`, and a place in m. The place is measured along the flight from its foot
-    on treads and sides, across it on risers and back.
-    """
+    """Returns the t at which the ray o + t d meets one flight (9,) if below `best`, and sets hit; else `best`."""
     oa, oc, da, dc = _in_flight_axes(o, d, flight)
     length, half, rise, n = flight[LENGTH], flight[HALF_WIDTH], flight[RISE], int(flight[STEPS])
     end = flight[LENGTH] + flight[LANDING]
@@ -210,11 +171,7 @@ def _hit_flight(o, d, flight, hit, best, index):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _on_stairs(x, y, flights):  # type: ignore[no-untyped-def]
-    """Return True if a flight of stairs replaces the level ground at (x, y) m; False without flights.
-
-    flights (S, 9): rows of `terrain.flight_rows`. A flight covers the ground from its first riser, half a step from the
-    foot, to the end of the landing.
-    """
+    """Returns True if a flight (S, 9) replaces the level ground at (x, y)."""
     for k in range(len(flights)):
         f = flights[k]
         dx, dy = x - f[FOOT_X], y - f[FOOT_Y]
@@ -226,16 +183,10 @@ def _on_stairs(x, y, flights):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def first_hit(o, d, solids, hit):  # type: ignore[no-untyped-def]
-    """Return the t (in lengths of d) of the first thing that the ray o + t d meets at t > 1e-9; inf if it meets
-    nothing.
+    """Returns the t (in lengths of d) of the first thing that the ray o + t d meets; inf if it meets nothing.
 
-    o, d (3,): origin in m and direction, of any length. solids: a `sim.scene.raycast.Solids`. The level ground z = 0
-    counts except where stairs replace it.
-
-    hit (6,) is set: kind (GROUND, WALL, PILLAR, TREAD or RISER), unit normal x, y, z, index among its kind (0 for the
-    ground), and the place along the thing in m. The place counts along a wall, round a pillar, along a flight for
-    treads and sides, across it for risers; it is 0 on the ground. Without a hit only the kind is set, to NOTHING; the
-    other slots keep what they held.
+    hit (6,) is set: slots HIT_KIND, unit normal, HIT_INDEX among its kind, HIT_PLACE along the thing in m. Without a
+    hit only the kind is set.
     """
     best = np.inf
     hit[HIT_KIND] = NOTHING

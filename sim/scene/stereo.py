@@ -16,11 +16,7 @@ from sim.types import Array, Camera
 
 
 def project_pair(camera: Camera, xyz: Array) -> Array:
-    """Return u, v, d (N, 3) in px of world points xyz (N, 3) in m (eq. 6, with the camera's pose).
-
-    camera: a pinhole camera with a baseline, without lens distortion. Points at depth 0 or behind the camera have no
-    meaning; a depth of 0 gives inf or nan, with a numpy warning.
-    """
+    """Returns u, v, d (N, 3) px of world points xyz (N, 3) m before the camera (eq. 6, with its pose)."""
     x = turned(camera.rotation, xyz - camera.position)
     (fx, fy), (u0, v0) = camera.focal_px, camera.centre_px
     z = x[:, 2]
@@ -28,10 +24,7 @@ def project_pair(camera: Camera, xyz: Array) -> Array:
 
 
 def back_project(camera: Camera, uvd: Array) -> Array:
-    """Return the world points (N, 3), m, that are measured as uvd (N, 3): u, v, d in px; the inverse of `project_pair`.
-
-    A row with nan gives nan. d must be above 0; the depth is b fx / d.
-    """
+    """Returns the world points (N, 3) m that are measured as uvd (N, 3) px, d above 0."""
     (fx, fy), (u0, v0) = camera.focal_px, camera.centre_px
     z = camera.baseline * fx / uvd[:, 2]
     x = np.column_stack([(uvd[:, 0] - u0) / fx * z, (uvd[:, 1] - v0) / fy * z, z])
@@ -39,10 +32,7 @@ def back_project(camera: Camera, uvd: Array) -> Array:
 
 
 def pair_jacobian(camera: Camera, xyz: Array) -> Array:
-    """Return the derivatives d(u, v, d)/d(x, y, z) of `project_pair` at world points xyz (N, 3), (N, 3, 3) in px/m.
-
-    Rows are u, v, d, columns world x, y, z. The determinant is -b fx^2 fy / z_c^4 for every pose of the camera.
-    """
+    """Returns d(u, v, d)/d(x, y, z) of `project_pair` at xyz (N, 3): (N, 3, 3) px/m."""
     x = turned(camera.rotation, xyz - camera.position)
     (fx, fy), z = camera.focal_px, x[:, 2]
     J = np.zeros((len(x), 3, 3))
@@ -53,10 +43,6 @@ def pair_jacobian(camera: Camera, xyz: Array) -> Array:
 
 
 def point_covariances(camera: Camera, xyz: Array, variances: Array) -> Array:
-    """Return the covariances J^-1 R J^-T (N, 3, 3), m^2, of measured world points xyz (N, 3), m.
-
-    variances (3,): of u, v and d, px^2, the diagonal of R; J: the Jacobian of the pair at each point. The standard
-    deviation along the line of sight grows with the squared depth.
-    """
+    """Returns the covariances J⁻¹ R J⁻ᵀ (N, 3, 3) m² of measured points xyz (N, 3); variances (3,) px²: of u, v, d."""
     inverse = inverse_3x3(pair_jacobian(camera, xyz))
     return product(inverse * variances, np.swapaxes(inverse, 1, 2))

@@ -15,28 +15,21 @@ FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, HALF_WIDTH, RISE, STEPS, LANDING = range
 
 
 def height_at(scene: Scene, xy: Array) -> Array:
-    """Return the ground's height in m at points xy (..., 2) m, shape (...): 0 off the stairs, and 0 where xy is nan.
-
-    scene: gives the stairs; without any all heights are 0. On stairs the height rises smoothly over each step; on a
-    landing it is the flight's whole rise. Where two flights overlap, the height further from 0 counts. A flight of
-    length 0 counts nowhere.
-    """
+    """Returns the ground's height in m at points xy (..., 2): 0 off the stairs, and where xy is nan."""
     xy = np.asarray(xy, dtype=float)
     z = np.zeros(xy.shape[:-1])
     for stairs in scene.stairs:
         h = _flight_height(stairs, xy)
+        # Where two flights overlap, the height further from 0 counts.
         z = np.where(np.abs(h) > np.abs(z), h, z)
     return z
 
 
 def _flight_height(stairs: Stairs, xy: Array) -> Array:
-    """Return the height in m of one flight of stairs at points xy (..., 2) m, shape (...); 0 off the flight and where
-    xy is nan.
+    """Returns the height of one flight of stairs at points xy (..., 2), 0 off it.
 
     Each step rises smoothly over its tread, as a walker's body does: h = rise/n (k + r - sin(2πr)/2π) with k + r = n s,
-    where s is the share of the way from foot to head and n the number of steps. Value and slope are continuous; each
-    step adds rise/n and is level at both its edges. Behind the head, as far as the landing, h = rise. A flight of
-    length 0 gives 0.
+    where s is the share of the way from foot to head and n the number of steps.
     """
     axis = stairs.head - stairs.foot
     length = float(length_of(axis))
@@ -53,11 +46,7 @@ def _flight_height(stairs: Stairs, xy: Array) -> Array:
 
 
 def flight_rows(scene: Scene) -> Array:
-    """Return the stairs of a scene as rows (S, 9) for the compiled ray casting; (0, 9) without stairs.
-
-    Columns: foot x, foot y (m), unit axis x, unit axis y (from foot to head), length, half width, rise (m, negative if
-    it goes down), number of steps, landing (m). A flight of length 0 has a nan axis, with a numpy warning.
-    """
+    """Returns the stairs of a scene as rows (S, 9) for the ray casting, m; columns FOOT_X …."""
     rows = np.zeros((len(scene.stairs), 9))
     for row, stairs in zip(rows, scene.stairs, strict=True):
         axis = stairs.head - stairs.foot

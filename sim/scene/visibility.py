@@ -20,35 +20,22 @@ from sim.types import Array, Camera, Ints, Scene
 
 @dataclass(frozen=True)
 class BodyVisibility:
-    """What a camera sees of R people, one row each.
+    """What a camera sees of R people, one row each."""
 
-    box (R, 4)          left, top, width, height in px of the whole body, hidden parts included, not clipped to the
-                        image; nan if the person is not wholly in front of a pinhole camera
-    visibility (R,)     visible share of the whole silhouette, 0 to 1; 0 where the box is nan
-    truncation (R,)     share of the silhouette outside the image, 0 to 1; 1 where the box is nan
-    visible_box (R, 4)  left, top, width, height in px of the visible part; nan if nothing is visible
-    """
-
+    # (R, 4) left, top, width, height in px of the whole body, hidden parts included, not clipped to the image; nan if
+    # the person is not wholly in front of a pinhole camera
     box: Array
-    visibility: Array
-    truncation: Array
-    visible_box: Array
+    visibility: Array  # (R,) visible share of the whole silhouette, 0 to 1; 0 where the box is nan
+    truncation: Array  # (R,) share of the silhouette outside the image, 0 to 1; 1 where the box is nan
+    visible_box: Array  # (R, 4) left, top, width, height in px of the visible part; nan if nothing is visible
 
 
 def measure_visibility(
     camera: Camera, scene: Scene, frame: Ints, pos3: Array, height: Array, shapes: Ellipsoids
 ) -> BodyVisibility:
-    """Return what the camera sees of R people, as a BodyVisibility with R rows; all frames in one call.
+    """Returns what the camera sees of R people in any number of frames, exact to about 1/300.
 
-    A point of a person is visible if it lies in the image and nothing hides it. People of the same frame hide each
-    other. For a pinhole camera the scene's walls, pillars and stairs hide, too; from above they hide nobody.
-
-    frame (R,): frame numbers, sorted; unsorted ones give wrong results without an error. pos3 (R, 3) m: feet. height
-    (R,) m: body heights. shapes: Ellipsoids of the same R people.
-
-    Visibility and truncation are exact to about 1/300, the share of one sample of the silhouette. A person who is not
-    wholly in front of a pinhole camera has a nan box, visibility 0, truncation 1 and a nan visible box. Lens distortion
-    is ignored. R may be 0.
+    frame (R,): sorted; people of one frame hide each other. pos3 (R, 3): feet. height (R,). Lens distortion is ignored.
     """
     from sim.scene.visibility_kernels import sample_visibility
 
@@ -56,26 +43,14 @@ def measure_visibility(
     box = outline_boxes(ellipses)
     solids = solids_of(scene)
     visibility, truncation, visible_box = sample_visibility(
-        frame_starts(frame),
-        box,
-        np.ascontiguousarray(ellipses.centre),
-        packed_inverse(ellipses.shape),
-        occlusion_distance(camera, pos3, height),
-        np.ascontiguousarray(pos3[:, :2]),
-        np.array(camera.image, dtype=float),
-        camera.kind == "pinhole",
-        np.array(camera.position, dtype=float),
-        unprojection(camera),
-        solids,
-        only_flights(solids.flights),
-    )
+        frame_starts(frame), box, np.ascontiguousarray(ellipses.centre), packed_inverse(ellipses.shape),
+        occlusion_distance(camera, pos3, height), np.ascontiguousarray(pos3[:, :2]),
+        np.array(camera.image, dtype=float), camera.kind == "pinhole", np.array(camera.position, dtype=float),
+        unprojection(camera), solids, only_flights(solids.flights),
+    )  # fmt: skip
     return BodyVisibility(box, visibility, truncation, visible_box)
 
 
 def frame_starts(frame: Ints) -> Ints:
-    """Return the first row of each frame that occurs in sorted frame numbers (R,), followed by R: shape (F + 1,),
-    int64.
-
-    Rows count from 0; F is the number of distinct frames. Without rows the result is [0, 0], one frame without rows.
-    """
+    """Returns the first row of each frame in sorted frame numbers (R,), then R: (F + 1,)."""
     return np.concatenate([[0], np.flatnonzero(np.diff(frame)) + 1, [len(frame)]]).astype(np.int64)

@@ -18,11 +18,7 @@ LEFT, TOP, WIDTH, HEIGHT = range(4)  # columns of boxes
 
 @njit(cache=True)
 def _inside(centre, inverse, i, u, v):  # type: ignore[no-untyped-def]
-    """Return True if image point (u, v) px lies in the ellipse of body or head of person i: (u - m)ᵀ E⁻¹ (u - m) <= 1.
-
-    centre (R, 2, 2) px: centres m. inverse (R, 2, 3): E⁻¹ packed as entries 11, 12, 22. The second axis is body, head.
-    False for nan ellipses.
-    """
+    """Returns True if image point (u, v) lies in the body or head of person i."""
     for part in range(2):
         x, y = u - centre[i, part, 0], v - centre[i, part, 1]
         if x * x * inverse[i, part, XX] + 2 * x * y * inverse[i, part, XY] + y * y * inverse[i, part, YY] <= 1.0:
@@ -32,12 +28,7 @@ def _inside(centre, inverse, i, u, v):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _nearer_people(i, first, last, box, distance, found):  # type: ignore[no-untyped-def]
-    """Write into `found` the rows of the people of one frame who may hide person i; return their number.
-
-    They are those of the rows first … last - 1 (last excluded) that are nearer than i and whose boxes overlap that of
-    i. Of two at one distance the lower row is nearer. box (R, 4): left, top, width, height in px. distance (R,) m: see
-    `body.occlusion_distance`. found: int64, long enough for all rows; entries behind the number returned are not set.
-    """
+    """Writes to `found` the rows of first … last - 1 that may hide person i; returns how many."""
     n = 0
     for j in range(first, last):
         if distance[j] > distance[i] or (distance[j] == distance[i] and j >= i):
@@ -55,12 +46,7 @@ def _nearer_people(i, first, last, box, distance, found):  # type: ignore[no-unt
 
 @njit(cache=True)
 def _walls_between(x, y, eye, walls, found):  # type: ignore[no-untyped-def]
-    """Write into `found` the indices of walls whose line separates the person at (x, y) m from the eye; return their
-    number.
-
-    The line is taken as endless in both directions. eye (3,) m: the camera's position. walls (W, 4): x1, y1, x2, y2 in
-    m. found (W,) int64; entries behind the number returned are not set.
-    """
+    """Writes to `found` the walls whose line separates (x, y) from the eye; returns how many."""
     n = 0
     for w in range(len(walls)):
         ax, ay = walls[w, X1], walls[w, Y1]
@@ -73,12 +59,7 @@ def _walls_between(x, y, eye, walls, found):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _pillars_before(x, y, eye, pillars, found):  # type: ignore[no-untyped-def]
-    """Write into `found` the indices of pillars that may hide the person at (x, y) m from the eye; return their number.
-
-    A pillar counts if it is not behind the eye, seen towards the person, and if the tangent from the eye to it is
-    shorter than the way to the person. eye (3,) m: the camera's position. pillars (P, 3): x, y, radius in m. found (P,)
-    int64; entries behind the number returned are not set.
-    """
+    """Writes to `found` the pillars that may hide (x, y) from the eye; returns how many."""
     n = 0
     dx, dy = x - eye[0], y - eye[1]
     for p in range(len(pillars)):
@@ -91,10 +72,7 @@ def _pillars_before(x, y, eye, pillars, found):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _meets_wall(d, eye, wall, height):  # type: ignore[no-untyped-def]
-    """Return True if the ray eye + s d, s > 0, meets the upright rectangle over one wall, from z = 0 to `height` (m).
-
-    d, eye (3,): direction, and origin in m. wall (4,): x1, y1, x2, y2 in m. False for a ray parallel to the wall.
-    """
+    """Returns True if the ray eye + s d meets the upright rectangle over one wall."""
     ex, ey = wall[X2] - wall[X1], wall[Y2] - wall[Y1]
     ax, ay = wall[X1] - eye[0], wall[Y1] - eye[1]
     cross = d[0] * ey - d[1] * ex
@@ -108,10 +86,7 @@ def _meets_wall(d, eye, wall, height):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _meets_pillar(d, eye, pillar, height):  # type: ignore[no-untyped-def]
-    """Return True if the ray eye + s d, s > 0, meets one upright pillar from z = 0 to `height` (m), its top included.
-
-    d, eye (3,): direction, and origin in m. pillar (3,): x, y, radius in m. False for a vertical ray.
-    """
+    """Returns True if the ray eye + s d meets one upright pillar."""
     px, py = pillar[CENTRE_X] - eye[0], pillar[CENTRE_Y] - eye[1]
     a = d[0] * d[0] + d[1] * d[1]
     b = px * d[0] + py * d[1]
@@ -125,13 +100,10 @@ def _meets_pillar(d, eye, pillar, height):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def visible_span(start, length, cells, low, high, first, last, limit):  # type: ignore[no-untyped-def]
-    """Return start and length in px of the cells low … high (both inclusive) along one axis of a box, clipped to 0 …
-    limit.
+    """Returns start and length in px of the cells low … high along one axis of a box, clipped to 0 … limit.
 
-    start, length: of the amodal box along this axis, px. cells: number of equal cells along it, counted from 0. low,
-    high: outermost visible cells. first, last: outermost cells that the silhouette covers. If the cell `first` is
-    visible, the span begins at the edge of the box; if `last` is, it ends there. limit: size of the image along this
-    axis, px.
+    first, last: outermost of the cells that the silhouette covers; where they are visible, the span reaches the box's
+    edge.
     """
     a = start + (0 if low == first else low) * length / cells
     b = start + (cells if high == last else high + 1) * length / cells
@@ -141,11 +113,7 @@ def visible_span(start, length, cells, low, high, first, last, limit):  # type: 
 
 @njit(cache=True)
 def _meets_any(d, eye, between, before, solids):  # type: ignore[no-untyped-def]
-    """Return True if the ray eye + s d, s > 0, meets one of some walls or pillars; False if both lists are empty.
-
-    d, eye (3,): direction, and origin in m. between: indices of walls. before: indices of pillars, both of `solids` (a
-    `raycast.Solids`).
-    """
+    """Returns True if the ray eye + s d meets one of these walls or pillars."""
     hit = False
     for w in between:
         hit = hit or _meets_wall(d, eye, solids.walls[w], solids.wall_height)
@@ -156,13 +124,7 @@ def _meets_any(d, eye, between, before, solids):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _stairs_before(d, eye, x, y, stairs, hit):  # type: ignore[no-untyped-def]
-    """Return True if the ray eye + s d meets stairs or ground before the upright plane through (x, y) m that faces the
-    eye.
-
-    d, eye (3,): direction, and origin in m. stairs: a `raycast.Solids` that holds flights only. hit (6,): scratch,
-    overwritten. Level ground can come first only in front of a flight that goes down. False if the ray leads away from
-    the plane.
-    """
+    """Returns True if the ray meets stairs or ground before the upright plane through (x, y) that faces the eye."""
     dx, dy = x - eye[0], y - eye[1]
     towards = d[0] * dx + d[1] * dy
     return towards > 0.0 and first_hit(eye, d, stairs, hit) < (dx * dx + dy * dy) / towards
@@ -172,18 +134,11 @@ def _stairs_before(d, eye, x, y, stairs, hit):  # type: ignore[no-untyped-def]
 def sample_visibility(  # type: ignore[no-untyped-def]
     starts, box, centre, inverse, distance, pos, image_size, has_eye, eye, unproject, solids, stairs
 ):
-    """Return visibility (R,), truncation (R,) and visible boxes (R, 4), left, top, width, height in px, of R people.
+    """Returns visibility (R,), truncation (R,) and visible boxes (R, 4) px of R people.
 
-    visibility: visible share of a silhouette. truncation: its share outside the image. Both are 0 to 1, measured on 16
-    x 32 samples of the box. A row whose box is nan or empty, or whose ellipses hold no sample, has visibility 0,
-    truncation 1 and a nan visible box. A visible box is nan if nothing is visible.
-
-    Arguments, people sorted by frame: starts (F + 1,): first row of each frame, then R. box (R, 4): left, top, width,
-    height in px, amodal. centre (R, 2, 2) px, inverse (R, 2, 3): centres and packed inverse shapes (entries 11, 12, 22)
-    of the ellipses of body and head. distance (R,): occlusion order, nearest lowest; of equal ones the lower row is
-    nearer. pos (R, 2) m: feet. image_size (2,): width, height in px. has_eye: False for a camera from above, for which
-    solids and stairs hide nobody. eye (3,) m: the camera's position. unproject (3, 3): see `raycast.unprojection`.
-    solids: a `raycast.Solids`, of which walls and pillars count. stairs: a `raycast.Solids` that holds flights only.
+    starts (F + 1,): first row of each frame. box (R, 4) px. centre (R, 2, 2) px, inverse (R, 2, 3): of body and head.
+    distance (R,): occlusion order, nearest lowest. pos (R, 2) m: feet. has_eye: False for a camera from above, for
+    which solids and stairs hide nobody. unproject (3, 3): `raycast.unprojection`. stairs: Solids of flights only.
     """
     rows = len(box)
     seen, cut, part = np.zeros(rows), np.ones(rows), np.full((rows, 4), np.nan)
@@ -200,6 +155,7 @@ def sample_visibility(  # type: ignore[no-untyped-def]
             n_walls = _walls_between(pos[i, 0], pos[i, 1], eye, solids.walls, between) if has_eye else 0
             n_pillars = _pillars_before(pos[i, 0], pos[i, 1], eye, solids.pillars, before) if has_eye else 0
             whole = left >= 0 and top >= 0 and left + width <= image_size[0] and top + height <= image_size[1]
+            # Most people are wholly in view with nothing before them.
             if whole and n + n_walls + n_pillars == 0 and not has_stairs:
                 seen[i], cut[i], part[i] = 1.0, 0.0, box[i]
                 continue

@@ -21,47 +21,35 @@ __all__ = ["box_groups", "frame_groups", "groups_over_time"]
 
 @dataclass(frozen=True, eq=False)
 class _MemberRows:
-    """R rows, one for each person in a group of two or more in one frame, sorted by (frame, group, id).
+    """R rows, one for each person in a group of two or more in one frame, sorted by (frame, group, id)."""
 
-    frame, id, group (R,): frame number, person id, group id. pos, vel (R, D): position and velocity, in the caller's
-    unit. starts (S,): index of the first row of each group in each frame.
-    """
-
+    # frame, id, group (R,): frame number, person id, group id
     frame: Ints
     id: Ints
     group: Ints
+    # pos, vel (R, D): position and velocity, in the caller's unit
     pos: Array
     vel: Array
-    starts: Ints
+    starts: Ints  # (S,) index of the first row of each group in each frame
 
     @property
     def counts(self) -> Ints:
-        """Returns the number of members of each group in each frame, shape (S,), in the order of `starts`."""
+        """The number of members of each group in each frame (S,)."""
         return np.diff(np.append(self.starts, len(self.id)))
 
 
 def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:
-    """Returns the groups of two or more people of one frame, in order of their ids; empty Groups if there is none.
-
-    id (N,): person ids. group (N,): group ids, -1 = alone. pos, vel (N, D): m, m/s, D = 2 or 3. Of each group: members:
-    sorted person ids; pos, vel (D,): means over the members; extent (2, 2): covariance of their x and y (divided by the
-    number of members), m²; size: number of members; hull (V, 2): convex hull, counter-clockwise, of their footprints
-    (polygons of 0.25 m round each person) on the ground, m. Members' positions must not be nan.
-    """
+    """Returns the groups of two or more people of one frame (see `groups_over_time`)."""
     return groups_over_time(np.zeros(len(id), np.int64), id, group, pos, vel, 0, 1)[0]
 
 
 def groups_over_time(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, first: int, length: int, px_per_m: float = 1.0
 ) -> list[Groups]:
-    """Returns a list of the Groups of each of the frames first … first + length - 1, in order; groups by ascending id.
+    """Returns the Groups of each of the frames first … first + length - 1, by ascending id.
 
-    Rows are people in frames, in any order: frame, id, group (R,), group -1 = alone; pos, vel (R, D), D = 2 or 3: m,
-    m/s. Only groups of two or more people of one frame count; a frame without one gives empty Groups. Rows of other
-    frames are ignored. Of each group: sorted members, their number, means of pos and vel, covariance of x and y (m²),
-    and as hull (V, 2) the convex hull, counter-clockwise, of their footprints (polygons of 0.25 m round each person).
-    Members' positions must not be nan. px_per_m other than 1: pos and vel are in px and px/s, footprints have that
-    scale (px per m of ground), and all results are in px.
+    frame, id, group (R,): people in frames, in any order, group -1 = alone. pos, vel (R, D): m, m/s, or px with a
+    px_per_m, the scale of the footprints; results are in the same unit. extent is the covariance of x and y.
     """
     rows, order = _member_rows(frame, id, group, pos, vel)
     hulls = footprint_hulls(pos[order, :2] / px_per_m, rows.counts)
@@ -71,14 +59,9 @@ def groups_over_time(
 def box_groups(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, box: Array, first: int, length: int
 ) -> list[Groups]:
-    """Returns a list of the Groups in the image of each of the frames first … first + length - 1, in order; groups by
-    ascending id.
+    """Returns the Groups in the image of each of the frames first … first + length - 1; hulls are those of boxes.
 
-    Rows are people in frames, in any order: frame, id, group (R,), group -1 = alone; pos, vel (R, 2): px, px/s; box (R,
-    4): left, top, width, height in px, finite. Of each group of two or more people in one frame: sorted members, their
-    number, means of pos and vel, covariance of pos (px²), and as hull (V, 2) the convex hull of the members' boxes,
-    counter-clockwise in (u, v) coordinates. A frame without a group gives empty Groups; rows of other frames are
-    ignored.
+    As `groups_over_time`; pos, vel (R, 2): px, px/s. box (R, 4): left, top, width, height, px.
     """
     rows, order = _member_rows(frame, id, group, pos, vel)
     low, high = box[:, :2], box[:, :2] + box[:, 2:]
@@ -89,11 +72,7 @@ def box_groups(
 
 
 def _member_rows(frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array) -> tuple[_MemberRows, Ints]:
-    """Returns the rows of people in groups of two or more in one frame, sorted by (frame, group, id), and their indices
-    (K,) in the given arrays.
-
-    frame, id, group (R,), group -1 = alone. pos, vel (R, D). Both results may be without rows.
-    """
+    """Returns the rows of people in groups of two or more in one frame, and their indices in the given arrays."""
     rows = np.lexsort((id, group, frame))
     rows = rows[group[rows] >= 0]
     new = (np.diff(frame[rows], prepend=-1) != 0) | (np.diff(group[rows], prepend=-1) != 0)
@@ -104,12 +83,6 @@ def _member_rows(frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array) -> 
 
 
 def _assemble(rows: _MemberRows, hulls: Sequence[Array], first: int, length: int) -> list[Groups]:
-    """Returns one Groups for each of the frames first … first + length - 1; empty Groups for a frame without groups.
-
-    rows: the people of all groups; other frames than these are ignored. hulls: polygon (V, 2) of each group in each
-    frame, in the order of rows.starts. Extents are covariances of the first two coordinates, divided by the number of
-    members.
-    """
     starts, counts = rows.starts, rows.counts
     if not len(starts):
         return [Groups.none()] * length

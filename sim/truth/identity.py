@@ -20,26 +20,20 @@ ALONE = -1
 
 @dataclass(frozen=True, slots=True)
 class GroupChange:
-    """What happened to a group between two partitions of a crowd.
+    """What happened to a group between two partitions of a crowd."""
 
-    - kind: merge, split, form (people alone become a group), dissolve (a group becomes people alone), enter or leave.
-    - before, after: sorted ids of the groups concerned; -1 once for each person alone; empty where nobody is concerned.
-    - members: sorted ids of the people concerned, as the caller numbers them.
-    """
-
+    # merge, split, form (people alone become a group), dissolve (a group becomes people alone), enter or leave
     kind: str
+    # before, after: sorted ids of the groups concerned; -1 once for each person alone; empty where nobody is concerned
     before: tuple[int, ...]
     after: tuple[int, ...]
-    members: tuple[int, ...]
+    members: tuple[int, ...]  # sorted ids of the people concerned, as the caller numbers them
 
 
 def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) -> dict[PersonSet, int | None]:
     """Returns for each new group of two or more people the id that it keeps, or None if it needs a new id.
 
-    old: members of each group before, by id. parts: the new partition, disjoint sets; sets of one person are ignored.
-    born: time at which each id in `old` began; a missing one raises KeyError. A group with the same members keeps its
-    id. The remaining old and new groups are matched greedily, most common members first; ties go to the older, then the
-    smaller id, then the new group with the smallest person. Fewer than two common members never match.
+    old: members before, by id. parts: the new partition, disjoint sets. born: when each id in `old` began.
     """
     new = sorted((p for p in parts if len(p) > 1), key=min)
     same = {people: g for g, people in old.items()}  # mostly nothing has changed: no need to compare all with all
@@ -61,21 +55,11 @@ def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) 
 def lineage(
     old: Members, new: Members, before: PersonSet, now: PersonSet, entered: PersonSet = frozenset()
 ) -> list[GroupChange]:
-    """Returns what happened to the groups between two partitions, old groups first, each in order of group id.
+    """Returns what happened to the groups between two partitions: old groups first, each in order of group id.
 
-    old, new: members of each group by id. before, now: all people present. entered: people who count as having just
-    entered though they are in both. People who are in only one of before and now have left or entered. People who stay
-    are in both.
-
-    - split: the people of an old group who stay are now in several groups, or in groups and alone; dissolve: two or
-      more stay and all are alone.
-    - merge: the people of a new group who stay were in several groups, or in groups and alone; form: two or more stay
-      and all were alone.
-    - enter: all people of a new group have just entered, or all but one who was alone.
-    - leave: all people of an old group have left, or all but one who is now alone.
-
-    `members` of a split or dissolve are the old group's people present now, of a leave all its old people, else all
-    people of the new group. A group that only grows or shrinks by people who enter or leave gives no change.
+    old, new: members by id. before, now: all people present. entered: people who count as having just entered. Members
+    of a split or dissolve are the old group's people present now, of a leave all its old people, else those of the new
+    group.
     """
     stay = (before & now) - entered
     was, is_ = _unit_of(old, before), _unit_of(new, now)
@@ -89,32 +73,19 @@ def lineage(
 
 
 def _unit_of(groups: Members, everybody: PersonSet) -> dict[int, int]:
-    """Returns the group id of each person of `everybody`; a person alone gets a negative number that no other person
-    has.
-
-    groups: members by group id; they are in the result even if not in `everybody`.
-    """
+    """Returns the group id of each person; a person alone gets a negative number that no other person has."""
     unit = {p: -1 - k for k, p in enumerate(sorted(everybody))}
     return unit | {p: g for g, people in groups.items() for p in people}
 
 
 def _names(units: Iterable[int]) -> tuple[int, ...]:
-    """Returns the numbers of `units` sorted, with every negative number (a person alone) replaced by -1."""
     return tuple(sorted(max(u, ALONE) for u in units))
 
 
 def _changes_of_old(
     g: int, people: PersonSet, stay: PersonSet, is_: dict[int, int], now: PersonSet
 ) -> list[GroupChange]:
-    """Returns the split, dissolve or leave of the old group g as a list of one, or [] if it goes on or only merges.
-
-    - Two or more of its people who stay are apart now: dissolve if all of them are alone, else split. Its `members` are
-      the people present now.
-    - Nobody stays, or one person who is alone now: leave. Its `members` are all old people.
-
-    people: its members before. stay: people present before and now. is_: group id of each person now, negative if alone
-    (each another number). now: all people present now.
-    """
+    """Returns the split, dissolve or leave of the old group g as a list of one, or []."""
     left = people & stay
     targets = {is_[p] for p in left}
     if len(targets) > 1:
@@ -126,14 +97,7 @@ def _changes_of_old(
 
 
 def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, int]) -> list[GroupChange]:
-    """Returns the merge, form or enter of the new group g as a list of one, or [] if it only continues one old group.
-
-    - Two or more of its people who stayed were apart: form if all of them were alone, else merge.
-    - Nobody was there before, or only one person who was alone: enter.
-
-    `members` are always all people of the new group. people: its members now. stay: people present before and now. was:
-    group id of each person before, negative if alone (each another number).
-    """
+    """Returns the merge, form or enter of the new group g as a list of one, or []."""
     sources = {was[p] for p in people & stay}
     if len(sources) > 1:
         kind = "form" if max(sources) < 0 else "merge"
@@ -147,25 +111,21 @@ def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, i
 class Identities:
     """Gives groups ids that last through time: a new object for each sequence, then one `step` for each partition.
 
-    State: next_id: the next new id, from 1. groups: members of each present group, by id. born: time (an integer such
-    as a frame) at which each id began, of ended groups, too. people: all people present at the last time.
+    State: next_id: from 1. groups: members of each present group, by id. born: when each id began, of ended groups,
+    too. people: all people present at the last time.
     """
 
     next_id: int = 1
-    groups: dict[int, PersonSet] = field(default_factory=dict)
+    groups: dict[int, PersonSet] = field(default_factory=dict)  # members of each present group, by id
+    # time (an integer such as a frame) at which each id began, of ended groups, too
     born: dict[int, int] = field(default_factory=dict)
-    people: PersonSet = frozenset()
+    people: PersonSet = frozenset()  # all people present at the last time
 
     def step(
         self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset()
     ) -> list[GroupChange]:
-        """Takes the partition of time t and returns what has changed since the last call; updates groups, born, people
-        and next_id.
-
-        people: all people present. parts: the partition, disjoint sets; people alone may be left out. entered: people
-        who count as having just entered although they were present before. t must not fall from call to call. At the
-        first call all groups enter. The changes of old groups come first, each in order of group id; [] if nothing
-        changed.
+        """Takes the partition of time t, not before the last one, and returns what has changed since; at first all
+        enter.
         """
         new: dict[int, PersonSet] = {}
         for part, kept in identify(self.groups, parts, self.born).items():

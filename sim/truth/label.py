@@ -2,76 +2,109 @@
 
 `bodies` gives the part that sensors need; `label` adds groups, events and hard negatives (strangers who walk like a
 group). The times of orders are not used; sim.truth.order_fulfilment checks afterwards whether the orders came true.
+Hulls of groups in the image are those of their members' silhouettes: two polygons of POINTS (24) vertices each,
+inscribed in the ellipses of body and head.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from sim.clock import FrameTicks
-from sim.scene.body import RecordedBodies, recorded_bodies
-from sim.scene.camera import px_per_m_at_centre
+from sim.scene.body import Ellipsoids, Outlines, RecordedBodies, contour, outlines, recorded_bodies
+from sim.scene.camera import project, px_per_m_at_centre
 from sim.scene.visibility import measure_visibility
-from sim.truth.image_group_hulls import image_groups
 from sim.truth.merge_split_events import GroupsAndEvents
 from sim.truth.order_fulfilment import fulfilment
-from sim.types import Camera, GroupEvent, Groups, Ints, Motion, Near, Order, States, Truth
+from sim.types import Array, Camera, GroupEvent, Groups, Ints, Motion, Near, Order, States, Truth
+
+POINTS = 24  # vertices of each polygon
+INSTANT = 0.02  # s: half the step by which ground velocities become image velocities
+
+
+def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
+    """Returns the Groups of each frame as the camera sees them, with the ids, members and sizes of the ground groups.
+
+    shapes: ellipsoids of body and head, in the order of the truth's rows. pos and extent: of the boxes' middles, px.
+    hull: of the silhouettes, empty if a member is not wholly in front of the camera.
+    """
+    assert truth.box is not None
+    assert truth.vel is not None
+    rows, cuts = _members(truth, ground)
+    centre = (truth.box[:, :2] + truth.box[:, 2:] / 2)[rows]
+    vel = image_velocities(camera, shapes.centre[rows, 0], truth.vel[rows])
+    pos, speed = _means(centre, cuts), _means(vel, cuts)
+    off = centre - np.repeat(pos, np.diff(cuts), axis=0)
+    extent = _means(off[:, :, None] * off[:, None, :], cuts)
+    hull = hulls(outlines(camera, Ellipsoids(shapes.centre[rows], shapes.shape[rows])), cuts)
+    ends = np.cumsum([0, *(len(groups.id) for groups in ground)])
+    return tuple(
+        groups.replace(pos=pos[a:b], vel=speed[a:b], extent=extent[a:b], hull=tuple(hull[a:b]))
+        for groups, (a, b) in zip(ground, pairwise(ends), strict=True)
+    )
+
+
+def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
+    """Returns the truth's rows of all groups' members, and where each of the G groups begins in them (G + 1,)."""
+    starts = np.searchsorted(truth.frame, np.arange(1, len(ground) + 1))
+    rows, sizes = [np.zeros(0, np.int64)], [0]
+    for index, (start, groups) in enumerate(zip(starts, ground, strict=True), start=1):
+        if len(groups.id):
+            sizes += [len(members) for members in groups.members]
+            rows.append(start + np.searchsorted(truth.id[truth.rows(index)], np.concatenate(groups.members)))
+    return np.concatenate(rows), np.cumsum(sizes)
+
+
+def _means(values: Array, cuts: Ints) -> Array:
+    count = np.diff(cuts).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(np.add.reduceat(values, cuts[:-1], axis=0) / count) if len(count) else values[:0]
+
+
+def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
+    """Returns the convex hull (V, 2) px of each group of silhouettes. cuts (G + 1,): where each group begins."""
+    from sim.geometry import hull_kernels
+
+    edge = contour(ellipses, POINTS)[: cuts[-1]]
+    sets = np.split(edge.reshape(-1, 2), edge.shape[1] * cuts[1:])
+    return list(hull_kernels.convex_hulls(sets[:-1]))
+
+
+def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
+    """Returns the velocities (N, 2) px/s in the image of points middle (N, 3) m that move at vel (N, 2) m/s."""
+    step = INSTANT * np.column_stack([vel, np.zeros(len(vel))])
+    return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))
 
 
 def bodies(motion: Motion, camera: Camera | None) -> Truth:
-    """Returns a Truth with positions, boxes and visibility of every person in every frame, but without groups.
+    """Returns a Truth with positions, boxes and visibility of everybody in every frame, but without groups.
 
-    Its rows are people present in a frame, sorted by (frame, id); frames count from 1, the id is the column + 1. group
-    is -1 in every row; groups, groups_px, events, near and labelled are None. The motion's orders are taken over.
-    camera None: no camera; boxes, truncation and visible boxes are then None, visibility is 1 and px_per_m nan. Else
-    px_per_m is the scale at the image centre; a person not wholly in front of the camera has nan boxes, visibility 0
-    and truncation 1.
+    Without a camera, boxes are None and visibility is 1.
     """
     return _bodies(motion, camera, recorded_bodies(motion))
 
 
 def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Truth:
-    """Returns a Truth with positions, boxes and visibility of every person in every frame, but without groups (group is
-    -1).
-
-    people: rows and shapes as recorded_bodies(motion) returns them. camera None: boxes, truncation and visible boxes
-    are None, visibility is 1 and px_per_m nan.
-    """
     t, p = people.frame - 1, people.id - 1
     seen = None if camera is None else measure_visibility(
         camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
     )  # fmt: skip
     return Truth(
-        name=motion.name,
-        fps=motion.fps,
-        length=len(motion.present),
-        px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera),
-        frame=people.frame,
-        id=people.id,
-        group=np.full(len(p), -1, np.int64),
-        pos=motion.pos[t, p],
-        vel=motion.vel[t, p],
-        box=None if seen is None else seen.box,
-        visibility=np.ones(len(p)) if seen is None else seen.visibility,
-        z=people.pos3[:, 2],
-        heading=motion.heading[t, p],
-        height=motion.height[p],
-        truncation=None if seen is None else seen.truncation,
-        visible_box=None if seen is None else seen.visible_box,
+        name=motion.name, fps=motion.fps, length=len(motion.present),
+        px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera), frame=people.frame, id=people.id,
+        group=np.full(len(p), -1, np.int64), pos=motion.pos[t, p], vel=motion.vel[t, p],
+        box=None if seen is None else seen.box, visibility=np.ones(len(p)) if seen is None else seen.visibility,
+        z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
+        truncation=None if seen is None else seen.truncation, visible_box=None if seen is None else seen.visible_box,
         orders=motion.orders,
-    )
+    )  # fmt: skip
 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
-    """Returns the whole Truth: bodies, and groups, events and hard negatives measured from motion and intent.
-
-    Hard negatives: pairs of strangers who walk like a group. All frames count as labelled. The motion's orders are
-    taken over; whether they came true is not checked. camera None: no camera; boxes, truncation, visible boxes and
-    groups in the image are then None, visibility is 1 and px_per_m nan. Else px_per_m is the scale at the image centre.
-    """
+    """Returns the whole Truth: bodies, and groups, events and hard negatives measured from motion and intent."""
     from sim.truth.merge_split_events import groups_and_events
 
     people = recorded_bodies(motion)
@@ -83,17 +116,13 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     ground = tuple(_ground_groups(truth))
     events, orders = _events_in_frames(_events(s, found), motion, found.group, shown)
     return truth.replace(
-        groups=ground,
-        groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
-        labelled=np.ones(truth.length, dtype=np.bool_),
-        events=events,
-        near=_near_in_frames(found.near, shown),
+        groups=ground, groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
+        labelled=np.ones(truth.length, dtype=np.bool_), events=events, near=_near_in_frames(found.near, shown),
         orders=orders,
-    )
+    )  # fmt: skip
 
 
 def _events(s: States, found: GroupsAndEvents) -> list[GroupEvent]:
-    """Returns all events of a crowd at the ticks of its states, in no order; crossings and queues are measured here."""
     from sim.truth.crossing_events import crossings
     from sim.truth.queue_detection import queues
 
@@ -105,11 +134,7 @@ def _events(s: States, found: GroupsAndEvents) -> list[GroupEvent]:
 def _events_in_frames(
     events: list[GroupEvent], motion: Motion, group: Ints, shown: FrameTicks
 ) -> tuple[tuple[GroupEvent, ...], tuple[Order, ...]]:
-    """Returns the events with frames in place of ticks, sorted, and the orders with the events that fulfil them.
-
-    group (C, P): group id of each person at each tick. Groups that enter or leave between two frames of which none
-    shows it have no such event.
-    """
+    """Returns the events with frames in place of ticks, sorted, and the orders with the events that fulfil them."""
     ticks = sorted(events, key=_sorting)
     converted = [_in_frames(event, shown) for event in ticks]
     every = sorted((e for e in converted if e is not None), key=_sorting)
@@ -127,10 +152,10 @@ def _sorting(e: GroupEvent) -> tuple[int, int, str, tuple[int, ...], tuple[int, 
 
 
 def _in_frames(event: GroupEvent, shown: FrameTicks) -> GroupEvent | None:
-    """Returns the event with frames in place of ticks, both from 1; None if its people enter or leave unseen."""
     last = len(shown.tick) - 1
     if event.kind in ("enter", "leave"):  # a leave is in the last frame before the change
         start = shown.first(event.start - 1) if event.kind == "enter" else shown.first(event.start) - 1
+        # Groups that enter or leave between two frames of which none shows it have no such event.
         seen = 0 <= start <= last and not (event.kind == "leave" and start == last)
         return replace(event, start=start + 1, end=start + 1) if seen else None
     start = min(shown.first(event.start - 1), last)
@@ -138,7 +163,6 @@ def _in_frames(event: GroupEvent, shown: FrameTicks) -> GroupEvent | None:
 
 
 def _near_in_frames(near: Near, shown: FrameTicks) -> Near:
-    """Returns the stretches with frames in place of ticks, without those that no frame shows."""
     start = np.searchsorted(shown.tick, near.start - 1) + 1
     end = np.searchsorted(shown.tick, near.end - 1, side="right")
     kept = start <= end
@@ -146,9 +170,6 @@ def _near_in_frames(near: Near, shown: FrameTicks) -> Near:
 
 
 def _ground_groups(truth: Truth) -> Iterator[Groups]:
-    """Yields the Groups on the ground of frame 1, 2, … in turn; the truth must have pos and vel, else
-    AssertionError.
-    """
     from sim.truth.group_hulls import frame_groups
 
     assert truth.pos is not None

@@ -1,51 +1,204 @@
 """Makes the merge, split, form, dissolve, enter and leave events of a crowd, and the group id of each person.
 
-It takes positions, velocities and intent (the group that the script means a person to belong to). Steps:
-sim.truth.group_membership says who is together in each frame, sim.truth.identity which group keeps its id and what kind
-of event a change is. Crossings and queues: sim.truth.crossing_events, sim.truth.queue_detection.
+It takes positions, velocities and intent: the group that the script means a person to belong to. In every frame the
+crowd is divided into parts: groups, and people alone. Two parts that are meant to be one are joined in the first frame
+of the first stretch in which the merge rule holds between them. A part whose people are meant to be in different groups
+is divided in the first frame of the first stretch in which the split rule holds between those people. People who enter
+in the same frame and are meant to be together form one part from that frame on. sim.truth.merge_split_rules has the
+rules. Stretches are found by looking ahead; the times at which the script gave orders are not used. sim.truth.identity
+says which group keeps its id and what kind of event a change is.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
+from typing import Literal
 
 import numpy as np
 
-from sim.truth.group_membership import partitions
-from sim.truth.identity import GroupChange, Identities
-from sim.truth.merge_split_rules import HOLD_TIME, frames_of, mean_of_present
+from sim.truth.identity import GroupChange, Identities, PersonSet
+from sim.truth.merge_split_rules import HOLD_TIME, frames_of, holds_for, mean_of_present, separation
 from sim.truth.proximity import strangers
 from sim.types import Array, Bools, GroupEvent, Ints, Near
+
+Rule = Literal["merge", "split"]
+NEVER = np.iinfo(np.int64).max
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredMotion:
+    """The motion from which groups are found: T frames, P people."""
+
+    # pos, vel (T, P, 2): m, m/s, nan while absent
+    pos: Array
+    vel: Array
+    present: Bools  # (T, P) flags
+    intent: Ints  # (T, P) index of the group that the script means a person to belong to, -1 while absent
+    hold: int  # number of frames for which the merge or split rule must hold
+
+
+def partitions(
+    pos: Array, vel: Array, present: Bools, intent: Ints, fps: float
+) -> Iterator[tuple[int, list[PersonSet]]]:
+    """Yields (t, parts) for frame 0 and for each later frame t (from 0) in which the parts may have changed.
+
+    parts: disjoint sets of columns (person id - 1) that make up all people present, valid until the next t. pos, vel
+    (T, P, 2): m, m/s. present (T, P). intent (T, P): the group a person is meant to belong to, -1 while absent.
+    """
+    there = present[..., None]
+    pos, vel = np.where(there, pos, np.nan), np.where(there, vel, np.nan)
+    motion = MeasuredMotion(pos, vel, present, intent, frames_of(HOLD_TIME, fps))
+    turns = _turns(present, intent)
+    parts: list[PersonSet] = []
+    rules = _RuleTimes(motion)
+    t, k = 0, 0
+    while t < len(present):
+        if k < len(turns) and turns[k] == t:
+            parts = _enter_and_leave(parts, motion, t)
+            k += 1
+        parts = rules.join_and_divide(parts, t)
+        yield t, parts
+        t = min(rules.next_change(parts, t), int(turns[k]) if k < len(turns) else NEVER)
+
+
+def _turns(present: Bools, intent: Ints) -> Ints:
+    """Returns frame 0 and the frames from which somebody else is present, or meant to be in another group."""
+    if not len(present):
+        return np.zeros(0, np.int64)
+    moved = (np.diff(present, axis=0) | (np.diff(intent, axis=0) != 0)).any(axis=1)
+    return np.concatenate([[0], np.flatnonzero(moved) + 1])
+
+
+def _enter_and_leave(parts: list[PersonSet], motion: MeasuredMotion, t: int) -> list[PersonSet]:
+    here = frozenset(np.flatnonzero(motion.present[t]).tolist())
+    stay = [part & here for part in parts if part & here]
+    return stay + list(_by_intent(here - frozenset().union(*stay), motion, t).values())
+
+
+def _by_intent(people: Iterable[int], motion: MeasuredMotion, t: int) -> dict[int, PersonSet]:
+    """Returns the people by the group that they are meant to belong to in frame t."""
+    found: dict[int, set[int]] = {}
+    for p in sorted(people):
+        found.setdefault(int(motion.intent[t, p]), set()).add(p)
+    return {g: frozenset(some) for g, some in found.items()}
+
+
+class _RuleTimes:
+    """When parts of the crowd will join or divide in one motion.
+
+    State: for each rule and two parts, the frames from which the rule will hold long enough. They are measured once,
+    when both parts exist for the first time, and remain valid while the parts stay the same.
+    """
+
+    def __init__(self, motion: MeasuredMotion) -> None:
+        self.motion = motion
+        self._known: dict[tuple[Rule, PersonSet, PersonSet], Ints] = {}
+
+    def join_and_divide(self, parts: list[PersonSet], t: int) -> list[PersonSet]:
+        """Returns the parts after all joins and divisions that are due in frame t (from 0)."""
+        while True:
+            divided = [piece for part in parts for piece in self._divide(part, t)]
+            joined = _connected(divided, self._due_to_join(divided, t))
+            if len(joined) == len(divided) == len(parts):
+                return parts
+            parts = joined
+
+    def next_change(self, parts: list[PersonSet], t: int) -> int:
+        """Returns the first frame after t in which parts join or may divide; NEVER if there is none."""
+        times = [_first(frames, t + 1) for _, frames in self._meant_to_join(parts, t)]
+        for part in parts:
+            times += [_first(self._onsets("split", a, b, t), t + 1) for a, b in self._meant_to_divide(part, t)]
+        return min(times, default=NEVER)
+
+    def _meant_to_join(self, parts: list[PersonSet], t: int) -> Iterator[tuple[tuple[PersonSet, PersonSet], Ints]]:
+        """Yields ((a, b), frames of the merge rule) for each two parts that are meant to be one group in frame t."""
+        meant: dict[int, list[tuple[PersonSet, PersonSet]]] = {}
+        for part in parts:
+            g, core = max(_by_intent(part, self.motion, t).items(), key=lambda item: len(item[1]))
+            # A part joins as the group that most of its people are meant to be in; the rule is measured between these.
+            if 2 * len(core) > len(part):
+                meant.setdefault(g, []).append((part, core))
+        for some in meant.values():
+            for (a, core_a), (b, core_b) in combinations(some, 2):
+                yield (a, b), self._onsets("merge", core_a, core_b, t)
+
+    def _due_to_join(self, parts: list[PersonSet], t: int) -> list[tuple[PersonSet, PersonSet]]:
+        return [pair for pair, frames in self._meant_to_join(parts, t) if _first(frames, t) == t]
+
+    def _meant_to_divide(self, part: PersonSet, t: int) -> Iterator[tuple[PersonSet, PersonSet]]:
+        return combinations(_by_intent(part, self.motion, t).values(), 2) if len(part) > 1 else iter(())
+
+    def _divide(self, part: PersonSet, t: int) -> list[PersonSet]:
+        if len(part) == 1:
+            return [part]
+        # Two subsets stay together, too, if a third one connects them.
+        unsplit = [(a, b) for a, b in self._meant_to_divide(part, t) if _first(self._onsets("split", a, b, t), t) != t]
+        return _connected(list(_by_intent(part, self.motion, t).values()), unsplit)
+
+    def _onsets(self, rule: Rule, a: PersonSet, b: PersonSet, t: int) -> Ints:
+        """Returns the frames, ascending, from which the rule will hold long enough between parts a and b."""
+        key = (rule, a, b)
+        if key not in self._known:
+            self._known[key] = self._measure(rule, np.array(sorted(a)), np.array(sorted(b)), t)
+        return self._known[key]
+
+    def _measure(self, rule: Rule, a: Ints, b: Ints, t: int) -> Ints:
+        motion = self.motion
+        both = motion.present[t:, a].any(axis=1) & motion.present[t:, b].any(axis=1)
+        ends = np.flatnonzero(both)
+        if not len(ends):
+            return ends
+        window = slice(t, t + int(ends[-1]) + 1)
+        found = separation(motion.pos[window], motion.vel[window], a, b)
+        holds = found.merge_rule() if rule == "merge" else found.split_rule()
+        holds &= self._intended(rule, window, a, b)
+        return np.flatnonzero(holds_for(holds, motion.hold)) + t
+
+    def _intended(self, rule: Rule, window: slice, a: Ints, b: Ints) -> Bools:
+        intent, present = self.motion.intent[window], self.motion.present[window]
+        same = intent[:, a, None] == intent[:, None, b]
+        there = present[:, a, None] & present[:, None, b]
+        ok = ~there | (same if rule == "merge" else ~same)
+        return np.asarray(ok.all(axis=(1, 2)))
+
+
+def _first(frames: Ints, t: int) -> int:
+    k = int(np.searchsorted(frames, t))
+    return int(frames[k]) if k < len(frames) else NEVER
+
+
+def _connected(parts: list[PersonSet], links: list[tuple[PersonSet, PersonSet]]) -> list[PersonSet]:
+    """Returns the parts, each united with all that links connect it to."""
+    whole = {part: part for part in parts}
+    for a, b in links:
+        one = whole[a] | whole[b]
+        for part in parts:
+            if part <= one:
+                whole[part] = one
+    return list(dict.fromkeys(whole[part] for part in parts))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupsAndEvents:
-    """What is measured of the groups in a motion of T frames and P people.
+    """What is measured of the groups in a motion of T frames and P people."""
 
-    - group (T, P): id of each person's group, from 1; -1 for a person who is alone or absent.
-    - events: merge, split, form, dissolve, enter and leave, in order of the frame in which the group changed; () if
-      none.
-    - near: pairs of people who satisfy the merge rule (less than 1.5 m apart, velocities differing by less than 0.5
-      m/s, for 2 s) but are strangers (hard negatives).
-    """
-
-    group: Ints
+    group: Ints  # (T, P) id of each person's group, from 1; -1 for a person who is alone or absent
+    # merge, split, form, dissolve, enter and leave, in order of the frame in which the group changed; () if none
     events: tuple[GroupEvent, ...]
+    # pairs of people who satisfy the merge rule (less than 1.5 m apart, velocities differing by less than 0.5 m/s, for
+    # 2 s) but are strangers (hard negatives)
     near: Near
 
 
 def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> GroupsAndEvents:
     """Returns the group ids, the events (all kinds but cross and queue) and the near strangers of a motion.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. intent (T, P): index of the group a person is meant to belong to.
-    pos and vel are nan, intent is -1 where a person is absent. fps: frames per s. The id of a person is the column + 1;
-    frames of events count from 1. Without frames there are no events.
-
-    A merge, split, form or dissolve event starts in the first frame in which its rule holds, and ends when the rule has
-    held for HOLD_TIME (2 s). Rules: together if less than 1.5 m apart with velocities differing by less than 0.5 m/s;
-    apart if beyond 2.5 m, or 1.5 m with a difference above 0.7 m/s. An enter event lies in the group's first frame, a
-    leave event in the last frame before the change. Groups that are there in frame 1 have no enter event.
+    pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P). intent (T, P): the group a person is meant to belong
+    to, -1 while absent. Frames of events count from 1, a person's id is the column + 1. A merge, split, form or
+    dissolve starts in the first frame in which its rule holds, and ends when it has held for HOLD_TIME. An enter lies
+    in the group's first frame, a leave in the last frame before the change.
     """
     group = np.full(present.shape, -1, np.int64)
     identities, events = Identities(), []
@@ -61,13 +214,6 @@ def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps:
 
 
 def _event(change: GroupChange, t: int, hold: int, pos: Array) -> GroupEvent:
-    """Returns the event of a change in frame t, which counts from 0; `members` of the change are columns (person id -
-    1).
-
-    Frames of the event count from 1. A leave is in the last frame before t, all other kinds start in t. hold: length in
-    frames of all kinds but enter and leave (one frame). pos (T, P, 2): m, nan while absent. The event's position is the
-    mean of its people who are present in its first frame; nan if none is.
-    """
     start = t if change.kind == "leave" else t + 1
     end = start if change.kind in ("enter", "leave") else start + hold - 1
     x, y = mean_of_present(pos[start - 1 : start, list(change.members)])[0]

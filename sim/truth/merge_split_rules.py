@@ -23,60 +23,44 @@ HOLD_TIME = 2.0  # s for which either rule must hold
 
 
 def frames_of(seconds: float, fps: float) -> int:
-    """Returns the number of frames that last `seconds` (s) at fps frames per s, rounded up (1e-9 above a whole number
-    is ignored); at least 1."""
+    """Returns the number of frames that last `seconds`, rounded up, at least 1."""
+    # Rounding errors of a whole number of frames do not count.
     return max(1, math.ceil(seconds * fps - 1e-9))
 
 
 def holds_for(holds: Bools, frames: int) -> Bools:
-    """Returns for each frame whether `holds` (T, ...) is True in it and the next frames - 1 frames, same shape as
-    `holds`.
-
-    frames: 1 or more. The last frames - 1 frames are always False: a stretch that the end of the recording cuts off
-    does not count. With fewer than `frames` frames all are False.
-    """
+    """Returns for each frame whether `holds` (T, ...) is True in it and in the next frames - 1 frames."""
     if len(holds) < frames:
         return np.zeros_like(holds)
     total = np.concatenate([np.zeros_like(holds[:1], np.int64), np.cumsum(holds, axis=0)])
     out = np.zeros_like(holds)
+    # A stretch that the end of the recording cuts off does not count.
     out[: len(holds) - frames + 1] = total[frames:] - total[:-frames] == frames
     return out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Separation:
-    """How far apart two parts of a crowd are in each of T frames; or pairs of parts, arrays of any shape.
+    """How far apart two parts of a crowd are in each of T frames; or pairs of parts, arrays of any shape."""
 
-    distance (T,): m between the nearest members. velocity_difference (T,): length in m/s of the difference of the mean
-    velocities. Both are inf in frames in which a part is absent.
-    """
-
-    distance: Array
+    distance: Array  # (T,) m between the nearest members
+    # (T,) length in m/s of the difference of the mean velocities. Both are inf in frames in which a part is absent.
     velocity_difference: Array
 
     def merge_rule(self) -> Bools:
-        """Returns for each frame whether the merge rule holds, shape (T,).
-
-        It holds if the nearest members are less than 1.5 m apart and the mean velocities differ by less than 0.5 m/s;
-        not if a part is absent.
-        """
+        """Returns the frames in which the merge rule holds (T,)."""
         return (self.distance < MERGE_DISTANCE) & (self.velocity_difference < MERGE_VELOCITY)
 
     def split_rule(self) -> Bools:
-        """Returns for each frame whether the split rule holds, shape (T,).
-
-        It holds if the nearest members are more than 2.5 m apart, or more than 1.5 m with mean velocities that differ
-        by more than 0.7 m/s; not if a part is absent.
-        """
+        """Returns the frames in which the split rule holds (T,)."""
         leaving = (self.distance > MERGE_DISTANCE) & (self.velocity_difference > SPLIT_VELOCITY)
         return np.isfinite(self.distance) & ((self.distance > SPLIT_DISTANCE) | leaving)
 
 
 def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
-    """Returns the distance (nearest members, m) and difference of mean velocities (m/s), in each frame, of the people
-    in columns a and in columns b.
+    """Returns how far apart the people in columns a and those in columns b are in each frame.
 
-    pos, vel (T, P, 2): m, m/s, nan while absent. Absent members are left out; both values are inf if a part has nobody.
+    pos, vel (T, P, 2): m, m/s, nan while absent.
     """
     gap = pos[:, a, None] - pos[:, None, b]
     gap2 = dot(gap, gap).reshape(len(pos), -1)
@@ -86,10 +70,7 @@ def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
 
 
 def mean_of_present(values: Array) -> Array:
-    """Returns the mean (T, 2) of values (T, K, 2) over those of the K people who are present; nan if none is.
-
-    A person with a nan or inf value counts as absent in that frame.
-    """
+    """Returns the mean (T, 2) of values (T, K, 2) over the people with finite values; nan if none has."""
     there = np.isfinite(values.sum(axis=-1))
     total = np.where(there[..., None], values, 0.0).sum(axis=1)
     with np.errstate(invalid="ignore"):

@@ -13,9 +13,15 @@ import numpy as np
 
 from scenarios.errors import OrderError
 from sim.elementary import length
-from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY
-from sim.truth.queue_detection import QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, detect_queues
-from sim.truth.queue_shapes import MAX_SPACING, MIN_SPACING
+from sim.truth.merge_split_rules import (
+    HOLD_TIME,
+    MERGE_DISTANCE,
+    MERGE_VELOCITY,
+    SPLIT_DISTANCE,
+    SPLIT_VELOCITY,
+    separation,
+)
+from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, detect_queues
 from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, States, Truth
 
 PATIENCE = 10.0  # s from the firing of an order until its rule has come true
@@ -34,13 +40,9 @@ WORDS = {
 
 
 def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
-    """Returns for each order id the index in `truth.events` of the event that fulfils the order; two orders may share
-    one.
+    """Returns for each order id the index in `truth.events` of the event that fulfils it.
 
-    motion: with its orders. truth: measured from that motion. Raises OrderError for the first order, in the script's
-    order, that no event fulfils (an order that never fired included); the error says how close the motion came to the
-    rule. Raises OrderError for a queue whose people did not all leave from the same end. A motion without orders gives
-    {}.
+    Raises OrderError for the first order that no event fulfils, and for a queue that people left from both ends.
     """
     fulfilled = {}
     for order in truth.orders:
@@ -53,10 +55,6 @@ def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
 
 
 def _check_fifo(order: Order, motion: Motion) -> None:
-    """Raises OrderError if the people of the queue that fulfils the order did not all leave it from the same end.
-
-    Queues are detected in the motion anew; those that hold enough of the order's people after it fired count.
-    """
     s = motion.states()
     people = {p for part in order.before for p in part}
     fired = _fired(order, s)
@@ -75,19 +73,14 @@ def _check_fifo(order: Order, motion: Motion) -> None:
 
 
 def _fired(order: Order, s: States) -> int:
-    """Returns the tick, from 0, at which an order that has fired did so."""
     assert order.time is not None
     return round(order.time * s.rate)
 
 
 def fulfilment(order: Order, events: Sequence[GroupEvent], group: Ints, s: States) -> int | None:
-    """Returns the index in `events` of the first event that fulfils an order, None if no event does.
+    """Returns the index of the first event that fulfils an order, None if no event does.
 
-    events: at the ticks of the states s, from 1. group (C, P): group ids, -1 = alone or absent. The event has the right
-    kind (merge or form, split or dissolve, queue) and one of the order's people. They are together (parted) at its
-    first tick and not at the tick before; a queue holds 3 of them. It starts no earlier than the order fired, and early
-    enough that its rule (2 s; queues 3 s) has held within PATIENCE (10 s) of the firing. An order that never fired is
-    not fulfilled.
+    events: at the ticks of the states, from 1. group (C, P): group ids at each tick, -1 = alone or absent.
     """
     if order.time is None:
         return None
@@ -100,49 +93,30 @@ def fulfilment(order: Order, events: Sequence[GroupEvent], group: Ints, s: State
 
 
 def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
-    """Returns True if an event of the right kind and time has the people and the effect that the order asks for.
-
-    - Queue: at least 3 (QUEUE_PEOPLE) of the order's people, or all if they are fewer, are members.
-    - Merge: one of the order's people is a member. In the event's first frame, but not in the frame before, all of them
-      are in one group (others may be, too).
-    - Split: one of the order's people is a member. In the event's first frame, but not in the frame before, no group
-      has people of two of the planned parts.
-
-    An event in frame 1 fulfils no merge or split. group (C, P): group ids, -1 = alone or absent.
-    """
+    """Returns True if an event of the right kind and time has the people and the effect that the order asks for."""
     if order.kind == "queue":
         people = {p for part in order.before for p in part}
         return len(people & set(event.members)) >= min(QUEUE_PEOPLE, len(people))
     wanted = [np.array(part, dtype=np.int64) - 1 for part in order.after]
     done = _together if order.kind == "merge" else _apart
     people = {p for part in order.after for p in part}
+    # The effect must come with the event: it is there at its first tick, and not before.
     now, before = group[event.start - 1], group[max(event.start - 2, 0)]
     return bool(people & set(event.members)) and done(wanted, now) and not done(wanted, before)
 
 
 def _together(wanted: list[Ints], group: Ints) -> bool:
-    """Returns True if the people of each part are in one group; a part of one person always is. Two parts may be in one
-    group, too.
-
-    wanted: columns (person id - 1) of each part. group (P,): group ids in one frame, negative = alone or absent.
-    """
+    """Returns True if the people (columns) of each part are in one group (P,) in one frame."""
     return all(group[w[0]] >= 0 and bool((group[w] == group[w[0]]).all()) for w in wanted if len(w) > 1)
 
 
 def _apart(wanted: list[Ints], group: Ints) -> bool:
-    """Returns True if no group has people of two parts; people alone or absent are ignored.
-
-    wanted: columns (person id - 1) of each part. group (P,): group ids in one frame, negative = alone or absent.
-    """
+    """Returns True if no group has people of two parts."""
     ids = [set(group[w][group[w] >= 0].tolist()) for w in wanted]
     return sum(map(len, ids)) == len(set().union(*ids))
 
 
 def _unfulfilled(order: Order, motion: Motion) -> OrderError:
-    """Returns, without raising it, the OrderError for an order that no event fulfils.
-
-    It says that the order never fired, or how close the motion came to its rule within 10 s (PATIENCE) of the firing.
-    """
     s = motion.states()
     place, length = f"event {order.id} (seed {motion.seed})", len(s.present)
     if order.time is None:
@@ -163,14 +137,7 @@ def _unfulfilled(order: Order, motion: Motion) -> OrderError:
 
 
 def closest(order: Order, s: States, window: slice) -> str:
-    """Returns in words how close the people came to an order's rule within a window (slice) of ticks that count from 0.
-
-    - Queue: the greatest number of its people slower than 0.4 m/s at once, and the longest stretch in s with 3 of them.
-    - Merge: at each tick the part furthest from the others counts; the least such distance, m. Split: the part nearest
-      to the others counts; the greatest such distance. Both with the velocity difference at that time, m/s.
-
-    If the window is empty, or the parts were never there together, it says that.
-    """
+    """Returns in words how close the people came to an order's rule within a window of ticks."""
     pos, vel, present = s.pos[window], s.vel[window], s.present[window]
     if not len(pos):
         return "the recording had ended"
@@ -184,7 +151,7 @@ def closest(order: Order, s: States, window: slice) -> str:
         )
     parts = order.before if order.kind == "merge" else order.after
     columns = [np.array(part, dtype=np.int64) - 1 for part in parts]
-    gap, difference = _gaps(columns, pos, vel, present, widest=order.kind == "merge")
+    gap, difference = _gaps(columns, pos, vel, widest=order.kind == "merge")
     if not np.isfinite(gap).any():
         return "the parts were never there together"
     k = int(np.nanargmin(gap) if order.kind == "merge" else np.nanargmax(gap))
@@ -193,36 +160,17 @@ def closest(order: Order, s: States, window: slice) -> str:
 
 
 def _longest(holds: Bools) -> int:
-    """Returns the number of frames of the longest stretch of True in holds (T,); 0 if there is none."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
-def _gaps(columns: list[Ints], pos: Array, vel: Array, present: Bools, widest: bool) -> tuple[Array, Array]:
-    """Returns two arrays (T,) about one part and all other parts: distance of the nearest members, m; difference of the
-    mean velocities, m/s.
-
-    In each frame the part with the widest gap is taken (`widest`, for merges) or the one with the narrowest gap (for
-    splits). Both are nan where no two parts are present, or there is one part only. columns: of the people of each
-    part. pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P): flags.
+def _gaps(columns: list[Ints], pos: Array, vel: Array, widest: bool) -> tuple[Array, Array]:
+    """Returns distances (T,) and velocity differences (T,) of the part furthest from (`widest`) or nearest to all
+    others.
     """
-    gaps, differences = [], []
-    for i, a in enumerate(columns):
-        rest = np.concatenate([c for j, c in enumerate(columns) if j != i]) if len(columns) > 1 else a[:0]
-        d = length(pos[:, a, None] - pos[:, None, rest])
-        gaps.append(np.where(np.isnan(d), np.inf, d).reshape(len(pos), -1).min(axis=1, initial=np.inf))
-        differences.append(length(_mean_velocity(vel, present, a) - _mean_velocity(vel, present, rest)))
-    gap, difference = np.array(gaps), np.array(differences)
+    rests = [np.concatenate([columns[0][:0], *columns[:k], *columns[k + 1 :]]) for k in range(len(columns))]
+    gaps = [separation(pos, vel, a, rest) for a, rest in zip(columns, rests, strict=True)]
+    gap, difference = np.array([g.distance for g in gaps]), np.array([g.velocity_difference for g in gaps])
     gap[np.isinf(gap)] = -np.inf if widest else np.inf
     worst = gap.argmax(axis=0) if widest else gap.argmin(axis=0), np.arange(len(pos))
     return np.where(np.isfinite(gap[worst]), gap[worst], np.nan), difference[worst]
-
-
-def _mean_velocity(vel: Array, present: Bools, columns: Ints) -> Array:
-    """Returns the mean velocity (T, 2), m/s, of the people in these columns who are present; nan if none is.
-
-    vel (T, P, 2): m/s. present (T, P): flags.
-    """
-    n = present[:, columns].sum(axis=1)[:, None]
-    total = np.where(present[:, columns, None], vel[:, columns], 0.0).sum(axis=1)
-    return np.where(n > 0, total / np.maximum(n, 1), np.nan)

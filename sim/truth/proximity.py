@@ -19,11 +19,9 @@ CHUNK = 200_000  # rows handled together: bounds memory
 
 
 def close_pairs(frame: Ints, pos: Array, reach: float) -> tuple[Ints, Ints]:
-    """Returns all pairs of rows i < j of the same frame that are less than `reach` apart, as two arrays (K,), sorted by
-    (i, j).
+    """Returns all pairs of rows i < j of the same frame that are less than `reach` apart, sorted, (K,) each.
 
-    A row is one position in one frame. frame (R,): ascending. pos (R, 2): finite, in the unit of reach. reach: above 0.
-    No rows give no pairs.
+    frame (R,): ascending. pos (R, 2): finite.
     """
     found = [_pairs_of(frame, pos, low, high, reach) for low, high in _portions(frame)]
     i, j = (np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in (0, 1))
@@ -32,11 +30,7 @@ def close_pairs(frame: Ints, pos: Array, reach: float) -> tuple[Ints, Ints]:
 
 
 def _portions(frame: Ints) -> Iterator[tuple[int, int]]:
-    """Yields half-open ranges (low, high) of rows that hold whole frames, of about CHUNK (200,000) rows each; none
-    without rows.
-
-    frame (R,): ascending frame of each row. A range ends with the frame that its 200,000th row belongs to.
-    """
+    """Yields half-open ranges of rows that hold whole frames, of about CHUNK rows."""
     low = 0
     while low < len(frame):
         high = int(np.searchsorted(frame, frame[min(low + CHUNK, len(frame)) - 1], side="right"))
@@ -45,13 +39,8 @@ def _portions(frame: Ints) -> Iterator[tuple[int, int]]:
 
 
 def _pairs_of(frame: Ints, pos: Array, low: int, high: int, reach: float) -> tuple[Ints, Ints]:
-    """Returns the pairs (i, j), i < j, of rows low … high - 1 that are in the same frame and less than `reach` apart,
-    unsorted.
-
-    There must be at least one row; the rows hold whole frames. frame (R,): ascending. pos (R, 2): in the unit of reach.
-    Rows are sorted by frame and by the cells of a grid as wide as `reach`; all neighbours of a row then lie in two runs
-    of rows behind it.
-    """
+    # Sorted by frame and by the cells of a grid as wide as `reach`, all neighbours of a row lie in two runs of rows
+    # behind it.
     f, p = frame[low:high] - frame[low], pos[low:high]
     cell = np.floor((p - p.min(axis=0)) / reach).astype(np.int64) + 1
     rows, columns = int(cell[:, 1].max()) + 2, int(cell[:, 0].max()) + 2
@@ -69,22 +58,16 @@ def _pairs_of(frame: Ints, pos: Array, low: int, high: int, reach: float) -> tup
 
 
 def runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:
-    """Returns all pairs (k, first[k]), (k, first[k] + 1) … (k, end[k] - 1) for k = 0, 1, …, as two arrays of equal
-    length.
-
-    first, end (K,). Where end[k] ≤ first[k] there is no pair.
-    """
+    """Returns all pairs (k, first[k]), (k, first[k] + 1) … (k, end[k] - 1) for k = 0, 1, …, as two arrays."""
     n = np.maximum(end - first, 0)
     i = np.repeat(np.arange(len(n)), n)
     return i, np.arange(len(i)) - np.repeat(np.cumsum(n) - n, n) + first[i]
 
 
 def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Ints, Ints, Ints]:
-    """Returns (pair, first frame, last frame), both inclusive, of each stretch that is at least `least` frames long.
+    """Returns (pair, first frame, last frame) of each stretch of at least `least` frames, (S,) each, sorted.
 
-    Three arrays (S,), sorted by (pair, first frame). pair, frame (K,): rows sorted by (pair, frame); pair is any number
-    that names two people, or one. A stretch is a run of rows of one pair whose frames are at most `bridge` apart; 1
-    means without a gap. Its length counts from the first to the last frame, gaps included. No rows give no stretch.
+    pair, frame (K,): rows sorted by (pair, frame). Frames of a stretch are at most `bridge` apart.
     """
     if not len(pair):
         return pair, frame, frame
@@ -96,18 +79,15 @@ def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Int
 
 
 def strangers(pos: Array, vel: Array, present: Bools, intent: Ints, group: Ints, fps: float) -> Near:
-    """Returns the hard negatives: stretches in which two people satisfy the merge rule but do not belong together.
+    """Returns the stretches in which two people satisfy the merge rule but do not belong together.
 
-    pos, vel (T, P, 2): m, m/s, finite where present. present (T, P): flags. intent (T, P): index of the group a person
-    is meant to belong to; it must differ. group (T, P): measured group ids, -1 = alone. fps: frames per s. The rule
-    (less than 1.5 m apart, velocities differing by less than 0.5 m/s) holds for at least HOLD_TIME (2 s) without a gap.
-    Two people of one measured group, which has not split yet, are no strangers. Frames count from 1; a person's id is
-    the column + 1. Sorted by first frame, then by the ids. Nobody near gives no rows.
+    pos, vel (T, P, 2): m, m/s. present (T, P). intent (T, P): must differ. group (T, P): measured, -1 = alone.
     """
     t, p = np.nonzero(present)
     i, j = close_pairs(t, pos[t, p], MERGE_DISTANCE)
     t, a, b = t[i], p[i], p[j]
     differ = length(vel[t, a] - vel[t, b])
+    # Two people of one group that has not split yet are no strangers.
     same_group = (group[t, a] >= 0) & (group[t, a] == group[t, b])
     kept = (differ < MERGE_VELOCITY) & (intent[t, a] != intent[t, b]) & ~same_group
     t, a, b = t[kept], a[kept], b[kept]

@@ -1,8 +1,13 @@
 """Recognises queues in measured motion: people who wait in line behind one another. For truth and trackers alike.
 
-In each moment sim.truth.queue_shapes finds the lines of people who wait. Here lines are followed through time by the
-people in them, and those that last long enough become queues. Serving queues in the simulation:
-sim.crowd.queue_service.
+*Shapes, each in one moment.* People of one moment who stand close to each other form a crowd. A line is an ordered set
+of people of a crowd for which three tests hold along the straight line that fits them best: neighbours are 0.4 to 1.5 m
+apart (MIN_SPACING, MAX_SPACING), nobody is more than 0.5 m (MAX_OFFSET) off the straight line, and the direction from
+one person to the next turns by at most 60°. A circle of people in conversation can pass the first two tests, but not
+the third. All moments are handled at once. Tables of positions (M, n, 2) hold M ordered sets; only the first `count`
+(M,) positions of each set count.
+
+*Through time.* Lines are followed by the people in them, and those that last long enough become queues.
 """
 
 from __future__ import annotations
@@ -13,11 +18,150 @@ from itertools import groupby
 
 import numpy as np
 
-from sim.elementary import length
+from sim.elementary import atan2, length, unit
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.proximity import close_pairs, stretches
-from sim.truth.queue_shapes import MAX_SPACING, QueueShapes, queue_shapes
 from sim.types import Array, Bools, GroupEvent, Ints
+
+MIN_SPACING, MAX_SPACING = 0.4, 1.5  # m along the line
+MAX_OFFSET = 0.5  # m
+MIN_TURN_COSINE = 0.5  # cosine of the greatest turn from one person to the next
+OFF_LINE = 1e9  # m: stands for the position along the line of people who are off it
+MIN_CROWD_SHARE = 2 / 3  # of a crowd that must be in the line: else it is no queue
+MAX_CELLS = 2_000_000  # numbers handled together: bounds memory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class QueueShapes:
+    """M lines of people who stand behind one another."""
+
+    # (M, n) row numbers, in the table of positions, of the people in order along the line; only the first count (M,) of
+    # each are valid
+    rows: Ints
+    count: Ints
+    u: Array  # (M, 2) unit vector along the line from the first person towards the last
+    middle: Array  # (M, 2) mean position x, y, m
+
+
+def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
+    """Yields tables of the lines of all crowds, at most one for each crowd; a table holds crowds of equal size.
+
+    pos (N, 2): m. i, j (K,): rows that stand close to each other; a crowd is connected by such pairs. The line is the
+    whole crowd, else the longest line of three people and two thirds of the crowd; of several, the straightest.
+    """
+    for crowd in _crowds(len(pos), i, j):
+        portion = max(1, MAX_CELLS // (crowd.shape[1] * crowd.shape[1] * crowd.shape[1]))
+        for low in range(0, len(crowd), portion):
+            some = crowd[low : low + portion]
+            order, count = _best(pos[some])
+            found = count > 0
+            rows, count = np.take_along_axis(some[found], order[found], axis=1), count[found]
+            yield QueueShapes(rows, count, *_axes(pos[rows], count)[:2])
+
+
+def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
+    """Yields the rows (C, n) of the C crowds of each size n > 1."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(i), np.int8), (i, j)), shape=(people, people))
+    _, crowd = connected_components(graph, directed=False)
+    order = np.argsort(crowd, kind="stable")
+    size = np.bincount(crowd, minlength=1)
+    first = np.cumsum(size) - size
+    for n in np.unique(size[size > 1]):
+        yield order[first[size == n, None] + np.arange(n)]
+
+
+def _best(p: Array) -> tuple[Ints, Ints]:
+    """Returns the order (C, n) of the people along the line in each crowd, and how many are in it (C,), or 0."""
+    n = p.shape[1]
+    whole_crowd = np.full(len(p), n)
+    u = _axes(p, whole_crowd)[0]
+    order = np.argsort((p * u[:, None]).sum(axis=2), axis=1, kind="stable")
+    count = np.where(_fits(np.take_along_axis(p, order[..., None], axis=1), whole_crowd), n, 0)
+    least = max(3, int(np.ceil(MIN_CROWD_SHARE * n - 1e-9)))
+    rest = np.flatnonzero(count == 0) if n >= least else np.zeros(0, np.int64)
+    if len(rest):
+        crowd, some, long, residual = _lines_through_pairs(p[rest], least)
+        ranked = np.lexsort((residual, -long, crowd))
+        ranked = ranked[np.flatnonzero(np.diff(crowd[ranked], prepend=-1))]
+        order[rest[crowd[ranked]]], count[rest[crowd[ranked]]] = some[ranked], long[ranked]
+    return order, count
+
+
+def _axes(p: Array, count: Ints) -> tuple[Array, Array, Array]:
+    """Returns the best straight line of each set: unit vector (M, 2), middle (M, 2) m, root of the squared distances
+    (M,).
+    """
+    within = np.arange(p.shape[1]) < count[:, None]
+    middle = np.where(within[..., None], p, 0.0).sum(axis=1) / count[:, None]
+    arm = np.where(within[..., None], p - middle[:, None], 0.0)
+    xx, yy, xy = ((arm[..., a] * arm[..., b]).sum(axis=1) for a, b in ((0, 0), (1, 1), (0, 1)))
+    u = unit(0.5 * atan2(2 * xy, xx - yy))
+    whole = p[np.arange(len(p)), count - 1] - p[:, 0]
+    u = np.where(((u * whole).sum(axis=1) >= 0)[:, None], u, -u)
+    least = (xx + yy) / 2 - length(np.stack([(xx - yy) / 2, xy], axis=-1))
+    return u, middle, np.sqrt(np.maximum(least, 0.0))
+
+
+def _fits(p: Array, count: Ints) -> Bools:
+    """Returns which of M ordered sets of positions pass the three tests of a line."""
+    u, middle, _ = _axes(p, count)
+    arm = p - middle[:, None]
+    off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
+    within = np.arange(p.shape[1]) < count[:, None]
+    good = (off <= MAX_OFFSET) | ~within
+    good[:, 1:] &= _steps_fit((arm * u[:, None]).sum(axis=2)) | ~within[:, 1:]
+    good[:, 2:] &= _turns_fit(p) | ~within[:, 2:]
+    return np.asarray(good.all(axis=1))
+
+
+def _steps_fit(along: Array) -> Bools:
+    steps = np.diff(along, axis=1)
+    return np.asarray((steps >= MIN_SPACING) & (steps <= MAX_SPACING))
+
+
+def _turns_fit(p: Array) -> Bools:
+    step = np.diff(p, axis=1)
+    size = length(step)
+    return np.asarray((step[:, :-1] * step[:, 1:]).sum(axis=2) >= MIN_TURN_COSINE * size[:, :-1] * size[:, 1:])
+
+
+def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
+    """Returns crowd, order, length and misfit of lines sought through each two people of crowds (C, n, 2)."""
+    i, j = np.triu_indices(p.shape[1], 1)
+    crowd, seed = np.nonzero(_steps_fit(np.stack([np.zeros((len(p), len(i))), _lengths(p, i, j)], axis=1))[:, 0])
+    i, j, places = i[seed], j[seed], p[crowd]
+    rows = np.arange(len(crowd))
+    u = places[rows, j] - places[rows, i]
+    u /= length(u)[:, None]
+    arm = places - (places[rows, i] + places[rows, j])[:, None] / 2
+    off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
+    along = np.where(off <= MAX_OFFSET, (arm * u[:, None]).sum(axis=2), OFF_LINE)
+    order = np.argsort(along, axis=1, kind="stable")
+    places = np.take_along_axis(places, order[..., None], axis=1)
+    links = _steps_fit(np.take_along_axis(along, order, axis=1))
+    links[:, 1:] &= _turns_fit(places) | ~links[:, :-1]
+    start, count = _longest(links)
+    order = np.take_along_axis(order, np.minimum(start[:, None] + np.arange(p.shape[1]), p.shape[1] - 1), axis=1)
+    places = np.take_along_axis(p[crowd], order[..., None], axis=1)
+    good = np.flatnonzero((count >= least) & _fits(places, count))
+    return crowd[good], order[good], count[good], _axes(places[good], count[good])[2]
+
+
+def _lengths(p: Array, i: Ints, j: Ints) -> Array:
+    return length(p[:, j] - p[:, i])
+
+
+def _longest(links: Bools) -> tuple[Ints, Ints]:
+    """Returns start and length (M,) of the longest run of linked positions in each row."""
+    start, count, run = np.zeros(len(links), np.int64), np.ones(len(links), np.int64), np.ones(len(links), np.int64)
+    for k in range(links.shape[1]):
+        run = np.where(links[:, k], run + 1, 1)
+        start, count = np.where(run > count, k + 2 - run, start), np.maximum(run, count)
+    return start, count
+
 
 WAITING_SPEED = 0.4  # m/s: slower people wait
 ADVANCE_TIME = 3.0  # s: people who move for no longer between two waits advance in the queue, and count as waiting
@@ -33,65 +177,49 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class DetectedQueue:
-    """A queue found in measured motion. People are columns (person id - 1).
+    """A queue found in measured motion. People are columns (person id - 1)."""
 
-    - first: first frame with 3 people in line; last: last frame in which the line was seen. Frames from 0, both
-      inclusive; only examined frames (about 10 per s) count.
-    - order: members from one end of the line to the other; either end may be the head. People who joined later are
-      inserted between those they stood between. Empty if nobody was in line for MEMBER_TIME (1 s).
-    - left: members who left before the end, in the order of leaving; () if none.
-    - middle: x, y of the line's middle when it was first followed, m; this may be before frame `first`.
-    - fifo: True if everyone who left did so from the same end of the line, or nobody left. A person may leave up to
-      MEMBER_TIME before people nearer to that end.
-    """
-
-    first: int
+    first: int  # first frame with 3 people in line;
+    # last frame in which the line was seen. Frames from 0, both inclusive; only examined frames (about 10 per s) count.
     last: int
+    # members from one end of the line to the other; either end may be the head. People who joined later are inserted
+    # between those they stood between. Empty if nobody was in line for MEMBER_TIME (1 s).
     order: tuple[int, ...]
-    left: tuple[int, ...]
-    middle: Vector
+    left: tuple[int, ...]  # members who left before the end, in the order of leaving; () if none
+    middle: Vector  # x, y of the line's middle when it was first followed, m; this may be before frame `first`
+    # True if everyone who left did so from the same end of the line, or nobody left. A person may leave up to
+    # MEMBER_TIME before people nearer to that end.
     fifo: bool
 
 
 @dataclass(frozen=True, slots=True)
 class _LineNow:
-    """A line of waiting people in one moment.
+    """A line of waiting people in one moment."""
 
-    - t: frame, from 0. order: columns (person id - 1) from one end to the other. u: unit vector x, y from the first
-      person towards the last.
-    - middle: x, y of their mean position, m. drift: their mean velocity along u and to the left of u, m/s.
-    """
-
-    t: int
-    order: tuple[int, ...]
-    u: Vector
-    middle: Vector
-    drift: Vector
+    t: int  # frame, from 0
+    order: tuple[int, ...]  # columns (person id - 1) from one end to the other
+    u: Vector  # unit vector x, y from the first person towards the last
+    middle: Vector  # x, y of their mean position, m
+    drift: Vector  # their mean velocity along u and to the left of u, m/s
 
     def turned(self) -> _LineNow:
-        """Returns the same line with its ends exchanged: order, u and drift reversed."""
+        """Returns the same line with its ends exchanged."""
         return replace(self, order=self.order[::-1], u=(-self.u[0], -self.u[1]), drift=(-self.drift[0], -self.drift[1]))
 
 
 @dataclass
 class _FollowedLine:
-    """A line of waiting people that is followed through time. Frames count from 0; people are columns (person id - 1).
+    """A line of waiting people that is followed through time; frames from 0, people are columns."""
 
-    - now: the line when last seen. since, three: first and last frame with at least 3 people (QUEUE_PEOPLE).
-    - middle: x, y of the line's middle in the frame in which following began, m.
-    - seen: by person, number of moments (examined frames) in the line. gone: by person, the line in the last of these
-      moments.
-    - ranks: all people seen, in order along the line.
-    - drift: sum over `moments` moments of the line's mean velocity along itself and to its left, m/s.
-    """
-
-    now: _LineNow
+    now: _LineNow  # the line when last seen
+    # since, three: first and last frame with at least 3 people (QUEUE_PEOPLE)
     since: int
     three: int
-    middle: Vector
-    seen: dict[int, int] = field(default_factory=dict)
-    gone: dict[int, _LineNow] = field(default_factory=dict)
-    ranks: list[int] = field(default_factory=list)
+    middle: Vector  # x, y of the line's middle in the frame in which following began, m
+    seen: dict[int, int] = field(default_factory=dict)  # by person, number of moments (examined frames) in the line
+    gone: dict[int, _LineNow] = field(default_factory=dict)  # by person, the line in the last of these moments
+    ranks: list[int] = field(default_factory=list)  # all people seen, in order along the line
+    # sum over `moments` moments of the line's mean velocity along itself and to its left, m/s
     drift: Vector = (0.0, 0.0)
     moments: int = 0
 
@@ -99,17 +227,11 @@ class _FollowedLine:
 def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
     """Returns a queue event for each queue, in order of first and last frame.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P): flags. group (T, P): group ids, -1 = alone. fps: frames per s. A person
-    with a nan position counts as absent. A line is people who wait behind one another: 0.4 to 1.5 m apart along a
-    straight line, at most 0.5 m off it, turning by at most 60°. It has at least two thirds of its crowd, the waiting
-    people linked by distances below 1.5 m. A queue is a line that has 3 people (QUEUE_PEOPLE) for at least QUEUE_TIME
-    (3 s); a line may be lost for 1.5 s. Waiting means slower than WAITING_SPEED (0.4 m/s), except for up to 3 s when
-    advancing. A line that moves sideways, on average faster than 0.1 m/s and than along itself, is no queue.
-
-    The event starts in the first frame with 3 people and ends in the last frame with two in line. Its members are all
-    people who were in line for MEMBER_TIME (1 s); a queue without a member gives no event. Its position is the middle
-    of the line when it was first followed. before, after: sorted ids of the groups of the members present in the first
-    and last frame, -1 once for each member alone. The id of a person is the column + 1; frames of events count from 1.
+    pos, vel (T, P, 2): m, m/s. present (T, P). group (T, P): group ids, -1 = alone. A queue is a line (see
+    `queue_shapes`) of people who wait, that has QUEUE_PEOPLE for QUEUE_TIME and may be lost for BRIDGE_TIME. A line
+    that moves sideways is none. The event starts in the first frame with 3 people and ends in the last with two in
+    line. Its members are all who were in line for MEMBER_TIME. Its position is the middle of the line when it was first
+    followed.
     """
     found = []
     for q in detect_queues(pos, vel, present, fps):
@@ -123,18 +245,14 @@ def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> l
 
 
 def _groups_of(label: Ints) -> tuple[int, ...]:
-    """Returns the ids of the groups among label (K,), the group ids of K people: -1 once for each negative label, then
-    each id once, ascending.
-    """
+    """Returns the ids of the groups among labels (K,), after -1 once for each person alone."""
     return (-1,) * int((label < 0).sum()) + tuple(np.unique(label[label >= 0]).tolist())
 
 
 def detect_queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[DetectedQueue]:
-    """Returns all queues, sorted by first frame, last frame and members, also queues without members (empty `order`).
+    """Returns all queues, sorted, also those without members; about MAX_RATE frames per second are examined.
 
-    A queue is a line of waiting people that has at least 3 for 3 s. pos, vel (T, P, 2): m, m/s. present (T, P): flags.
-    fps: frames per s. A person with a nan position counts as absent. At most about 10 frames per second (MAX_RATE) are
-    examined, from frame 0. No frames give [].
+    pos, vel (T, P, 2): m, m/s. present (T, P).
     """
     there = present & np.isfinite(pos).all(axis=2)
     stride = max(1, round(fps / MAX_RATE))
@@ -152,12 +270,7 @@ def detect_queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[De
 
 
 def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
-    """Returns for each person and frame whether the person waits, shape (T, P); False while absent.
-
-    A person waits who is slower than WAITING_SPEED (0.4 m/s), or who was and will be so at two times at most
-    ADVANCE_TIME (3 s) apart. vel (T, P, 2): m/s; nan is not slow. there (T, P): the person is present. fps: frames per
-    s.
-    """
+    """Returns who waits in each frame (T, P): slow people, and those who advance for up to ADVANCE_TIME between."""
     with np.errstate(invalid="ignore"):
         slow = there & (length(vel) < WAITING_SPEED)
     p, t = np.nonzero(slow.T)
@@ -169,9 +282,6 @@ def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
 
 
 def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
-    """Returns the lines of waiting people in every `stride`-th frame from frame 0, ordered by frame, then by least
-    column. pos, vel (T, P, 2): m, m/s. waits (T, P): the person waits.
-    """
     t, p = np.nonzero(waits[::stride])
     i, j = close_pairs(t, pos[t * stride, p], MAX_SPACING)
     made: list[_LineNow] = []
@@ -181,11 +291,6 @@ def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
 
 
 def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array) -> Iterator[_LineNow]:
-    """Yields the lines of the table c (M ordered sets of people).
-
-    t, p: frame (from 0) and column of the person in each row that c.rows refers to. vel (T, P, 2): m/s; nan counts as
-    0.
-    """
     within = np.arange(c.rows.shape[1]) < c.count[:, None]
     mean = np.where(within[..., None], np.nan_to_num(vel[t[c.rows], p[c.rows]]), 0.0).sum(axis=1) / c.count[:, None]
     along, aside = (mean * c.u).sum(axis=1), mean[:, 1] * c.u[:, 0] - mean[:, 0] * c.u[:, 1]
@@ -196,14 +301,7 @@ def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array) -> Iterator[_LineNow
 
 
 def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: int) -> None:
-    """Adds the line `now` to the line in `following` that shares most people with it, or appends it as a new one.
-
-    A followed line fits if it was last seen earlier and shares at least two people, in the same order; ties go to the
-    older. `now` is turned so that both run the same way. A line of fewer than 3 people (QUEUE_PEOPLE) that fits none is
-    dropped. hold: frames for which a queue needs 3 people. bridge: frames for which a line may be lost. The record of a
-    followed line starts anew if it had fewer than 3 people for more than `bridge` frames before it reached `hold`.
-    Modifies `following`; returns nothing.
-    """
+    """Adds the line `now` to the line in `following` that shares most people with it, or appends it as a new one."""
     people, long = set(now.order), len(now.order) >= QUEUE_PEOPLE
     fits = [f for f in following if f.now.t < now.t and len(people.intersection(f.now.order)) > 1]
     fits = [f for f in fits if _same_order(f.now, now)]
@@ -216,6 +314,7 @@ def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: in
     else:
         return
     if long:
+        # A line that was too short for too long before it became a queue starts anew.
         if now.t - f.three > bridge and f.three - f.since < hold:
             f.since, f.seen, f.gone, f.ranks, f.drift, f.moments = now.t, {}, {}, [], (0.0, 0.0), 0
         f.three = now.t
@@ -230,36 +329,23 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 def _same_order(before: _LineNow, now: _LineNow) -> bool:
-    """Returns True if the people who are in both lines stand in the same order; `now` is read backwards if it points
-    the other way.
-
-    With fewer than two people in both lines the answer is True.
-    """
+    """Returns True if the people who are in both lines stand in the same order."""
     order = now.order if _dot(before.u, now.u) >= 0 else now.order[::-1]
     return [p for p in order if p in before.order] == [p for p in before.order if p in order]
 
 
 def _record_people(f: _FollowedLine) -> None:
-    """Counts the people of f.now in `seen`, sets `gone`, and inserts new people in `ranks` behind all who stand before
-    them.
-
-    A new person with nobody before comes first. Modifies f.
-    """
     for k, p in enumerate(f.now.order):
         f.seen[p] = f.seen.get(p, 0) + 1
         f.gone[p] = f.now
+        # A new person comes behind all who stand before them in line.
         if p not in f.ranks:
             ahead = [f.ranks.index(q) for q in f.now.order[:k]]
             f.ranks.insert(max(ahead) + 1 if ahead else 0, p)
 
 
 def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[DetectedQueue]:
-    """Returns the queue that a followed line f was, as a list of one; [] if it was too short or moved sideways.
-
-    Too short: the first and last frame with 3 people are less than `hold` - `stride` frames apart. Sideways: on average
-    faster than 0.1 m/s, and faster than along itself. stride: frames between two moments. fps: frames per s. People in
-    line for less than 1 s are no members; the queue may have none.
-    """
+    """Returns the queue that a followed line was, as a list of one; [] if it was too short or moved sideways."""
     along, aside = (abs(v) / f.moments for v in f.drift)
     if f.three - f.since + stride < hold or (aside > SIDEWAYS_SPEED and aside > along):
         return []
@@ -269,11 +355,7 @@ def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[Dete
 
 
 def _from_one_end(f: _FollowedLine, left: list[int], late: float) -> bool:
-    """Returns True if all people (columns) in `left` left the followed line f from the same end; True if `left` is
-    empty.
-
-    For a person who left, all people between that person and the end must have left at most `late` frames later.
-    """
+    """Returns True if all people in `left` left the line from the same end, but for `late` frames."""
 
     def stay(p: int, beyond: tuple[int, ...]) -> bool:
         return any(f.gone[q].t > f.gone[p].t + late for q in beyond)

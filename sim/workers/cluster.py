@@ -26,8 +26,7 @@ from typing import Any
 
 from scenarios.errors import InputError, WorkError
 from sim.versions import runtime
-from sim.workers.process import WorkResult, run_pickled
-from sim.workers.protocol import THREAD_VARIABLES, R, RunItems, T, worker_loss
+from sim.workers.pool import THREAD_VARIABLES, R, RunItems, T, WorkResult, run_pickled, worker_loss
 
 ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]+/?"
 SAME = "install the same on all (pip install -c constraints.txt) and restart the workers"
@@ -44,19 +43,9 @@ PROFILE_SAFE = (
 
 @contextmanager
 def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
-    """Give the RunItems (run a function over items) of the dask cluster whose scheduler listens at `address`.
+    """Yields the RunItems of the dask cluster at `address` ("tcp://HOST:PORT"); the cluster keeps running.
 
-    address: "tcp://HOST:PORT". workers: least number of items under way. As many items are under way as the cluster has
-    worker threads, but at least `workers`, plus the `ahead` of the call. Results come in the order in which they
-    arrive. The end of the block closes the connection; the cluster itself keeps running. Side effect: dask's logger
-    "distributed" is silenced up to CRITICAL.
-
-    Entering the block raises InputError if the address is malformed or dask.distributed is not installed, and WorkError
-    if no scheduler answers within CONNECT_TIMEOUT (10 s). Reading results raises the exception of the function, and
-    WorkError if the connection is lost, or if a worker has other versions or sources than this
-    process, has several threads, or cannot import flockscope. An item that killed too many workers raises WorkError
-    unless `on_loss` is given; then on_loss(item, error) is its result. A cluster without workers causes a warning after
-    20 s.
+    As many items are under way as the cluster has threads, at least `workers`, and the `ahead` of the call.
     """
     client = _connect(address)
 
@@ -110,11 +99,9 @@ def _connect(address: str) -> Any:
 
 
 class _ClusterCapacity:
-    """How many items the cluster can run at a time.
+    """How many items the cluster can run at a time: its worker threads, counted once a second, at least `least`.
 
-    client: the dask client. address: of the scheduler, for messages. least: the smallest capacity reported. State: the
-    number of the cluster's worker threads at the last count, the time of that count, and the time of the last count
-    with threads, at first of the construction; None after the warning that there are none, until there are some.
+    State: the threads at the last count, its time, and since when there are none (None after the warning).
     """
 
     def __init__(self, client: Any, address: str, least: int) -> None:
@@ -123,12 +110,7 @@ class _ClusterCapacity:
         self._empty_since: float | None = time.monotonic()
 
     def count(self) -> int:
-        """Return how many items can run at a time: the number of worker threads, but at least `least`.
-
-        Counts the threads anew if the last count is COUNT_INTERVAL (1 s) old, else returns the last count. Warns once
-        if there are no threads for NO_WORKERS_WARNING (20 s). Raises WorkError if the connection to the scheduler is
-        lost.
-        """
+        """Returns how many items can run at a time; warns once if there are no threads for 20 s."""
         now = time.monotonic()
         if now - self._counted >= COUNT_INTERVAL:
             if self._client.status not in ("running", "connecting"):
@@ -147,17 +129,13 @@ class _ClusterCapacity:
 
 
 def lost_connection(address: str) -> WorkError:
-    """Return (not raise) the WorkError for a scheduler at `address` that can no longer be reached."""
+    """Returns the error for a scheduler at `address` that can no longer be reached."""
     got = f"a lost connection to {address}"
     return WorkError(place="--cluster", got=got, expected="a scheduler that stays reachable", remedy=REMEDY)
 
 
+# The result of the future is a pickled WorkResult.
 def _submit(client: Any, function: Callable[[Any], Any], item: Any) -> Any:
-    """Submit the call function(item) to the cluster; returns its dask future, whose result is a pickled WorkResult.
-
-    The worker runs the call by unpickling the bytes of a ClusterCall. Raises the pickling error of a function or item
-    that cannot be pickled.
-    """
     name = getattr(getattr(function, "func", function), "__name__", "work").strip("_")
     body = pickle.dumps(ClusterCall(pickle.dumps((function, item)), tuple(runtime().items())))
     return client.submit(pickle.loads, body, key=f"{name}-{uuid.uuid4().hex}", pure=False)
@@ -165,30 +143,20 @@ def _submit(client: Any, function: Callable[[Any], Any], item: Any) -> Any:
 
 @dataclass(frozen=True)
 class ClusterCall:
-    """A call for a worker of a cluster: unpickling the pickle of a ClusterCall runs it and gives a pickled WorkResult.
-
-    call: a pickled (function, item). required: (name, value) pairs of the runtime that the worker must have
-    (sim.versions.runtime). `__reduce__` makes unpickling run the call, so a scheduler that only forwards the bytes
-    needs none of our code. Unpickling raises WorkError as `run_on_worker`.
-    """
+    """A call whose unpickling runs it, and gives a pickled WorkResult."""
 
     call: bytes
     required: tuple[tuple[str, str], ...]
 
     def __reduce__(self) -> tuple[Any, ...]:
+        # The scheduler only forwards these bytes, so it needs none of our code.
         return run_on_worker, (self.call, self.required)
 
 
 def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
-    """Run a call on the dask worker that this process is; returns a pickled WorkResult.
+    """Runs a pickled (function, item) on the dask worker that this process is; returns a pickled WorkResult.
 
-    It holds the call's value or exception, so an exception of the function itself is not raised. call: a pickled
-    (function, item). required: (name, value) pairs of the runtime that the worker must have, as ("numpy", "2.1.0").
-    Sets each of THREAD_VARIABLES (OMP_NUM_THREADS and others) to 1 in this process unless it is set already. Before
-    Python 3.11.9 it stops dask's profiler.
-
-    Raises WorkError if the worker has more than one thread, or if its runtime differs from `required`; ValueError if
-    this process is no dask worker.
+    Raises WorkError if the worker has several threads, or its runtime differs from the `required` pairs.
     """
     from distributed import get_worker
 
@@ -214,22 +182,17 @@ def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
 
 
 def _stop_profiler(worker: Any) -> None:
-    """Stop the profiler of a dask `worker`, which inspects the stack of each thread a hundred times a second.
-
-    Waits at most CONNECT_TIMEOUT (10 s) until it has stopped. Does nothing if no profiler is running.
-    """
     profile = worker.periodic_callbacks.get("profile")
     if profile is not None and profile.is_running():
+        # The profiler inspects the stack of each thread a hundred times a second.
         worker.loop.add_callback(profile.stop)
         stopped = threading.Event()
         worker.loop.add_callback(stopped.set)
         stopped.wait(CONNECT_TIMEOUT)
 
 
+# Waits for the first finished future only, and only so long that the threads are counted in time.
 def _drain(finished: queue.SimpleQueue[str]) -> Iterator[str]:
-    """Yield the keys of all finished futures in the queue; waits at most COUNT_INTERVAL (1 s) for the first, else
-    yields none.
-    """
     with suppress(queue.Empty):
         yield finished.get(timeout=COUNT_INTERVAL)
         while True:
@@ -237,11 +200,8 @@ def _drain(finished: queue.SimpleQueue[str]) -> Iterator[str]:
 
 
 def _fetchers(client: Any, futures: list[Any]) -> list[Callable[[], bytes]]:
-    """Return for each finished future, in order, a call that returns the future's bytes or raises its error.
-
-    Several futures are gathered in one request, at once. If one of them failed, each call fetches its own future
-    instead. A single future is fetched when its call is made. client: the dask client.
-    """
+    # One request for all is faster.
+    """Returns for each finished future, in order, a call that returns its bytes or raises its error."""
     if len(futures) > 1:
         with suppress(Exception):  # one of them failed: its own result() raises the error
             return [partial(bytes, body) for body in client.gather(futures)]

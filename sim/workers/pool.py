@@ -1,33 +1,202 @@
-"""A pool of local worker processes that run a function over items.
+"""A pool of local worker processes that run a function over items, and what all kinds of workers share.
 
-Processes are spawned, use one thread each, and are replaced when they die. The item of a dead process is run again,
-until three processes have died of it; then it is an error (WorkError) or gets a substitute result.
+A process is spawned when it gets its first item, and again after its death. It runs one item at a time in one thread,
+ignores Ctrl-C (its parent handles it), and exits when its parent does. Functions, items and results pass through a pipe
+as pickles. The item of a dead process is run again, until three processes have died of it; then it is an error
+(WorkError) or gets a substitute result.
 """
 
 from __future__ import annotations
 
 import os
+import pickle
+import signal
+import threading
+import traceback
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, Generic
+from typing import Any, Generic, Protocol, TypeVar
 
 from scenarios.errors import WorkError
-from sim.workers.process import WorkerProcess
-from sim.workers.protocol import MAX_LOSSES, THREAD_VARIABLES, R, RunItems, T, worker_loss
+
+# environment variables that are set to 1 in every worker: a worker computes in one thread
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "OPENCV_FOR_THREADS_NUM",
+)
+
+MAX_LOSSES = 3  # workers of the local pool that one item may kill before it counts as failed
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class RunItems(Protocol):
+    """Runs a function over items on some workers: this process, local processes, or a dask cluster.
+
+    Functions, items and results are pickled. A dead worker's item is run again, so a function may run more than once.
+    """
+
+    def __call__(
+        self,
+        function: Callable[[T], R],
+        items: Iterable[T],
+        *,
+        ahead: int = 0,
+        on_loss: Callable[[T, WorkError], R] | None = None,
+    ) -> Iterator[tuple[T, R]]:
+        """Yields (item, function(item)) for every item, in the order in which the results arrive.
+
+        Args:
+            function: Importable by the workers. Its exception ends the iteration.
+            items: Read lazily, one whenever a worker is free, so that a generator can react to earlier results.
+            ahead: Number of items that a cluster's scheduler holds beyond one per worker.
+            on_loss: Gives the result of an item that killed too many workers (3 local ones); None: WorkError.
+        """
+
+
+def worker_loss(losses: int, cause: str) -> WorkError:
+    """Returns the error for an item that killed `losses` workers, the last by `cause` ("exit code 3")."""
+    return WorkError(
+        got=f"an item that killed {losses} workers, the last by {cause}",
+        expected="workers that finish",
+        remedy="run again, with fewer workers if memory is short",
+    )
+
+
+EXIT_TIMEOUT = 5.0  # s that a terminated process has to exit before it is killed
+
+
+class RemoteTraceback(Exception):
+    """The text of a traceback in a worker: the cause of the call's exception when that is raised here."""
+
+    def __str__(self) -> str:
+        return f"\n{self.args[0]}"
+
+
+@dataclass(frozen=True)
+class WorkResult:
+    """The outcome of one call in a worker."""
+
+    value: Any = None  # the return value, None after an exception
+    error: BaseException | None = None  # the exception, None after success
+    trace: str = ""  # the text of the exception's traceback in the worker, "" after success
+
+    def result(self) -> Any:
+        """Returns the call's value, or raises its exception, caused by a RemoteTraceback."""
+        if self.error is not None:
+            raise self.error from RemoteTraceback(self.trace)
+        return self.value
+
+
+class WorkerProcess:
+    """A worker process that runs one call at a time; it is started by its first item, and again after its death.
+
+    State: the process (None before its first item and after its end was noticed), the pipe to it, and `ended`, a text
+    that says how the last process ended: "exit code 3" or "signal 9 (SIGKILL)"; "" if none has ended.
+    """
+
+    def __init__(self) -> None:
+        self.ended = ""
+        self._process: Any = None
+        self._pipe: Any = None
+
+    def send(self, function: Callable[[Any], Any], item: Any) -> Any:
+        """Sends the call function(item); returns the connection that is readable at its end or the process's."""
+        call = pickle.dumps((function, item))
+        if self._process is None or not self._process.is_alive():
+            self._start()
+        with suppress(OSError):  # the process died just now: receive() returns None
+            self._pipe.send_bytes(call)
+        return self._pipe
+
+    def receive(self) -> WorkResult | None:
+        """Returns the outcome of the call that was sent last; None if the process died, and then sets `ended`."""
+        try:
+            body = self._pipe.recv_bytes()
+        except (EOFError, OSError):
+            self.join()
+            return None
+        # Some exceptions can be pickled, but not unpickled; these become a RuntimeError.
+        result: WorkResult = pickle.loads(body)
+        return result
+
+    def terminate(self) -> None:
+        """Asks the process to exit at once, without waiting."""
+        if self._process is not None:
+            self._process.terminate()
+
+    def join(self) -> None:
+        """Waits until the process has exited (kills it after 5 s), closes its pipe and sets `ended`."""
+        if self._process is None:
+            return
+        self._process.join(EXIT_TIMEOUT)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._pipe.close()
+        code = self._process.exitcode
+        self.ended = f"exit code {code}" if code >= 0 else f"signal {-code} ({signal.Signals(-code).name})"
+        self._process = None
+
+    def _start(self) -> None:
+        from multiprocessing import get_context
+
+        if self._process is not None:
+            self.join()
+        context = get_context("spawn")
+        self._pipe, child_end = context.Pipe()
+        self._process = context.Process(target=_serve, args=(child_end,))
+        self._process.start()
+        child_end.close()
+
+
+def _serve(pipe: Any) -> None:
+    # The parent handles Ctrl-C.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
+    with suppress(EOFError, OSError):
+        while True:
+            pipe.send_bytes(run_pickled(pipe.recv_bytes()))
+
+
+def run_pickled(call: bytes) -> bytes:
+    """Runs a pickled (function, item) and returns the pickled WorkResult; never raises, not even SystemExit."""
+    try:
+        function, item = pickle.loads(call)
+        return pickle.dumps(WorkResult(function(item)))
+    except BaseException as error:
+        trace = traceback.format_exc()
+        with suppress(Exception):
+            body = pickle.dumps(WorkResult(error=error, trace=trace))
+            pickle.loads(body)
+            return body
+        text = type(error).__name__
+        with suppress(BaseException):  # its __str__ may raise
+            text += f": {error}"
+        return pickle.dumps(WorkResult(error=RuntimeError(text), trace=trace))
+
+
+def _exit_with_parent() -> None:
+    from multiprocessing import parent_process
+    from multiprocessing.connection import wait
+
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        # A killed parent leaves no worker behind.
+        os._exit(1)
 
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[RunItems]:
-    """Give the RunItems (run a function over items) of `workers` local worker processes for the length of the block.
-
-    workers: 1 or more; with 0 no item is run. A process is spawned when it gets its first item, and again after its
-    death. The block sets THREAD_VARIABLES (OMP_NUM_THREADS and others) to 1 in this process's environment, so that the
-    workers inherit them, and restores them at its end. The end of the block terminates the processes, also in the
-    middle of a call. Reading results raises the exception of the function, the pickling error of an item, and WorkError
-    for an item of which three processes died unless `on_loss` is given. `ahead` is ignored.
-    """
+    """Yields the RunItems of `workers` spawned processes; the end of the block terminates them, also in a call."""
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    # The processes inherit the variables.
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     processes = [WorkerProcess() for _ in range(workers)]
 
@@ -53,10 +222,7 @@ def process_pool(workers: int) -> Iterator[RunItems]:
 
 @dataclass
 class _PendingItem(Generic[T]):
-    """An item that has no result yet.
-
-    item: the argument for the function. losses: number of worker processes that have died while running it, 0 at first.
-    """
+    """An item without result, and how many processes have died of it."""
 
     item: T
     losses: int = 0
@@ -68,15 +234,6 @@ def _run_items(
     items: Iterable[T],
     on_loss: Callable[[T, WorkError], R] | None,
 ) -> Iterator[tuple[T, R]]:
-    """Yield (item, function(item)) for every item, in the order in which the results arrive.
-
-    items: read one whenever a process is idle; items to repeat come first. Each of `processes` runs one item at a time,
-    so the death of a process is the loss of one item. The item is run again until MAX_LOSSES (3) processes have died of
-    it. Then on_loss(item, error) becomes its result; if `on_loss` is None, the WorkError is raised. It is raised in
-    spite of `on_loss` after more than MAX_LOSSES × (number of processes + 1) deaths without a result in between. Raises
-    the exception of the function, and the pickling error of a function or item. When the iteration ends early, busy
-    processes are terminated.
-    """
     from multiprocessing.connection import wait
 
     waiting, to_repeat, idle = map(_PendingItem, items), list[_PendingItem[T]](), list(processes)
@@ -84,6 +241,7 @@ def _run_items(
     losses_in_a_row = 0  # deaths since the last result
     try:
         while True:
+            # Items are read one by one, so that a generator can react to earlier results.
             while idle and (pending := to_repeat.pop() if to_repeat else next(waiting, None)) is not None:
                 process = idle.pop()
                 busy[process.send(function, pending.item)] = process, pending
@@ -99,6 +257,7 @@ def _run_items(
             pending.losses, losses_in_a_row = pending.losses + 1, losses_in_a_row + 1
             if pending.losses < MAX_LOSSES:
                 to_repeat.append(pending)
+            # If all die without a result in between, the fault is not the item's.
             elif on_loss is None or losses_in_a_row > MAX_LOSSES * (len(processes) + 1):
                 raise worker_loss(MAX_LOSSES, process.ended)
             else:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
-from sim.scene.box_scale import scale_of_all_boxes
+from sim.scene.boxes import scale_of_all_boxes
 from sim.scene.camera import px_per_m_at_centre
 from sim.sequence import simulate
 from sim.types import Groups, Sequence, Tracks

@@ -12,7 +12,7 @@ import pytest
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from sim.types import Detections, Frame, Sequence
-from sim.workers.process import run_pickled
+from sim.workers.pool import run_pickled
 from tracking.app.cli import run
 from tracking.config import Config, param
 from tracking.interrupts import is_interruption, recorded_interrupts

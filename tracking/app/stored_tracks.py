@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from sim.io.files.side_files import is_hidden
+from sim.io.files.own_files import is_hidden
 from sim.io.formats.box_columns import BoxScale
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks

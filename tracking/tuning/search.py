@@ -21,7 +21,7 @@ from scenarios.errors import InputError, OrderError, WorkError
 from scenarios.printable import counted
 from sim.dataset.generate import LEFT_OUT
 from sim.io.files.own_files import refuse_foreign_file
-from sim.io.files.value_check import TABLE, TEXT, Rules, list_of
+from sim.io.files.tables import TABLE, TEXT, Rules, list_of
 from sim.types import Tracker
 from tracking.environment.episodes import Episode, Source
 from tracking.keyword_options import documented, from_keywords

@@ -24,36 +24,36 @@ from sim.io.files.output_paths import output_paths
 from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
-from sim.io.store.manifest_check import read_whole_manifest
+from sim.io.store.manifest import read_whole_manifest
 from sim.io.store.streams import file_name
 from sim.types import Array, Ints, Sequence, Truth
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
+# names of folders that divide recordings into splits
 SPLITS = ("train", "training", "val", "valid", "validation", "test", "testing", "fit", "demo")
-"""Names of folders that divide recordings into splits."""
 
 
 def coco(
     source: str | Path, out: str | Path, min_visibility: float = 0.0, *, person_class: int | None = None
 ) -> list[Path]:
-    """Write the sequences of a source that have labelled boxes as COCO files, and return their paths.
+    """Writes the sequences of a source that have labelled boxes as COCO files.
 
-    source: path of a dataset or recording. out: the JSON file, replaced if it exists. If sequences belong to several
-    splits, each has a file of its own: `coco-train.json`, `coco-val.json` for `coco.json`. The split of a generated
-    sequence follows its seed, that of a recording the folder it lies in (train, val, test, …). min_visibility: people
-    who are less visible, 0 to 1, are left out. So are people outside the picture, and rows with an unknown box.
-    person_class: class of people in MOTChallenge texts; None: 1.
+    Each frame is an image, each sequence a video, both numbered from 1. Annotations have bbox [left, top, width,
+    height] px (amodal, unclipped), segmentation, area, track_id (the person's id), group_id (-1 for alone) and
+    visibility.
 
-    Each frame is an image, each sequence a video, both numbered from 1. file_name is the path of the frame's picture or
-    video relative to the source (a folder, else the folder of the file); info.root is the way there from the JSON file.
-    A sequence without pictures has images without file_name; of others, frames without a picture are left out.
-    Annotations have bbox [left, top, width, height] px (amodal, unclipped), segmentation, area, track_id (the person's
-    id), group_id (-1 for alone, or where no groups are labelled) and visibility. An unknown image size is replaced by
-    the extent of the boxes. info has the content hash if all exported sequences are generated. The same dataset gives
-    the same bytes.
+    Args:
+        source: A dataset or recording.
+        out: The JSON file, replaced if it exists. If there are several splits (by seed, or by the recordings' folders),
+            each has a file of its own: `coco-train.json`, `coco-val.json` for `coco.json`.
+        min_visibility: People who are less visible, 0 to 1, are left out.
+        person_class: Class of people in MOTChallenge texts; None: 1.
 
-    Raises InputError if the source cannot be opened, a file of it is invalid, no sequence has labelled boxes, two
-    sequences have one name, min_visibility is no share, or `out` cannot be written; WorkError if the disk is full.
+    Returns:
+        The paths of the files. The same dataset gives the same bytes.
+
+    Raises:
+        InputError: No sequence has labelled boxes, two have one name, or an argument is wrong.
     """
     if not is_number(min_visibility, 0, 1):
         raise InputError(
@@ -80,7 +80,6 @@ def coco(
 
 
 def _split(sequence: Sequence, root: Path) -> str:
-    """Returns the name of the split that a sequence belongs to; "other" if none is known."""
     if sequence.source.get("kind") == "generated":
         seed = sequence.source["seed"]
         return split_of(range(seed, seed + 1))
@@ -126,12 +125,9 @@ def _truth(sequence: Sequence) -> tuple[Truth, Array]:
 
 
 def _size(sequence: Sequence) -> dict[str, int]:
-    """Return {"width", "height"} of the sequence's pictures in px; for an unknown image size, the extent of the boxes.
-
-    The extent is the highest right and lower edge, rounded up, at least 1. The sequence must have a truth with boxes.
-    """
     if sequence.image_size is not None:
         return {"width": sequence.image_size[0], "height": sequence.image_size[1]}
+    # Without pictures, the extent of the boxes is the size.
     box = _truth(sequence)[1]
     edges = box[:, :2] + box[:, 2:]
     right, bottom = np.ceil(edges[np.isfinite(edges).all(axis=1)].max(axis=0, initial=1)).astype(int).tolist()
@@ -139,7 +135,6 @@ def _size(sequence: Sequence) -> dict[str, int]:
 
 
 def _images(sequence: Sequence, root: Path) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yields (frame, size and, where a picture is stored, file_name) of the frames that are images."""
     size, files = _size(sequence), _picture_files(sequence)
     for index in range(1, (sequence.length or 0) + 1):
         if not files:
@@ -149,7 +144,6 @@ def _images(sequence: Sequence, root: Path) -> Iterator[tuple[int, dict[str, Any
 
 
 def _picture_files(sequence: Sequence) -> dict[int, Path]:
-    """Returns the file with the picture of each frame, perhaps one video for all; empty without pictures."""
     if not sequence.has_images:
         return {}
     folder = Path(sequence.source["path"])
@@ -182,17 +176,13 @@ def _annotations(sequence: Sequence, index: int, min_visibility: float) -> Itera
 
 
 def _inside(box: Array, size: tuple[int, ...]) -> tuple[float, ...]:
-    """Returns left, top, right, bottom of the part of a box inside the picture, px; nan for an unknown box."""
     low, high = np.clip(box[:2], 0, size), np.clip(box[:2] + box[2:], 0, size)
     return tuple(np.round([*low, *high], 2).tolist())
 
 
 def run_lengths(ids: Ints) -> dict[int, list[int]]:
-    """Return the mask of each person in an image of ids (H, W) as COCO's uncompressed run lengths, by id.
-
-    Pixels are counted down the columns, from left to right; numbers of pixels outside and inside the mask alternate,
-    the first is outside. Only ids above 0 are people.
-    """
+    """Returns the mask of each person in an image of ids (H, W) as COCO's uncompressed run lengths, by id."""
+    # COCO counts pixels down the columns; numbers outside and inside the mask alternate.
     flat = ids.ravel(order="F")
     starts = np.concatenate([[0], np.flatnonzero(np.diff(flat)) + 1]) if len(flat) else np.zeros(0, np.int64)
     ends = np.append(starts[1:], len(flat))

@@ -24,20 +24,24 @@ from sim.io.files.atomic import write_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
 from sim.io.store.camera_files import read_camera
-from sim.io.store.manifest_check import read_whole_manifest
+from sim.io.store.manifest import read_whole_manifest
 from sim.types import Camera
 
 FOLDERS = {"left": "image_2", "right": "image_3", "disparity": "disp_noc_0"}
 
 
 def kitti(source: str | Path, out: str | Path) -> list[Path]:
-    """Write the pairs, disparities and calibrations of a generated dataset, and return the folders of its sequences.
+    """Writes the pairs, disparities and calibrations of a generated dataset in KITTI's layout.
 
-    source: a sequence or dataset with the streams left and right; disparities are written where stored. out: folder;
-    files of an earlier export are replaced. The same dataset gives the same bytes.
+    Args:
+        source: A sequence or dataset with the streams left and right; disparities are written where stored.
+        out: The folder; files of an earlier export are replaced.
 
-    Raises InputError if the source is no generated dataset, a sequence lacks left or right, a file of it is missing or
-    altered, two sequences share a folder, or `out` cannot be written; WorkError if the disk is full.
+    Returns:
+        The folders of the sequences.
+
+    Raises:
+        InputError: Two sequences share a folder.
     """
     folders = sequence_folders(Path(source), "generated")
     targets = [Path(out) / split_and_name(folder) for folder in folders]
@@ -49,7 +53,7 @@ def kitti(source: str | Path, out: str | Path) -> list[Path]:
 
 
 def calibration(camera: Camera) -> str:
-    """Return the text of calib.txt for the camera of a rectified pair."""
+    """Returns the text of calib.txt for the camera of a rectified pair."""
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     left = np.array([[fx, 0, cx - 0.5, 0], [0, fy, cy - 0.5, 0], [0, 0, 1, 0]])  # KITTI: a pixel's centre is a whole px
     right = left.copy()

@@ -1,4 +1,4 @@
-"""WebDataset export: pack stored sequences into tar shards that the library webdataset streams.
+"""WebDataset export: packs stored sequences into tar shards that the library webdataset streams.
 
 A sample is a whole sequence (all its files, hence its content hash), or one frame with its labels; all files of a
 sample share a key and stand next to each other. The same dataset gives the same bytes: members are sorted by sequence
@@ -13,27 +13,147 @@ import io
 import re
 import tarfile
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
 from sim import hashing
-from sim.io.export.webdataset_samples import BLOCK, Member, SequenceItem, read_item, tar_members
 from sim.io.files import tables
-from sim.io.files.atomic import new_file, remove_partials, write_file
-from sim.io.files.lock import lock_folder
+from sim.io.files.atomic import lock_folder, new_file, remove_partials, write_file
 from sim.io.files.own_files import refuse_foreign_file
-from sim.io.files.value_check import TABLE, TEXT, Rules, list_of
-from sim.io.source import sequence_folders
+from sim.io.files.tables import TABLE, TEXT, Rules, list_of
+from sim.io.pictures.stored_pictures import StoredPictures
+from sim.io.source import sequence_folders, split_and_name
+from sim.io.store.manifest import MANIFEST, read_manifest, read_whole_manifest
+from sim.io.store.sequence_folder import open_sequence
+from sim.io.store.streams import file_name
+from sim.types import Array, Detections, FrameTruth, Groups
+
+# streams with one picture per frame; a frame's sample holds those of them that are stored
+FRAME_STREAMS = ("left", "right", "disparity", "ids")
+
+BLOCK = 512  # bytes: a tar holds whole blocks
+
+# name of a file in the tar, its size in bytes, and a call that reads its content
+Member = tuple[str, int, Callable[[], bytes]]
+
+
+@dataclass(frozen=True)
+class SequenceItem:
+    """A stored sequence to pack."""
+
+    folder: Path  # where it is stored
+    bytes: int  # what its members add to a tar
+    content: str  # its content hash, which names truth, detections and pixels
+    manifest: str  # the hash of its manifest
+    # file type of its pictures ("jpg", "png" or "mp4"), None without pictures or with 16-bit streams only
+    images: str | None
+
+    @property
+    def name(self) -> str:
+        """The name <split>/<sequence>."""
+        return split_and_name(self.folder)
+
+    @property
+    def key(self) -> str:
+        """The name as a sample's key; webdataset ends a key at its first dot."""
+        return self.name.replace(".", "%2E")
+
+
+def read_item(folder: Path, samples: str) -> SequenceItem:
+    """Returns the item of a stored sequence. samples: "sequence" or "frame"."""
+    manifest = read_whole_manifest(folder)
+    item = SequenceItem(folder, 0, manifest["content_hash"], manifest["sha256"], manifest.get("images"))
+    return replace(item, bytes=sum(_tar_bytes(name, size) for name, size, _ in tar_members(item, samples)))
+
+
+def _tar_bytes(name: str, size: int) -> int:
+    letters = len(name.encode())
+    # A name of more than 100 bytes is a member of its own.
+    longer = BLOCK + _whole(letters + 1) if letters > tarfile.LENGTH_NAME else 0
+    return longer + BLOCK + _whole(size)
+
+
+def _whole(size: int) -> int:
+    return -(-size // BLOCK) * BLOCK
+
+
+def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
+    """Yields the members of a stored sequence, in the order of packing.
+
+    All files, the manifest first; or, for samples "frame", the labels and then the pictures of each frame.
+    """
+    manifest = read_manifest(item.folder)
+    stored = StoredPictures(item.folder, manifest)
+    if samples == "sequence":
+        path = item.folder / MANIFEST
+        yield f"{item.key}.{MANIFEST}", path.stat().st_size, path.read_bytes
+        for name, facts in manifest["files"].items():
+            yield f"{item.key}.{name.replace('/', '.')}", facts["bytes"], partial(stored.body, name)
+        return
+    streams = [stream for stream in stored.streams if stream in FRAME_STREAMS]
+    for index, body in enumerate(frame_labels(item.folder, manifest), 1):
+        yield f"{item.key}/{index:06d}.json", len(body), partial(bytes, body)
+        for stream in streams:
+            name = file_name(stream, stored.images, index)
+            size = manifest["files"][name]["bytes"]
+            yield f"{item.key}/{index:06d}.{stream}{Path(name).suffix}", size, partial(stored.body, name)
+
+
+def frame_labels(folder: Path, manifest: dict[str, Any]) -> Iterator[bytes]:
+    """Yields the JSON labels of each frame of a stored sequence, from frame 1; unknown values are null.
+
+    Keys: sequence, fps, image_size, frame, t, and, where stored, people, groups and detections.
+    """
+    sequence = open_sequence(folder)
+    truth = sequence.truth
+    about = {"sequence": sequence.name, "fps": sequence.fps, "image_size": manifest["sequence"]["image_size"]}
+    for frame in sequence.without_pictures():
+        row: dict[str, Any] = {**about, "frame": frame.index, "t": frame.t}
+        if truth is not None:
+            here = truth.at(frame.index)
+            row |= {"people": list(_people(here)), "groups": _groups(here.groups)}
+        if frame.detections is not None:
+            row["detections"] = list(_detections(frame.detections))
+        yield tables.json_text(row).encode()
+
+
+def _people(truth: FrameTruth) -> Iterator[dict[str, Any]]:
+    assert truth.pos is not None, "simulated people have positions"
+    for k, (number, group) in enumerate(zip(truth.id.tolist(), truth.group.tolist(), strict=True)):
+        row = {"id": number, "group": group, "box": None if truth.box is None else _numbers(truth.box[k])}
+        row |= dict(zip(("x", "y"), _numbers(truth.pos[k]), strict=True))
+        if truth.vel is not None:
+            row |= dict(zip(("vx", "vy"), _numbers(truth.vel[k]), strict=True))
+        yield {**row, "visibility": tables.nan_to_none(float(truth.visibility[k]))}
+
+
+def _groups(groups: Groups | None) -> list[dict[str, Any]] | None:
+    if groups is None:
+        return None
+    rows = zip(groups.id.tolist(), groups.members, groups.hull, strict=True)
+    return [{"id": number, "members": members.tolist(), "hull": hull.tolist()} for number, members, hull in rows]
+
+
+def _detections(found: Detections) -> Iterator[dict[str, Any]]:
+    for k, score in enumerate(found.score.tolist()):
+        row = {"score": score, "box": None if found.box is None else _numbers(found.box[k])}
+        yield {**row, "plane": found.plane, **dict(zip("xyz", _numbers(found.pos[k]), strict=False))}
+
+
+def _numbers(row: Array) -> list[float | None]:
+    return [tables.nan_to_none(value) for value in row.tolist()]
+
 
 SAMPLES = ("sequence", "frame")
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
 RECORD = tarfile.RECORDSIZE
 INDEX = "index.json"
 INDEX_MARKS: Rules = {"content_hash": TEXT, "shards": list_of(TABLE)}
-SHARD_MARKS: Rules = {"manifests": TEXT, "sequences": TABLE}
-"""What every index.json, and every .json of a shard, has."""
+SHARD_MARKS: Rules = {"manifests": TEXT, "sequences": TABLE}  # what every index.json, and every .json of a shard, has
 
 Progress = Callable[[int, int, str], None]
 
@@ -46,17 +166,17 @@ def webdataset(
     samples: str = "sequence",
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Pack a generated dataset into OUT/shard-000000.tar, …, and write OUT/index.json; returns the index as a dict.
+    """Packs a generated dataset into OUT/shard-000000.tar, …, and writes OUT/index.json.
 
-    shard_size: bytes that a shard may have. A sequence is never divided, so a shard of a single sequence may be larger.
-    samples: "sequence" (all files of a sequence) or "frame" (one frame's labels and pictures). A .json beside each
-    shard describes it. Complete shards of an earlier run are kept. progress: called as progress(shards done, shards in
-    all, name of the last one) after each shard. Keys of the index: format, samples, content_hash, and shards, the
-    content of each shard's .json.
+    Args:
+        source: A generated sequence or dataset.
+        out: The folder. Complete shards of an earlier run are kept.
+        shard_size: Bytes that a shard may have. A sequence is never divided, so a shard of one sequence may be larger.
+        samples: "sequence" (all files of a sequence) or "frame" (one frame's labels and pictures).
+        progress: Called as progress(shards done, shards in all, name of the last one) after each shard.
 
-    Raises InputError if the source is not a generated dataset or a file of it is missing or altered, two sequences
-    share a name, OUT holds shards of another export, another process writes to OUT, OUT cannot be written, or samples
-    are frames and the pictures are videos. Raises WorkError if the disk is full.
+    Returns:
+        The index: format, samples, content_hash, and shards, the content of the .json beside each shard.
     """
     items, root = _items(Path(source), samples), Path(out)
     shards = list(_shards(items, shard_size))
@@ -76,11 +196,7 @@ def webdataset(
 
 
 def size_of(text: str) -> int:
-    """Return the number of bytes that a text names: `500MB`, `1.5 GB`, `3 kB`, `20000000`; units are powers of 1000.
-
-    Units are B, kB, MB and GB, spelt so; blanks around are ignored. Fractions of a byte are rounded. Raises InputError
-    if the text is no such size (as `500M` or `3 KB`) or rounds to 0.
-    """
+    """Returns the bytes that a text such as `500MB`, `1.5 GB` or `3 kB` names; units are powers of 1000."""
     found = re.fullmatch(r"([0-9]{1,12}(?:\.[0-9]{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
     if size < 1:
@@ -91,12 +207,6 @@ def size_of(text: str) -> int:
 
 
 def _items(source: Path, samples: str) -> list[SequenceItem]:
-    """Return the sequences to pack, sorted by their names <split>/<sequence>.
-
-    source: path of a dataset or sequence. samples: "sequence" or "frame". Raises InputError if the source is not a
-    generated dataset or holds no sequence, a manifest is invalid, two sequences share a name, or samples are "frame"
-    and a sequence has videos.
-    """
     found = sorted((read_item(p, samples) for p in sequence_folders(source, "generated")), key=lambda item: item.name)
     twice = next((a.name for a, b in pairwise(found) if a.name == b.name), None)
     if twice is not None:
@@ -111,10 +221,7 @@ def _items(source: Path, samples: str) -> list[SequenceItem]:
 
 
 def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]]:
-    """Yield the sequences of each shard: consecutive items, as many as fit into a tar of `size` bytes, at least one.
-
-    Without items one empty shard is yielded.
-    """
+    """Yields the consecutive sequences of each shard, as many as fit into a tar of `size` bytes, at least one."""
     some: list[SequenceItem] = []
     full = 0
     for item in items:
@@ -127,29 +234,18 @@ def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]
 
 
 def _facts(samples: str, number: int, items: list[SequenceItem]) -> dict[str, Any]:
-    """Return what the .json of a shard holds before its tar is written.
-
-    Keys: name ("shard-000000.tar" for number 0), samples, manifests (one hash of the manifests' hashes, in order),
-    sequences (content hash by <split>/<sequence>). The size and hash of the tar are added later. number: of the shard,
-    from 0. items: its sequences.
-    """
     manifests = hashing.canonical_hash([item.manifest for item in items])
     hashes = {item.name: item.content for item in items}
     return {"name": f"shard-{number:06d}.tar", "samples": samples, "manifests": manifests, "sequences": hashes}
 
 
 def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
-    """Raise InputError if OUT (`root`) holds a shard of another export; do nothing otherwise.
-
-    plan: the facts of each shard to write. A shard-*.tar is of another export if the plan does not name it or its .json
-    contradicts the plan. A tar without .json is accepted, as an interrupted run leaves it. Also raises InputError if a
-    .json is unreadable or no JSON object, or if a file of others has the name of one that will be written.
-    """
     wanted = {facts["name"]: facts for facts in plan}
     refuse_foreign_file(root / INDEX, INDEX_MARKS)
     for name in wanted:
         refuse_foreign_file((root / name).with_suffix(".json"), SHARD_MARKS)
     for path in sorted(root.glob("shard-*.tar")):
+        # A tar without .json is what an interrupted run leaves.
         beside = path.with_suffix(".json")
         facts = wanted.get(path.name)
         if facts is None or (beside.is_file() and not facts.items() <= tables.read_json(beside).items()):
@@ -160,12 +256,6 @@ def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
 
 
 def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the .json of a shard in OUT (`root`) that is complete: its tar has the hash that the .json names; else
-    None.
-
-    facts: its "name" is the shard's file name. None, too, if the tar or its .json is missing. Raises InputError if the
-    .json is unreadable or no JSON object.
-    """
     path = root / facts["name"]
     if not path.is_file() or not path.with_suffix(".json").is_file():
         return None
@@ -177,6 +267,7 @@ def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
 
 def _write_shard(root: Path, facts: dict[str, Any], items: list[SequenceItem]) -> dict[str, Any]:
     path = root / facts["name"]
+    # The .json stands for a whole tar.
     path.with_suffix(".json").unlink(missing_ok=True)
     with new_file(path) as beside:
         _tar(beside, (member for item in items for member in tar_members(item, facts["samples"])))

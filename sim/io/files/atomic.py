@@ -1,7 +1,9 @@
-"""Atomic writing: a file or folder is written under a temporary name, synced to disk, then renamed to its target.
+"""Safe writing: a file or folder appears complete or not at all, and two commands never write to one folder at a time.
 
-It therefore appears complete or not at all. An OSError becomes a WorkError if the disk is full, else an InputError.
-Killed runs leave files with names .partial-…-<12 hex digits>, which `remove_partials` deletes.
+What is written gets a temporary name, is synced to disk, then renamed to its target. An OSError becomes a WorkError if
+the disk is full, else an InputError. Killed runs leave files with names .partial-…-<12 hex digits>, which
+`remove_partials` deletes. A lock on an output folder makes a second command fail at once. On systems and file systems
+without such locks, nothing is locked.
 """
 
 from __future__ import annotations
@@ -12,11 +14,80 @@ import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
+
+# folders whose lock an enclosing block of this thread holds
+_held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
+
+
+@contextmanager
+def lock_folder(root: Path) -> Iterator[None]:
+    """Creates the folder `root` and holds its lock for the block; InputError at once if somebody else holds it."""
+    made = [p for p in (root, *root.parents) if not p.exists()]
+    try:
+        with _lock(root):
+            token = _held.set(_held.get() | {root.resolve()})
+            try:
+                yield
+            finally:
+                _held.reset(token)
+                with suppress(OSError):  # only who holds the lock may remove what others would lock
+                    for folder in made:
+                        folder.rmdir()
+    except OSError as error:
+        raise write_error(root, error) from error
+
+
+def hold_lock(root: Path) -> AbstractContextManager[None]:
+    """Returns `lock_folder(root)`, or a block without effect inside one of this thread for the same folder."""
+    return nullcontext() if root.resolve() in _held.get() else lock_folder(root)
+
+
+@contextmanager
+def _lock(root: Path) -> Iterator[None]:
+    try:
+        import fcntl
+    except ImportError:
+        root.mkdir(parents=True, exist_ok=True)
+        yield
+        return
+    while True:
+        root.mkdir(parents=True, exist_ok=True)
+        try:
+            descriptor = os.open(root, os.O_RDONLY)
+        except FileNotFoundError:  # removed by who held its lock
+            continue
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(descriptor)
+            raise InputError(
+                file=root, got="another run that writes here", expected="one at a time",
+                remedy="wait, or choose another --out",
+            ) from None  # fmt: skip
+        except OSError:  # NFS cannot lock folders
+            break
+        if _is_folder(descriptor, root):
+            break
+        os.close(descriptor)
+    try:
+        yield
+    finally:
+        os.close(descriptor)
+
+
+# Whoever held the lock may have removed the folder, and another may stand at its path now.
+def _is_folder(descriptor: int, root: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), os.stat(root))
+    except FileNotFoundError:
+        return False
+
 
 PARTIAL = ".partial-"  # beginning of temporary names
 OURS = re.compile(re.escape(PARTIAL) + r"(.*-[0-9a-f]{12}|[0-9a-f]{32})", re.DOTALL)  # all of a temporary name
@@ -24,11 +95,9 @@ SYNC_THREADS = 8  # files synced at a time
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
+# A full disk is no fault of the call, so it is a WorkError (exit 1) and not an InputError (exit 2).
 def write_error(path: Path, error: OSError) -> FlockscopeError:
-    """Return (not raise) the user's error for an OSError while writing `path`.
-
-    It is a WorkError if the disk or quota is full or the file too large, else an InputError.
-    """
+    """Returns the user's error for an OSError while writing `path`."""
     reason = error.strerror or type(error).__name__
     if error.errno in DISK_FULL:
         return WorkError(
@@ -39,13 +108,8 @@ def write_error(path: Path, error: OSError) -> FlockscopeError:
 
 @contextmanager
 def staged_path(target: Path) -> Iterator[Path]:
-    """Give a temporary path beside the target for the length of the block, then delete what is left there.
-
-    The block creates a file or folder at that path and renames it to the target. The target's missing parents are
-    created, and removed again if they stay empty. The name is random, since writers on two machines may share a process
-    id. An OSError inside the block, or on creating the parents, is raised as WorkError if the disk is full, else as
-    InputError (write_error).
-    """
+    """Yields a random temporary path beside the target, for the block to rename; what is left there is deleted."""
+    # Two machines that share a disk may have the same process id, so the name is random.
     partial = target.parent / f"{PARTIAL}{target.name}-{uuid4().hex[:12]}"
     made = [p for p in (target.parent, *target.parent.parents) if not p.exists()]
     try:
@@ -55,16 +119,14 @@ def staged_path(target: Path) -> Iterator[Path]:
         raise write_error(target, error) from error
     finally:
         _remove(partial)
+        # The parents that were made here are removed again if they stayed empty.
         with suppress(OSError):
             for folder in made:
                 folder.rmdir()
 
 
 def write_file(target: Path, content: bytes) -> None:
-    """Write `content` to the file `target`, which appears complete or not at all; an existing file is replaced.
-
-    Missing parent folders are created. Raises WorkError if the disk is full, InputError if the file cannot be written.
-    """
+    """Writes `content` to the file `target`, which appears complete or not at all; an existing file is replaced."""
     with staged_path(target) as partial:
         partial.write_bytes(content)
         move_synced(partial, target)
@@ -72,22 +134,15 @@ def write_file(target: Path, content: bytes) -> None:
 
 @contextmanager
 def new_file(target: Path) -> Iterator[Path]:
-    """Give a temporary path for the block to write a file to; the file replaces the target when the block ends.
-
-    If the block ends with an exception, the temporary file is deleted and the target stays as it was. Missing parent
-    folders are created. An OSError is raised as WorkError if the disk is full, else as InputError; so is a block that
-    has created no file.
-    """
+    """Yields a temporary path for the block to write a file to; the file replaces the target when the block ends."""
     with staged_path(target) as partial:
         yield partial
         move_synced(partial, target)
 
 
 def move_synced(partial: Path, target: Path) -> None:
-    """Rename the file `partial` to `target`, in the same folder, after its content has reached the disk.
-
-    Some file systems report only then that the disk is full. An existing target is replaced. Raises OSError.
-    """
+    """Renames the file `partial` to `target`, in the same folder, after its content has reached the disk."""
+    # Some file systems report only now that the disk is full.
     _sync_file(partial)
     os.replace(partial, target)
     _sync_folder(target.parent)
@@ -95,18 +150,13 @@ def move_synced(partial: Path, target: Path) -> None:
 
 @contextmanager
 def new_folder(target: Path, keep: Callable[[], bool]) -> Iterator[Path]:
-    """Give an empty temporary folder for the block to fill; it becomes the folder `target` when the block ends.
-
-    An existing target is deleted first, unless `keep()` returns True: then the target stays and the new folder is
-    dropped. `keep` serves two writers of the same sequence, of which the first one wins; and it raises for a target
-    that must not be deleted. If the block ends with an exception, the new folder is deleted and the target stays. An
-    OSError is raised as WorkError if the disk is full, else as InputError.
-    """
+    """Yields a temporary folder that becomes `target` when the block ends, unless `keep()` saves an existing target."""
     with staged_path(target) as partial:
         partial.mkdir()
         yield partial
         _sync_tree(partial)
         if target.exists():
+            # Two writers may make the same sequence: the first one wins. `keep` raises for a folder that must stay.
             if keep():
                 return
             _remove(target)
@@ -119,26 +169,18 @@ def new_folder(target: Path, keep: Callable[[], bool]) -> Iterator[Path]:
 
 
 def write_unsynced(path: Path, content: bytes) -> None:
-    """Write a file into a folder that is still temporary, without syncing it to disk; missing parents are created.
-
-    An existing file is overwritten. Raises OSError if the file cannot be written.
-    """
+    """Writes a file into a folder that is still temporary, without syncing it to disk."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content)
 
 
 def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: Iterable[str] = ()) -> None:
-    """Write files into the folder `target`, which may hold files of others; they count as complete once `seal` is
-    there.
+    """Replaces `files` (content by name) in the folder `target`, and deletes `names`; `seal` comes last.
 
-    files: content by name; all are synced to disk before the first replaces its target. seal: the last of their names.
-    The old seal is deleted before any other file changes, and the new one appears after all others have. A killed run
-    therefore leaves the old files whole or a folder without a seal. The first of `files` is the first to appear, so
-    that it marks even a folder that never had a seal. names: files that are deleted unless `files` has them. Other
-    files stay. A missing folder is created, and what killed runs left for this target is deleted.
-
-    Raises WorkError if the disk is full, InputError if the folder cannot be written.
+    The file `seal` marks a complete folder: it is deleted before any other file changes, so a killed run leaves the old
+    files whole, or a folder without a seal.
     """
+    # The first file appears first, so that it marks even a folder that never had a seal.
     first, *others = (name for name in files if name != seal)
     for path in _leftovers(target):
         _remove(path)
@@ -160,7 +202,6 @@ def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: I
 
 
 def _leftovers(target: Path) -> list[Path]:
-    """Return the temporary files and folders that killed writers of `target`, and of no other, left beside it."""
     if not target.parent.is_dir():
         return []
     form = re.compile(re.escape(f"{PARTIAL}{target.name}-") + "[0-9a-f]{12}")
@@ -168,11 +209,7 @@ def _leftovers(target: Path) -> list[Path]:
 
 
 def remove_partials(*folders: Path) -> None:
-    """Delete the temporary files and folders directly in the given folders, left by killed runs.
-
-    Their names are .partial-<name>-<12 hex digits>, or .partial-<32 hex digits> for a marker of `generate`; files with
-    other names stay. Missing folders, and files that cannot be deleted, are ignored.
-    """
+    """Deletes what killed runs left directly in the given folders: files and folders with temporary names."""
     for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*") if OURS.fullmatch(p.name)]:
         _remove(path)
 
@@ -185,12 +222,9 @@ def _write_synced_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _sync_tree(folder: Path) -> None:
-    """Sync a folder and all files and folders below it to disk; files in 8 threads, which is faster than one by one.
-
-    Raises OSError if a file cannot be synced; folders that cannot be synced are ignored.
-    """
     within = sorted(folder.rglob("*"))
     with ThreadPoolExecutor(SYNC_THREADS) as pool:
+        # Threads, because a sync waits for the disk.
         list(pool.map(_sync_file, [path for path in within if not path.is_dir()]))
     for path in [*(path for path in within if path.is_dir()), folder]:
         _sync_folder(path)
@@ -202,8 +236,8 @@ def _sync_file(path: Path) -> None:
 
 
 def _sync_folder(path: Path) -> None:
-    """Sync the list of entries of the folder `path` to disk; does nothing on systems that cannot. Raises nothing."""
     with suppress(OSError):
+        # Some systems cannot sync a folder's list of entries; then nothing happens.
         descriptor = os.open(path, os.O_RDONLY)
         try:
             os.fsync(descriptor)

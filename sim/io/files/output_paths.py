@@ -21,12 +21,9 @@ RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECA
 
 
 def file_name(label: str) -> str:
-    """Return the file name for a label: the label itself if it is harmless, else a changed one.
+    """Returns the file name for a label: the label itself if it is harmless on all usual systems, else a changed one.
 
-    The result is one name inside a folder, on all usual file systems: 1 to 200 bytes of UTF-8, without separators, and
-    not hidden. "_" replaces separators, control characters, characters that Windows forbids, a dot at the beginning, a
-    dot or blank at the end, and the whole of an empty label. A device name of Windows (as "con") gets a "_" in front. A
-    label of more than 200 bytes is cut and ends in 16 hex digits of its SHA-256. Different labels may give one name.
+    Different labels may give one name.
     """
     name = "".join("_" if _is_forbidden(c) else c for c in label)
     if name[:1] in ("", "."):
@@ -47,22 +44,16 @@ def _is_forbidden(character: str) -> bool:
 
 
 def output_path(folder: str | Path, label: str, ending: str = "") -> Path:
-    """Return the path of the file or folder for a label, directly inside `folder`; nothing is created.
-
-    Its name is `file_name(label)` and then `ending`, which is ours, as ".html" or "-s00001".
-    """
+    """Returns the path of the file or folder for a label, directly inside `folder`; nothing is created."""
     return Path(folder) / (file_name(label) + ending)
 
 
 def output_paths(folder: str | Path, labels: Iterable[str], ending: str = "", source: object = "") -> list[Path]:
-    """Return the path for each label, as `output_path`, in the order of the labels.
-
-    source: where the labels come from, for the error. Raises InputError if two labels give one path. Names that differ
-    in case or in composition of accents alone count as one, because some file systems keep only one of them.
-    """
+    """Returns the `output_path` of each label; InputError, about `source`, if two labels give one path."""
     paths, seen = [], dict[str, str]()
     for label in labels:
         path = output_path(folder, label, ending)
+        # Some file systems keep only one of two names that differ in case or in composed accents alone.
         key = unicodedata.normalize("NFC", path.name).casefold()
         if key in seen:
             both = f"the name {label!r} twice" if label == seen[key] else f"the names {seen[key]!r} and {label!r}"

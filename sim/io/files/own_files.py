@@ -1,7 +1,7 @@
-"""Tells a file that flockscope wrote from a file of the same name that somebody else wrote, by its parsed content.
+"""Tells what a file is: ours, a stranger's of the same name, or a side file that an operating system put there.
 
-JSON files have keys that only we write, Parquet tables our metadata. Pages, PNG pictures and MP4 videos name the
-program that made them.
+JSON files of ours have keys that only we write, Parquet tables our metadata. Pages, PNG pictures and MP4 videos name
+the program that made them. Side files are ignored by readers of folders.
 """
 
 from __future__ import annotations
@@ -9,40 +9,49 @@ from __future__ import annotations
 import struct
 import zlib
 from html.parser import HTMLParser
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from scenarios.errors import InputError
 from sim.io.files import tables
-from sim.io.files.value_check import Rules
+from sim.io.files.tables import Rules
 
-GENERATOR = "flockscope"
-"""The name in the element <meta name="generator"> of a page, and in the comment of a video."""
+NAMES = frozenset({"__macosx", ".ds_store", "thumbs.db", "ehthumbs.db", "desktop.ini", "@eadir", "icon\r"})
+APPLE_DOUBLE = "._"  # beginning of the files in which macOS keeps attributes on disks that cannot store them
 
-HEAD = 1 << 16
-"""Bytes of a page in which its generator stands."""
 
-IHDR_END = 33
-"""Bytes of a PNG file up to the end of its first chunk."""
+def is_side_file(name: str | PurePath) -> bool:
+    """Returns True if a part of a relative path is the name of a side file or folder."""
+    return any(part.startswith(APPLE_DOUBLE) or part.lower() in NAMES for part in PurePath(name).parts)
+
+
+def is_hidden(path: PurePath) -> bool:
+    """Returns True if readers ignore the file or folder: its own name begins with a dot or is that of a side file."""
+    return path.name.startswith(".") or is_side_file(path.name)
+
+
+GENERATOR = "flockscope"  # the name in the element <meta name="generator"> of a page, and in the comment of a video
+
+HEAD = 1 << 16  # bytes of a page in which its generator stands
+
+IHDR_END = 33  # bytes of a PNG file up to the end of its first chunk
 
 
 def _chunk(kind: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
-SOFTWARE = _chunk(b"tEXt", b"Software\0" + GENERATOR.encode())
-"""The second chunk of our PNG files."""
+SOFTWARE = _chunk(b"tEXt", b"Software\0" + GENERATOR.encode())  # the second chunk of our PNG files
 
 
 def marked_png(picture: bytes) -> bytes:
-    """Return a PNG file's bytes with the name of our program in it."""
+    """Returns a PNG file's bytes with the name of our program in it."""
     return picture[:IHDR_END] + SOFTWARE + picture[IHDR_END:]
 
 
 def is_ours(path: Path, marks: Rules | None = None) -> bool | None:
-    """Return True if flockscope wrote the file, False if it did not, None if the file is missing or cannot be parsed.
+    """Returns True if flockscope wrote the file, False if not, None if it is missing or cannot be parsed.
 
-    marks: of a .json file, rules for keys that such a file of ours always has and no other program writes. Other files
-    are recognised if their names end in .parquet, .html, .png or .mp4.
+    marks: of a .json file, rules for keys that such a file of ours always has and no other program writes.
     """
     if not path.is_file():
         return None
@@ -57,11 +66,7 @@ def is_ours(path: Path, marks: Rules | None = None) -> bool | None:
 
 
 def refuse_foreign_file(path: Path, marks: Rules | None = None) -> None:
-    """Raise InputError if a file exists at `path` that is not ours by `is_ours`; do nothing otherwise.
-
-    For files that the user has not named, such as an index in an output folder: these are replaced only if we wrote
-    them. marks: of a .json file, as for `is_ours`.
-    """
+    """Raises InputError if there is a file at `path` that is not ours: only our own files are replaced unasked."""
     if path.exists() and not is_ours(path, marks):
         raise InputError(
             file=path, got="a file that flockscope did not write", expected="its own file, or none",
@@ -77,7 +82,7 @@ class _Generator(HTMLParser):
         self.name = ""
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Keep the content of a <meta name="generator">."""
+        """Keeps the content of a <meta name="generator">."""
         found = dict(attrs)
         if tag == "meta" and found.get("name") == "generator":
             self.name = found.get("content") or ""

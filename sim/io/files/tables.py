@@ -1,13 +1,13 @@
 """The project's Parquet tables and JSON files, to bytes and strictly back.
 
 Each column of a table has a unit, and the table has metadata in its schema. Equal content gives equal bytes. nan is
-null in JSON.
+null in JSON. Rules say what the values of a JSON file must be, so that a reader never meets a value of another kind.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,63 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from scenarios.limits import JSON_BYTES, is_number
-from scenarios.parsing import parse_json
-from scenarios.regular_file import require_regular
+from scenarios.reading import parse_json, require_regular
 from sim.types import Array, Ints
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a value must be."""
+
+    accepts: Callable[[Any], bool]  # returns True for a right value, whatever the type
+    words: str  # for the error
+
+
+Rules = Mapping[str, Rule]  # rules by key
+
+TEXT = Rule(lambda v: isinstance(v, str), "a text")
+TABLE = Rule(lambda v: isinstance(v, dict), "an object")
+FLAG = Rule(lambda v: isinstance(v, bool), "true or false")
+
+
+def whole(low: int, high: int) -> Rule:
+    """Returns the rule for whole numbers from `low` to `high`, both included."""
+    return Rule(
+        lambda v: isinstance(v, int) and not isinstance(v, bool) and low <= v <= high,
+        f"a whole number from {low} to {high}",
+    )
+
+
+def number(low: float, high: float) -> Rule:
+    """Returns the rule for numbers from `low` to `high`, both included."""
+    return Rule(lambda v: is_number(v, low, high), f"a number from {low:g} to {high:g}")
+
+
+def one_of(*words: str) -> Rule:
+    """Returns the rule for one of these texts."""
+    return Rule(lambda v: v in words, f"one of {', '.join(words)}")
+
+
+def list_of(rule: Rule) -> Rule:
+    """Returns the rule for lists, possibly empty, whose values all follow `rule`."""
+    return Rule(lambda v: isinstance(v, list) and all(map(rule.accepts, v)), f"a list, each {rule.words}")
+
+
+def or_none(rule: Rule) -> Rule:
+    """Returns the rule for null, and for values that follow `rule`."""
+    return Rule(lambda v: v is None or rule.accepts(v), f"null, or {rule.words}")
+
+
+def check_values(path: Path, values: Any, rules: Rules, remedy: str, *, inside: str = "") -> None:
+    """Raises InputError, with the key, for the first value that does not follow its rule."""
+    if not isinstance(values, dict):
+        raise InputError(file=path, place=inside, got=repr(values), expected=TABLE.words, remedy=remedy)
+    for key, rule in rules.items():
+        if (inside or key in values) and not rule.accepts(values.get(key)):
+            got = repr(values[key]) if key in values else "nothing"
+            place = f"{inside}.{key}" if inside else key
+            raise InputError(file=path, place=place, got=got, expected=rule.words, remedy=remedy)
+
 
 FORMAT = 1
 KEY = b"flockscope"
@@ -28,51 +82,39 @@ REDO = "run the command that made it again"
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a Parquet table to write.
+    """A column of a Parquet table to write."""
 
-    name: of the column. values: an array (R,), or R arrays of any lengths for a column of lists. unit: its unit as a
-    text, "1" for none. kind: number type of the arrays of a column of lists, by default float64; ignored otherwise.
-    """
-
-    name: str
-    values: NDArray[Any] | list[NDArray[Any]]
-    unit: str = "1"
-    kind: type = np.float64
+    name: str  # of the column
+    values: NDArray[Any] | list[NDArray[Any]]  # an array (R,), or R arrays of any lengths for a column of lists
+    unit: str = "1"  # its unit as a text, "1" for none
+    kind: type = np.float64  # number type of the arrays of a column of lists, by default float64; ignored otherwise
 
 
 @dataclass(frozen=True)
 class StoredTable:
-    """A Parquet table of R rows as read from `file`.
-
-    columns: by name an array (R,). For a column of lists it is the pair (all values in one array; array (R,) of the
-    index after each list's last value). facts: the metadata that was stored with the table, by name, and "format".
-    """
+    """A Parquet table of R rows as read from `file`."""
 
     file: Path
+    # by name an array (R,). For a column of lists it is the pair (all values in one array; array (R,) of the index
+    # after each list's last value).
     columns: dict[str, Any]
-    facts: dict[str, Any]
+    facts: dict[str, Any]  # the metadata that was stored with the table, by name, and "format"
 
     def has(self, name: str) -> bool:
-        """Return True if the table has this column."""
+        """Returns True if the table has this column."""
         return name in self.columns
 
     def floats(self, *names: str) -> Array:
-        """Return the columns `names` as float64: one as (R,), n > 1 as (R, n).
-
-        Raises InputError if a column is missing or no numbers.
-        """
+        """Returns the columns `names` as float64: one as (R,), n > 1 as (R, n)."""
         found = [np.asarray(self._numbers(name, "iufb"), np.float64) for name in names]
         return found[0] if len(found) == 1 else np.stack(found, axis=1)
 
     def ints(self, name: str) -> Ints:
-        """Return column `name` as (R,), int64. Raises InputError if it is missing or no whole numbers."""
+        """Returns column `name` as (R,), int64."""
         return np.asarray(self._numbers(name, "i"), np.int64)
 
     def lists(self, name: str, kind: type) -> list[NDArray[Any]]:
-        """Return column `name`, a column of lists, as R arrays of number type `kind`; no rows give [].
-
-        Raises InputError if the column is missing or no lists of such numbers.
-        """
+        """Returns column `name`, a column of lists, as R arrays of number type `kind`; no rows give []."""
         column = self._get(name)
         if not isinstance(column, tuple) or column[0].dtype.kind != np.dtype(kind).kind:
             raise InputError(file=self.file, place=name, got="another column", expected="lists of numbers", remedy=REDO)
@@ -80,7 +122,6 @@ class StoredTable:
         return [np.asarray(v, kind) for v in np.split(values, ends[:-1])] if len(ends) else []
 
     def _numbers(self, name: str, kinds: str) -> NDArray[Any]:
-        """Return column `name`; raise InputError if it is missing or numpy's kind of its type is not in `kinds`."""
         column = self._get(name)
         if isinstance(column, tuple) or column.dtype.kind not in kinds:
             got = "a column of lists" if isinstance(column, tuple) else f"a column of {column.dtype}"
@@ -94,55 +135,46 @@ class StoredTable:
         return self.columns[name]
 
     def fact(self, name: str) -> Any:
-        """Return the value `name` of the table's metadata. Raises InputError if it is missing."""
+        """Returns the value `name` of the table's metadata."""
         if name not in self.facts:
             raise InputError(file=self.file, place="schema", got=f"no {name}", expected="that value", remedy=REDO)
         return self.facts[name]
 
     def count(self, name: str, limit: int) -> int:
-        """Return the value `name` of the metadata, a whole number from 0 to `limit`; raise InputError for another."""
+        """Returns the metadata `name`, a whole number from 0 to `limit`; raises InputError for another value."""
         value = self.fact(name)
         fits = isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= limit
         self.reject(not fits, name, repr(value), f"a whole number from 0 to {limit}")
         return int(value)
 
     def number(self, name: str, low: float, high: float) -> float:
-        """Return the value `name` of the metadata, a number from `low` to `high`; raise InputError for another."""
+        """Returns the metadata `name`, a number from `low` to `high`; raises InputError for another value."""
         value = self.fact(name)
         self.reject(not is_number(value, low, high), name, repr(value), f"a number from {low:g} to {high:g}")
         return float(value)
 
     def frames(self, name: str) -> set[int]:
-        """Return the value `name` of the metadata, a list of whole numbers, as a set; raise InputError for another.
-
-        Whether they are frames of the table is not checked."""
+        """Returns the metadata `name`, a list of whole numbers, as a set; raises InputError for another value."""
         value = self.fact(name)
         fits = isinstance(value, list) and all(isinstance(v, int) for v in value)
         self.reject(not fits, name, repr(value), "a list of frames")
         return set(value)
 
     def cuts(self, first: int, count: int) -> Ints:
-        """Return the index of the first row of each of `count` frames from `first` on, and of the end: (count + 1,).
-
-        Raises InputError if the rows are not sorted by the column frame, or one is outside these frames.
-        """
+        """Returns the first row of each of `count` frames from `first` on, and the end of the last: (count + 1,)."""
         frame = self.ints("frame")
         wrong = bool(len(frame)) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any())
         self.reject(bool(wrong), "frame", "other frames", f"frames {first} to {first + count - 1}, in order")
         return np.searchsorted(frame, np.arange(first, first + count + 1))
 
     def reject(self, wrong: bool, place: str, got: str, expected: str) -> None:
-        """Raise InputError about a place in this file if `wrong` is True; do nothing otherwise."""
+        """Raises InputError about a place in this file if `wrong` is True."""
         if wrong:
             raise InputError(file=self.file, place=place, got=got, expected=expected, remedy=REDO)
 
 
 def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
-    """Return a Parquet file as bytes; equal content gives equal bytes.
-
-    columns: all of equal length. facts: metadata, stored as JSON in the schema together with our "format" (1). Raises
-    ValueError if columns differ in length or `facts` holds NaN or infinity, TypeError if it holds what JSON cannot.
-    """
+    """Returns a Parquet file as bytes; `facts` is metadata in its schema. Equal content gives equal bytes."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -154,6 +186,7 @@ def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
     )
     sink = pa.BufferOutputStream()
     table = pa.Table.from_arrays(arrays, schema=schema)
+    # Checksums of pages: a damaged file is an error, and not other numbers.
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     return bytes(sink.getvalue())
 
@@ -169,11 +202,7 @@ def _arrow(column: Column) -> Any:
 
 
 def read_table(path: Path) -> StoredTable:
-    """Read a Parquet table that table_bytes wrote.
-
-    Raises InputError if the file is missing or damaged (a page differs from its checksum), was not written by
-    table_bytes, has another format number, or holds nulls. NaN is no null.
-    """
+    """Reads a Parquet table that `table_bytes` wrote; raises InputError for another or a damaged one."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -200,10 +229,7 @@ def read_table(path: Path) -> StoredTable:
 
 
 def is_own_table(path: Path) -> bool:
-    """Return True if the Parquet table `path` was written by table_bytes; only its schema is read.
-
-    Raises InputError if the file is no Parquet table, OSError if it cannot be read.
-    """
+    """Returns True if `table_bytes` wrote the Parquet table `path`; only its schema is read."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -223,44 +249,29 @@ def _numpy(column: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """Return a value as JSON on one line, keys in their order; characters beyond ASCII stay as they are.
-
-    Lone surrogates, which Python reads from names of files that are no UTF-8, are escaped. Raises ValueError for NaN
-    and infinity, TypeError for a type that JSON does not have.
-    """
+    """Returns a value as JSON on one line, keys in their order; characters beyond ASCII stay as they are."""
     return _storable(json.dumps(value, ensure_ascii=False, allow_nan=False))
 
 
 def _storable(text: str) -> str:
-    """Return a JSON text with each lone surrogate as the six characters of its escape, so that it can be UTF-8."""
+    # Lone surrogates, from file names that are no UTF-8, become the six characters of their escape.
     return text.encode("utf-8", "backslashreplace").decode()
 
 
 def json_document(value: dict[str, Any]) -> bytes:
-    """Return a JSON file, indented by two blanks and ended by a line feed, as UTF-8 bytes.
-
-    Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
-    """
+    """Returns a JSON file, indented by two blanks, as UTF-8 bytes."""
     return (_storable(json.dumps(value, ensure_ascii=False, allow_nan=False, indent=2)) + "\n").encode()
 
 
 def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
-    """Return the JSON file {"format": 1, name: [items]} as UTF-8 bytes, with one item per line; without items the list
-    is empty.
-
-    Raises ValueError for NaN and infinity, TypeError for a type that JSON does not have.
-    """
+    """Returns the JSON file {"format": 1, name: [items]} as UTF-8 bytes, one item per line."""
     lines = ",\n".join(json_text(item) for item in items)
     body = f"[\n{lines}\n]" if lines else "[]"
     return f'{{"format": {FORMAT}, "{name}": {body}}}\n'.encode()
 
 
 def read_json(path: Path, remedy: str = REDO) -> dict[str, Any]:
-    """Read the file `path`, which holds one JSON object, as a dict.
-
-    remedy: for the error about a file that is no JSON object. Raises InputError if it is unreadable, no regular file,
-    above 64 MB or no JSON object, holds NaN, is nested deeper than 32 levels, or has a whole number beyond 64 bits.
-    """
+    """Reads the file `path`, which holds one JSON object, as a dict."""
     from sim.io.files.numeric_text import read_text
 
     value = parse_json(read_text(path, JSON_BYTES), path, remedy)
@@ -270,11 +281,7 @@ def read_json(path: Path, remedy: str = REDO) -> dict[str, Any]:
 
 
 def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
-    """Read a JSON object that we wrote, as a dict.
-
-    remedy: for the error about a file that is no JSON object. A file without the key "format" is accepted. Raises
-    InputError if the file is unreadable, no JSON object, or of another format number than 1.
-    """
+    """Reads a JSON object of our format number; a file without "format" is accepted."""
     value = read_json(path, remedy)
     found = value.get("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
@@ -283,10 +290,10 @@ def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
 
 
 def nan_to_none(value: float) -> float | None:
-    """Return the number `value` as it stands in JSON: None for nan, else a float. Infinity stays infinity."""
+    """Returns the number `value` as it stands in JSON: None for nan, else a float."""
     return None if value != value else float(value)
 
 
 def none_to_nan(value: float | None) -> float:
-    """Return the number as read from JSON: nan for None, else a float."""
+    """Returns the number as read from JSON: nan for None, else a float."""
     return float("nan") if value is None else float(value)

@@ -17,7 +17,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
-from scenarios.regular_file import is_present
+from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, crowded, read_number, read_numbers, read_text
 from sim.io.formats.group_labels import labelled_truth_fields, require_size
@@ -29,16 +29,10 @@ CORRECT = "correct or remove the line"
 
 
 def frame_numbers(raw: Ints, id: Ints | None = None) -> Ints:
-    """Return our frame numbers from 1, round((raw - first) / step) + 1, shape of `raw` (N,), int64; halves are rounded
-    up.
+    """Returns our frames from 1, round((raw - first) / step) + 1, halves up, of raw video frames (N,).
 
-    raw (N,): numbers of video frames, in any order; first is the lowest. step: the most frequent difference between
-    successive distinct raw numbers, the smallest if several are as frequent. id (N,): the person of each row; None:
-    unknown. If all are equal the result is ones; an empty `raw` gives an empty result.
-
-    Two raw numbers nearer than a step may get the same frame. If they have a person in common, as where a recording
-    changes between two grids that are shifted by a part of a step, the later one gets the next frame. So do the ones
-    after it, up to the next gap. No raw number is moved by more than one frame.
+    step: the most frequent difference between successive distinct raw numbers. id (N,): the person of each row; None:
+    unknown. Frames that would share a number and a person are parted.
     """
     distinct, row = np.unique(raw, return_inverse=True)
     steps = np.diff(distinct)
@@ -53,15 +47,13 @@ def frame_numbers(raw: Ints, id: Ints | None = None) -> Ints:
 
 
 def _parted(slot: Ints, people: list[set[int]]) -> Ints:
-    """Return the slots (K,), our frames from 1, of K >= 1 distinct raw frames, ascending as before.
-
-    slot (K,): as rounded, ascending. people: the ids in each raw frame. A slot is raised by one, and no more, if it is
-    not after the one before it and they have a person in common or that one was raised. So two may still be equal.
-    """
     parted = slot.copy()
     here, raised = people[0], False
     for k in range(1, len(slot)):
         last = int(parted[k - 1])
+        # Where a recording changes between two grids that are shifted by a part of a step, the later frame with a
+        # person in common gets the next number, and so do the ones after it, up to the next gap; none moves by more
+        # than one.
         if slot[k] <= last and (raised or here & people[k]):
             parted[k] = max(min(last + 1, int(slot[k]) + 1), last)
         raised = bool(parted[k] > slot[k])
@@ -70,13 +62,7 @@ def _parted(slot: Ints, people: list[set[int]]) -> Ints:
 
 
 def read_groups(path: Path) -> dict[int, int]:
-    """Return the group label of each person in the BIWI groups.txt `path`, by person id; people alone have no entry.
-
-    A line lists the ids of one group, separated by blanks or commas; labels count from 1 in the order of the lines.
-    Lines with fewer than two different ids are no group. Lines that share a person become one group with the lowest
-    label, with a warning. Raises InputError if the file is unreadable, or, with the line, if a word is no whole number
-    from 0 on.
-    """
+    """Returns the group label of each person in a groups.txt, by person id; people alone have no entry."""
     label: dict[int, int] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):
         members = set(_ids(path, number, line))
@@ -84,6 +70,7 @@ def read_groups(path: Path) -> dict[int, int]:
             continue
         earlier = {label[m] for m in members if m in label}
         name = min(earlier, default=max(label.values(), default=0) + 1)
+        # Lines that share a person become one group, with the lowest label.
         if earlier:
             warnings.warn(
                 f"{path}: line {number}: shares a person with an earlier line; taken as one group", stacklevel=2
@@ -107,13 +94,7 @@ def _ids(path: Path, number: int, line: str) -> list[int]:
 
 
 def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
-    """Return (rows of obsmat.txt in `folder`, our frames from 1 (R,), person ids (R,)), all sorted by (frame, id).
-
-    A row is frame, id, x, z, y, vx, vz, vy in m and m/s, frame being the file's own number. Raises InputError if the
-    file is unreadable or has no line, a line is not 8 finite numbers within 1e6, a frame or id is no integer, an id is
-    negative, or an id stands twice in a frame. Also for more than 1,000,000 frames, 5000 people in a frame, or
-    20,000,000 frames times people.
-    """
+    """Returns (rows of obsmat.txt, our frames (R,), person ids (R,)), sorted by (frame, id)."""
     path = folder / "obsmat.txt"
     rows = read_numbers(path, (8, 8), layout="frame id x z y vx vz vy")
     if not len(rows.line):
@@ -132,13 +113,9 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
 
 
 def read_truth(folder: Path, fps: float = FPS) -> Truth:
-    """Return the truth of the BIWI recording in `folder`: positions m and velocities m/s on the ground, no boxes.
+    """Returns the truth of a recording: positions m and velocities m/s on the ground, no boxes.
 
-    Groups are those of groups.txt, the same in all frames, and every frame counts as labelled; their hulls and events
-    are measured from the motion. Without groups.txt everybody is alone, no frame counts as labelled, and groups and
-    events are None. Visibility is 1, the ground's height 0, the image scale nan. fps: annotated frames per second,
-    default 2.5. Raises InputError if obsmat.txt or groups.txt is unreadable or invalid; warns if two lines of
-    groups.txt share a person.
+    Groups are those of groups.txt in all frames. Without that file everybody is alone, and no frame counts as labelled.
     """
     rows, frame, id = _table(folder)
     pos, vel = rows.values[:, (2, 4)], rows.values[:, (5, 7)]
@@ -156,11 +133,7 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
 
 
 def open_folder(folder: Path, *, fps: float | None = None) -> Sequence:
-    """Return the BIWI recording in `folder` as Sequence, without pictures and detections; its length is the last frame.
-
-    fps: annotated frames per second, above 0, which is not checked; None: 2.5. Raises InputError if obsmat.txt is
-    unreadable or invalid. An invalid groups.txt raises InputError when the truth is read.
-    """
+    """Returns the recording in `folder` as Sequence, without pictures and detections. fps: None: 2.5."""
     rate = FPS if fps is None else fps
     length = int(_table(folder)[1].max(initial=0))
 

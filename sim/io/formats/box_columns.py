@@ -12,42 +12,32 @@ from scenarios.limits import PICTURE_SIDE
 from sim.io.files.numeric_text import NumericTable, is_number_text
 from sim.types import Array, Ints
 
-BoxScale = tuple[float, float]
-"""Factors of x and y that make the boxes of a text pixels of the pictures."""
+BoxScale = tuple[float, float]  # factors of x and y that make the boxes of a text pixels of the pictures
 
-ENOUGH = 10
-"""Rows that are needed to judge by how their columns vary."""
+ENOUGH = 10  # rows that are needed to judge by how their columns vary
 
-MOST_SHARE = 2.0
-"""Greatest left and top of boxes in shares of the picture; people may be partly outside."""
+MOST_SHARE = 2.0  # greatest left and top of boxes in shares of the picture; people may be partly outside
 
-PERSON = (1.2, 6.0)
-"""Height of a person's box divided by its width."""
+PERSON = (1.2, 6.0)  # height of a person's box divided by its width
 
-STAY = 0.5
-"""Least share of rows whose id is in the frame before or after, too, among tracks."""
+STAY = 0.5  # least share of rows whose id is in the frame before or after, too, among tracks
 
-SMOOTH = 0.3
-"""Corners: the difference of x2 and x1 varies by less than this part of what x2 does."""
+SMOOTH = 0.3  # Corners: the difference of x2 and x1 varies by less than this part of what x2 does
 
-BEYOND = 0.2
-"""Share of boxes beyond the picture, above which they are those of larger pictures."""
+BEYOND = 0.2  # share of boxes beyond the picture, above which they are those of larger pictures
 
-MANY, PART = 100, 0.7
-"""So many boxes reach further than this part of both sides of the picture."""
+MANY, PART = 100, 0.7  # so many boxes reach further than this part of both sides of the picture
 
 NO_ID = "frame,left,top,width,height,score"
 
 
 def reject_missing_ids(rows: NumericTable, frame: Ints, id: Ints) -> None:
-    """Raise InputError if column 2 is no id but the left edge of a box, and the ids are missing; else do nothing.
-
-    Column 6 then holds scores, which are no heights: they are at most 1. Scores up to 100 are told by two signs: there
-    are 6 columns, which make no boxes of people in their order but do one column earlier, and the ids do not last.
-    """
+    """Raises InputError if column 2 is no id but the left edge of a box, and the ids are missing."""
     values = rows.values
     if not len(values) or values.shape[1] < 6 or (id == -1).all():
         return
+    # Column 6 then holds scores: at most 1, which is no height. Scores up to 100 show in other ways: the six columns
+    # make boxes of people one column earlier only, and the ids do not last.
     score = (values[:, 5] >= 0) & (values[:, 5] <= 1) & (values[:, 4] > 1) & (values[:, 3] > 1)
     earlier = values.shape[1] == 6 and _aspect(values[:, 1:5]) and not _aspect(values[:, 2:6]) and not _lasts(frame, id)
     if score.all() or (len(values) >= ENOUGH and earlier):
@@ -64,7 +54,6 @@ def _aspect(box: Array) -> bool:
 
 
 def _lasts(frame: Ints, id: Ints) -> bool:
-    """Return True if most ids are in neighbouring frames, too, or are numbers that count rows."""
     if len(np.unique(frame)) < 2 or (np.diff(id) > 0).all():
         return True
     number = np.unique(frame, return_inverse=True)[1]
@@ -75,7 +64,7 @@ def _lasts(frame: Ints, id: Ints) -> bool:
 
 
 def require_pixels(rows: NumericTable, box: Array) -> None:
-    """Raise InputError if none of the boxes (B, 4) is larger than a pixel, as those in shares of the picture are."""
+    """Raises InputError if no box (B, 4) is larger than a pixel, as boxes in shares of the picture are."""
     if len(box) and (np.abs(box[:, :2]) <= MOST_SHARE).all() and (box[:, 2:] <= 1).all():
         raise InputError(
             file=rows.file, place="boxes", got=f"numbers up to {box.max():.3g} in all {len(box)} boxes",
@@ -85,13 +74,11 @@ def require_pixels(rows: NumericTable, box: Array) -> None:
 
 
 def corner_doubt(box: Array) -> str:
-    """Return what speaks for x1,y1,x2,y2 in boxes (B, 4) that were read as left, top, width, height; "" for nothing.
-
-    If in every row the width is above the left edge, and varies along with it, the width is a right edge.
-    """
+    """Returns what speaks for corners x1,y1,x2,y2 in boxes (B, 4) read as left, top, width, height; "": nothing."""
     x1, y1, x2, y2 = box.T
     if len(box) < ENOUGH or not ((x2 > x1) & (y2 > y1)).all():
         return ""
+    # A width that varies along with the left edge is a right edge.
     if not np.std(x2 - x1) < SMOOTH * np.std(x2):
         return ""
     return (
@@ -101,10 +88,7 @@ def corner_doubt(box: Array) -> str:
 
 
 def size_doubt(box: Array, size: tuple[int, int]) -> str:
-    """Return what speaks for boxes (B, 4) of pictures of another size (width, height) than this; "" for nothing.
-
-    Many boxes then lie beyond the picture, or all of many keep to its upper left part.
-    """
+    """Returns what speaks for boxes (B, 4) px of pictures of another size (width, height); "": nothing."""
     if not len(box):
         return ""
     beyond = (box[:, :2] >= size).any(axis=1).mean()
@@ -118,10 +102,7 @@ def size_doubt(box: Array, size: tuple[int, int]) -> str:
 
 
 def parse_box_scale(text: str) -> BoxScale:
-    """Return the factors of x and y that a text such as "2" or "1920,1080" names.
-
-    Raises InputError unless it is one or two numbers above 0, at most 16,384.
-    """
+    """Returns the factors of x and y that a text such as "2" or "1920,1080" names."""
     cells = text.split(",")
     factors = [float(cell) if is_number_text(cell) else float("nan") for cell in cells]
     if len(cells) > 2 or not all(0 < f <= PICTURE_SIDE for f in factors):

@@ -1,18 +1,177 @@
-"""The camera calibration that a user gives for a recording (`--camera FILE`): read it, scale it to the pictures."""
+"""The camera calibration that a user gives for a recording (`--camera FILE`): read it, scale it to the pictures.
+
+*Tsai's calibration as XML* (as in PETS 2009): a world point X becomes x_cam = (x, y, z) = R X + T in mm, with R = Rz Ry
+Rx of the angles rx, ry, rz (rad) and T = (tx, ty, tz). Ideal sensor position: (f x/z, f y/z) in mm, f the focal length.
+Distorted position Xd (2-vector, mm): Xd (1 + kappa1 |Xd|²) = ideal. Pixel: u = sx Xd_x/dpx + cx, v = Xd_y/dpy + cy,
+where dpx, dpy are the size of a sensor element in mm, sx a scale factor and (cx, cy) the image centre in px.
+
+*OpenCV's YAML* of a rectified pair (`cv2.FileStorage`, `cv2.stereoRectify`): image_width, image_height, px; P1 and
+P2, the 3 x 4 projections of the left and right camera, P2[0, 3] = -P2[0, 0] times the baseline in m; and, as OpenCV
+knows no world, rotation (3 x 3, world to rectified left camera) and position (3 numbers, of the left camera, m).
+
+Pixel coordinates of both begin at the middle of the first pixel, ours at its corner.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.regular_file import require_regular
-from sim.io.formats.opencv_yaml import read_opencv_yaml
-from sim.io.formats.tsai import read_tsai
+from scenarios.limits import COORDINATE, XML_BYTES
+from scenarios.reading import require_regular
+from sim.io.files.numeric_text import read_number, read_text
 from sim.io.store.camera_files import read_camera
-from sim.types import Camera
+from sim.scene.camera_check import require_camera
+from sim.types import Array, Camera
+
+MM = 1000.0  # per m
+PARTS = {
+    "Geometry": ("width", "height", "dpx", "dpy"),
+    "Intrinsic": ("focal", "kappa1", "cx", "cy", "sx"),
+    "Extrinsic": ("tx", "ty", "tz", "rx", "ry", "rz"),
+}
+LARGEST = 1e9  # mm or px: absolute value of a number
+POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
+
+
+def read_tsai(path: Path) -> Camera:
+    """Returns the camera of Tsai's calibration as XML, in m and px."""
+    v = _values(path)
+    rotation = _rotation(v["rx"], v["ry"], v["rz"])
+    shift = np.array([v["tx"], v["ty"], v["tz"]]) / MM
+    camera = Camera(
+        kind="pinhole", image=(round(v["width"]), round(v["height"])),
+        focal_px=(v["sx"] * v["focal"] / v["dpx"], v["focal"] / v["dpy"]), centre_px=(v["cx"] + 0.5, v["cy"] + 0.5),
+        position=-rotation.T @ shift, rotation=rotation, radial=v["kappa1"] * v["focal"] ** 2,
+    )  # fmt: skip
+    return require_camera(camera, path)
+
+
+def _values(path: Path) -> dict[str, float]:
+    try:
+        root = ElementTree.fromstring(read_text(path, XML_BYTES))
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        expected = "Tsai's calibration as XML, or a camera.json"
+        raise InputError(file=path, got=f"no XML ({error})", expected=expected, remedy="check --camera") from None
+    found = {}
+    for part, names in PARTS.items():
+        element = root.find(part)
+        for name in names:
+            text = None if element is None else element.get(name)
+            try:
+                value = read_number(text if text is not None else "nan")
+            except ValueError:
+                value = float("nan")
+            if not abs(value) <= LARGEST or (name in POSITIVE and value <= 0):
+                kind = "a number above 0" if name in POSITIVE else f"a number within {LARGEST:g}"
+                raise InputError(
+                    file=path, place=f"{part} {name}", got="nothing" if text is None else repr(text), expected=kind,
+                    remedy="complete the calibration",
+                )  # fmt: skip
+            found[name] = value
+    return found
+
+
+def _rotation(rx: float, ry: float, rz: float) -> Array:
+    (a, b, c), (sa, sb, sc) = np.cos([rx, ry, rz]), np.sin([rx, ry, rz])
+    x = np.array([[1, 0, 0], [0, a, -sa], [0, sa, a]])
+    y = np.array([[b, 0, sb], [0, 1, 0], [-sb, 0, b]])
+    z = np.array([[c, -sc, 0], [sc, c, 0], [0, 0, 1]])
+    return np.asarray(z @ y @ x)
+
+
+SAME = 1e-6  # relative difference allowed between P1 and the left part of P2
+KEYS = ("image_width", "image_height", "P1", "P2", "rotation", "position")
+KEY = re.compile(r"([A-Za-z_]\w*)\s*:\s*(.*)")
+NUMBER = re.compile(r"[-+]?([0-9]{1,30}\.?[0-9]{0,30}|\.[0-9]{1,30})([eE][-+]?[0-9]{1,3})?")
+LIST = re.compile(r"\[([^\[\]]*)\]")
+# A matrix of two or of any number of dimensions, as FileStorage writes it
+MATRIX = re.compile(
+    r"!!opencv-(?:nd-)?matrix\s+(?:rows:\s*([0-9]{1,2})\s+cols:\s*([0-9]{1,2})|sizes:\s*\[([0-9,\s]{0,20})\])\s+"
+    r"dt:\s*\w+\s+data:\s*(\[[^\[\]]*\])\s*"
+)
+
+
+def read_opencv_yaml(path: Path) -> Camera:
+    """Returns the left Camera, with its baseline, of a rectified pair in OpenCV's YAML `path`."""
+    blocks = _blocks(path, read_text(path))
+    missing = [key for key in KEYS if key not in blocks]
+    if missing:
+        raise InputError(
+            file=path, place=", ".join(missing), got="nothing", expected=f"the keys {', '.join(KEYS)}",
+            remedy="add them: see Calibration in docs/reference/formats.md",
+        )  # fmt: skip
+    values = {key: _value(blocks[key]) for key in KEYS}
+    width, height = (float(_numbers(path, values, k, ())) for k in ("image_width", "image_height"))
+    left, right = (_numbers(path, values, k, (3, 4)) for k in ("P1", "P2"))
+    rotation, position = _numbers(path, values, "rotation", (3, 3)), _numbers(path, values, "position", (3,))
+    fx, fy = float(left[0, 0]), float(left[1, 1])
+    apart = np.abs(left - right)
+    apart[0, 3] = 0
+    if not (fx > 0 and apart.max() <= SAME * fx and right[0, 3] < 0):
+        expected = "P1 and P2 equal but for P2[0, 3] < 0"
+        raise InputError(file=path, place="P2", got="another pair", expected=expected, remedy="rectify the pair")
+    if width != round(width) or height != round(height):
+        expected = "whole numbers of px"
+        raise InputError(
+            file=path, place="image_width", got=f"{width:g}×{height:g}", expected=expected, remedy="correct it"
+        )
+    camera = Camera(
+        kind="pinhole", image=(int(width), int(height)), focal_px=(fx, fy),
+        # OpenCV's pixel coordinates begin at the centre of the first pixel, ours at its corner.
+        centre_px=(float(left[0, 2]) + 0.5, float(left[1, 2]) + 0.5), position=position, rotation=rotation,
+        baseline=float(-right[0, 3] / fx),
+    )  # fmt: skip
+    return require_camera(camera, path)
+
+
+def _blocks(path: Path, text: str) -> dict[str, str]:
+    lines = [line.partition("#")[0].rstrip() for line in text.splitlines()]
+    if not lines or not lines[0].startswith("%YAML"):
+        expected = "a file of cv2.FileStorage, which begins with %YAML"
+        raise InputError(file=path, got="no OpenCV YAML", expected=expected, remedy="check --camera")
+    blocks: dict[str, list[str]] = {}
+    key = ""
+    for line in lines[1:]:
+        if found := KEY.match(line):
+            key = found[1]
+            blocks[key] = [found[2]]
+        elif key and line[:1].isspace():
+            blocks[key].append(line)
+    return {key: "\n".join(block) for key, block in blocks.items()}
+
+
+def _value(block: str) -> Array | None:
+    matrix = MATRIX.fullmatch(block)
+    body = (block if matrix is None else matrix[4]).strip()
+    if matrix is None and NUMBER.fullmatch(body):
+        return np.array(float(body))
+    items = LIST.fullmatch(body)
+    numbers = [] if items is None else [item.strip() for item in items[1].split(",")]
+    if not numbers or not all(NUMBER.fullmatch(item) for item in numbers):
+        return None
+    values = np.array([float(item) for item in numbers])
+    if matrix is None:
+        return values
+    sizes = re.findall(r"[0-9]+", matrix[3]) if matrix[1] is None else (matrix[1], matrix[2])
+    shape = tuple(int(size) for size in sizes)
+    return values.reshape(shape) if int(np.prod(shape)) == len(values) else None
+
+
+def _numbers(path: Path, values: Mapping[str, Array | None], key: str, shape: tuple[int, ...]) -> Array:
+    value = values.get(key)
+    if value is None or value.size != int(np.prod(shape)) or not (np.abs(value) <= COORDINATE).all():
+        got = "no such numbers" if value is None else f"shape {value.shape}"
+        expected = f"numbers of shape {shape} within {COORDINATE:g}" if shape else f"a number within {COORDINATE:g}"
+        raise InputError(file=path, place=key, got=got, expected=expected, remedy="correct it")
+    return np.asarray(value.reshape(shape), np.float64)
+
 
 PERSON, SMALLEST = 1.7, 2.0  # a person's height, m, and the least px that it must have in the picture
 WIDEST, WIDEST_SHARE = 2.0, 0.25  # m, and share of the height: a longer baseline is not in metres
@@ -20,12 +179,7 @@ SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios 
 
 
 def read_calibration(path: Path) -> Camera:
-    """Return the Camera of the calibration file `path`: Tsai's XML if its name ends in .xml, OpenCV's YAML of a
-    rectified pair if it ends in .yml or .yaml, else our camera.json.
-
-    Raises InputError if there is no such file, it is no XML, YAML or JSON object, a value is missing or of the wrong
-    kind or shape, the camera cannot be used (sim.scene.camera_check), or its lengths cannot be metres.
-    """
+    """Returns the camera of a calibration file: Tsai's .xml, OpenCV's .yml of a rectified pair, or camera.json."""
     require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
     if path.suffix.lower() == ".toml":
         remedy = "give the recording's calibration; a TOML file describes a view for `flockscope replay --camera`"
@@ -41,12 +195,8 @@ def read_calibration(path: Path) -> Camera:
 
 
 def _require_metres(camera: Camera, path: Path) -> Camera:
-    """Return the camera unchanged; raise InputError if its lengths cannot be metres.
-
-    The height is no length in m if a person right below would be smaller than 2 px in any direction of view; the
-    baseline is none if it is longer than 2 m and than a quarter of the height.
-    """
     height = float(camera.position[2])
+    # From so high, a person right below would be smaller than 2 px in any direction of view.
     person = camera.focal_px[1] * PERSON / height if camera.kind == "pinhole" else np.inf
     if person < SMALLEST:
         got = f"height {height:g} m, from where a person is {person:.2g} px tall"
@@ -63,18 +213,11 @@ def _require_metres(camera: Camera, path: Path) -> Camera:
 def scaled_to_image(
     camera: Camera, image: tuple[int, int] | None, path: Path, aspect: Fraction = Fraction(1)
 ) -> Camera:
-    """Return the camera for pictures of `image` = (width, height) px, if it was calibrated at another size.
-
-    Focal lengths and image centre are scaled per axis, px_per_m by the geometric mean of both factors; position,
-    rotation and distortion stay. With `image` None or equal to the camera's size, the camera is returned unchanged.
-    path: the recording, for the error. aspect: width / height of the recording's stored pixels, which `image` shows as
-    squares; the camera may be calibrated with stored or square pixels.
-
-    Raises InputError if the aspect ratios differ by more than SHAPE_TOLERANCE (1 %).
-    """
+    """Returns the camera for pictures of `image` (width, height) px; `aspect` is that of the stored pixels."""
     if image is None or image == camera.image:
         return camera
     x, y = image[0] / camera.image[0], image[1] / camera.image[1]
+    # It may be calibrated with the stored pixels or with square ones.
     if all(abs(x / y / ratio - 1) > SHAPE_TOLERANCE for ratio in (1.0, float(aspect))):
         raise InputError(
             file=path, place="--camera", got="a calibration for {}×{} px".format(*camera.image),

@@ -20,12 +20,12 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
-from scenarios.regular_file import read_regular
+from scenarios.reading import read_regular
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import read_number, whole_number
 from sim.io.formats.group_labels import labelled_truth_fields, require_size
 from sim.io.formats.velocity import differentiate
-from sim.scene.box_scale import scale_of_all_boxes, scale_of_first_boxes
+from sim.scene.boxes import scale_of_all_boxes, scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Frame, Ints, Sequence, Truth
 
@@ -37,36 +37,24 @@ CHORD = 1.0  # s, for velocities: labels rest for some frames and then jump by p
 
 @dataclass(frozen=True)
 class CaviarRecording:
-    """The content of a CAVIAR file: R boxes sorted by (frame, id), and `length` frames.
+    """The content of a CAVIAR file: R boxes sorted by (frame, id), and `length` frames."""
 
-    name: that in the file, else the file's name without suffix. length: the last frame in the file. listed (L,): the
-    frames in the file, ascending, each once. frame (R,): from 1. id (R,): the person's id. label (R,): the id of the
-    person's group, -1 for alone. centre (R, 2): x, y of the box's centre, px. size (R, 2): width, height, px. labelled:
-    True if the file has a list of groups, perhaps empty, in any frame. caviar: True if it is one of CAVIAR's own
-    recordings: people have hypotheses about what they do, and all boxes lie in CAVIAR's pictures.
-    """
-
-    name: str
-    length: int
-    listed: Ints
-    frame: Ints
-    id: Ints
-    label: Ints
-    centre: Array
-    size: Array
-    labelled: bool
+    name: str  # that in the file, else the file's name without suffix
+    length: int  # the last frame in the file
+    listed: Ints  # (L,) the frames in the file, ascending, each once
+    frame: Ints  # (R,) from 1
+    id: Ints  # (R,) the person's id
+    label: Ints  # (R,) the id of the person's group, -1 for alone
+    centre: Array  # (R, 2) x, y of the box's centre, px
+    size: Array  # (R, 2) width, height, px
+    labelled: bool  # True if the file has a list of groups, perhaps empty, in any frame
+    # True if it is one of CAVIAR's own recordings: people have hypotheses about what they do, and all boxes lie in
+    # CAVIAR's pictures
     caviar: bool
 
 
 def read_xml(path: Path) -> CaviarRecording:
-    """Read the people and groups of the CAVIAR file (CVML) `path`. Our frame is the file's frame number + 1.
-
-    A list of fewer than two members is no group. A person in two groups of a frame stays in the first, with a warning.
-    A file without people gives no rows. Raises InputError if the file is unreadable, no CVML or without frames, and,
-    with the file's frame number, if an object has no box or a box without area, a number is missing or beyond 1e6, an
-    id or frame is no whole number from 0 on, or an id stands twice in a frame. Also raises it for more than
-    1,000,000 frames, or 20,000,000 frames times people.
-    """
+    """Reads the people and groups of the CAVIAR file (CVML) `path`; our frame is the file's + 1."""
     root = _root(path)
     rows: list[tuple[float, ...]] = []
     listed, labelled, hypotheses = set[int](), False, root.find("frame/objectlist/object/hypothesislist") is not None
@@ -102,10 +90,6 @@ def read_xml(path: Path) -> CaviarRecording:
 
 
 def _root(path: Path) -> ET.Element:
-    """Return the root element of a CVML file; raise InputError if it is unreadable, no XML, or of another kind.
-
-    A text in another encoding than UTF-8 is decoded as its XML declaration says.
-    """
     body = read_regular(path, XML_BYTES)
     try:
         root = ET.fromstring(body)
@@ -135,7 +119,6 @@ def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
 
 
 def _whole(path: Path, place: str, element: ET.Element, key: str, limit: int = LAST_ID) -> int:
-    """Return the whole number from 0 to `limit` of an attribute; raise InputError for any other text."""
     text = element.get(key)
     try:
         value = whole_number(text or "")
@@ -150,12 +133,6 @@ def _whole(path: Path, place: str, element: ET.Element, key: str, limit: int = L
 
 
 def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
-    """Return the group id of each person in one frame by person id; people alone have no entry.
-
-    path: the file, for messages. element: the XML of the frame. index: our frame, from 1; messages name index - 1.
-    Groups with fewer than two members are ignored; a person in two groups keeps the first, with a warning. Raises
-    InputError if a member or group id is no whole number from 0 on.
-    """
     label: dict[int, int] = {}
     for group in element.iterfind("grouplist/group"):
         words = (group.findtext("members") or "").replace(",", " ").split()
@@ -165,6 +142,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
                 remedy="correct the list",
             )  # fmt: skip
         members = {int(w) for w in words}
+        # One member is no group.
         if len(members) < 2:
             continue
         if members & label.keys():
@@ -175,11 +153,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
 
 
 def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
-    """Return one object as (frame, id, label, centre x, centre y, width, height), px; label -1 for alone.
-
-    index: our frame, from 1. person: the XML of the object. label: group ids of the frame, by person id. Raises
-    InputError if the box is missing or has no area, or a number is missing or wrong.
-    """
+    """Returns (frame, id, label, centre x, centre y, width, height), px; label -1 for alone."""
     place = f"frame {index - 1}"
     id, box = _whole(path, place, person, "id"), person.find("box")
     if box is None:
@@ -194,16 +168,10 @@ def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> t
 
 
 def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> Truth:
-    """Return the truth of a CAVIAR file in the image: boxes (left, top, width, height in px), no positions on the
-    ground.
+    """Returns the truth of a CAVIAR file in the image: boxes in px, no positions on the ground, no velocities.
 
-    Groups are those of the file, one hull around their members' boxes (groups_px; `groups` stays None), and every frame
-    in the file counts as labelled. Events are measured in these frames from the motion of the boxes' centres,
-    differences over 1 s; velocities are not kept (None). If the file has no group lists or no boxes, no frame counts as
-    labelled, and groups and events are None. Visibility is 1. fps: frames per second, default 25. px_per_m: image
-    scale; None: the median of the boxes' longer sides / 1.7 m.
-
-    Raises InputError if the file is unreadable, no CVML or invalid (see read_xml). Warns about a person in two groups.
+    Groups have one hull around their members' boxes. Events are measured from the centres in the frames that the file
+    lists, which count as labelled. px_per_m: None: the median of the boxes' longer sides / 1.7 m.
     """
     found = read_xml(path)
     scale = scale_of_all_boxes(found.size.max(axis=1)) if px_per_m is None else px_per_m
@@ -222,11 +190,8 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
 
 
 def _measured(found: CaviarRecording, vel: Array, fps: float, px_per_m: float) -> dict[str, Any]:
-    """Return the fields events, near and labelled of a Truth by name, measured in the frames that the file lists.
-
-    vel (R, 2): px/s. These frames count as evenly spaced in time.
-    """
     listed = found.listed
+    # The listed frames count as evenly spaced in time.
     rate = fps / float(np.diff(listed).mean()) if len(listed) > 1 else fps
     turn = np.searchsorted(listed, found.frame) + 1
     known = labelled_truth_fields(
@@ -239,13 +204,10 @@ def _measured(found: CaviarRecording, vel: Array, fps: float, px_per_m: float) -
 
 
 def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
-    """Return the CAVIAR file `path` as Sequence, without pictures and detections.
+    """Returns the CAVIAR file `path` as Sequence, without pictures and detections.
 
-    The image size is 384 × 288 px for CAVIAR's own recordings, else unknown. fps: frames per second; None: 25 for
-    CAVIAR's own recordings, with a warning. px_per_m: image scale; None: the median of the longer sides of the first
-    100 boxes / 1.7 m, nan without boxes. `source["px_per_m_frames"]` is then the last frame of these boxes. Raises
-    InputError at once if the file is unreadable, no CVML or invalid (see read_xml), or not CAVIAR's own without `fps`.
-    The file is read again when the truth is asked for.
+    px_per_m: None: the median of the longer sides of the first 100 boxes / 1.7 m; `source["px_per_m_frames"]` is then
+    the last frame of these boxes.
     """
     found = read_xml(path)
     rate = _frame_rate(path, found) if fps is None else fps
@@ -275,8 +237,6 @@ def _frame_rate(path: Path, found: CaviarRecording) -> float:
 
 
 def is_caviar(path: Path) -> bool:
-    """Return True if the first 1000 bytes of the file contain "<dataset", CVML's root element. Raises OSError if
-    unreadable.
-    """
+    """Returns True if the file begins as CVML does."""
     with path.open("rb") as file:
         return b"<dataset" in file.read(1000)

@@ -18,10 +18,9 @@ from sim.types import Array, GroupEvent, Groups, Ints
 
 
 def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
-    """Return rows (R, …) as an array (T, P, …) with T = length frames and P people, nan where a person has no row.
+    """Returns rows (R, …) as an array (T, P, …), people by ascending id, nan where a person has no row.
 
-    frame (R,): from 1 to `length`, else IndexError. id (R,): person ids; the people's columns are in ascending order of
-    id. values (R, …): any numbers per row. Each id stands once in a frame; of two rows the later one holds.
+    frame (R,): from 1 to `length`. id (R,): each once in a frame.
     """
     out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
     out[frame - 1, np.searchsorted(np.unique(id), id)] = values
@@ -29,12 +28,9 @@ def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
 
 
 def require_size(path: Path, length: int, id: Ints) -> None:
-    """Raise InputError if a recording is too large for arrays of all its frames and people; do nothing otherwise.
-
-    path: the recording, for the message. length: number of frames. id (R,): the person of each row. At most 20,000,000
-    frames times people are allowed, so that one mistyped frame number does not fill the memory.
-    """
+    """Raises InputError if frames times people are too many for arrays of them. id (R,): of each row."""
     people = len(np.unique(id))
+    # One mistyped frame number must not fill the memory.
     if length * people > CELLS:
         got = f"{length:,} frames with {people:,} people"
         expected = f"at most {CELLS:,} frames times people"
@@ -44,17 +40,11 @@ def require_size(path: Path, length: int, id: Ints) -> None:
 def labelled_truth_fields(
     frame: Ints, id: Ints, label: Ints, pos: Array, vel: Array, *, fps: float, length: int, px_per_m: float = 1.0
 ) -> dict[str, Any]:
-    """Return the fields groups, events, near and labelled of a Truth, by name, for a recording with group labels.
+    """Returns the fields groups, events, near and labelled of a Truth, of a recording with group labels.
 
-    frame (from 1), id, label (R,), sorted by (frame, id); label is the id of the person's group, -1 for alone. pos, vel
-    (R, 2): m and m/s, or px and px/s if px_per_m is not 1. fps: frames/s. length: number of frames, at least the last
-    of `frame`, else IndexError.
-
-    groups: one Groups per frame, as labelled; a label counts as a group in frames where two or more people have it.
-    Merge, split, form, dissolve, enter and leave events are those of groups measured from motion and labels; such a
-    group gets the label of its members as id. Cross and queue events are those of the labelled groups. Events are
-    sorted by start, end, kind. near: pairs of strangers that satisfied the merge rule, with first and last frame.
-    labelled: all True. Places and hulls are in the unit of `pos`.
+    frame (from 1), id, label (R,): rows sorted by (frame, id); label is the person's group, -1 for alone. pos, vel (R,
+    2): m and m/s, or px and px/s with a `px_per_m`; so are the results. Merges, splits and the like are those of the
+    groups that motion and labels give, crossings and queues those of the labelled groups.
     """
     from sim.truth.crossing_events import crossings
     from sim.truth.group_hulls import groups_over_time
@@ -83,21 +73,12 @@ def labelled_truth_fields(
 
 
 def _names(measured: Ints, label: Ints) -> dict[int, int]:
-    """Return the label of each measured group, by its measured id; it is the label in the group's first row.
-
-    measured, label (R,): of each row the id of its measured group (-1 for alone, left out) and its group label.
-    """
     found, first = np.unique(measured, return_index=True)
     return {int(g): int(label[k]) for g, k in zip(found, first, strict=True) if g >= 0}
 
 
 def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: float) -> GroupEvent:
-    """Return a copy of the event with the recording's person ids, group labels and unit.
-
-    names: label by measured group id; ids without a label stay. Ids before and after are sorted again. people (P,):
-    person id of each column, ascending; the event's member m is column m - 1. The event's place, in m, is multiplied by
-    px_per_m.
-    """
+    """Returns the event with the recording's person ids, group labels and unit."""
     return replace(
         event,
         before=tuple(sorted(names.get(g, g) for g in event.before)),
@@ -108,10 +89,7 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
 
 
 def scale_groups(groups: Groups, factor: float) -> Groups:
-    """Return groups with all lengths multiplied by `factor`: positions, velocities and hulls.
-
-    Extents (covariances) are multiplied by its square. Ids, members and sizes stay. Factor 1 returns `groups` itself.
-    """
+    """Returns groups with all lengths multiplied by `factor`: positions, velocities and hulls."""
     if factor == 1.0:
         return groups
     return groups.replace(

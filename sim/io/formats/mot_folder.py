@@ -15,9 +15,9 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, is_number
 from scenarios.limits import PICTURE_SIDE as SIDE
-from scenarios.regular_file import is_present
+from scenarios.reading import is_present
 from sim.io.files.numeric_text import read_number, read_text
-from sim.io.files.side_files import is_hidden
+from sim.io.files.own_files import is_hidden
 from sim.io.formats import mot_text
 from sim.io.formats.box_columns import BoxScale, size_doubt
 from sim.io.formats.calibration import scaled_to_image
@@ -31,27 +31,17 @@ DEFAULT_FPS = 25.0
 
 @dataclass(frozen=True)
 class SeqInfo:
-    """The content of a seqinfo.ini.
+    """The content of a seqinfo.ini."""
 
-    name: the folder's name if missing. fps: frames per second, None if missing. length: number of frames, None if
-    missing. image_size: (width, height) px, None if one is missing. image_dir: the folder of the pictures, relative to
-    the sequence's, "img1" if missing.
-    """
-
-    name: str
-    fps: float | None
-    length: int | None
-    image_size: tuple[int, int] | None
-    image_dir: str = "img1"
+    name: str  # the folder's name if missing
+    fps: float | None  # frames per second, None if missing
+    length: int | None  # number of frames, None if missing
+    image_size: tuple[int, int] | None  # (width, height) px, None if one is missing
+    image_dir: str = "img1"  # the folder of the pictures, relative to the sequence's, "img1" if missing
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """Read the section [Sequence] of the seqinfo.ini `path`; without that section every key counts as missing.
-
-    Other keys are ignored. Raises InputError if the file is unreadable or no ini file, the length is no whole number
-    from 1 to 1,000,000, a side of the image no whole number from 1 to 16,384, the image larger than 40 million px, or
-    the frame rate not from 0.01 to 1000.
-    """
+    """Reads the section [Sequence] of a seqinfo.ini; without it every key counts as missing."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(read_text(path))
@@ -85,11 +75,7 @@ def read_seqinfo(path: Path) -> SeqInfo:
 
 
 def frame_rate(given: float | None, found: float | None, path: Path | None = None) -> float:
-    """Return the frames per second: `given` by the user (--fps), else `found` in the recording, else 25 with a warning.
-
-    given, found: None if unknown. path: the recording; if there is a video beside it, the warning names its rate.
-    Raises InputError if `given` is not from 0.01 to 1000.
-    """
+    """Returns the frames per second: `given` (--fps), else `found` in the recording, else 25 with a warning."""
     if given is not None:
         low, high = FRAME_RATES
         if not is_number(given, low, high):
@@ -100,6 +86,7 @@ def frame_rate(given: float | None, found: float | None, path: Path | None = Non
         video = None if path is None else _video_beside(path)
         # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
+        # A video beside the text tells which rate is right.
         if video is not None and video[1] != DEFAULT_FPS:
             text = f"{path}: without a frame rate; taken at {DEFAULT_FPS:g} fps, but {video[0].name} beside it has "
             text += f"{video[1]:g}: give --fps {video[1]:g}"
@@ -115,10 +102,6 @@ def _is_video(path: Path) -> bool:
 
 
 def _video_beside(path: Path) -> tuple[Path, float] | None:
-    """Return the video beside a text or folder that has its name, else the only one there, and its frames per second.
-
-    None if there is none, or its rate cannot be told.
-    """
     from sim.io.formats import video
 
     around = [path.parent, path] if path.is_dir() else [path.parent]
@@ -145,23 +128,10 @@ def open_folder(
     person_class: int | None = None,
     box_scale: BoxScale | None = None,
 ) -> Sequence:
-    """Return the MOTChallenge folder `path` (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
+    """Returns a MOTChallenge folder (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
-    Pictures in img1_right/, if there are any, are those of the right camera of a rectified pair, by the same numbers.
-
-    fps: frames per second instead of those of seqinfo.ini; with neither, 25 with a warning. px_per_m: image scale;
-    None: unknown (nan; the truth then takes the boxes' median height / 1.7 m). camera: its calibration, scaled to the
-    picture size; None: unknown. images False leaves the pictures out; otherwise they are decoded one by one while
-    iterating. A frame without a readable picture has none, with a warning. background: sample of frames for background
-    models; None for 50 frames spread over the recording, fewer if it is shorter. box_scale: factors of x and y of the
-    boxes of det.txt; None: 1. The length is that of seqinfo.ini,
-    else the last frame of gt.txt, det.txt and the pictures.
-
-    Raises InputError if seqinfo.ini, det.txt or an option is invalid, two pictures are the same frame, nothing tells
-    the length, the pictures differ from seqinfo.ini in size, the calibration has another aspect ratio, or `background`
-    is given without pictures or asks for more frames than there are or fit into 2 GB. An invalid gt.txt raises
-    InputError at once if seqinfo.ini tells no length, else when the truth is read. Iterating raises InputError for
-    pictures of different sizes or none that can be read.
+    img1_right/ holds the pictures of the right camera of a rectified pair. Options as of `open_source`. The length is
+    that of seqinfo.ini, else the last frame of texts and pictures. The truth is read, and checked, when asked for.
     """
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
@@ -223,10 +193,7 @@ def open_folder(
 
 
 def left_pictures(path: Path) -> PictureFolder:
-    """Return the picture files of the MOTChallenge folder `path`, of the left camera, by frame.
-
-    Raises InputError as `open_folder`.
-    """
+    """Returns the picture files of the left camera of a MOTChallenge folder, by frame."""
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
     return _find_pictures(path, info)
@@ -238,7 +205,6 @@ def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
 
 
 def _refuse_beyond(path: Path, pictures: PictureFolder, length: int) -> None:
-    """Warn about more pictures than frames; raise InputError if there are not more, but some have higher numbers."""
     beyond = [file for frame, file in pictures.files.items() if frame > length]
     if beyond and len(pictures.files) <= length:
         raise InputError(
@@ -250,16 +216,12 @@ def _refuse_beyond(path: Path, pictures: PictureFolder, length: int) -> None:
 
 
 def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
-    """Return the (width, height) px of the pictures, None if unknown.
-
-    stated: the size by seqinfo.ini. seen: that of the first picture. Each is None if unknown. ini: its path, for the
-    error. Raises InputError if both are known and differ.
-    """
     if stated is not None and seen is not None and stated != seen:
         raise InputError(
             file=ini, place="imWidth, imHeight", got="{} × {}".format(*stated),
             expected="{} × {}, the size of the pictures".format(*seen), remedy="correct it, or restore the pictures",
         )  # fmt: skip
+    # One of the two may be unknown.
     return stated or seen
 
 
@@ -272,16 +234,9 @@ def open_text(
     person_class: int | None = None,
     box_scale: BoxScale | None = None,
 ) -> Sequence:
-    """Return the MOT text file `path` as Sequence without pictures: its rows are detections if every id is -1, else
-    truth.
+    """Returns a MOT text as Sequence without pictures: detections if every id is -1, else truth.
 
-    fps: frames per second; None: 25 with a warning. px_per_m: image scale; None: unknown (nan; the truth then takes the
-    boxes' median height / 1.7 m). camera: calibration, None if unknown; it is not scaled. person_class: the class of
-    people; None: 1, with a warning about rows of others. box_scale: factors of x and y of the boxes; None: 1. The
-    length is the last frame in the file; the name is the file's, without suffix.
-
-    Raises InputError if `fps` is not above 0, or if the file is unreadable, invalid or has no row, or a row has neither
-    box nor ground position. Reading the truth raises InputError for an id twice in a frame, or an invalid visibility.
+    Options as of `open_source`. The camera is not scaled.
     """
     rate = frame_rate(fps, None, path)
     scale = float("nan") if px_per_m is None else px_per_m
@@ -309,10 +264,6 @@ def open_text(
 
 
 def _labelled_frames(path: Path) -> Ints:
-    """Return the frames (from 1) with a row in det/det.txt or gt/gt.txt of the folder `path`, ascending.
-
-    Raises InputError if one of them is invalid.
-    """
     texts = [text for text in (path / "det" / "det.txt", path / "gt" / "gt.txt") if text.is_file()]
     frames = [read_table(text, boxless=True).frame for text in texts]
     return np.unique(np.concatenate([np.zeros(0, np.int64), *frames]))

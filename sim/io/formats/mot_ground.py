@@ -10,36 +10,31 @@ import warnings
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.regular_file import is_present
+from scenarios.reading import is_present
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable
 from sim.types import Array, Bools, Ints
 
+# step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
 LONGEST = 12.0
-"""Step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing."""
 
-ENOUGH = 10
-"""Rows or steps that are needed to judge by how many of them something is true."""
+ENOUGH = 10  # rows or steps that are needed to judge by how many of them something is true
 
+# share of rows at the position of another row of their frame, above which these are no positions of people
 SHARED = 0.1
-"""Share of rows at the position of another row of their frame, above which these are no positions of people."""
 
-MOVED = 0.5
-"""A box that moves by more than this share of its height belongs to somebody who does not stand."""
+MOVED = 0.5  # A box that moves by more than this share of its height belongs to somebody who does not stand
 
+# files beside a text, or in the folder above it, that vouch for positions in m
 VOUCHERS = ("manifest.json", "camera.json", "run.json")
-"""Files beside a text, or in the folder above it, that vouch for positions in m."""
 
 
-FAST = 12.0
-"""m/s that nobody keeps up. Half of the steps above it are centimetres, or a wrong frame rate."""
+FAST = 12.0  # m/s that nobody keeps up. Half of the steps above it are centimetres, or a wrong frame rate.
 
 
 def ground_positions(table: MotTable) -> Array | None:
-    """Return the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1); None if there are none.
+    """Returns the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1); None if there are none.
 
-    There are none if the text has fewer than 10 columns, if z = -1 in all rows, or if
-    all rows have the same whole numbers, or the same position though a frame has several rows. There are also none,
-    with a warning that says why, if people cannot move so and no manifest or camera file vouches for metres.
+    Warns, and returns None, if people cannot move so and no file beside the text vouches for metres.
     """
     known, doubt = _known(table)
     if doubt:
@@ -49,13 +44,11 @@ def ground_positions(table: MotTable) -> Array | None:
 
 
 def has_ground(table: MotTable) -> bool:
-    """Return True if `ground_positions` gives positions, without its warning."""
+    """Returns True if `ground_positions` gives positions, without its warning."""
     return _known(table)[0] is not None
 
 
 def _known(table: MotTable) -> tuple[Bools | None, str]:
-    """Return which rows (N,) have a position in m, None if there are no positions; and why people cannot move so, ""
-    if that is not the reason."""
     if table.rest.shape[1] < 4:
         return None, ""
     xyz, known = table.rest[:, 1:4], np.asarray(table.rest[:, 3] != -1)
@@ -64,6 +57,7 @@ def _known(table: MotTable) -> tuple[Bools | None, str]:
     if table.rows.values.shape[1] != GROUND_COLUMNS and not _vouched(table):
         alone = len(known) == len(np.unique(table.frame))
         same = len(known) > 1 and bool((xyz == xyz[0]).all())
+        # All rows equal: a category, or a value that stands for "unknown".
         if same and (not alone or bool((xyz == np.round(xyz)).all())):
             return None, ""
         doubt = _doubt(table, known)
@@ -73,10 +67,7 @@ def _known(table: MotTable) -> tuple[Bools | None, str]:
 
 
 def require_metres(table: MotTable, fps: float) -> None:
-    """Raise InputError if a text of positions alone cannot be in metres at this frame rate (frames/s); else do nothing.
-
-    It cannot if half of at least 10 steps are faster than 12 m/s. Such a text has no boxes that could be used instead.
-    """
+    """Raises InputError if a text of positions alone cannot be in metres: it has no boxes to use instead."""
     if table.rows.values.shape[1] != GROUND_COLUMNS or _vouched(table):
         return
     first, second = _steps(table.frame, table.id)
@@ -95,7 +86,6 @@ def _vouched(table: MotTable) -> bool:
 
 
 def _doubt(table: MotTable, known: Bools) -> str:
-    """Return why the positions cannot be those of people in m; "" if they can."""
     rows = np.flatnonzero(known)
     xy, frame, id = table.rest[rows, 1:3], table.frame[rows], table.id[rows]
     places, count = np.unique(np.c_[frame, xy], axis=0, return_counts=True)
@@ -118,7 +108,6 @@ def _doubt(table: MotTable, known: Bools) -> str:
 
 
 def _steps(frame: Ints, id: Ints) -> tuple[Ints, Ints]:
-    """Return the rows before and after each step of a person with an id from 0, (S,) each."""
     order = np.lexsort((frame, id))
     order = order[id[order] >= 0]
     pairs = np.flatnonzero(np.diff(id[order]) == 0)
@@ -126,12 +115,10 @@ def _steps(frame: Ints, id: Ints) -> tuple[Ints, Ints]:
 
 
 def _pace(xy: Array, frame: Ints, first: Ints, second: Ints) -> Array:
-    """Return the length of each step in m per frame, (S,)."""
     return np.asarray(np.hypot(*(xy[second] - xy[first]).T) / np.maximum(frame[second] - frame[first], 1))
 
 
 def _stand_while_boxes_move(box: Array, id: Ints, first: Ints, second: Ints, step: Array) -> bool:
-    """Return True if most people whose boxes move keep one position. first, second: rows of each step, (S,)."""
     people, who = np.unique(id[first], return_inverse=True)
     centre = box[:, :2] + box[:, 2:] / 2
     way = np.bincount(who, np.hypot(*(centre[second] - centre[first]).T))

@@ -1,4 +1,9 @@
-"""Decides which rows of a MOTChallenge text are people: by the class in column 8, and by the flag in column 7."""
+"""Decides which rows of a MOTChallenge text are people, by class (column 8) and flag (column 7), and which distractors.
+
+A distractor looks like a person: people on vehicles (class 2), static people (7), other distractors (8), reflections
+(12), and in MOT20 vehicles without a motor (6). The benchmark leaves a track on a distractor out of the scores. Which
+tracks lie on distractors follows from a matching with all labelled rows, so the other unscored rows are kept, too.
+"""
 
 from __future__ import annotations
 
@@ -9,27 +14,52 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.formats.mot_ground import has_ground
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable
-from sim.types import Array, Bools
+from sim.types import Array, Bools, Unscored
 
-PEDESTRIAN = 1
-"""Class of a person from MOT16 on."""
+DISTRACTORS = (2, 7, 8, 12)  # classes of distractors from MOT16 on
 
-LABELS = "gt.txt"
-"""Name of a text of labels. Its column 7 is a flag; that of another text may be a confidence."""
+MOT20 = "MOT20"  # begins the names of MOT20's sequences
 
-LAST_CLASS = 100
-"""Greatest class of the usual sets of classes; COCO has up to 91."""
+MOT20_DISTRACTORS = (*DISTRACTORS, 6)
 
-SHOWN = 8
-"""Most values that a message lists."""
+# columns after the box in labels of MOTChallenge: flag, class, visibility. More columns have other classes.
+LABEL_COLUMNS = 3
+
+CLASSES = range(1, 14)  # classes of MOTChallenge. A text with another class has classes of its own, and no distractors.
+
+
+def unscored_rows(table: MotTable, people: Bools, name: str, person_class: int | None) -> Unscored | None:
+    """Returns the labelled rows beside `people` (N,), sorted by frame; None if no distractor is among them."""
+    found = classes_of(table, person_class is not None)
+    if (
+        found is None
+        or table.rest.shape[1] > LABEL_COLUMNS
+        or person_class not in (None, PEDESTRIAN)
+        or not np.isin(found, CLASSES).all()
+    ):
+        return None
+    mot20 = any(each.startswith(MOT20) for each in (name, table.rows.file.resolve().parent.parent.name))
+    distractor = np.isin(found, MOT20_DISTRACTORS if mot20 else DISTRACTORS)
+    rows = np.flatnonzero(~people & (table.id >= 0) & ~table.without_box())
+    if not distractor[rows].any():
+        return None
+    rows = rows[np.argsort(table.frame[rows], kind="stable")]
+    return Unscored(table.frame[rows], table.box[rows], distractor[rows])
+
+
+PEDESTRIAN = 1  # class of a person from MOT16 on
+
+LABELS = "gt.txt"  # name of a text of labels. Its column 7 is a flag; that of another text may be a confidence.
+
+LAST_CLASS = 100  # greatest class of the usual sets of classes; COCO has up to 91
+
+SHOWN = 8  # most values that a message lists
 
 
 def labelled_people(table: MotTable, person_class: int | None) -> Bools:
-    """Return flags (N,), True for rows that are labelled people: an id from 0, a flag other than 0, the right class.
+    """Returns flags (N,) of rows that are people: an id from 0, another flag than 0, the right class.
 
-    person_class: the class of people; None: 1, with a warning about rows of other classes. Column 7 of a text that is
-    no gt.txt counts as a flag only if all its values are 0, 1 or -1 and not all are 0. Raises InputError if there are
-    rows but no person, or if `person_class` is given and the text has no classes.
+    person_class: the class of people; None: 1, with a warning about rows of other classes.
     """
     keep, file = np.asarray(table.id >= 0), table.rows.file
     if len(keep) and not keep.any():
@@ -38,6 +68,7 @@ def labelled_people(table: MotTable, person_class: int | None) -> Bools:
             remedy="give each person an id",
         )  # fmt: skip
     flag = table.rest[:, 0] if table.rest.shape[1] else np.ones(len(keep))
+    # Column 7 of another text may be a confidence.
     if file.name == LABELS or (np.isin(flag, (0, 1, -1)).all() and flag.any()):
         keep &= flag != 0
         if len(keep) and not keep.any():
@@ -57,10 +88,7 @@ def labelled_people(table: MotTable, person_class: int | None) -> Bools:
 
 
 def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
-    """Return `keep` (N,) without the rows of other classes than that of people; `keep` itself if there are no classes.
-
-    person_class: None: 1, with a warning about rows of other classes. Raises InputError if this leaves no row.
-    """
+    """Returns `keep` (N,) without the rows of other classes than that of people."""
     found = classes_of(table, person_class is not None)
     if found is None or not keep.any():
         return keep
@@ -81,12 +109,7 @@ def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
 
 
 def classes_of(table: MotTable, named: bool) -> Array | None:
-    """Return column 8 (N,) if it holds classes, else None. named: True if the user named a class (--class).
-
-    8 or 9 columns have a class unless it is -1 in all rows. 10 columns have one if the user named one, or if z is -1 in
-    all rows, and column 8 has whole numbers from 0. If columns 8 to 10 are no metres, column 8 is a class, as in
-    VisDrone, if each person has one all the time and not all are 0 or 1, which may be flags.
-    """
+    """Returns column 8 (N,) if it holds classes, else None. named: True if the user named one (--class)."""
     if table.rest.shape[1] < 2 or table.rows.values.shape[1] == GROUND_COLUMNS:
         return None
     column = table.rest[:, 1]
@@ -96,11 +119,11 @@ def classes_of(table: MotTable, named: bool) -> Array | None:
         return column
     if (column < 0).any() or (column != np.round(column)).any():
         return None
+    # If columns 8 to 10 are no metres, column 8 may be a category, as in VisDrone.
     return column if named or (table.rest[:, 3] == -1).all() or _one_for_each(table, column) else None
 
 
 def _one_for_each(table: MotTable, column: Array) -> bool:
-    """Return True if column 8 is a category that each id keeps; 10 columns that may be metres have none."""
     if (table.id < 0).any() or column.max(initial=0) < 2 or column.max(initial=0) > LAST_CLASS or has_ground(table):
         return False
     order = np.lexsort((column, table.id))

@@ -1,71 +1,153 @@
 """The rows of a MOTChallenge text, read strictly. A wrong line raises InputError that names it.
 
 Lines have 6 to 10 columns, the first of which are frame (from 1), id, and the box's left, top, width, height in px.
-Lines of 4 columns are frame, id and the ground position x, y in m.
+Lines of 4 columns are frame, id and the ground position x, y in m. If the first line names the columns, they may have
+another order.
 """
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
+from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
-from sim.io.files.numeric_text import NumericTable, crowded, read_numbers
+from sim.io.files.numeric_text import NumericTable, crowded, is_number_text, read_numbers, read_text
 from sim.io.formats.box_columns import BoxScale, reject_missing_ids
-from sim.io.formats.named_columns import column_names, read_named
 from sim.types import Array, Bools, Ints
 
-GROUND_COLUMNS = 4
-"""Columns of a text of ground positions alone: frame, id, x, y."""
+Column = np.ndarray[tuple[int], np.dtype[np.float64]]
 
+# units that may end the names of positions, as x_cm,y_cm, in m
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
+
+# meaning of a column, and the names it may have
+NAMES = {
+    "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_index"),
+    "id": ("id", "track_id", "trackid", "person_id", "ped_id", "target_id"),
+    "score": ("score", "conf", "confidence"),
+    "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
+    "left": ("left", "bb_left", "xmin", "x1"),
+    "top": ("top", "bb_top", "ymin", "y1"),
+    "right": ("right", "xmax", "x2"),
+    "bottom": ("bottom", "ymax", "y2"),
+    "width": ("width", "w", "bb_width"),
+    "height": ("height", "h", "bb_height"),
+    "cx": ("cx", "xc", "x_center", "center_x"),
+    "cy": ("cy", "yc", "y_center", "center_y"),
+    "x": ("x", *(f"x_{unit}" for unit in UNITS)),
+    "y": ("y", *(f"y_{unit}" for unit in UNITS)),
+}
+
+EXPECTED = (
+    "frame and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), or frame,id,x,y in m (x_cm,y_cm in cm)"
+)
+
+
+def column_names(path: Path) -> list[str] | None:
+    """Returns the names in the first line of a text, in lower case; None if a cell of it is a number."""
+    line = next((line for line in read_text(path).splitlines() if line.strip()), "")
+    cells = [cell.strip().strip('"').lower() for cell in line.split("," if "," in line else None)]
+    return cells if cells and not line.startswith("#") and not any(map(is_number_text, cells)) and cells[0] else None
+
+
+def read_named(path: Path, names: list[str]) -> NumericTable:
+    """Reads a text with named columns as 8 columns of a MOTChallenge text, or as 4: frame, id, x, y in m."""
+    rows = read_numbers(path, (len(names), len(names)), header=True, layout="those that line 1 names")
+    found: dict[str, int] = {}
+    for k, name in enumerate(names):
+        meaning = next((key for key, some in NAMES.items() if name in some), None)
+        if meaning in found:
+            _refuse(path, names)
+        if meaning is not None:
+            found[meaning] = k
+    if not len(rows.line):
+        return replace(rows, values=np.zeros((0, 6)))
+
+    def column(name: str, default: float = -1.0) -> Column:
+        return rows.values[:, found[name]] if name in found else np.full(len(rows.line), default)
+
+    have, id = found.keys(), column("id")
+    if "frame" not in have:
+        _refuse(path, names)
+    frame = column("frame")
+    if have >= {"id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
+        x, y = (column(axis) * UNITS.get(names[found[axis]].partition("_")[2], 1.0) for axis in ("x", "y"))
+        columns = [frame, id, x, y]
+    else:
+        left, top, w, h = _box(column, have) or _refuse(path, names)
+        columns = [frame, id, left, top, w, h, column("score", 1.0), column("class")]
+    unused = [name for k, name in enumerate(names) if k not in found.values()]
+    if unused:
+        warnings.warn(f"{path}: line 1: columns that are not used: {', '.join(unused)}", stacklevel=4)
+    if frame.min() == 0:
+        columns[0] = frame + 1
+        warnings.warn(f"{path}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
+    return replace(rows, values=np.stack(columns, axis=1))
+
+
+def _box(column: Callable[[str], Column], have: Set[str]) -> tuple[Column, Column, Column, Column] | None:
+    w, h = column("width"), column("height")
+    if have >= {"left", "top", "width", "height"}:
+        return column("left"), column("top"), w, h
+    if have >= {"left", "top", "right", "bottom"}:
+        return column("left"), column("top"), column("right") - column("left"), column("bottom") - column("top")
+    if have >= {"cx", "cy", "width", "height"}:
+        return column("cx") - w / 2, column("cy") - h / 2, w, h
+    return (column("x"), column("y"), w, h) if have >= {"x", "y", "width", "height"} else None
+
+
+def _refuse(path: Path, names: list[str]) -> NoReturn:
+    raise InputError(
+        file=path, place="line 1", got=f"columns {','.join(names)}", expected=EXPECTED,
+        remedy="rename the columns",
+    )  # fmt: skip
+
+
+GROUND_COLUMNS = 4  # columns of a text of ground positions alone: frame, id, x, y
+
+# what the columns of a text without names must be, and what to do
 LAYOUT = "frame,id,left,top,width,height,… or frame,id,x,y: name the columns in the first line, if they are others"
-"""What the columns of a text without names must be, and what to do."""
 
 
 @dataclass(frozen=True)
 class MotTable:
-    """A MOTChallenge text file, N rows in the order of the file.
+    """A MOTChallenge text file, N rows in the order of the file."""
 
-    rows: the numbers as read, with their lines for errors. frame (N,): from 1. id (N,): of the person or track, usually
-    -1 for detections. box (N, 4): left, top, width, height in px, all -1 for no box. rest (N, 0 to 4): the columns
-    after the box: confidence or flag; then class and visibility, or x, y, z in m.
-    """
-
-    rows: NumericTable
-    frame: Ints
-    id: Ints
-    box: Array
-    rest: Array
+    rows: NumericTable  # the numbers as read, with their lines for errors
+    frame: Ints  # (N,) from 1
+    id: Ints  # (N,) of the person or track, usually -1 for detections
+    box: Array  # (N, 4) left, top, width, height in px, all -1 for no box
+    rest: Array  # (N, 0 to 4) the columns after the box: confidence or flag; then class and visibility, or x, y, z in m
 
     def boxes(self) -> Array:
-        """Return the boxes of the rows that have one, (B, 4). Raises nothing."""
+        """Returns the boxes of the rows that have one, (B, 4)."""
         return self.box[~self.without_box()]
 
     def without_box(self) -> Bools:
-        """Return flags (N,), True for rows whose box is -1,-1,-1,-1, which means that the row has no box. Raises
-        nothing."""
+        """Returns flags (N,): True for rows whose box is -1,-1,-1,-1."""
         return np.asarray((self.box == -1).all(axis=1))
 
 
 def read_table(
     path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None
 ) -> MotTable:
-    """Read the MOTChallenge text file `path` of 6 to 10 columns: frame, id, left, top, width, height, and up to four
-    more; or of 4 columns: frame, id, x, y in m, which are read as rows without box, of confidence 1 and z = 0.
+    """Reads a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
 
-    length: the last frame allowed; None: 1,000,000. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors
-    of x and y that make the boxes pixels; None: 1. A file without
-    lines gives a table without rows. Rows stay in the order of the file. Raises InputError if the file is unreadable,
-    and, with the line, if a cell is no finite number, the number of columns is wrong, a frame is outside 1 to `length`,
-    a frame or id is no integer, a number is beyond 1e6, a frame has more than 5000 lines, or a box has no area.
+    length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
+    boxes pixels. Rows stay in the order of the file.
     """
     named = column_names(path)
     rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS, layout=LAYOUT) if named is None else read_named(path, named)
     frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] == GROUND_COLUMNS:
+        # A text of positions: no box, confidence 1, z = 0.
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
     table = MotTable(rows, frame, id, box, rest)
     last = FRAMES if length is None else length

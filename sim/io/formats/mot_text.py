@@ -17,24 +17,45 @@ import numpy as np
 
 from sim.arrays import repeated_ids
 from sim.io.formats.box_columns import BoxScale, corner_doubt, require_pixels
-from sim.io.formats.mot_distractors import unscored_rows
 from sim.io.formats.mot_ground import ground_positions, require_metres
-from sim.io.formats.mot_people import labelled_people, of_class
+from sim.io.formats.mot_people import labelled_people, of_class, unscored_rows
 from sim.io.formats.mot_table import MotTable, read_table
-from sim.io.formats.unit_scores import unit_scores
 from sim.io.formats.velocity import differentiate
-from sim.scene.box_scale import scale_of_all_boxes
+from sim.scene.boxes import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth
 
+FEW = 0.02  # share of scores outside [0, 1] up to which they count as outliers of scores in [0, 1]
+
+
+def unit_scores(score: Array) -> tuple[Array, str]:
+    """Returns the finite scores (N,) in [0, 1], and how they were mapped, "" if they were not.
+
+    A few outliers are clipped. Other scores s become 1 / (1 + exp(-(s - c) / d)), c the lower quartile and d such that
+    the median becomes about 0.75.
+    """
+    outside = (score < 0) | (score > 1)
+    count = int(outside.sum())
+    if not count:
+        return score, ""
+    if (score == score[0]).all():
+        return np.ones_like(score), ""
+    if count <= max(FEW * len(score), 1):
+        return np.clip(score, 0, 1), f"{count} of {len(score)} scores outside 0 to 1 are clipped"
+    quarter, median = np.quantile(score, (0.25, 0.5))
+    # A det.txt holds what its detector takes for people, so that most boxes must be able to start a track.
+    # Rounded, so that a few more scores seldom move them.
+    c, d = float(f"{quarter:.2g}"), float(f"{(median - quarter) / np.log(3) or 1.0:.1g}")
+    mapped = 1 / (1 + np.exp(-np.clip((score - c) / d, -500, 500)))
+    span = f"scores from {score.min():g} to {score.max():g}"
+    return mapped, f"{span} are mapped into 0 to 1 by 1 / (1 + exp(-(score - {c:g}) / {d:g}))"
+
+
+# remedy if most rows have the id of another row of their frame
 NO_ID = "check that column 2 is the id: name the columns in the first line, as frame,left,top,width,height,score"
-"""Remedy if most rows have the id of another row of their frame."""
 
 
 def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
-    """Raise InputError, with the line, if an id stands twice in a frame; do nothing otherwise.
-
-    keep (N,): True for the rows of the table that count. Negative ids are not checked.
-    """
+    """Raises InputError if an id from 0 stands twice in a frame. keep (N,): the rows that count."""
     counted = np.flatnonzero(keep & (table.id >= 0))
     again = np.zeros(len(table.frame), bool)
     again[counted] = repeated_ids(table.frame[counted], table.id[counted])
@@ -43,24 +64,17 @@ def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
 
 @dataclass(frozen=True)
 class DetectionTable:
-    """The content of a det.txt, N rows sorted by frame, those of a frame in the order of the file.
+    """The content of a det.txt, N rows sorted by frame, those of a frame in the order of the file."""
 
-    frame (N,): from 1. id (N,): as in the file, usually -1. plane: "ground" (pos in m) or "image" (pos in px). pos (N,
-    2): x, y on the ground, or the box's centre. box (N, 4): left, top, width, height in px, None if any row has none.
-    score (N,): in [0, 1].
-    """
-
-    frame: Ints
-    id: Ints
-    plane: Plane
-    pos: Array
-    box: Array | None
-    score: Array
+    frame: Ints  # (N,) from 1
+    id: Ints  # (N,) as in the file, usually -1
+    plane: Plane  # "ground" (pos in m) or "image" (pos in px)
+    pos: Array  # (N, 2) x, y on the ground, or the box's centre
+    box: Array | None  # (N, 4) left, top, width, height in px, None if any row has none
+    score: Array  # (N,) in [0, 1]
 
     def at(self, index: int, fps: float) -> Detections:
-        """Return the detections of frame `index` (from 1), none if the file has no row of it; their time is (index - 1)
-        / fps s.
-        """
+        """Returns the detections of frame `index` (from 1) at the time (index - 1) / fps s."""
         low, high = np.searchsorted(self.frame, (index, index + 1))
         box = None if self.box is None else self.box[low:high]
         return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
@@ -69,16 +83,7 @@ class DetectionTable:
 def read_detections(
     path: Path, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None
 ) -> DetectionTable:
-    """Read a det.txt: points on the ground (m) if every row has one, else the centres of the boxes in the image (px).
-
-    path: the file. length: the last frame allowed; None: 1,000,000. person_class: the class of people, if the file has
-    classes; None: 1, with a warning about rows of other classes, which are left out. box_scale: as of `read_table`.
-    The boxes are None if any row lacks one. Scores are
-    1 if the file has none; scores outside [0, 1] are mapped into it as `unit_scores` does, with a
-    warning. A file without lines gives no rows.
-
-    Raises InputError as read_table, and for a row without box (-1,-1,-1,-1) if any row lacks a ground point.
-    """
+    """Reads a det.txt: points on the ground (m) if every row has one, else the boxes' centres (px)."""
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     _check_boxes(table)
     ground = ground_positions(table)
@@ -95,7 +100,6 @@ def read_detections(
 
 
 def _check_boxes(table: MotTable) -> None:
-    """Raise InputError for boxes in shares of the picture; warn about boxes that look like corners."""
     require_pixels(table.rows, table.boxes())
     doubt = corner_doubt(table.boxes())
     if doubt:
@@ -103,8 +107,6 @@ def _check_boxes(table: MotTable) -> None:
 
 
 def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
-    """Return flags (N,), True for rows without box. Raise InputError for the first of them if any row lacks a ground
-    position."""
     boxless = table.without_box()
     if ground is None or np.isnan(ground).any():
         table.rows.reject(boxless, "a box, or x, y, z in every line", "give each line a box or a ground position")
@@ -112,10 +114,8 @@ def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
 
 
 def ground_cells(xyz: Sequence[float]) -> str:
-    """Return the last three cells "x,y,z" of a MOT line, in m with 3 decimals, for a position xyz of 3 finite numbers.
-
-    z = -1 would mean unknown, so a z that rounds to -1.000 is written -1.001.
-    """
+    """Returns the last three cells "x,y,z" of a MOT line for a position in m."""
+    # z = -1 would mean unknown.
     x, y, z = (f"{v:.3f}" for v in xyz)
     return f"{x},{y},{z if z != '-1.000' else '-1.001'}"
 
@@ -124,32 +124,24 @@ def read_truth(
     path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
     person_class: int | None = None, box_scale: BoxScale | None = None,
 ) -> Truth:  # fmt: skip
-    """Read a gt.txt as truth of people, without group labels: everybody is alone (-1), and no frame counts as labelled.
+    """Reads a gt.txt as truth of people without group labels, as MOTChallenge's own scoring counts them.
 
-    Rows with flag 0 or of another class than people are left out, as in MOTChallenge's own scoring; so are negative
-    ids. They must be valid all the same. person_class: the class of people; None: 1, with a warning about
-    others. The rest is sorted by (frame, id). name, fps (frames/s): of the
-    sequence. length: number of frames; None: up to the last frame kept. px_per_m: image scale; nan: the median height
-    of the boxes / 1.7 m, nan without boxes. box_scale: as of `read_table`.
-    Boxes are None if a row has none (-1,-1,-1,-1). Positions and velocities
-    are None without ground positions, nan in rows where they are unknown; velocities are differences over 0.5 s.
-    Visibility is 1 where the file has none or -1.
-
-    Raises InputError as read_table (unreadable file, invalid line, frame beyond `length`), for a row without box if any
-    row lacks a ground position, for an id twice in a frame, and for a visibility outside [0, 1] other than -1. Also
-    for positions without boxes that cannot be in metres.
+    length: None: up to the last frame kept. px_per_m: nan: the boxes' median height / 1.7 m. Boxes are None if a row
+    has none, positions (nan in rows without) and velocities if no row has one.
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     _check_boxes(table)
     require_metres(table, fps)
     ground = ground_positions(table)
     boxed = not _reject_placeless(table, ground).any()
+    # Rows that do not count must be valid all the same.
     keep = labelled_people(table, person_class)
     reject_duplicate_ids(table, keep)
     order = np.flatnonzero(keep)
     order = order[np.lexsort((table.id[order], table.frame[order]))]
     frame, id, box = table.frame[order], table.id[order], table.box[order]
     visibility = np.ones(len(order))
+    # MOT16 and later: flag, class, visibility.
     if table.rest.shape[1] == 3:
         v = table.rest[:, 2]
         table.rows.reject((v > 1) | ((v < 0) & (v != -1)), "visibility from 0 to 1, or -1", "correct the last column")

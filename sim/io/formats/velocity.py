@@ -15,19 +15,17 @@ WINDOW = 0.5  # s, length of the time window
 
 
 def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
-    """Return the velocity of each row, (R, D), in the unit of `pos` per s, in the order of the rows.
+    """Returns the velocity of each row (R, D), in the unit of `pos` per s: a difference over a centred window.
 
-    A row's velocity is the difference between the last and the first position of its id inside the window, divided by
-    the time between them. It is 0 if the id has no other row there, nan if one of the two positions is nan. frame, id
-    (R,), pos (R, D) float: rows in any order, each id once in a frame. fps: frames per second. window: length in s,
-    default 0.5, centred on the row. Half of it is rounded to whole frames, at least one, to each side; both end frames
-    count. Without rows the result has none.
+    frame, id (R,), pos (R, D): rows in any order, each id once in a frame. window: s. 0 where an id has one row there,
+    nan if one of the two positions is.
     """
     if len(frame) == 0:
         return np.zeros_like(pos)
     half = max(1, round(window * fps / 2))
     order = np.lexsort((frame, id))
     f, rank = frame[order], np.unique(id[order], return_inverse=True)[1]
+    # Keys of two people are further apart than a window, so one search serves all.
     stride = int(f.max() - f.min()) + 2 * half + 2
     key = rank * stride + (f - f.min()) + half
     first = np.searchsorted(key, key - half, side="left")
@@ -40,11 +38,10 @@ def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float =
 
 
 def chords(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
-    """Return the velocity of each row, (R, D), in the unit of `pos` per s: the chord from the id's earliest row within
-    the last `window` s to the row.
+    """Returns the velocity of each row (R, D): the chord from the id's earliest row of the last `window` s to the row.
 
-    frame, id (R,), pos (R, D): rows in any order, each id once in a frame. fps: frames per second; the window is
-    rounded up to whole frames, at least 1. nan in an id's first row and where it has no other row within the window.
+    frame, id (R,), pos (R, D): rows in any order, each id once in a frame. nan without an earlier row within the
+    window.
     """
     order = np.lexsort((frame, id))
     rank = np.unique(id[order], return_inverse=True)[1]

@@ -39,20 +39,9 @@ def open_video(
     camera: Camera | None = None,
     background: BackgroundChoice = ANY,
 ) -> Sequence:
-    """Return the video file `path` as Sequence; its pictures are decoded while iterating, and it has no detections or
-    truth.
+    """Returns a video file as Sequence whose pictures are decoded while iterating. Options as of `open_source`.
 
-    fps: frames per second; None: found in the file (frame_rate), and times of frames are those of the file if the rate
-    varies. px_per_m: image scale, None if unknown. camera:
-    calibration, scaled to the picture size, None if unknown. background: sample of frames for background models,
-    default 50 spread over the video, fewer if it is shorter. A frame that cannot be decoded has no picture, with a
-    warning. The length is None for VP8 videos, whose packets are not all shown.
-
-    Warns if the video is shorter than its header says, has gaps in time, states no credible frame rate, or stores
-    pixels that are not square. Raises
-    InputError if there is no file, it is no video or no picture can be decoded, the calibration has another aspect
-    ratio, or more background frames are asked for than there are or fit into 2 GB. Iterating raises InputError for a
-    picture of another size.
+    A frame that cannot be decoded has no picture, with a warning. Times are those of the file if the rate varies.
     """
     index = video_decoding.index_packets(path)
     length = len(index.stamps)
@@ -65,6 +54,7 @@ def open_video(
     if index.aspect != 1:
         words = f"pixels of shape {index.aspect.numerator}:{index.aspect.denominator} are made square"
         warnings.warn(f"{path.name}: {words}: pictures of {size_of(first)[0]}×{size_of(first)[1]} px", stacklevel=2)
+    # Some packets of VP8 are not shown, so the length is unknown.
     size, known = size_of(first), None if index.codec in video_decoding.HIDDEN else length
     rate, words = frame_rate(path.name, fps, index)
     choice = background.of(length, path, size)
@@ -88,14 +78,7 @@ def open_video(
 
 
 def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
-    """Yield a text for each part of a video that is missing, made from the index of its packets; nothing if it is
-    whole.
-
-    Its end is missing if reading broke off, or if it has fewer frames than its header promises. If the header names no
-    number of frames, the video must be shorter than the promised duration by more than 1 s and 5 usual steps. A gap is
-    a time without frames of more than 1 s and more than 5 usual steps (the median); one text reports the first gap and
-    counts the others.
-    """
+    """Yields a text for each part of a video that is missing: its end, or a gap in time."""
     times, length = index.times(), len(index.stamps)
     step = np.diff(times)
     usual = float(np.median(step)) if len(step) else 0.0
@@ -113,16 +96,11 @@ def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
 
 
 def frame_rate(name: str, given: float | None, index: video_decoding.PacketIndex) -> tuple[float, str]:
-    """Return (frames per second, text that says where they come from).
-
-    The first of these is taken: `given` by the user, unchecked; the container's rate, if it is from 0.1 to 300, and
-    either the frames come at a steady rate within 2 % of it, or their rate is implausible (outside 0.1 to 300); the
-    rate of the time stamps, if plausible; 25. The last two cause a warning. name: the video's name in the warning.
-    index: the video's packets.
-    """
+    """Returns (frames per second, text that says where they come from), with a warning if they are a guess."""
     if given is not None:
         return given, f"{given:g}, as given"
     header, timed, steady = index.rate, stamped_rate(index), is_steady(index.times())
+    # Containers often state a wrong rate: it must agree with the stamps, or they tell none.
     if _plausible(header) and (not _plausible(timed) or (steady and abs(header / timed - 1) <= AGREE)):
         return header, f"{header:g}, as the container says"
     if _plausible(timed):
@@ -141,15 +119,11 @@ def _plausible(rate: float) -> bool:
 
 
 def _is_gap(step: Array) -> Bools:
-    """Return flags for steps between frames, s, that are longer than 1 s and than 5 usual steps (the median)."""
     return np.asarray(step > max(GAP, GAPS * float(np.median(step)) if len(step) else 0.0))
 
 
 def is_steady(times: Array) -> bool:
-    """Return True if frames come at a steady rate: each within half a step of its time at the mean rate.
-
-    times: of the frames, s, ascending.
-    """
+    """Returns True if each frame is within half a step of its time at the mean rate. times: s, ascending."""
     if len(times) < 3:
         return True
     off = times - np.linspace(times[0], times[-1], len(times))
@@ -157,11 +131,7 @@ def is_steady(times: Array) -> bool:
 
 
 def stamped_rate(index: video_decoding.PacketIndex) -> float:
-    """Return the frames per second by the time stamps of the packets, rounded to 0.001; 0 with fewer than two stamps.
-
-    index: the video's packets. It is the number of steps between frames over the time from the first to the last. Gaps
-    that `missing` reports do not count.
-    """
+    """Returns the frames per second by the packets' time stamps, without gaps; 0 with fewer than two stamps."""
     step = np.diff(index.times())
     step = step[~_is_gap(step)]
     return round(len(step) / float(step.sum()), 3) if len(step) else 0.0

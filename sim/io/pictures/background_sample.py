@@ -18,33 +18,23 @@ from sim.types import BACKGROUNDS, Image
 
 @dataclass(frozen=True)
 class BackgroundChoice:
-    """Which frames of a recording are the sample for a background model.
+    """Which frames of a recording are the sample for a background model."""
 
-    how: "first" for the first `count` frames, "spread" for `count` frames spread evenly over the recording. count: 1 or
-    more, by default 50. asked: True if the user gave --background, False for the default.
-    """
-
+    # "first" for the first `count` frames, "spread" for `count` frames spread evenly over the recording
     how: Literal["first", "spread"] = "spread"
-    count: int = BACKGROUNDS
-    asked: bool = False
+    count: int = BACKGROUNDS  # 1 or more, by default 50
+    asked: bool = False  # True if the user gave --background, False for the default
 
     def __str__(self) -> str:
-        """Return the text that run.json holds, as "first 50 frames (causal from frame 50)".
-
-        "causal" means that no frame of the sample follows the frame that is tracked. For "spread" the text is "50
-        frames spread over the recording (not causal)".
-        """
+        """Returns the text that run.json holds, as "first 50 frames (causal from frame 50)"."""
         if self.how == "first":
             return f"first {self.count} frames (causal from frame {self.count})"
         return f"{self.count} frames spread over the recording (not causal)"
 
     def of(self, length: int, path: Path, size: tuple[int, int] | None = None) -> BackgroundChoice:
-        """Return the choice for a recording of `length` frames: itself if there are enough frames and they fit into 2
-        GB.
+        """Returns the choice for a recording of `length` frames; a default is reduced to what there is and fits.
 
-        size: (width, height) of the pictures in px, None if unknown. A default choice is reduced to all `length` frames
-        of a shorter recording, and to as many large pictures as fit. Raises InputError, naming the recording `path`, if
-        the user asked for more frames than there are, or than fit.
+        size: (width, height) px. A sample is at most 2 GB. Raises InputError if the user asked for more.
         """
         width, height = size or (1, 1)
         most = max(1, SAMPLE_BYTES // (3 * width * height))
@@ -59,21 +49,15 @@ class BackgroundChoice:
         return replace(self, count=min(self.count, length, most))
 
     def indices(self, length: int) -> list[int]:
-        """Return the frames of the sample, from 1 and ascending, for a recording of `length` frames.
-
-        A recording with at most `count` frames gives all of them. "first" takes the frames 1 to `count`, "spread" the
-        middle frame of each of `count` equal parts.
-        """
+        """Returns the frames of the sample, from 1 and ascending, of a recording of `length` frames."""
+        # Else the middle frame of each of `count` equal parts.
         if self.how == "first" or length <= self.count:
             return list(range(1, min(self.count, length) + 1))
         return [int((k + 0.5) * length / self.count) + 1 for k in range(self.count)]
 
 
 def parse_choice(text: str | None) -> BackgroundChoice:
-    """Return the choice that --background names: "first:N" or "spread:N", with N from 1 to 999,999.
-
-    None gives the default, spread:50, which counts as not asked for. Raises InputError for any other text.
-    """
+    """Returns the choice that --background names, "first:N" or "spread:N"; None is the default."""
     if text is None:
         return BackgroundChoice()
     found = re.fullmatch(r"(first|spread):([0-9]{1,6})", text)
@@ -86,23 +70,16 @@ def parse_choice(text: str | None) -> BackgroundChoice:
 
 @dataclass(frozen=True)
 class BackgroundSample:
-    """The sample of one recording's frames for a background model; calling it reads the pictures.
+    """The sample of one recording's frames for a background model; calling it reads the pictures."""
 
-    choice: which frames. length: number of frames of the recording. path: the recording, for messages. pictures: called
-    with ascending frames (from 1), it yields (frame, picture) for those of them that can be read.
-    """
-
-    choice: BackgroundChoice
-    length: int
-    path: Path
+    choice: BackgroundChoice  # which frames
+    length: int  # number of frames of the recording
+    path: Path  # the recording, for messages
+    # called with ascending frames (from 1), it yields (frame, picture) for those of them that can be read
     pictures: Callable[[list[int]], Iterable[tuple[int, Image]]]
 
     def __call__(self) -> Image:
-        """Return the pictures (K, H, W, 3) BGR uint8 in the order of frames; frames that cannot be read are left out.
-
-        K is at most `choice.count`. Warns if a default sample covers the whole recording, because that is shorter than
-        50 frames. Raises InputError if no picture can be read or their sizes differ.
-        """
+        """Returns the pictures (K, H, W, 3) in the order of frames, without those that cannot be read."""
         wanted, count = self.choice.indices(self.length), 0
         for count, (_, picture) in enumerate(self.pictures(wanted), 1):  # no second copy: 0.3 GB at 1920×1080
             if count == 1:

@@ -1,10 +1,19 @@
-"""Pictures of a recording as files in a folder: which file is which frame, reading them, gaps, and equal sizes."""
+"""Pictures of a recording as files in a folder: which file is which frame, reading them, gaps, and equal sizes.
+
+Pictures are often numbered from 0, from the middle of a longer recording, or with gaps. Labels are then numbered like
+the files, or from 1 in the order of the pictures. The labelled frames decide which. Where both are possible, the user
+is asked, because nobody notices pictures that are shifted against their labels. The size that a file declares is read
+before the picture is decoded, since a file of some kilobytes may declare a picture that fills the memory.
+"""
 
 from __future__ import annotations
 
 import os.path
+import re
+import struct
 import warnings
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,22 +22,203 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
-from scenarios.regular_file import refuse_irregular
-from sim.io.files.side_files import is_hidden
-from sim.io.pictures.picture_header import is_bearable
-from sim.io.pictures.picture_numbers import Labelled, Numbering, frames_of, numbering_of
-from sim.types import Image
+from scenarios.limits import FRAMES, fits_picture
+from scenarios.reading import refuse_irregular
+from sim.io.files.own_files import is_hidden
+from sim.types import Image, Ints
+
+WIDTH_TAG, HEIGHT_TAG = 256, 257  # of TIFF
+FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # of JPEG: those that begin a frame
+LONELY_MARKERS = frozenset(range(0xD0, 0xDA)) | {0x01}  # of JPEG: without a length
+
+
+def declared_size(body: bytes) -> tuple[int, int] | None:
+    """Returns (width, height) px by the header of a picture file; None for other or damaged bytes."""
+    try:
+        if body.startswith(b"\x89PNG\r\n\x1a\n"):
+            return struct.unpack(">II", body[16:24])
+        if body.startswith(b"\xff\xd8"):
+            return _jpeg(body)
+        if body.startswith(b"BM"):
+            width, height = struct.unpack("<ii", body[18:26])
+            return abs(width), abs(height)
+        if body[:4] in (b"II*\0", b"MM\0*"):
+            return _tiff(body, "<" if body[:2] == b"II" else ">")
+    except (struct.error, IndexError):
+        return None
+    return None
+
+
+def is_bearable(body: bytes) -> bool:
+    """Returns True if the declared size is known and a picture of it may be decoded."""
+    size = declared_size(body)
+    return size is not None and fits_picture(*size)
+
+
+def _jpeg(body: bytes) -> tuple[int, int] | None:
+    at = 2
+    while at + 4 <= len(body):
+        if body[at] != 0xFF or body[at + 1] in (0x00, 0xFF):  # fill bytes, or damage that decoders skip
+            at += 1
+            continue
+        marker = body[at + 1]
+        if marker in FRAME_MARKERS:
+            height, width = struct.unpack(">HH", body[at + 5 : at + 9])
+            return width, height
+        at += 2 if marker in LONELY_MARKERS else 2 + struct.unpack(">H", body[at + 2 : at + 4])[0]
+    return None
+
+
+def _tiff(body: bytes, order: str) -> tuple[int, int] | None:
+    (start,) = struct.unpack(f"{order}I", body[4:8])
+    (count,) = struct.unpack(f"{order}H", body[start : start + 2])
+    found = {}
+    for k in range(count):
+        entry = body[start + 2 + 12 * k : start + 14 + 12 * k]
+        tag, kind = struct.unpack(f"{order}HH", entry[:4])
+        if tag in (WIDTH_TAG, HEIGHT_TAG):
+            short = kind == 3
+            found[tag] = struct.unpack(f"{order}H" if short else f"{order}I", entry[8 : 10 if short else 12])[0]
+    return (found[WIDTH_TAG], found[HEIGHT_TAG]) if len(found) == 2 else None
+
+
+SPARSE = 100  # numbers in file names that use less than 1 of 100 values are time stamps, not frames
+
+# returns the labelled frames, ascending, each once; called only where they decide something
+Labelled = Callable[[], Ints]
+
+# the words and the numbers of a file name without suffix, in the order in which they alternate
+Key = tuple[tuple[str, ...], tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class Numbering:
+    """How picture numbers become frames: frame = (number - origin) / step + 1."""
+
+    origin: int = 1  # the number of frame 1
+    step: int = 1  # between the numbers of successive frames
+
+
+def numbering_of(folder: Path, files: list[Path], length: int | None, labelled: Labelled | None) -> Numbering | None:
+    """Returns how the files' numbers become frames; None if files are frames in the natural order of their names.
+
+    length: number of frames, None if unknown. labelled: None without labels. Raises InputError if pictures and labels
+    can be matched in two ways or in none; warns if labelled pictures are not taken by their numbers.
+    """
+    keys = [_key(path) for path in files]
+    _refuse_odd_names(folder, files, keys)
+    numbers = _numbers(keys)
+    if numbers is None:
+        if files and labelled is not None:
+            _say(folder, "pictures without a frame number in their names", "in the order of their names")
+        return None
+    found = np.unique(numbers)
+    low, high = int(found[0]), int(found[-1])
+    labels = np.zeros(0, np.int64) if labelled is None or len(found) == high == low + len(found) - 1 else labelled()
+    if len(labels):
+        return _labelled_numbering(folder, found, length, labels)
+    steps = np.unique(np.diff(found))
+    if length == len(found) and len(steps) == 1:
+        return Numbering(low, int(steps[0]))
+    # Without labels, nothing says what the numbers are, but their lowest and highest.
+    free = length is None and labelled is None
+    return Numbering(low if low == 0 or free or (length is not None and high > length) else 1)
+
+
+def frames_of(folder: Path, files: list[Path], numbering: Numbering | None) -> dict[int, Path]:
+    """Returns the picture file of each frame (from 1), ascending; a frame without a picture has no entry."""
+    keys = [_key(path) for path in files]
+    if numbering is None:
+        ordered = sorted(zip(keys, files, strict=True), key=lambda pair: (*pair[0], pair[1]))
+        return {frame: path for frame, (_, path) in enumerate(ordered, 1)}
+    numbers = _numbers(keys)
+    if files and numbers is None:
+        raise InputError(
+            file=folder, got=files[0].name, expected="names with frame numbers", remedy="rename the pictures"
+        )
+    found: dict[int, Path] = {}
+    for number, path in sorted(zip(numbers or (), files, strict=True)):
+        frame, rest = divmod(number - numbering.origin, numbering.step)
+        frame += 1
+        if frame in found:
+            got = f"{found[frame].name} and {path.name}"
+            raise InputError(file=folder, got=got, expected="one picture of each frame", remedy="remove one of the two")
+        if rest or not 1 <= frame <= FRAMES:
+            expected = f"frames up to {FRAMES}, numbered from {numbering.origin} in steps of {numbering.step}"
+            raise InputError(file=folder, got=path.name, expected=expected, remedy="rename the pictures")
+        found[frame] = path
+    return found
+
+
+def _key(path: Path) -> Key:
+    parts = re.split(r"([0-9]+)", path.stem)
+    return tuple(parts[::2]), tuple(int(part) for part in parts[1::2])
+
+
+def _refuse_odd_names(folder: Path, files: list[Path], keys: list[Key]) -> None:
+    counts = Counter(words for words, numbers in keys if numbers)
+    if not counts:
+        return
+    usual, count = counts.most_common(1)[0]
+    odd = [path.name for path, (words, _) in zip(files, keys, strict=True) if words != usual]
+    if count > 1 and odd:
+        example = next(path.name for path, (words, _) in zip(files, keys, strict=True) if words == usual)
+        more = f" and {len(odd) - 1} more" if len(odd) > 1 else ""
+        raise InputError(
+            file=folder, got=f"{odd[0]}{more} beside {example}", expected="names that differ in their numbers only",
+            remedy="move copies and other pictures elsewhere",
+        )  # fmt: skip
+
+
+def _numbers(keys: list[Key]) -> list[int] | None:
+    if not keys or len({words for words, _ in keys}) > 1 or not keys[0][1]:
+        return None
+    columns = list(zip(*(numbers for _, numbers in keys), strict=True))
+    varying = [column for column in columns if len(set(column)) > 1]
+    if len(varying) > 1:
+        return None
+    found = list((varying or columns[-1:])[0])
+    return None if max(found) - min(found) >= SPARSE * len(found) else found
+
+
+def _labelled_numbering(folder: Path, found: Ints, length: int | None, labels: Ints) -> Numbering:
+    low, high, first, last = int(found[0]), int(found[-1]), int(labels[0]), int(labels[-1])
+    span, count, steps = high - low + 1, len(found), np.unique(np.diff(found))
+    beyond = length is not None and high > length
+    # Each labelled frame has the picture of its number.
+    if low > 0 and not beyond and np.isin(labels, found).all():
+        return Numbering()
+    # Pictures in even steps, labels counted in order.
+    if len(steps) == 1 and steps[0] > 1 and last <= count:
+        _say(folder, f"pictures {low} to {high} in steps of {steps[0]}", f"1 to {count}, as the labels are numbered")
+        return Numbering(low, int(steps[0]))
+    # Labels end with the last picture, or before the first number: counted from the first.
+    if low != 1 and (last == span or (last < span and (last < low or (low > 0 and beyond)))):
+        _say(folder, f"pictures {low} to {high}", f"1 to {span}, as the labels are numbered")
+        return Numbering(low)
+    # Both readings are possible.
+    doubtful = low == 0 or (low > 1 and last <= span) or (low == 1 and last == count < span)
+    if doubtful or last < low or first > high:
+        raise InputError(
+            file=folder, got=f"{count} pictures numbered {low} to {high}, and labels of frames {first} to {last}",
+            expected="pictures and labels with the same numbers",
+            remedy="rename the pictures: each gets the number of its labels, from 000001",
+        )  # fmt: skip
+    return Numbering()
+
+
+def _say(folder: Path, pictures: str, frames: str) -> None:
+    warnings.warn(f"{folder}: {pictures} are taken as frames {frames}", stacklevel=5)
+
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff")
 Picture = TypeVar("Picture", bound=NDArray[Any])
 
 
 def fill_gaps(pairs: Iterable[tuple[int, Image]], length: int | None, place: str) -> Iterator[Image | None]:
-    """Yield a picture for each frame from 1 on, None for a frame that `pairs` leave out.
+    """Yields the picture of each frame from 1 to `length`, None where the ascending `pairs` have none.
 
-    pairs: (frame, picture), frames from 1 and ascending; read while iterating. length: number of frames; None: up to
-    the last pair; pairs beyond it are yielded, too. The first missing frame is reported by a warning with the
-    recording's name `place`; further ones are not.
+    length: None: up to the last pair. The first missing frame causes a warning about the recording `place`.
     """
     shown, warned = 0, False
     for number, picture in pairs:
@@ -49,15 +239,12 @@ def _warn_lost(place: str, frame: int) -> bool:
 
 
 def size_of(picture: NDArray[Any]) -> tuple[int, int]:
-    """Return (width, height) in px of a picture of shape (H, W) or (H, W, 3)."""
+    """Returns (width, height) in px of a picture of shape (H, W) or (H, W, 3)."""
     return picture.shape[1], picture.shape[0]
 
 
 def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str = "") -> Picture:
-    """Return the picture unchanged if its (width, height) in px is `size`, else raise InputError.
-
-    path, place: the file, and the frame in it, for the error.
-    """
+    """Returns the picture unchanged if its (width, height) is `size`, else raises InputError."""
     if size_of(picture) != size:
         got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)
         raise InputError(file=path, place=place, got=got, expected=expected, remedy="give pictures of one size")
@@ -65,20 +252,17 @@ def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str
 
 
 def read_picture(path: Path) -> Image | None:
-    """Return the picture file `path` as (H, W, 3) BGR uint8; None if it is missing, unreadable, truncated, no JPEG,
-    PNG, BMP or TIFF, or declares more than 16,384 px a side or 40 million px.
-
-    Grey pictures become BGR, 16-bit pictures keep their upper 8 bits, transparency is dropped. OpenCV's messages are
-    silenced meanwhile. Raises nothing.
-    """
+    """Returns a picture file as (H, W, 3) BGR uint8; None if it is missing, damaged, too large or of another kind."""
     import cv2
 
     try:
         body = path.read_bytes()
     except OSError:
         return None
+    # Some decoders return half a picture of a truncated file, or print to stderr.
     if not is_complete(body) or not is_bearable(body):
         return None
+    # A damaged picture is a lost frame, and no message of OpenCV.
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         picture = cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_COLOR)
@@ -90,11 +274,7 @@ def read_picture(path: Path) -> Image | None:
 
 
 def is_complete(body: bytes) -> bool:
-    """Return False if `body`, the bytes of a picture file, is empty, or a JPEG or PNG without its end mark; else True.
-
-    Other bytes, also those of no picture, count as complete. Checked before decoding, because some decoders return half
-    a picture of a truncated file, or print to stderr.
-    """
+    """Returns False if a picture file's bytes are empty, or a JPEG or PNG without its end mark."""
     if body.startswith(b"\xff\xd8"):
         return body.rfind(b"\xff\xd9") > body.rfind(b"\xff\xda") > 0
     return b"IEND" in body[-64:] if body.startswith(b"\x89PNG") else len(body) > 0
@@ -102,15 +282,13 @@ def is_complete(body: bytes) -> bool:
 
 @dataclass(frozen=True)
 class PictureFolder:
-    """The picture files of a recording.
+    """The picture files of a recording."""
 
-    folder: their folder. files: path of the file of each frame, by frame number (from 1); a frame without a picture has
-    no entry. `last` is the highest number, so frames without a picture below it are gaps. numbering: how the numbers in
-    the names became frames, None for files in the order of their names.
-    """
-
-    folder: Path
+    folder: Path  # their folder
+    # path of the file of each frame, by frame number (from 1); a frame without a picture has no entry. `last` is the
+    # highest number, so frames without a picture below it are gaps.
     files: dict[int, Path]
+    # how the numbers in the names became frames, None for files in the order of their names
     numbering: Numbering | None
 
     @property
@@ -119,19 +297,12 @@ class PictureFolder:
         return max(self.files, default=0)
 
     def first_size(self) -> tuple[int, int] | None:
-        """Return (width, height) in px of the first picture, in the order of `files`, that can be read; None if none
-        can."""
+        """Returns (width, height) px of the first picture that can be read; None if none can."""
         found = (read_picture(path) for path in self.files.values())
         return next((size_of(picture) for picture in found if picture is not None), None)
 
     def read(self, frames: Iterable[int], size: tuple[int, int] | None) -> Iterator[tuple[int, Image]]:
-        """Yield (frame, picture) for those of `frames` (from 1) whose picture can be read; pictures are (H, W, 3) BGR
-        uint8.
-
-        Pictures come in the order of `frames`, read one by one while iterating. size: (width, height) px of all
-        pictures; None means that no file can be read. Iterating raises InputError for None, and for a picture of
-        another size.
-        """
+        """Yields (frame, picture) of those `frames` whose picture can be read, all of this size, in px."""
         if size is None:
             raise InputError(
                 file=self.folder, got=f"{len(self.files)} pictures, none of which can be read", expected="JPG or PNG",
@@ -144,14 +315,9 @@ class PictureFolder:
 
 
 def find_pictures(folder: Path, length: int | None, labelled: Labelled | None) -> PictureFolder:
-    """Return the picture files of a folder by frame (from 1); a missing folder gives no files.
+    """Returns the picture files of a folder by frame; `picture_numbers` says which frame a file is.
 
-    length: number of frames, None if unknown. labelled: returns the labelled frames, None without labels and
-    detections. Files ending in .jpg, .jpeg, .png, .bmp, .tif and .tiff count, except hidden and side files. Which frame
-    a file is, and what is refused: `picture_numbers`.
-
-    Also raises InputError for a FIFO, device, folder or other thing that is no regular file. A link to a missing file
-    is a frame without picture.
+    length: number of frames, None if unknown. labelled: returns the labelled frames, None without labels.
     """
     files = _picture_files(folder)
     numbering = numbering_of(folder, files, length, labelled)
@@ -159,10 +325,7 @@ def find_pictures(folder: Path, length: int | None, labelled: Labelled | None) -
 
 
 def find_right_pictures(folder: Path, left: PictureFolder) -> PictureFolder:
-    """Return the picture files of the right camera by frame, numbered like those of the left one.
-
-    Raises InputError if the files have no number and are not as many as the left ones, and as `find_pictures`.
-    """
+    """Returns the picture files of the right camera by frame, numbered like those of the left one."""
     files = _picture_files(folder)
     if files and left.numbering is None and len(files) != len(left.files):
         got, expected = f"{len(files)} pictures without numbers", f"{len(left.files)}, as in {left.folder.name}"

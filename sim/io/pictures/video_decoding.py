@@ -19,7 +19,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAMES, PICTURE_SIZES, fits_picture
-from scenarios.regular_file import require_regular
+from scenarios.reading import require_regular
 from sim.types import Array, Image
 
 COVER = "attached_pic"
@@ -31,48 +31,35 @@ REMEDY = "give a video that a player plays to its end"
 
 @dataclass(frozen=True)
 class PacketIndex:
-    """The packets of a video stream, in the order of the file.
+    """The packets of a video stream, in the order of the file."""
 
-    stamps: when each packet is shown, in units of time_base (a fraction of a second), None if unknown. keys: True where
-    a group of packets begins that can be decoded by itself. rate: frames per second; promised: number of frames;
-    seconds: duration; these three by the header, 0 if missing. broken: why reading stopped before the end of the file,
-    "" if it did not. codec: libav's name of the codec. reorders: True if packets may be stored in another order than
-    they are shown. aspect: width / height of a stored pixel, 1 if unknown.
-    """
-
+    # when each packet is shown, in units of time_base (a fraction of a second), None if unknown
     stamps: tuple[int | None, ...]
-    keys: tuple[bool, ...]
+    keys: tuple[bool, ...]  # True where a group of packets begins that can be decoded by itself
     time_base: Fraction
-    rate: float
-    promised: int
-    seconds: float
-    broken: str
-    codec: str
-    reorders: bool
-    aspect: Fraction = Fraction(1)
+    rate: float  # frames per second;
+    promised: int  # number of frames;
+    seconds: float  # duration; these three by the header, 0 if missing
+    broken: str  # why reading stopped before the end of the file, "" if it did not
+    codec: str  # libav's name of the codec
+    reorders: bool  # True if packets may be stored in another order than they are shown
+    aspect: Fraction = Fraction(1)  # width / height of a stored pixel, 1 if unknown
 
     def times(self) -> Array:
-        """Return the times at which frames are shown, in s, ascending; unknown and repeated stamps are left out."""
+        """Returns the distinct times at which frames are shown, s, ascending."""
         return np.array(sorted({s for s in self.stamps if s is not None}), float) * float(self.time_base)
 
     def ranks(self) -> dict[int, int] | None:
-        """Return the frame (from 1) of each time stamp, a stamp being in units of time_base.
-
-        Returns None if the stamps cannot be trusted: one is missing or stands twice, they ascend in the file although
-        `reorders` is True, or the codec (VP8) has packets that are never shown.
-        """
+        """Returns the frame (from 1) of each time stamp; None if the stamps cannot be trusted."""
         known = [s for s in self.stamps if s is not None]
+        # Packets that may be reordered, and yet have ascending stamps: the container made them up.
         ascending = known == sorted(known)
         if len(set(known)) < len(self.stamps) or (self.reorders and ascending) or self.codec in HIDDEN:
             return None
         return {stamp: k for k, stamp in enumerate(sorted(known), 1)}
 
     def groups(self, wanted: set[int]) -> set[int] | None:
-        """Return the numbers (from 1) of the packet groups that hold the frames `wanted` (from 1).
-
-        A packet group can be decoded by itself; packets before the first are group 0. Frames beyond the end are
-        ignored. Returns None if the time stamps cannot be trusted (see ranks).
-        """
+        """Returns the numbers (from 1) of the packet groups that hold the frames `wanted`; None if unknown."""
         ranks = self.ranks()
         if ranks is None:
             return None
@@ -84,11 +71,7 @@ class PacketIndex:
 
 @contextmanager
 def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
-    """Give (libav container, first video stream) of a file for the length of the block, set to decode in one thread.
-
-    Cover pictures are no video stream. Raises InputError if the file is missing, no regular file, empty or no video,
-    has no video stream, uses an unknown codec, or has pictures of more than 16,384 px a side or 40 million px.
-    """
+    """Yields (libav container, first video stream) of a file, set to decode in one thread."""
     import av
 
     size = require_regular(path)
@@ -108,6 +91,7 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
         if not fits_picture(width, height) or not fits_picture(*square_size(width, height, _aspect(stream))):
             got = f"{width}×{height} px" + (f" of shape {aspect}" if (aspect := _aspect(stream)) != 1 else "")
             raise InputError(file=path, got=got, expected=PICTURE_SIZES, remedy="give a smaller video")
+        # The same pictures on every machine.
         stream.codec_context.thread_count = 1
         yield container, stream
 
@@ -117,12 +101,7 @@ def _reason(error: Exception) -> str:
 
 
 def index_packets(path: Path) -> PacketIndex:
-    """Return the packet index of the video file `path`: time stamps, key packets and header, read without decoding.
-
-    A damaged file is indexed up to the damage, and `broken` says why. Empty and discarded packets do not count. Raises
-    InputError if the file is missing, empty or no video, has no video stream, uses an unknown codec, or has more than
-    1,000,000 frames.
-    """
+    """Returns the packet index of a video, read without decoding; a damaged one is indexed up to the damage."""
     import av
 
     found, broken = [], ""
@@ -145,36 +124,24 @@ def index_packets(path: Path) -> PacketIndex:
 
 
 def _aspect(stream: Any) -> Fraction:
-    """Return width / height of a pixel of a libav video stream, 1 if unknown."""
     return stream.sample_aspect_ratio or stream.codec_context.sample_aspect_ratio or Fraction(1)
 
 
 def square_size(width: int, height: int, aspect: Fraction) -> tuple[int, int]:
-    """Return the (width, height) in px that show a picture with square pixels; the shorter side of a pixel grows.
-
-    width, height: of the stored picture, px. aspect: width / height of a stored pixel.
-    """
+    """Returns the (width, height) px that show a picture with square pixels of the shape `aspect`."""
     return (round(width * aspect), height) if aspect >= 1 else (width, round(height / aspect))
 
 
 def _seconds(stream: Any) -> float:
-    """Return the duration of a libav video stream in s by the header, 0 if missing.
-
-    Matroska writes it as a tag DURATION, as 00:00:11.429000000.
-    """
     if stream.duration is not None:
         return float(stream.duration * stream.time_base)
+    # Matroska has the duration as a tag.
     found = re.fullmatch(r"([0-9]+):([0-9][0-9]):([0-9][0-9](?:\.[0-9]+)?)", stream.metadata.get("DURATION", ""))
     return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3]) if found else 0.0
 
 
 def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
-    """Yield the packets of a libav container's video stream, in the order of the file, up to the first that cannot be
-    read.
-
-    index_packets stops there, too. The last packet is empty and makes the decoder give what it still holds. Raises
-    nothing for a damaged file.
-    """
+    """Yields the packets up to the first that cannot be read; the last, empty one flushes the decoder."""
     import av
 
     packets = container.demux(stream)
@@ -189,13 +156,7 @@ def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
 
 
 def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
-    """Yield (frame, picture (H, W, 3) BGR uint8) in the order in which frames are shown, of all frames or those
-    `wanted`.
-
-    Frames count from 1. index: the packet index of the same file `path`. wanted: frames in any order; None for all, []
-    for none. Frames that cannot be decoded, and frames beyond the end, are left out. Iterating raises InputError if the
-    file is missing, empty or no video, has no video stream, or uses an unknown codec.
-    """
+    """Yields (frame, picture) in the order in which frames are shown, of all frames or those `wanted`."""
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
     some = None if wanted is None else set(wanted)
     groups = None if some is None else index.groups(some)
@@ -210,11 +171,7 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
 
 
 def _decoded(container: Any, stream: Any, groups: set[int] | None) -> Iterator[Any]:
-    """Yield the decoded libav frames in the order in which they are shown, None for a packet that cannot be decoded.
-
-    container, stream: of libav, as open_stream gives them. groups: numbers (from 1) of the packet groups to decode; the
-    others are skipped. None decodes all. Raises nothing for a damaged file.
-    """
+    """Yields the decoded libav frames as shown, None for a packet that cannot be decoded, of these packet groups."""
     group, running = 0, False
     for packet in _demuxed(container, stream):
         group += packet.is_keyframe
@@ -238,15 +195,9 @@ def _decode_packet(stream: Any, packet: Any) -> list[Any]:
 
 
 def _picture(frame: Any, aspect: Fraction) -> Image:
-    """Return a decoded libav frame as (H, W, 3) BGR uint8 with square pixels, turned upright by the rotation it states
-    (quarter turns).
-
-    aspect: width / height of a stored pixel. OpenCV converts the usual pixel format (yuv420p, BT.601, narrow range,
-    even size). Other formats go through swscale's exact conversion, which takes ten times as long; its default one
-    darkens by one or two grey levels.
-    """
     import cv2
 
+    # OpenCV is ten times as fast as swscale's exact conversion; swscale's default darkens by one or two grey levels.
     usual = frame.format.name == "yuv420p" and frame.colorspace in BT601 and frame.color_range in NARROW
     if usual and frame.width % 2 == 0 and frame.height % 2 == 0:
         image = np.asarray(cv2.cvtColor(frame.to_ndarray(), cv2.COLOR_YUV2BGR_I420), np.uint8)

@@ -25,7 +25,7 @@ BT601, NARROW = 6, 1  # libav's numbers of the colour matrix and range that Open
 
 
 def rate_of(fps: float) -> Fraction:
-    """Return `fps`, frames per second, as the nearest fraction with a denominator up to 1001."""
+    """Returns `fps` as the nearest fraction with a denominator up to 1001."""
     return Fraction(fps).limit_denominator(1001)
 
 
@@ -33,15 +33,10 @@ def rate_of(fps: float) -> Fraction:
 def write_video(
     path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY, comment: str = ""
 ) -> Iterator[VideoWriter]:
-    """Give a VideoWriter for an H.264 mp4 file `path`, which is complete after the block; an existing file is
-    overwritten.
+    """Yields a VideoWriter for an H.264 mp4 file, which is complete after the block.
 
-    size: (width, height) px of all pictures. fps: frames per second, rounded to a fraction with a denominator up to
-    1001. quality: x264's constant rate factor, lower is better, default 18. comment: stored in the file, "" for none.
-    If the block raises, an incomplete file stays; if it adds no picture, a file without pictures.
-
-    Raises InputError if width or height is odd, OSError if the file cannot be opened or written, as on a full disk, and
-    WorkError if the finished video holds another number of pictures than were added.
+    size: (width, height) px, both even. quality: x264's constant rate factor, lower is better. Raises OSError if the
+    file cannot be written, and WorkError if the finished video lacks pictures.
     """
     if size[0] % 2 or size[1] % 2:
         raise InputError(
@@ -66,7 +61,6 @@ def write_video(
 
 
 def _pictures_in(path: Path) -> int:
-    """Return the number of whole pictures in a video, still encoded; 0 for an unreadable one."""
     import av
 
     try:
@@ -79,9 +73,7 @@ def _pictures_in(path: Path) -> int:
 class WholeFile:
     """The file that libav writes to: every byte is written, or the first exception is kept and writing ends.
 
-    file: the open raw file. libav goes on after a write that failed or was short, so each caller of libav then calls
-    `raise_error`. Ctrl-C, which Python cannot pass through libav, comes out there, too. State: the exception, None as
-    long as all is written.
+    State: the exception, None as long as all is written. Each caller of libav then calls `raise_error`.
     """
 
     def __init__(self, file: Any):
@@ -90,7 +82,7 @@ class WholeFile:
         self._error: BaseException | None = None
 
     def write(self, data: Any) -> int:
-        """Write all bytes; returns their number, also after a failure."""
+        """Writes all bytes; returns their number, also after a failure."""
         rest = memoryview(data)
         try:
             while rest and self._error is None:
@@ -98,12 +90,13 @@ class WholeFile:
                 if not count:
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 rest = rest[count:]
+        # libav goes on after an exception, also after Ctrl-C.
         except BaseException as error:
             self._error = error
         return len(data)
 
     def raise_error(self) -> None:
-        """Raise the exception that ended the writing; do nothing if all was written."""
+        """Raises the exception that ended the writing."""
         if self._error is not None:
             raise self._error
 
@@ -111,9 +104,7 @@ class WholeFile:
 class VideoWriter:
     """A video that is being written; made by `write_video`, which also ends and closes it.
 
-    file: what to write to. size: (width, height) of all pictures in px, both even. fps: frames per second. quality:
-    x264's constant rate factor, lower is better. comment: stored in the file, "" for none. State: libav's open
-    container and stream, and `count`, the number of pictures added.
+    State: libav's open container and stream, and `count`, the number of pictures added.
     """
 
     def __init__(self, file: WholeFile, size: tuple[int, int], fps: float, quality: int, comment: str):
@@ -129,16 +120,13 @@ class VideoWriter:
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = "yuv420p"
         context = self._stream.codec_context
+        # The same pictures give the same bytes.
         context.thread_count = 1
         context.color_range = NARROW
         context.colorspace = context.color_primaries = context.color_trc = BT601
 
     def add(self, picture: Image) -> None:
-        """Append a picture (H, W, 3) BGR uint8.
-
-        Raises InputError for a picture of another size than the video's, and OSError if the video cannot be written, as
-        on a full disk; so do `end` and `close`.
-        """
+        """Appends a picture (H, W, 3) BGR uint8."""
         import av
         import cv2
 
@@ -157,12 +145,12 @@ class VideoWriter:
         self.count += 1
 
     def end(self) -> None:
-        """Encode and write the frames that the encoder still holds; no picture may be added afterwards."""
+        """Writes the frames that the encoder still holds."""
         self._container.mux(self._stream.encode(None))
         self._file.raise_error()
 
     def close(self) -> None:
-        """Write the index of the file and close the container; the file object that was given stays open."""
+        """Writes the index of the file and closes the container."""
         try:
             self._container.close()
         finally:

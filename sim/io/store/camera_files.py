@@ -15,13 +15,7 @@ from sim.types import Array, Camera, Scene, Stairs
 
 
 def camera_document(camera: Camera) -> dict[str, Any]:
-    """Return the content of camera.json as a dict for JSON.
-
-    Keys: format (1), kind ("pinhole" or "top"), image [width, height] px, focal_px [fx, fy], centre_px [cx, cy],
-    position [x, y, z] m, rotation 3x3 (world to camera), baseline m (0 without a right camera), px_per_m (None if
-    unknown, as for a pinhole), and radial (Tsai's lens distortion, kappa1 × focal length², without unit), which is left
-    out if it is 0.
-    """
+    """Returns the content of camera.json: the fields of Camera; rotation is world to camera."""
     distortion = {"radial": camera.radial} if camera.radial else {}
     return {
         "format": tables.FORMAT,
@@ -38,12 +32,7 @@ def camera_document(camera: Camera) -> dict[str, Any]:
 
 
 def read_camera(path: Path) -> Camera:
-    """Read a camera.json as Camera; missing baseline and radial are 0, a missing or null px_per_m is nan.
-
-    Raises InputError if the file is unreadable, no JSON object or of another format number, a key is missing, or a
-    value has the wrong type or shape or is beyond 1e6. Also if the image size has fractions, px_per_m is missing for
-    kind "top", or the camera cannot be used (sim.scene.camera_check).
-    """
+    """Reads a camera.json; missing baseline and radial are 0, a missing px_per_m is nan."""
     d = tables.read_document(path)
     kind = _key(path, d, "kind")
     if kind not in ("pinhole", "top"):
@@ -68,13 +57,7 @@ def read_camera(path: Path) -> Camera:
 
 
 def scene_document(scene: Scene) -> dict[str, Any]:
-    """Return the content of scene.json as a dict for JSON, all lengths in m.
-
-    Keys: format (1), size [x, y], and lists, empty if there are none: walls and doors, each [[x1, y1], [x2, y2]];
-    pillars, each [x, y, radius]; service (service points), each [x, y]; stairs, each a dict of foot and head [x, y],
-    width, rise, steps (their number), landing (length of the plateau behind the head). Also wall_height and
-    pillar_height.
-    """
+    """Returns the content of scene.json, all lengths in m: the fields of Scene as lists."""
     stairs = [
         {"foot": s.foot.tolist(), "head": s.head.tolist(), "width": s.width, "rise": s.rise, "steps": s.steps,
          "landing": s.landing}
@@ -86,11 +69,7 @@ def scene_document(scene: Scene) -> dict[str, Any]:
 
 
 def read_scene(path: Path) -> Scene:
-    """Read a scene.json as Scene.
-
-    Raises InputError if the file is unreadable, no JSON object or of another format number, a key is missing, or a
-    value has the wrong type or shape or is beyond 1e6.
-    """
+    """Reads a scene.json."""
     d = tables.read_document(path)
     stairs = _key(path, d, "stairs")
     if not isinstance(stairs, list) or not all(isinstance(s, dict) for s in stairs):
@@ -125,11 +104,7 @@ def _key(path: Path, d: dict[str, Any], key: str) -> Any:
 
 
 def _numbers(path: Path, d: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:
-    """Return the numbers under `key` of the JSON object `d` as a float64 array.
-
-    shape: the shape they must have; -1 in front for any length, which may be 0; () for a single number. path: the file,
-    for the error. Raises InputError if the key is missing, or a value is no number, beyond 1e6 or of another shape.
-    """
+    """Returns the numbers under `key` as an array of this shape; -1 in front stands for any length."""
     value = _key(path, d, key)
     try:
         a = np.asarray(value)

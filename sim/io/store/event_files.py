@@ -23,12 +23,7 @@ ORDER_KEYS = ("id", "kind", "fired", "time", "before", "after", "event")
 
 
 def event_dict(event: GroupEvent) -> dict[str, Any]:
-    """Return an event as a dict for JSON, with the fields of GroupEvent as keys.
-
-    Keys: kind, start and end (frames from 1, inclusive), emitted (frame in which a tracker reported it, None in a
-    truth), before and after (lists of group ids, -1 for a person alone), members (list of person ids), pos [x, y].
-    Unknown (nan) coordinates of `pos` are None.
-    """
+    """Returns an event as a dict for JSON, with the fields of GroupEvent as keys."""
     return {
         "kind": event.kind, "start": int(event.start), "end": int(event.end),
         "emitted": None if event.emitted is None else int(event.emitted),
@@ -38,22 +33,12 @@ def event_dict(event: GroupEvent) -> dict[str, Any]:
 
 
 def events_bytes(events: Iterable[GroupEvent]) -> bytes:
-    """Return the events.json of a truth, as bytes, with one event per line in the given order; no events give an empty
-    list.
-
-    It is the JSON object {"format": 1, "events": [...]}. Raises ValueError for an infinite coordinate.
-    """
+    """Returns the events.json of a truth, one event per line."""
     return json_list("events", map(event_dict, events))
 
 
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
-    """Read an events.json as pairs (event, frame whose tracks reported it), in the order of the file.
-
-    The frame counts from 1 and is None if the file does not store it, as in a truth. Null coordinates become nan.
-    Raises InputError if the file is unreadable, no JSON object, of another format number or without a list of events.
-    Also raises InputError if an event lacks a key, has an unknown kind or a value of the wrong type, starts before
-    frame 1, ends before it starts or after frame 1,000,000, or has a negative id (before and after: below -1).
-    """
+    """Reads an events.json as pairs (event, frame whose tracks reported it, None if not stored)."""
     found = read_document(path).get("events")
     if not isinstance(found, list):
         raise InputError(file=path, place="events", got=type(found).__name__, expected="a list", remedy="correct it")
@@ -88,7 +73,7 @@ def _event(path: Path, k: int, e: Any) -> GroupEvent:
 
 
 def _number_from(least: int, value: Any) -> int:
-    """Return the value if it is a whole number from `least` on; raise ValueError otherwise. True is no number."""
+    # True is no number.
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise ValueError(f"{value!r}, which is no whole number from {least} on")
     return value
@@ -101,7 +86,6 @@ def _numbers_from(least: int, values: Any) -> tuple[int, ...]:
 
 
 def _coordinate(value: Any) -> float:
-    """Return a coordinate as float, nan for None. Raises ValueError for other types and beyond 1e6."""
     if value is None:
         return float("nan")
     if not is_number(value, -COORDINATE, COORDINATE):
@@ -114,21 +98,13 @@ def _bad(path: Path, k: int, got: str, expected: str) -> InputError:
 
 
 def near_bytes(near: Near) -> bytes:
-    """Return near.csv as bytes: a header and the columns start, end (frames from 1, inclusive), a, b (person ids).
-
-    A row is a pair of strangers who satisfy the merge rule. No rows give the header alone.
-    """
+    """Returns near.csv: start, end (frames from 1, inclusive), a, b (ids of strangers who satisfy the merge rule)."""
     rows = zip(near.start, near.end, near.a, near.b, strict=True)
     return "".join([NEAR_COLUMNS + "\n", *(f"{s},{e},{a},{b}\n" for s, e, a, b in rows)]).encode()
 
 
 def read_near(path: Path) -> Near:
-    """Read a near.csv (frames start, end and person ids a, b); a file with the header alone gives no rows.
-
-    A row is a pair of strangers who satisfy the merge rule from frame start to end (from 1, inclusive). Raises
-    InputError if the file is unreadable or its header is another one. Also raises InputError, with the line, if a line
-    has not four whole numbers, a frame is outside 1 to 1,000,000, the end precedes the start, or an id is negative.
-    """
+    """Reads a near.csv."""
     header, *lines = read_text(path).splitlines() or [""]
     if header != NEAR_COLUMNS:
         raise InputError(
@@ -150,21 +126,12 @@ def _near_row(path: Path, number: int, line: str) -> tuple[int, int, int, int]:
 
 
 def script_bytes(orders: Iterable[Order]) -> bytes:
-    """Return script.json as bytes, with one order of the script per line; no orders give an empty list.
-
-    The keys are id, kind, fired (frame from 1, or null), time (of firing, s, or null), before, after (lists of person
-    ids of each group), event (index from 0 in events.json of the event that fulfilled it, or null).
-    """
+    """Returns script.json, one order of the script per line."""
     return json_list("orders", ({key: getattr(o, key) for key in ORDER_KEYS} for o in orders))
 
 
 def read_script(path: Path) -> tuple[Order, ...]:
-    """Read the orders of a script.json, in the order of the file; a missing list gives (). time and event may miss.
-
-    Raises InputError if the file is unreadable, no JSON object or of another format number, or if "orders" is no list.
-    Also if an order lacks a key, or has a person id that is no whole number from 0 on, or a frame "fired" that is
-    neither null nor a whole number from 1 on, or a time or event that is no number.
-    """
+    """Reads the orders of a script.json; a missing list gives none."""
     found = read_document(path).get("orders", [])
     if not isinstance(found, list):
         raise InputError(file=path, place="orders", got=type(found).__name__, expected="a list", remedy="restore it")

@@ -28,13 +28,10 @@ _Row = tuple[int, Ints, Array, float, Array]  # group's id, members, x and y, si
 
 
 def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
-    """Return groups.parquet as bytes, for the groups of consecutive frames, the first of which has index `first`.
+    """Returns groups.parquet, a row per frame and group, for consecutive frames from `first` on.
 
-    unit: "m" or "px", that of positions and hulls. An item of `frames` may be None (groups unknown), which is stored
-    apart from a frame without groups. One row per frame and group; columns: frame, group (id), members (person ids), x,
-    y, (z), vx, vy, (vz), extent_xx, extent_xy, extent_yx, extent_yy (covariance of the members' positions), size
-    (people), hull (x1, y1, x2, …). Frames whose groups have no lists of members are noted as such; missing hulls are
-    stored as hulls without vertices. Positions of all frames have equally many columns, else ValueError.
+    unit: "m" or "px". None (groups unknown) is stored apart from a frame without groups, and so are frames whose groups
+    have no members.
     """
     known = [g for g in frames if g is not None]
     axes = AXES[: known[0].pos.shape[1]] if known else AXES[:2]
@@ -59,11 +56,6 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
 
 
 def _lists(rows: list[tuple[Any, ...]], ids: list[Ints], empty: NDArray[Any]) -> list[NDArray[Any]]:
-    """Return one flat array per group, over all frames.
-
-    rows: of each frame the lists of its groups (members or hulls), or () if that frame has none. ids: of each frame its
-    group ids. empty: the array, of the wanted number type, for a group of a frame without lists.
-    """
     every = [item for row, id in zip(rows, ids, strict=True) for item in (row or (empty,) * len(id))]
     return [np.asarray(item, empty.dtype).ravel() for item in every]
 
@@ -73,13 +65,7 @@ def _stack(parts: list[Array], width: int) -> Array:
 
 
 def read_groups(table: StoredTable) -> list[Groups | None]:
-    """Return the groups of each frame of a groups.parquet that was read as a table, in the order of frames.
-
-    An item is None for a frame whose groups are unknown, and Groups without rows for a frame without groups. Members
-    are () in a frame that was stored without them, hulls have no vertices. The first item is the first frame stored,
-    which need not be 1. Raises InputError if a column or a value of the metadata is missing or wrong, a row is outside
-    these frames, rows are not sorted by frame, or a hull has half a vertex.
-    """
+    """Returns the groups of each frame stored in a groups.parquet; None where they are unknown."""
     first, count = table.count("first", FRAMES), table.count("frames", FRAMES)
     missing, memberless = table.frames("missing"), table.frames("memberless")
     axes = AXES if table.has("z") else AXES[:2]
@@ -99,19 +85,13 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
 
 
 def wkt(hull: Array, digits: int) -> str:
-    """Return a hull, vertices (V, 2) x, y, as text "POLYGON ((x y, …))" with the first vertex repeated at the end.
-
-    digits: decimals of each number. A hull without vertices is "POLYGON EMPTY".
-    """
+    """Returns a hull (V, 2) as text "POLYGON ((x y, …))", the first vertex repeated at the end."""
     points = [f"{x:.{digits}f} {y:.{digits}f}" for x, y in hull]
     return f"POLYGON (({', '.join([*points, points[0]])}))" if points else "POLYGON EMPTY"
 
 
 def parse_wkt(text: str) -> Array:
-    """Return the vertices (V, 2) x, y of a WKT POLYGON of one ring; a last vertex equal to the first is left out.
-
-    "POLYGON EMPTY" gives shape (0, 2). Raises ValueError for other texts and for coordinates that are not finite.
-    """
+    """Returns the vertices (V, 2) of a WKT POLYGON of one ring; raises ValueError for other texts."""
     body = text.strip().removeprefix("POLYGON").strip()
     if body == "EMPTY":
         return np.zeros((0, 2))
@@ -124,14 +104,10 @@ def parse_wkt(text: str) -> Array:
 
 
 def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None] | None, first: int = 1) -> bytes:
-    """Return groups.csv as bytes, for consecutive frames, the first of which has index `first`.
+    """Returns groups.csv for consecutive frames from `first` on; nan and unknown values are empty.
 
-    ground: groups of each frame in the plane of their tracks or truth, None if unknown. image: groups of each frame in
-    px, as long as `ground` if both are given; None if unknown. Columns: frame, group (id), members (ids separated by
-    blanks), x, y, hull (WKT, 3 decimals), size, and, if `image` is given, hull_px (WKT, 2 decimals) of the group with
-    the same id, empty without one. Where the ground groups of a frame are unknown, its rows are the image's groups, and
-    x, y and hull are empty. Unknown numbers (nan) are empty, too. Without both, or without groups, there is the header
-    alone.
+    ground: groups of each frame in the plane of their tracks or truth. image: those in px, whose hull is hull_px; a
+    frame whose ground groups are unknown lists the image's groups, without place.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -164,15 +140,9 @@ def _cell(value: float) -> str:
 
 
 def read_groups_csv(path: Path, length: int) -> list[Groups]:
-    """Read a groups.csv, ours or another program's, as the Groups of each frame from 1 to `length`.
+    """Reads a groups.csv, ours or another program's, as the Groups of each frame from 1 to `length`.
 
-    The columns frame, group, members (ids separated by blanks), x, y and hull (WKT) must exist; size may be missing,
-    and further columns are ignored. Empty x, y and size become nan, an empty hull has no vertices. Velocities are 0,
-    extents nan. Groups are sorted by id; members of each are sorted, each once. A frame without lines has Groups
-    without rows. Whether members exist is not checked.
-
-    Raises InputError if the file is unreadable, and, with the line, if a column is missing, a cell is invalid, a frame
-    is outside 1 to `length`, an id or size is negative, a coordinate is beyond 1e6, or a group stands twice in a frame.
+    Velocities are 0, extents nan. Groups and members are sorted by id.
     """
     reader = csv.DictReader(io.StringIO(read_text(path)))
     frames: dict[int, list[_Row]] = {}
@@ -193,7 +163,6 @@ def read_groups_csv(path: Path, length: int) -> list[Groups]:
 
 
 def _row(path: Path, line: int, row: dict[str, str], length: int) -> tuple[int, _Row]:
-    """Return (frame, its group) of one row; raise InputError, with the line, if a cell is wrong."""
     try:
         frame, id = whole_number(row["frame"]), whole_number(row["group"])
         members = np.array(sorted({whole_number(m) for m in row["members"].split()}), np.int64)

@@ -15,19 +15,12 @@ from sim.io.files import tables
 
 
 def file_facts(files: Mapping[str, bytes]) -> dict[str, dict[str, Any]]:
-    """Return what a seal states of each file, {"sha256": its hash, "bytes": its size}, by name, sorted.
-
-    files: content by name.
-    """
+    """Returns what a seal states of each file, {"sha256", "bytes"} by name, sorted. files: content by name."""
     return {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in sorted(files.items())}
 
 
 def check_facts(path: Path, files: Any, remedy: str) -> None:
-    """Raise InputError if `files`, the entry of the seal `path`, has not the form of what
-    `file_facts` returns: "sha256" and "bytes" by name. Whether the files exist and match is not checked.
-
-    Every name must lead to a file inside the seal's folder. remedy: for the error.
-    """
+    """Raises InputError if `files` does not have the form of `file_facts`, or a name leads out of the folder."""
     expected = "names inside the folder, each with sha256 and bytes"
     if not isinstance(files, dict):
         raise InputError(file=path, place="files", got=type(files).__name__, expected=expected, remedy=remedy)
@@ -39,21 +32,13 @@ def check_facts(path: Path, files: Any, remedy: str) -> None:
 
 
 def with_hash(document: dict[str, Any]) -> dict[str, Any]:
-    """Return a copy of the document with the field `sha256`, the canonical hash of all its other fields.
-
-    An old `sha256` is replaced; `document` is not changed. Raises TypeError for one that cannot be hashed, as a set.
-    """
+    """Returns a copy of the document with the key sha256, the hash of all others."""
     body = {key: value for key, value in document.items() if key != "sha256"}
     return {**body, "sha256": hashing.canonical_hash(body)}
 
 
 def require_intact(path: Path, document: dict[str, Any], remedy: str, *, exact: bool = False) -> None:
-    """Raise InputError if a seal was altered: its fields do not have the hash in its key sha256, or `check_facts`
-    refuses its key files.
-
-    path: of the seal's file; document: what was read from it, with both keys. exact: True also refuses a file whose
-    bytes are not those that we write for the document, down to the last blank. remedy: for the error.
-    """
+    """Raises InputError if a seal was altered; `exact` also compares its bytes, down to the last blank."""
     if document["sha256"] != with_hash(document)["sha256"] or (
         exact and path.read_bytes() != tables.json_document(document)
     ):
@@ -64,11 +49,10 @@ def require_intact(path: Path, document: dict[str, Any], remedy: str, *, exact: 
 def damaged_files(
     folder: Path, files: dict[str, Any], *, seal: str, remedy: str, size_only: Container[str] = ()
 ) -> Iterator[InputError]:
-    """Yield (not raise) an InputError for each file that is missing, unreadable or whose hash differs from its seal.
+    """Yields an error for each file that is missing, unreadable or not as stated.
 
-    folder: holds the files, which are read while iterating. files: the facts of each file by name. seal: the name of
-    the document that states them, and remedy: for the error. size_only: names of files whose content is not
-    compared if they have the right size. Files that `files` does not name are ignored.
+    files: facts by name. seal: the name of the document that states them. size_only: names whose content is not
+    compared.
     """
     for name, facts in files.items():
         path = folder / name

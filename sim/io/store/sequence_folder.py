@@ -18,15 +18,23 @@ from scenarios.errors import InputError
 from scenarios.printable import printable
 from sim import hashing
 from sim.io.files import atomic, tables
-from sim.io.files.side_files import is_side_file
+from sim.io.files.own_files import is_side_file
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
-from sim.io.pictures.picture_writer import NO_PICTURES, WrittenPictures, write_pictures
-from sim.io.pictures.stored_pictures import StoredPictures
+from sim.io.pictures.stored_pictures import NO_PICTURES, StoredPictures, WrittenPictures, write_pictures
 from sim.io.store import truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.event_files import read_script
-from sim.io.store.manifest import MANIFEST, REDO, damaged_files, identity, is_own_sequence, read_manifest, with_hash
-from sim.io.store.manifest_check import check_manifest
+from sim.io.store.manifest import (
+    MANIFEST,
+    REDO,
+    check_manifest,
+    damaged_files,
+    identity,
+    is_own_sequence,
+    read_manifest,
+    with_hash,
+)
+from sim.io.store.seal import file_facts
 from sim.io.store.streams import check_streams, file_name
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
 from sim.versions import versions
@@ -43,19 +51,24 @@ def write_sequence(
     images: str = "jpg",
     keep: Callable[[], bool] = lambda: False,
 ) -> Path:
-    """Write a sequence as the folder `folder`, complete or not at all, and return the folder; an existing one is
-    replaced.
+    """Writes a sequence as a folder, complete or not at all.
 
-    scenario: TOML text of the resolved scenario. seed: that of the simulation. repeat: number of the suite entry's
-    copy, 0 without copies. streams: pictures to store, "left", "right", "disparity", "ids", "background"; by default
-    none; "background" is added to "left" or "right". images: their file type, "jpg", "png" or "mp4". One picture per
-    stream is in memory at a time. keep: called before an existing folder is replaced; if it returns True, that folder
-    stays.
+    Args:
+        folder: Where; an existing sequence is replaced.
+        sequence: What.
+        scenario: TOML text of the resolved scenario.
+        seed: That of the simulation.
+        repeat: Number of the suite entry's copy, 0 without copies.
+        streams: Pictures to store: "left", "right", "disparity", "ids"; "background" comes with left and right.
+        images: Their file type, "jpg", "png" or "mp4".
+        keep: Called before an existing folder is replaced; if it returns True, that folder stays.
 
-    Raises InputError if a stream or file type is unknown, the sequence lacks a stream, a video would have an odd width
-    or height, the folder cannot be written, or a file of others in it would be lost. Raises WorkError if an order of
-    the script was not fulfilled, the stream ids has a person id above 999, or the disk is full. Raises AssertionError
-    if truth and sequence differ in length, or only some frames have detections.
+    Returns:
+        The folder.
+
+    Raises:
+        InputError: A stream is unknown or missing, or a file of others in the folder would be lost.
+        WorkError: The disk is full, an order of the script failed, or a stream cannot hold an id or disparity.
     """
     wanted, names = check_streams(streams, images), set[str]()
     with atomic.new_folder(folder, lambda: keep() or _refuse_foreign(folder, names)) as partial:
@@ -70,11 +83,6 @@ def write_sequence(
 
 
 def _refuse_foreign(folder: Path, names: set[str]) -> bool:
-    """Raise InputError if the folder holds a file that we did not write; else return False.
-
-    Ours are the files that its own manifest lists, and those that have a name of the new sequence's files, `names`. In
-    a folder that is no sequence of ours, none are.
-    """
     ours = names if is_own_sequence(folder) else set()
     with suppress(InputError):  # a damaged or missing manifest lists nothing
         ours = ours | read_manifest(folder)["files"].keys()
@@ -92,13 +100,9 @@ def _refuse_foreign(folder: Path, names: set[str]) -> bool:
 def sequence_files(
     sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, pictures: WrittenPictures = NO_PICTURES
 ) -> dict[str, bytes]:
-    """Return all files of a sequence except its pictures: content by name relative to its folder, the manifest last.
+    """Returns the files of a sequence except its pictures: content by name, the manifest last.
 
-    Always scenario.toml, seqinfo.ini and manifest.json; camera.json, scene.json, those of the truth (gt/…) and of the
-    detections (det/…) where the sequence has them. scenario: TOML text of the resolved scenario. seed, repeat: of the
-    simulation; repeat 0 without copies. pictures: what has been written of its pictures, for the manifest; by default
-    nothing. Raises WorkError if an order of the script was not fulfilled, InputError if `sensor.hide` names an unknown
-    group, AssertionError if only some frames have detections.
+    pictures: what has been written of its pictures, for the manifest.
     """
     frames = list(sequence.without_pictures())
     found = [f.detections for f in frames if f.detections is not None]
@@ -114,8 +118,7 @@ def sequence_files(
         files |= truth_files.detection_files(found, sequence.fps, sequence.scene)
     files = dict(sorted(files.items()))
     manifest = _manifest(sequence, found, len(frames), scenario, seed, repeat, pictures)
-    listed = {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in files.items()}
-    listed = dict(sorted((listed | pictures.files).items()))
+    listed = dict(sorted((file_facts(files) | pictures.files).items()))
     return {**files, MANIFEST: tables.json_document(with_hash({**manifest, "files": listed}))}
 
 
@@ -147,15 +150,9 @@ def _manifest(
 
 
 def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> bytes:
-    """Return seqinfo.ini as bytes: name, imDir, frameRate, seqLength, and, if the image size is known, imWidth,
-    imHeight, imExt.
-
-    length: number of frames. The name, frame rate and image size are the sequence's. With PNG pictures imExt is .png;
-    otherwise, also for videos or without pictures, it is .jpg. imDir is always img1, so that MOTChallenge tools accept
-    it.
-    """
     width, height = sequence.image_size or (0, 0)
     folder, _, name = file_name("left", "png" if pictures.images == "png" else "jpg", 1).partition("/")
+    # imDir is always img1, so that MOTChallenge tools accept it.
     lines = [
         f"name={printable(sequence.name)}",
         f"imDir={folder}",
@@ -168,15 +165,10 @@ def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> byte
 
 
 def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -> Sequence:
-    """Return the stored sequence in a folder, equal to the one that was written, except for its `source`.
+    """Returns the stored sequence in a folder, equal to the one written, except for its `source`.
 
-    background: sample of frames for background models, instead of the stored empty frames; None takes those. `source`
-    has kind "generated", path, seed, repeat, truth_hash, streams, images, and, if known, background, origin (of a
-    replay) and stride.
-
-    Raises InputError if the manifest is invalid, a file is missing or altered, `background` is given for a sequence
-    without left pictures, or it asks for more frames than there are or fit into 2 GB. Of pictures only the size in
-    bytes is compared at once; their hash is checked when they are read, and a damaged one raises InputError then.
+    background: frames for background models, in place of the stored empty ones. Pictures are checked when they are
+    read.
     """
     manifest = check_manifest(folder / MANIFEST, read_manifest(folder))
     for error in damaged_files(folder, manifest, pictures=False):
@@ -231,7 +223,6 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
 
 
 def _require_length(path: Path, found: int, length: int) -> None:
-    """Raise InputError if the file `path` is of another number of frames, `found`, than the manifest's `length`."""
     if found != length:
         expected = f"{length} frames, as manifest.json says"
         raise InputError(file=path, got=f"{found} frames", expected=expected, remedy=REDO)
@@ -240,13 +231,7 @@ def _require_length(path: Path, found: int, length: int) -> None:
 def _background(
     pictures: StoredPictures, choice: BackgroundChoice | None, length: int
 ) -> tuple[Callable[[], Image] | None, dict[str, str]]:
-    """Return (loader of background pictures, entry for `Sequence.source` that names them); (None, {}) if there are
-    none.
-
-    The loader takes nothing and returns pictures (K, H, W, 3) BGR uint8; it raises InputError if a picture is missing
-    or damaged. choice: sample of frames of the left pictures; None takes the stored empty frames. length: frames of the
-    sequence. Raises InputError if a choice is given without left pictures, or asks for more frames than there are.
-    """
+    """Returns (loader of background pictures, entry for `Sequence.source`); (None, {}) if there are none."""
     if choice is not None:
         if "left" not in pictures.streams:
             got, remedy = "--background", "leave it out: it has none"
@@ -259,11 +244,7 @@ def _background(
 
 
 def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:
-    """Return the person ids of each group that the script names, by group name.
-
-    They are computed again from the stored scenario.toml, scene.json and gt/script.json in `folder`, and from seed and
-    repeat in `manifest`. Raises InputError if one of these files is unreadable or invalid.
-    """
+    # Computed again from the stored scenario, scene and script.
     from scenarios import load
     from sim.sequence import named_people
 

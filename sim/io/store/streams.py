@@ -17,8 +17,7 @@ from sim.types import Array, Camera, Ints
 STREAMS = ("left", "right", "disparity", "ids", "background")
 IMAGES = ("jpg", "png", "mp4")
 FOLDERS = {"left": "img1", "right": "img1_right", "disparity": "disparity", "ids": "ids", "background": "background"}
-EXACT = ("disparity", "ids")
-"""Streams of 16-bit numbers, always PNG."""
+EXACT = ("disparity", "ids")  # streams of 16-bit numbers, always PNG
 
 STEPS = 256  # stored disparity steps per px, as in KITTI
 LARGEST = 65535  # largest stored code
@@ -29,11 +28,7 @@ Codes = NDArray[np.uint16]
 
 
 def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
-    """Return the streams in the order left, right, disparity, ids, background, each once.
-
-    "background" is added if "left" or "right" is among them. streams: names, () for none. images: file type. Raises
-    InputError if a stream is unknown, or `images` is not "jpg", "png" or "mp4", also without streams.
-    """
+    """Returns the streams in the order of STREAMS; "background" comes with left and right."""
     wanted = set(streams)
     unknown = sorted(wanted - set(STREAMS))
     if unknown:
@@ -47,44 +42,31 @@ def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
 
 
 def coding(streams: Iterable[str], images: str) -> str | None:
-    """Return `images`, the file type, if it affects any of the streams; else None.
-
-    It affects none if there are no streams, or only disparity and ids, which are always PNG.
-    """
+    """Returns `images`, the file type, if it affects any of the streams; else None."""
     return images if set(streams) - set(EXACT) else None
 
 
 def suffix(stream: str, images: str) -> str:
-    """Return the file type of a stream, without dot: "png" for disparity and ids, else `images`."""
+    """Returns the file type of a stream, without dot."""
     return "png" if stream in EXACT else images
 
 
 def file_name(stream: str, images: str, index: int) -> str:
-    """Return the name of a picture's file relative to the sequence folder: "img1/000001.jpg" or "left.mp4", for
-    instance.
+    """Returns the name of a picture's file in the sequence folder: "img1/000001.jpg", or "left.mp4" for all.
 
-    stream: "left", "right", "disparity", "ids" or "background", else KeyError unless it is a video. images: file type,
-    "jpg", "png" or "mp4"; disparity and ids are always PNG. index: the frame, from 1; for "background" the picture's
-    number, from 1. An mp4 holds all pictures of a stream, so `index` is then ignored.
+    index: the frame, or the number of the background picture, from 1.
     """
     kind = suffix(stream, images)
     return f"{stream}.mp4" if kind == "mp4" else f"{FOLDERS[stream]}/{index:06d}.{kind}"
 
 
 def is_picture(name: str) -> bool:
-    """Return True if a file of a sequence folder holds pictures: a video, or a file in the folder of a stream.
-
-    name: relative to the sequence folder, with "/" between its parts.
-    """
+    """Returns True if a file of a sequence folder holds pictures. name: relative to the folder."""
     return name.endswith(".mp4") or name.partition("/")[0] in FOLDERS.values()
 
 
 def encode_ids(ids: Ints) -> Codes:
-    """Return ids (H, W) as uint16 in the style of MOTS: 2000 + id for people, 3000 for walls and pillars, 0 elsewhere.
-
-    ids: person id (from 1), negative for walls and pillars, 0 elsewhere. Raises WorkError if a person's id is above
-    999.
-    """
+    """Returns ids (H, W) as uint16 in the style of MOTS: 2000 + id for people, 3000 for walls and pillars, else 0."""
     if ids.max(initial=0) > PEOPLE:
         raise WorkError(
             place="--streams ids", got=f"person {int(ids.max())}", expected=f"{PEOPLE} people at most",
@@ -94,20 +76,13 @@ def encode_ids(ids: Ints) -> Codes:
 
 
 def decode_ids(codes: Codes) -> Ints:
-    """Return the ids (H, W) int64 of MOTS codes (H, W) uint16, the inverse of encode_ids.
-
-    Code 3000 gives -2 (walls and pillars), any other above 2000 gives code - 2000 (person id), the rest 0.
-    """
+    """Returns the ids (H, W) of MOTS codes; -2 for walls and pillars."""
     wide = codes.astype(np.int64)
     return np.where(wide == STATIC, -2, np.where(wide > PERSON, wide - PERSON, 0))
 
 
 def encode_disparity(disparity: Array, camera: Camera | None = None) -> Codes:
-    """Return disparities (H, W) px as uint16 as in KITTI: round(256 d), at least 1, 0 where d is nan or infinite.
-
-    d is the disparity of a pixel; negative ones and 0 become 1. camera: of the pair, for the error; None: unknown.
-    Raises WorkError if a disparity is 256 px or more.
-    """
+    """Returns disparities (H, W) px as uint16 as in KITTI: round(256 d), at least 1; 0 for unknown."""
     known = np.isfinite(disparity)
     steps = np.maximum(np.rint(np.where(known, disparity, 0.0) * STEPS), 1)
     if steps.max(initial=0) > LARGEST:
@@ -120,5 +95,5 @@ def encode_disparity(disparity: Array, camera: Camera | None = None) -> Codes:
 
 
 def decode_disparity(codes: Codes) -> Array:
-    """Return the disparities (H, W) px of stored codes: code / 256, nan where the code is 0 (unknown)."""
+    """Returns the disparities (H, W) px of codes, nan for unknown."""
     return np.where(codes > 0, codes / STEPS, np.nan)

@@ -2,30 +2,135 @@
 
 tracks.txt has 10 columns `frame,id,left,top,width,height,conf,x,y,z`. A missing box is -1,-1,-1,-1; a z of -1 means
 that the ground position is unknown. tracks.mot.txt has the first 7 columns, because TrackEval reads column 8 as class.
+Boxes are the tracker's own if it gives any, else projections of upright people, if that can be. Tracks of other
+programs are read from MOTChallenge text: positions on the ground (m) if the file has them, else the centres of the
+boxes (px), and velocities from the last 0.5 s.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.files import tables
-from sim.io.files.atomic import replace_sealed
-from sim.io.files.lock import hold_lock
-from sim.io.formats.box_columns import BoxScale
-from sim.io.formats.mot_text import ground_cells
+from sim.io.files.atomic import hold_lock, replace_sealed
+from sim.io.formats.box_columns import BoxScale, require_pixels
+from sim.io.formats.mot_ground import ground_positions, require_metres
+from sim.io.formats.mot_people import of_class
+from sim.io.formats.mot_table import MotTable, read_table
+from sim.io.formats.mot_text import ground_cells, reject_duplicate_ids, unit_scores
+from sim.io.formats.velocity import chords
 from sim.io.store.event_files import event_dict, read_events
-from sim.io.store.group_files import groups_bytes, groups_csv
+from sim.io.store.group_files import groups_bytes, groups_csv, read_groups_csv
 from sim.io.store.run_seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
-from sim.io.store.track_boxes import box_source, upright_boxes
 from sim.io.store.track_tables import RunRows, flatten, read_track_table, track_table
-from sim.io.store.track_text import read_track_text, with_groups
 from sim.io.store.truth_files import with_ground_height
-from sim.types import Array, Bools, Camera, GroupEvent, Scene, Tracks
+from sim.scene.body import PERSON_HEIGHT
+from sim.types import Array, Bools, Camera, GroupEvent, Ints, Plane, Scene, Tracks
+
+WIDTH = 0.50  # m, diameter of the upright cylinder
+
+
+def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["measured", "projected", "none"]:
+    """Returns where the boxes of stored tracks come from, the value `boxes` of run.json."""
+    if any(t.box is not None and len(t.id) for t in tracks):
+        return "measured"
+    upright = not any(t.plane == "image" or t.unit == "group" for t in tracks)
+    return "projected" if camera is not None and upright else "none"
+
+
+def upright_boxes(camera: Camera, pos: Array) -> Array:
+    """Returns the boxes (N, 4) px of people, 1.7 m high and 0.5 m across, at `pos` (N, 2 or 3) m.
+
+    Not clipped to the image; nan for somebody who is partly behind the camera, and for a nan position.
+    """
+    from sim.scene.camera import project
+
+    angle = np.arange(16) * (np.pi / 8)
+    rim = WIDTH / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    rim = np.concatenate([np.c_[rim, np.zeros(16)], np.c_[rim, np.full(16, PERSON_HEIGHT)]])
+    foot = pos if pos.shape[1] == 3 else np.concatenate([pos, np.zeros((len(pos), 1))], axis=1)
+    uv, depth = project(camera, (foot[:, None] + rim).reshape(-1, 3))
+    uv = np.where((depth > 0)[:, None], uv, np.nan).reshape(len(pos), 32, 2)
+    low, high = uv.min(axis=1), uv.max(axis=1)
+    return np.concatenate([low, high - low], axis=1)
+
+
+def read_track_text(
+    path: Path, fps: float, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None
+) -> list[Tracks]:
+    """Returns the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`, sorted by id.
+
+    length: None: to the last frame in the file. person_class, box_scale: as of `read_detections`.
+    """
+    table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+    require_pixels(table.rows, table.boxes())
+    _reject_empty(table, length)
+    table.rows.reject(
+        table.id < 0, "ids from 0", "give each track an id", "these are detections: `flockscope track` them first"
+    )
+    people = of_class(table, np.ones(len(table.id), bool), person_class)
+    reject_duplicate_ids(table, people)
+    order = np.lexsort((table.id, table.frame))
+    order = order[people[order]]
+    frame, id = table.frame[order], table.id[order]
+    require_metres(table, fps)
+    ground = ground_positions(table)
+    if ground is not None:
+        remedy = "complete the line, or write z = -1 in all"
+        table.rows.reject(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)
+    pos = _centres(table)[order] if ground is None else ground[order][:, :2]
+    box = None if table.without_box().any() else table.box[order]
+    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.id)))[0][order]
+    plane: Plane = "image" if ground is None else "ground"
+    vel, count = chords(frame, id, pos, fps), length or int(frame.max(initial=0))
+    cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()
+
+    def arrays(a: int, b: int) -> tuple[Array | Ints | None, ...]:
+        some = (id[a:b], np.full(b - a, -1, np.int64), pos[a:b], vel[a:b], np.full((b - a, 4, 4), np.nan))
+        return *some, None if box is None else box[a:b], score[a:b]
+
+    # Most frames of sparse texts are empty: they share their arrays.
+    nobody = Tracks(0, 0.0, plane, "person", *arrays(0, 0))  # type: ignore[arg-type]
+    none = (nobody.id, nobody.group, nobody.pos, nobody.vel, nobody.cov, nobody.box, nobody.score)
+    return [
+        Tracks(k + 1, k / fps, plane, "person", *(none if a == b else arrays(a, b)))  # type: ignore[arg-type]
+        for k, (a, b) in enumerate(pairwise(cuts))
+    ]
+
+
+def _reject_empty(table: MotTable, length: int | None) -> None:
+    if len(table.frame):
+        return
+    if length is None:
+        raise InputError(file=table.rows.file, got="no row", expected="tracks", remedy="check that it was written")
+    warnings.warn(f"{table.rows.file}: no row, so nobody was tracked", stacklevel=4)
+
+
+def _centres(table: MotTable) -> Array:
+    table.rows.reject(table.without_box(), "a box, or a ground position in every line", "complete the lines")
+    return table.box[:, :2] + table.box[:, 2:] / 2
+
+
+def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
+    """Returns copies of one tracker's tracks with the groups of a groups.csv.
+
+    A person in two groups gets the one with the higher id. Members without a track stay in the groups.
+    """
+    every = read_groups_csv(path, len(found))
+    answers = []
+    for tracks, groups in zip(found, every, strict=True):
+        group = tracks.group.copy()
+        for k, members in zip(groups.id, groups.members, strict=True):
+            group[np.isin(tracks.id, members)] = k
+        answers.append(tracks.replace(group=group, groups=groups))
+    return answers
 
 
 def write_tracks(
@@ -38,23 +143,22 @@ def write_tracks(
     info: dict[str, Any] | None = None,
     pairs: bytes | None = None,
 ) -> Path:
-    """Write the tracks of consecutive frames of one tracker into `folder`, and return the folder.
+    """Writes the tracks of consecutive frames of one tracker into a folder; run.json comes last.
 
-    Files: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if there are groups, pairs.parquet
-    if `pairs` is given, events.json, and run.json last, which names all others with their hashes. Files of these names
-    from an earlier run are replaced or deleted, others stay. A killed run leaves the earlier run whole, or a folder
-    that `read_tracks` refuses.
+    Args:
+        folder: Where. Files of an earlier run are replaced; others stay.
+        tracks: One Tracks per frame, all of one plane and unit.
+        fps: Frames per second.
+        camera: People on the ground or in space whose tracker gives no boxes get those of upright people in the texts.
+        scene: Gives the height of the ground under 2-D positions; None: 0.
+        info: Content of run.json, to which "format", "boxes", "files" and "sha256" are added.
+        pairs: Content of pairs.parquet (`pair_table`); None: no such file.
 
-    tracks: one Tracks per frame, all of one plane and unit (else AssertionError). fps: frames/s. camera: if the tracker
-    gives no boxes, tracks of people on the ground or in space get the boxes of upright people in the texts; None: no
-    such boxes. scene: gives the height of the ground under 2-D positions; None: 0. info: content of run.json, to which
-    "format", "boxes" (where the boxes come from: "measured", "projected" or "none"), "files" and "sha256" are added.
-    pairs: the content of pairs.parquet (`pair_table`); None: no such file.
+    Returns:
+        The folder.
 
-    Raises InputError if the tracks have wrong ids or unknown positions, a value of `info` is of the wrong kind, the
-    folder is a stored sequence or lies in one, it holds such a file of another program, another process writes to it,
-    or it cannot be written. Raises WorkError if the disk is full,
-    ValueError if `info` holds NaN or infinity, TypeError if it holds what JSON cannot.
+    Raises:
+        InputError: Tracks or `info` are wrong, or a file of others, or a stored sequence, is in the way.
     """
     folder = Path(folder)
     files = tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info, pairs=pairs)
@@ -73,18 +177,7 @@ def tracks_files(
     info: dict[str, Any] | None = None,
     pairs: bytes | None = None,
 ) -> dict[str, bytes]:
-    """Return the files of one tracker's tracks, as `write_tracks` writes them: content by name, run.json last.
-
-    Names: tracks.parquet, tracks.txt, tracks.mot.txt, groups.parquet and groups.csv if a frame has groups,
-    pairs.parquet with the content `pairs` if it is given, events.json, run.json. tracks: one Tracks per frame, of
-    consecutive frames, all of one plane and unit (else AssertionError). fps: frames/s. camera: gives people without
-    boxes those of upright people; None: no such boxes. scene: gives the height of the ground; None: 0. info: content of
-    run.json, to which "format", "boxes", "files" and "sha256" are added.
-
-    Nothing is written. No tracks give tables without rows, in the plane "ground". Raises InputError if an id is
-    negative or stands twice in a frame, a position or score is not finite, or a value of `info` is of the wrong kind.
-    Raises ValueError if `info` holds NaN or infinity, TypeError if it holds what JSON cannot.
-    """
+    """Returns the files of one tracker's tracks, as `write_tracks` writes them: content by name, run.json last."""
     every = list(tracks)
     rows, boxes = flatten(every), box_source(every, camera)
     rows.reject_faults("tracks", "correct the tracker")
@@ -124,18 +217,19 @@ def _text(rows: RunRows, box: Array, place: Array | None, *, full: bool) -> byte
 
 
 def read_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:
-    """Read the tracks of a folder that write_tracks wrote, of one of its files, or of another program's MOT text.
+    """Reads the tracks of a run, or of another program's MOTChallenge text.
 
-    Returns one Tracks per frame. A run of ours is checked as a whole, whichever file of it is given: every file must
-    have the hash in run.json. tracks.parquet is exact; tracks.mot.txt is read as text. Other texts are those of another
-    program: velocities are differences over 0.5 s, covariances nan, and everybody is alone; beside a tracks.txt, groups
-    and events are those of groups.csv and events.json, where they exist. fps (None: 25) and length (None: to the last
-    frame in the file) apply to text only; `length` adds empty frames at the end. An event belongs to the frame that
-    reported it; if that is not stored, to the frame in which it was emitted, else to its end.
+    Args:
+        path: A folder that `write_tracks` wrote, a file of it, or a text. Of a text, velocities are differences over
+            0.5 s, covariances nan, and everybody is alone, but for groups.csv and events.json beside a tracks.txt.
+        fps: Frames per second of a text; None: 25.
+        length: Frames of a text; None: to the last frame in the file.
 
-    Raises InputError if there are no tracks, a run is unfinished, damaged or mixed with another, a file is unreadable
-    or invalid, a frame is beyond `length`, or an event's frame is outside the tracks. Warns about a text without rows
-    if `length` is given.
+    Returns:
+        One Tracks per frame. An event belongs to the frame that reported it, else to `emitted`, else to its end.
+
+    Raises:
+        InputError: There are no tracks, or they are unfinished, damaged, invalid or mixed with those of another run.
     """
     folder = run_folder(Path(path))
     if folder is not None:
@@ -147,11 +241,7 @@ def read_checked_tracks(
     path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: int | None = None,
     box_scale: BoxScale | None = None,
 ) -> list[Tracks]:  # fmt: skip
-    """Read tracks as `read_tracks` does, but of a run that `check_run` found whole: no hash is compared again.
-
-    person_class: the class of people in a text of another program; None: 1. box_scale: factors of x and y of its boxes;
-    None: 1.
-    """
+    """Reads tracks as `read_tracks` does, but compares no hash of a run again."""
     path = Path(path)
     folder = path if path.is_dir() else path.parent
     whole = path.is_dir() or path.name in WHOLE

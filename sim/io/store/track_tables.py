@@ -25,33 +25,25 @@ PLANES = ("ground", "space", "image")
 
 @dataclass(frozen=True)
 class RunRows:
-    """The tracks of all frames of one tracker, R rows in the order of frames.
+    """The tracks of all frames of one tracker, R rows in the order of frames."""
 
-    plane, unit: of all tracks. frame (R,): from the tracks' index, from 1. id, group (R,): of the track and of its
-    group, -1 for alone. pos, vel (R, D) m or px (per s), D = 3 in the plane "space", else 2. cov (R, 2D, 2D):
-    covariance of position and velocity. box (R, 4): left, top, width, height in px, nan in a frame without boxes.
-    boxless (R,): True in such a frame. score (R,): 1 if the tracker gives none.
-    """
-
+    # plane, unit: of all tracks
     plane: Any
     unit: Any
-    frame: Any
+    frame: Any  # (R,) from the tracks' index, from 1
+    # id, group (R,): of the track and of its group, -1 for alone. pos, vel (R, D) m or px (per s), D = 3 in the plane
+    # "space", else 2.
     id: Any
     group: Any
     pos: Array
     vel: Array
-    cov: Array
-    box: Array
-    boxless: Any
-    score: Array
+    cov: Array  # (R, 2D, 2D) covariance of position and velocity
+    box: Array  # (R, 4) left, top, width, height in px, nan in a frame without boxes
+    boxless: Any  # (R,) True in such a frame
+    score: Array  # (R,) 1 if the tracker gives none
 
     def reject_faults(self, file: object, remedy: str) -> None:
-        """Raise InputError for the first fault, with its frame: a wrong id or group, or a number that is not finite.
-
-        Ids are non-negative and unique in a frame; groups are -1 or more, and the ids where the unit is "group".
-        Positions, scores, and boxes in a frame with boxes are finite. Velocities and covariances may be nan, which
-        means unknown, but not infinite. file, remedy: for the error.
-        """
+        """Raises InputError for the first fault, with its frame: a wrong id or group, or number."""
         for wrong, got, expected in self._checks():
             row = int(np.argmax(wrong)) if wrong.any() else None
             if row is not None:
@@ -66,6 +58,7 @@ class RunRows:
             yield self.group != self.id, "a group that is not the id", "group equal to id where the unit is group"
         for name in ("pos", "score"):
             yield _rows_with(~np.isfinite(getattr(self, name))), f"NaN or infinity in {name}", "finite numbers"
+        # nan means unknown.
         for name in ("vel", "cov"):
             yield _rows_with(np.isinf(getattr(self, name))), f"infinity in {name}", "finite numbers, or nan for unknown"
         box = ~np.isfinite(self.box).all(axis=1) & ~self.boxless
@@ -73,15 +66,11 @@ class RunRows:
 
 
 def _rows_with(wrong: Any) -> Any:
-    """Return True (R,) for each row of `wrong`, (R, …) bool, that holds a True."""
     return wrong.reshape(len(wrong), int(np.prod(wrong.shape[1:]))).any(axis=1)
 
 
 def flatten(every: list[Tracks]) -> RunRows:
-    """Return the rows of all frames of one tracker; without tracks none, in the plane "ground".
-
-    every: one Tracks per frame, all of one plane and unit, else AssertionError.
-    """
+    """Returns the rows of all frames of one tracker; without tracks none, in the plane "ground"."""
     kinds = {(t.plane, t.unit) for t in every}
     assert len(kinds) <= 1, f"a tracker stays in one plane and unit: {sorted(kinds)}"
     plane, unit = next(iter(kinds), ("ground", "person"))
@@ -109,11 +98,7 @@ def _state(plane: str) -> list[str]:
 
 
 def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
-    """Return tracks.parquet as bytes, a row per track and frame. rows: those of `every`, one Tracks per frame.
-
-    fps: frames/s. Columns: frame (from 1), id, group, x, y, (z), vx, vy, (vz), box_left, box_top, box_width,
-    box_height (nan in frames without boxes), score, and cov_a_b for each pair a, b of positions and velocities.
-    """
+    """Returns tracks.parquet, a row per track and frame. rows: those of `every`, one Tracks per frame."""
     unit, state = "px" if rows.plane == "image" else "m", _state(rows.plane)
     values = np.concatenate([rows.pos, rows.vel], axis=1)
     units = [f"{unit}/s" if name.startswith("v") else unit for name in state]
@@ -139,9 +124,9 @@ def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
 
 
 def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
-    """Return pairs.parquet as bytes: how probable it is that two people belong together, a row per pair and frame.
+    """Returns pairs.parquet: how probable it is that two people belong together.
 
-    frame (R,): from 1; a, b (R,): ids; probability (R,): 0 to 1. The columns have these names.
+    frame (R,): from 1. a, b (R,): ids. probability (R,): 0 to 1.
     """
     return table_bytes(
         [Column("frame", frame), Column("a", a), Column("b", b), Column("probability", probability, "1")], {}
@@ -149,11 +134,7 @@ def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
 
 
 def read_track_table(folder: Path) -> list[Tracks]:
-    """Return the tracks in tracks.parquet, one Tracks per frame, with the groups of groups.parquet if it exists.
-
-    Events are not read. Raises InputError if a file is missing or damaged, a column or value is missing or of the wrong
-    type, rows are outside the frames or out of order, a number is not finite, or an id is wrong.
-    """
+    """Returns the tracks of tracks.parquet, with the groups of groups.parquet, without events."""
     table = tables.read_table(folder / EXACT)
     plane, unit = table.fact("plane"), table.fact("unit")
     table.reject(plane not in PLANES, "plane", repr(plane), "ground, space or image")
@@ -176,8 +157,6 @@ def read_track_table(folder: Path) -> list[Tracks]:
 
 
 def _rows(table: StoredTable, plane: str, unit: str, boxless: set[int]) -> RunRows:
-    """Return the checked rows of tracks.parquet. boxless: frames without boxes. Raises InputError for the first
-    fault."""
     state = _state(plane)
     d = len(state) // 2
     values, frame = table.floats(*state), table.ints("frame")
@@ -191,11 +170,6 @@ def _rows(table: StoredTable, plane: str, unit: str, boxless: set[int]) -> RunRo
 
 
 def _groups(path: Path, first: int, count: int) -> list[Groups | None]:
-    """Return the groups of each frame in the groups.parquet `path`; None for each of `count` frames if it is missing.
-
-    Raises InputError if the file is damaged, holds other frames than those from `first` on, a negative group id, one
-    twice in a frame, or a position or hull that is not finite.
-    """
     if not path.is_file():
         return [None] * count
     table = tables.read_table(path)
@@ -210,7 +184,6 @@ def _groups(path: Path, first: int, count: int) -> list[Groups | None]:
 
 
 def _group_fault(groups: Groups) -> str | None:
-    """Return the first fault of the groups of one frame in words, None if there is none."""
     if len(groups.id) and groups.id.min() < 0:
         return f"group {groups.id.min()}"
     if len(np.unique(groups.id)) != len(groups.id):

@@ -13,7 +13,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, SCALES
-from scenarios.regular_file import is_present
+from scenarios.reading import is_present
 from sim.io.files.tables import REDO, Column, StoredTable, nan_to_none, read_table, table_bytes
 from sim.io.formats.mot_text import ground_cells
 from sim.io.store.event_files import events_bytes, near_bytes, read_events, read_near, read_script, script_bytes
@@ -27,12 +27,7 @@ SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 
 
 def truth_files(truth: Truth) -> dict[str, bytes]:
-    """Return the files under gt/ of a truth: content as bytes by name, as "gt/truth.parquet".
-
-    Always truth.parquet and script.json (the orders of the script). Where the truth has boxes, gt.txt (MOTChallenge).
-    groups.parquet where it has groups on the ground, groups_px.parquet where it has groups in the image, groups.csv
-    with either. Where it has them, events.json and near.csv (pairs of strangers who came near each other).
-    """
+    """Returns the files under gt/ of a truth, content by name: those for which it has values."""
     files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders)}
     if truth.box is not None:
         files["gt/gt.txt"] = _mot_text(truth, truth.box)
@@ -70,15 +65,12 @@ def _table(truth: Truth) -> bytes:
 
 
 def _spans(flags: Bools) -> list[list[int]]:
-    """Return [first frame, last frame], counted from 1 and inclusive, of each run of True in flags (T,); [] without
-    any.
-    """
+    """Returns [first frame, last frame], from 1 and inclusive, of each run of True in flags (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [[int(a) + 1, int(b)] for a, b in edges.reshape(-1, 2)]
 
 
 def _flags(table: StoredTable, spans: Any, length: int) -> Bools:
-    """Return flags (length,) that are True in each span [first frame, last frame]; InputError if a span is none."""
     flags, ends = np.zeros(length, bool), range(1, length + 1)
     for span in spans if isinstance(spans, list) else [spans]:
         fits = isinstance(span, list) and len(span) == 2 and all(type(v) is int and v in ends for v in span)
@@ -88,12 +80,6 @@ def _flags(table: StoredTable, spans: Any, length: int) -> Bools:
 
 
 def _mot_text(truth: Truth, box: Array) -> bytes:
-    """Return gt.txt as bytes, with a row per person and frame: frame, id, left, top, width, height, 1, 1, visibility.
-
-    The two ones are flag and class. Boxes have 2 decimals, visibility 3. box: (R, 4) left, top, width, height in px of
-    the truth's rows, whose order is kept. People without a finite box of positive size have no row. Widths and heights
-    below 0.01 px are written as 0.01.
-    """
     lines = []
     rows = zip(truth.frame.tolist(), truth.id.tolist(), box.tolist(), truth.visibility.tolist(), strict=True)
     for frame, id, (left, top, width, height), visibility in rows:
@@ -104,12 +90,7 @@ def _mot_text(truth: Truth, box: Array) -> bytes:
 
 
 def read_truth(folder: Path) -> Truth:
-    """Read the truth of a sequence folder, equal to the one written; columns and files that are not stored become None.
-
-    A frame whose groups are unknown comes back as a frame without groups. Raises InputError if gt/truth.parquet or
-    gt/script.json is missing, a file is damaged or invalid, or rows are not sorted by (frame, id), stand twice or lie
-    outside the sequence's frames 1 to length.
-    """
+    """Reads the truth of a sequence folder; what is not stored becomes None."""
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
     length, labelled = table.count("length", FRAMES), table.fact("labelled")
@@ -153,16 +134,10 @@ def _groups(path: Path) -> tuple[Groups, ...] | None:
 
 
 def detection_files(detections: list[Detections], fps: float, scene: Scene | None = None) -> dict[str, bytes]:
-    """Return det/det.parquet (exact) and det/det.txt (MOT text with 10 columns), content by name.
+    """Returns det/det.parquet (exact) and det/det.txt (MOT text of 10 columns), content by name.
 
-    detections: one Detections per frame, from frame 1, all of one plane, and all with or without boxes and velocities
-    (else AssertionError); none give tables without rows. fps: frames/s. scene: gives the height of the ground, which is
-    the z of ground points (x, y) in det.txt; None: 0. Missing scores are written as 1.
-
-    Columns of det.parquet: frame (from 1), x, y, (z), score, and, where known, vx, vy, (vz), box_left, box_top,
-    box_width, box_height. Columns of det.txt: frame, id, left, top, width, height, score, x, y, z. There the id is -1,
-    a missing box -1,-1,-1,-1, the position of a detection in the image -1,-1,-1, and a width or height below 0.01 px
-    0.01.
+    detections: one Detections per frame, all of one plane, and all with or without boxes and velocities. scene: gives
+    the z of ground points in det.txt; None: 0.
     """
     plane, boxed, moving = _form(detections)
     axes = ("x", "y", "z")[: detections[0].pos.shape[1]] if detections else ("x", "y")
@@ -187,26 +162,18 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
 
 
 def _form(detections: list[Detections]) -> tuple[str, bool, bool]:
-    """Return (plane, whether there are boxes, whether there are velocities), which must be equal in all frames.
-
-    detections: one Detections per frame. Without frames: ("image", True, False). Raises AssertionError if frames
-    differ.
-    """
     forms = {(d.plane, d.box is not None, d.vel is not None) for d in detections}
     assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
     return next(iter(forms), ("image", True, False))
 
 
 def scores_or_ones(score: Array, rows: int) -> Array:
-    """Return `score` (N,) if it has `rows` = N items, else N ones: the detector or tracker gives no scores."""
+    """Returns `score` (N,) if it has `rows` items, else ones: no scores are given."""
     return score if len(score) == rows else np.ones(rows)
 
 
 def with_ground_height(pos: Array, scene: Scene | None) -> Array:
-    """Return positions x, y, z in m, (N, 3).
-
-    pos: (N, 3) is returned unchanged; (N, 2) gets the height of the scene's ground as z, 0 without a scene.
-    """
+    """Returns positions (N, 3) m; a 2-D position gets the height of the scene's ground as z."""
     if pos.shape[1] == 3:
         return pos
     z = np.zeros(len(pos)) if scene is None else height_at(scene, pos)
@@ -224,12 +191,7 @@ def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None)
 
 
 def read_detections(path: Path) -> list[Detections]:
-    """Read a det.parquet: one Detections per frame, from frame 1; frames without rows have none.
-
-    Velocities and boxes are None if the file has no such columns; a third position column z makes positions (M, 3).
-    Raises InputError if the file is missing or damaged, a column or a value of the metadata is missing or wrong, a row
-    is outside the stored number of frames, or rows are not sorted by frame.
-    """
+    """Reads a det.parquet: one Detections per frame, from frame 1."""
     table = read_table(path)
     axes = ("x", "y", "z") if table.has("z") else ("x", "y")
     pos, score, fps = table.floats(*axes), table.floats("score"), table.number("fps", *FRAME_RATES)

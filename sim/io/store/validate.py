@@ -14,7 +14,7 @@ from typing import Any
 from scenarios.errors import FlockscopeError, InputError
 from sim import hashing
 from sim.io.files.atomic import PARTIAL
-from sim.io.files.side_files import is_side_file
+from sim.io.files.own_files import is_side_file
 from sim.io.formats.mot_folder import read_seqinfo
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
@@ -28,15 +28,17 @@ from sim.types import BACKGROUNDS, Detections, Groups, Truth
 
 
 def validate(folder: str | Path) -> list[FlockscopeError]:
-    """Return the problems of a generated sequence or dataset, or of tracks that `flockscope track` stored, as errors
-    that are not raised; empty if there are none.
+    """Returns the problems of a generated sequence or dataset, or of tracks, as errors that are not raised.
 
-    Checked are: files left by interrupted runs, the lists in seqmaps/, of each sequence hashes, content, texts and
-    pictures, and of each run of a tracker hashes and content. Problems come in that order, sequences and runs sorted by
-    path. If files of a sequence or run are damaged, only these are reported for it. A single sequence or run is checked
-    without leftovers and seqmaps.
+    Args:
+        folder: A sequence, a run, or a folder of some.
 
-    Raises InputError if the folder does not exist, or holds no sequence, no run and no other problem.
+    Returns:
+        Leftovers of interrupted runs, faults of seqmaps/, then those of each sequence and run, sorted by path. If files
+        are damaged, nothing else is reported for their sequence or run.
+
+    Raises:
+        InputError: There is nothing to check.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -57,22 +59,16 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
 
 
 def holds_sequences(folder: str | Path) -> bool:
-    """Return True if the folder is a generated sequence, perhaps an incomplete one, or holds one at any depth."""
+    """Returns True if the folder is or holds a generated sequence, at any depth."""
     return bool(_inside(Path(folder), manifests.is_sequence))
 
 
 def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
-    """Return `root` and the folders below it for which kind(folder) is True, sorted, without those left by interrupted
-    runs."""
     return sorted(p for p in (root, *root.glob("**/*/")) if PARTIAL not in str(p.relative_to(root)) and kind(p))
 
 
 def content_hash(folder: str | Path) -> str:
-    """Return the SHA-256 (64 hex digits) of a generated dataset or sequence; exports of it contain the same hash.
-
-    It is made from the content hashes in the manifests; the files are not read. Raises InputError if the folder holds
-    no sequences or a recording, or if a manifest is missing or altered.
-    """
+    """Returns the SHA-256 of a generated dataset or sequence, by its manifests; exports contain the same."""
     found = {
         split_and_name(p): manifests.read_manifest(p)["content_hash"]
         for p in sequence_folders(Path(folder), "generated")
@@ -90,13 +86,6 @@ def _left_behind(root: Path) -> Iterator[InputError]:
 
 
 def _seqmaps(root: Path) -> Iterator[InputError]:
-    """Yield a problem for each sequence that is in a split's seqmap or folder but not in both, and for a missing
-    seqmap.
-
-    A seqmap is the text seqmaps/<split>.txt that lists the split's sequences. root: the folder of a dataset, or of one
-    split of it. Within a split, missing sequences come first, then those not listed, each sorted by name. A split
-    without folders needs no seqmap. Problems are InputErrors, not raised.
-    """
     base = root if (root / "seqmaps").is_dir() else root.parent
     for split in sorted(root.glob("flockscope-*")) if base == root else [root]:
         path = base / "seqmaps" / f"{split.name}.txt"
@@ -143,11 +132,6 @@ def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
 
 
 def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError]:
-    """Yield a problem for each stored hash, length, text, group, event or picture that contradicts the other files.
-
-    folder: a sequence all of whose files have the hashes of `manifest`. Problems are FlockscopeErrors, not raised.
-    Raises InputError, while iterating, if a file is invalid.
-    """
     text = (folder / "scenario.toml").read_text(encoding="utf-8")
     if hashing.scenario_hash(text) != manifest["scenario_hash"]:
         yield _problem(folder / "scenario.toml", "another scenario", "the one of scenario_hash")
@@ -170,12 +154,6 @@ def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError
 
 
 def _pictures(folder: Path, manifest: dict[str, Any], length: int) -> Iterator[FlockscopeError]:
-    """Yield a problem for pictures that are missing, unreadable, of another size or beyond the last frame.
-
-    folder, manifest: of the sequence. length: its number of frames. Streams stored as PNG are also compared with the
-    hash of their raw pixels. One problem at most is reported for each stream, but every surplus picture. Problems are
-    errors that are not raised.
-    """
     stored = StoredPictures(folder, manifest)
     named = {name for name in manifest["files"] if is_picture(name)}
     for stream in stored.streams:
@@ -211,12 +189,6 @@ def _truth(folder: Path, truth: Truth, length: int) -> Iterator[InputError]:
 
 
 def _text(path: Path, wanted: bytes) -> Iterator[InputError]:
-    """Yield a problem at the first line where the text file `path` differs from `wanted`, or if it is missing; nothing
-    if equal.
-
-    wanted: the bytes that the exact Parquet table gives. The problem is an InputError, not raised; lines count from 1.
-    Raises OSError if the file cannot be read.
-    """
     if not path.is_file():
         yield _problem(path, "missing", "the text of the exact table")
         return
@@ -228,11 +200,6 @@ def _text(path: Path, wanted: bytes) -> Iterator[InputError]:
 
 
 def _groups(path: Path, truth: Truth, groups: tuple[Groups, ...] | None) -> Iterator[InputError]:
-    """Yield a problem for the first frame with a group whose member is absent or has another group in the truth.
-
-    path: the file of the groups, for the message. groups: one Groups per frame, from frame 1; None yields nothing. The
-    problem is an InputError, not raised; later frames are not checked.
-    """
     for index, some in enumerate(groups or (), 1):
         here = truth.rows(index)
         group_of = dict(zip(truth.id[here].tolist(), truth.group[here].tolist(), strict=True))

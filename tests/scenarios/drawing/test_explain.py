@@ -1,4 +1,4 @@
-"""A scenario in words, in characters and as SVG."""
+"""A scenario in words and as SVG."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from scenarios.drawing.explain import COLOURS, _colours, svg, text
-from scenarios.drawing.plan_text import CharacterPlan
 from scenarios.drawing.routes import group_routes, middle, order_marks, spread
 from scenarios.drawing.words import number, order, trigger
 from scenarios.loading.resolve import load, names
@@ -45,17 +44,6 @@ def test_stops_and_scatter_in_words(path: Path) -> None:
     said = text(load(path, [f"group.a.stops={stops}", "group.a.scatter=0.5", "group.a.enter=-1"]))
     assert "stopping at (9, 4) [until 4, 8 s, for 1 s], (8, 4) [for 2 to 3 s, only 1 member]" in said
     assert "scattered by 0.5 m, entering at -1 s" in said
-
-
-def test_the_sketch_has_everything_in_its_place(path: Path) -> None:
-    rows = [line[1:-1] for line in text(load(path)).splitlines() if line.startswith("│")]
-    assert (len(rows), len(rows[0])) == (20, 64)
-    assert rows[1].count("█") > 55
-    assert rows[1][14:18] == "    "  # the door
-    assert rows[10][20] == "A"
-    assert rows[16][7:9] == "●●"
-    assert "③" in rows[6]
-    assert rows[10].count("◎") == 3
 
 
 def test_svg_is_well_formed_and_names_groups_and_orders(path: Path) -> None:
@@ -128,14 +116,6 @@ def test_values_in_words_and_their_extent(value, words, mid, half) -> None:  # t
     assert (number(value, "s"), middle(value), spread(value)) == (words, mid, half)
 
 
-def test_names_in_a_sketch_cover_no_other_name_nor_goal(path: Path) -> None:
-    """Two groups from one place, and a third whose goal is there."""
-    scenario = load(path, ["group.a.start=[9, 5]", "group.b.start=[9, 5]", "group.w.goal=[9, 5]"])
-    drawing = text(scenario).split("┘")[0]
-    assert {"A", "B", "W"} <= set(drawing)
-    assert drawing.count("◎") >= 3
-
-
 def test_every_trigger_in_words(path: Path) -> None:
     def of(when: str) -> str:
         return trigger(load(path, [f"event.m1.when={when}"]).event[0].when)
@@ -152,13 +132,3 @@ def test_each_of_twelve_groups_has_the_next_of_ten_colours(tmp_path: Path) -> No
     scenario = load(tmp_path / "many.toml")
     colour = _colours(group_routes(scenario), order_marks(scenario))
     assert [colour[f"g{k}"] for k in range(12)] == [*COLOURS, COLOURS[0], COLOURS[1]]
-
-
-@pytest.mark.parametrize("at", [(0.0, 1.0), (3.0, 1.0), (5.0, 1.0), (-4.0, 9.0)])
-def test_words_longer_than_the_plan_are_cut(at: tuple[float, float]) -> None:
-    plan = CharacterPlan((5.0, 5.0), 10)
-    plan.put(at, "abcdefghijklmnop")
-    assert ["".join(row) for row in plan.cells if set(row) != {" "}] == ["abcdefghij"]
-    plan = CharacterPlan((5.0, 5.0), 10)
-    plan.name(at, "abcdefghijklmnop")
-    assert ["".join(row) for row in plan.cells if set(row) != {" "}] == ["abcdefghij"]

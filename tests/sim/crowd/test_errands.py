@@ -10,7 +10,7 @@ import pytest
 from scenarios.loading.resolve import load
 from scenarios.schema.scenario import Stop
 from scenarios.schema.values import Distribution
-from sim.crowd.stops import PlannedStop, draw_stops
+from sim.crowd.population import PlannedStop, draw_stops
 from sim.crowd.world import run
 from sim.sequence import simulate
 from sim.types import Array, Motion

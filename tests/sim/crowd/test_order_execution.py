@@ -6,8 +6,7 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.crowd.forces import Steering
 from sim.crowd.formation import standing
-from sim.crowd.queue_service import ServiceQueue
-from sim.crowd.triggers import concerned
+from sim.crowd.order_execution import ServiceQueue, concerned
 from sim.crowd.world import World, run
 
 HEAD = """

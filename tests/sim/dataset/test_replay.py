@@ -10,7 +10,7 @@ import pytest
 import sim
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load, load_observation
-from scenarios.schema.observation import ObservationSpec
+from scenarios.schema.scenario import ObservationSpec
 from sim.dataset.replay import Cut, replay
 from sim.dataset.splits import is_real
 from sim.io.formats.biwi import open_folder

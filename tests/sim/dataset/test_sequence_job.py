@@ -12,8 +12,15 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
 from sim.dataset import sequence_job as jobs
-from sim.dataset.sequence_job import JobOutcome, SequenceJob, is_stored, lost_job, run_job, stored_manifest
-from sim.dataset.setting_differences import setting_differences
+from sim.dataset.sequence_job import (
+    JobOutcome,
+    SequenceJob,
+    is_stored,
+    lost_job,
+    run_job,
+    setting_differences,
+    stored_manifest,
+)
 from sim.io.files import atomic
 from tests.fake_simulator import FakeSimulator, scenario
 

@@ -10,7 +10,7 @@ import pytest
 from benchmarks.fuzz.readers import FILES, READERS
 from benchmarks.fuzz.specimens import TEXTS, write_texts
 from scenarios.errors import InputError
-from scenarios.regular_file import read_regular
+from scenarios.reading import read_regular
 from sim.io.source import open_source
 
 FILE_KINDS = sorted(set(READERS) & set(TEXTS) - set(FILES) - {"setting", "tracker setting"})

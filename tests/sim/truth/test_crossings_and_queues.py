@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from scenarios.loading import geometry_check, script_check
+from scenarios.loading import checks
 from scenarios.loading.resolve import load
 from sim.crowd import forces_avoidance_kernels, population
 from sim.crowd.world import run
@@ -279,5 +279,5 @@ def test_nobody():
 
 def test_facts_of_scenarios_and_truth_agree():
     """`scenarios` cannot import `sim`: what its checks know of queues and bodies stands there once more."""
-    assert script_check.QUEUE_PEOPLE == queue_detection.QUEUE_PEOPLE
-    assert geometry_check.BODY == population.BODY_RADIUS == forces_avoidance_kernels.BODY
+    assert checks.QUEUE_PEOPLE == queue_detection.QUEUE_PEOPLE
+    assert checks.BODY == population.BODY_RADIUS == forces_avoidance_kernels.BODY

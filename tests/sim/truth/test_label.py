@@ -1,10 +1,84 @@
 import numpy as np
 import pytest
 
-from sim.scene.body import person_boxes
-from sim.truth.label import bodies, label
-from sim.types import Motion, Scene, Stairs
-from tests.reference_sense import crowd, pinhole, walkers
+from sim.geometry.polygons import area, convex_hull
+from sim.scene.body import Ellipsoids, contour, ellipsoids, outlines, person_boxes
+from sim.scene.camera import project
+from sim.truth.label import POINTS, bodies, hulls, image_groups, image_velocities, label
+from sim.types import Array, Groups, Motion, Scene, Stairs
+from tests.reference_sense import above, crowd, pinhole, walkers
+
+
+def some(n: int, seed: int) -> Ellipsoids:
+    r = np.random.default_rng(seed)
+    pos3 = np.column_stack([r.uniform([6, 3], [9, 6], (n, 2)), np.zeros(n)])
+    return ellipsoids(pos3, r.uniform(0, 6, n), r.uniform(1.5, 1.95, n))
+
+
+def inside(hull: Array, points: Array) -> Array:
+    """How far points lie to the left of every side of a counter-clockwise polygon."""
+    side = np.roll(hull, -1, axis=0) - hull
+    side = side / np.linalg.norm(side, axis=1, keepdims=True)
+    d = points[None] - hull[:, None]
+    return (side[:, None, 0] * d[..., 1] - side[:, None, 1] * d[..., 0]).min(axis=0)
+
+
+@pytest.mark.parametrize("camera", [pinhole(), above(20)])
+@pytest.mark.parametrize("seed", range(5))
+def test_hulls_are_the_hulls_of_dense_silhouettes(camera, seed: int) -> None:  # type: ignore[no-untyped-def]
+    shapes = some(9, seed)
+    edge = contour(outlines(camera, shapes), points=400)
+    for hull, members in zip(
+        hulls(outlines(camera, shapes), np.array([0, 2, 5, 9])), ([0, 1], [2, 3, 4], [5, 6, 7, 8]), strict=True
+    ):
+        exact = convex_hull(edge[members].reshape(-1, 2))
+        assert inside(exact, hull).min() > -0.02  # points of it, to the 400-gons' own error
+        assert inside(hull, exact).min() > -0.01 * np.ptp(exact, axis=0).max()
+        assert area(hull) == pytest.approx(area(exact), rel=0.02)
+        same = convex_hull(contour(outlines(camera, shapes), POINTS)[members].reshape(-1, 2))
+        assert np.array_equal(hull, same)
+
+
+def test_groups_keep_ids_and_members_and_get_places_in_the_image() -> None:
+    motion, camera = crowd(0, people=6, frames=4), pinhole()
+    truth = bodies(motion, camera)
+    two = np.zeros((2, 2))
+    members = (np.array([1, 2]), np.array([4, 5, 6]))
+    groups = Groups(np.array([3, 8]), members, two, two, np.zeros((2, 2, 2)), np.array([2.0, 3.0]), (two, two))
+    ground = (groups, Groups.none(), groups, Groups.none())
+    pos3 = np.column_stack([truth.pos, np.zeros(len(truth.id))])  # type: ignore[list-item]
+    shapes = ellipsoids(pos3, truth.heading, truth.height)  # type: ignore[arg-type]
+    found = image_groups(truth, ground, camera, shapes)
+    assert [g.id.tolist() for g in found] == [[3, 8], [], [3, 8], []]
+    assert found[2].members[1].tolist() == [4, 5, 6]
+    box = truth.at(3).box
+    assert box is not None
+    middle = box[:, :2] + box[:, 2:] / 2
+    assert found[2].pos == pytest.approx(np.stack([middle[:2].mean(axis=0), middle[3:].mean(axis=0)]))
+    assert found[2].extent[1] == pytest.approx(np.cov(middle[3:].T, bias=True))
+    assert found[2].size.tolist() == [2, 3]
+    assert inside(found[2].hull[1], middle[3:]).min() > 0
+
+
+def test_who_is_behind_the_camera_leaves_no_hull() -> None:
+    pos3 = np.array([[8.0, 9.0, 0.0], [8.0, -9.0, 0.0], [8.0, 8.0, 0.0]])
+    shapes = ellipsoids(pos3, np.zeros(3), np.full(3, 1.7))
+    split, whole = hulls(outlines(pinhole(0, 0, (8, -6, 1.5)), shapes), np.array([0, 2, 3]))
+    assert split.shape == (0, 2)
+    assert len(whole) > 2
+
+
+def test_no_groups() -> None:
+    assert hulls(outlines(pinhole(), some(3, 0)), np.array([0])) == []
+
+
+@pytest.mark.parametrize("camera", [pinhole(), above(20)])
+def test_image_velocities_are_differences_of_places(camera) -> None:  # type: ignore[no-untyped-def]
+    r = np.random.default_rng(0)
+    middle, vel = r.uniform([5, 3, 0.8], [11, 8, 0.9], (20, 3)), r.normal(size=(20, 2))
+    later = middle + 1e-4 * np.column_stack([vel, np.zeros(20)])
+    slow = (project(camera, later)[0] - project(camera, middle)[0]) / 1e-4
+    assert image_velocities(camera, middle, vel) == pytest.approx(slow, rel=1e-2, abs=0.05)
 
 
 def meeting(frames: int = 120) -> Motion:

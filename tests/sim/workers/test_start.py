@@ -11,9 +11,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from sim.workers.pool import process_pool
-from sim.workers.process import RemoteTraceback
-from sim.workers.protocol import MAX_LOSSES, THREAD_VARIABLES
+from sim.workers.pool import MAX_LOSSES, THREAD_VARIABLES, RemoteTraceback, process_pool
 from sim.workers.start import results_in_order, start_workers
 from tests.errands import complain, fall, fall_at_first, hide, process, refuse, root_of, told
 

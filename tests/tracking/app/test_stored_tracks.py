@@ -12,7 +12,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.hashing import file_hash
-from sim.io.files.lock import lock_folder
+from sim.io.files.atomic import lock_folder
 from sim.io.source import open_source
 from sim.io.store import seal
 from sim.io.store.run_seal import read_run

@@ -34,7 +34,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     detections or boxes of both. Also for fewer than 50 labelled people (rows of all frames), or fewer than 25 of them
     detected. Raises WorkError if the disk is full.
     """
-    from scenarios.loading.sensor_profiles import dump_sensor
+    from scenarios.loading.resolve import dump_sensor
     from sim.io.files.atomic import write_file
     from tracking.fitting.detection_matching import match_sequence
     from tracking.fitting.error_statistics import error_statistics, simulated_detections

@@ -101,7 +101,7 @@ def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
     o = options
     given = RecordingOptions(o.fps, o.px_per_m, o.camera, True, None, o.person_class, o.box_scale)  # type: ignore[arg-type]
     stated = [name for name, known in (("fps", "fps" in info), ("px_per_m", info.get("plane") != "image")) if known]
-    given.reject(folder, "a run", "run.json states it", "camera", "person_class", "box_scale", *stated)
+    given.reject(folder, "a run", "run.json states it", " ".join(("camera person_class box_scale", *stated)))
     scale, frames = info.get("px_per_m"), int(info.get("px_per_m_frames") or 0)
     if options.px_per_m is not None:
         scale, frames = options.px_per_m, 0

@@ -20,8 +20,8 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     replayed. Raises WorkError if the disk is full.
     """
     from scenarios.loading.resolve import load_observation
+    from sim.dataset.generate import ReplayOptions, store_replays
     from sim.dataset.replay import Cut
-    from sim.dataset.replay_dataset import ReplayOptions, store_replays
     from sim.io.source import open_source
 
     option_parsing.output_folder(options.out)

@@ -76,7 +76,7 @@ def track(options: TrackOptions) -> CommandResult:
     or a folder cannot be written. Raises WorkError if the tracker fails or the disk is full. Tracks stored before an
     error stay.
     """
-    from sim.io.files.lock import lock_folder
+    from sim.io.files.atomic import lock_folder
     from sim.io.source import open_source
     from sim.io.store.run_seal import reject_foreign, tracked_hash
     from tracking.tracker_registry import find

@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.export.webdataset import size_of, webdataset
-from sim.io.export.webdataset_samples import read_item
+from sim.io.export.webdataset import read_item, size_of, webdataset
 from sim.io.files import atomic, tables
 from sim.io.source import open_source, sequence_folders
 from sim.io.store import sequence_folder

@@ -10,7 +10,7 @@ from scenarios.errors import InputError
 from sim.io.formats.box_columns import parse_box_scale
 from sim.io.formats.mot_text import read_detections
 from sim.io.source import open_source
-from sim.io.store.track_text import read_track_text
+from sim.io.store.track_files import read_track_text
 
 FRAMES, PEOPLE = 12, 4
 

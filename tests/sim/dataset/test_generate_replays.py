@@ -9,8 +9,8 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load, load_observation
+from sim.dataset.generate import ReplayOptions, store_replays
 from sim.dataset.replay import Cut
-from sim.dataset.replay_dataset import ReplayOptions, store_replays
 from sim.dataset.splits import is_real
 from sim.io.formats.biwi import open_folder
 from sim.io.source import open_source

@@ -4,7 +4,7 @@ import numpy as np
 
 from sim.geometry.footprints import footprint_hull
 from sim.geometry.polygons import polygon_gap
-from sim.truth.encounters import encounters, members_by_frame, net_crossings
+from sim.truth.crossing_events import encounters, members_by_frame, net_crossings
 
 
 def cut(a, b):

@@ -4,7 +4,7 @@ import pytest
 
 import scenarios
 from scenarios.errors import InputError
-from scenarios.loading.sensor_profiles import dump_sensor, sensor_settings
+from scenarios.loading.resolve import dump_sensor, sensor_settings
 from scenarios.schema.sensor import BoxNoise, FalseAlarms, Hide, Memory, Sensor
 
 MINE = Sensor(

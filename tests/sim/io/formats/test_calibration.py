@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.formats.calibration import scaled_to_image
-from sim.io.formats.tsai import read_tsai
+from sim.io.formats.calibration import read_tsai, scaled_to_image
 from sim.io.source import open_source
 from sim.io.store.camera_files import camera_document, read_camera
 from sim.scene.camera import project, to_ground

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim.truth.queue_shapes import queue_shapes
+from sim.truth.queue_detection import queue_shapes
 from tests.reference_queue_shapes import chain
 
 

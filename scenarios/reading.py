@@ -1,0 +1,144 @@
+"""Reads files of users as bytes, and TOML and JSON texts as plain values; what is wrong is an InputError of one line.
+
+Only a regular file of bounded size is opened: a FIFO or a device would block or never end; a folder, a socket and a
+circle of symbolic links have no content. Values are refused that other code could not hold: deep nesting, whole numbers
+beyond 64 bits, and in JSON the words NaN and Infinity.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any, NoReturn
+
+from scenarios.errors import InputError
+from scenarios.limits import DEPTH, INTEGER, NESTING
+
+FAR = "whole numbers within 64 bits"
+
+
+def parse_toml(text: str, file: object = "") -> dict[str, Any]:
+    """Returns the table that a TOML text stands for."""
+    remedy = "correct the line; strings need quotes, tables inside a line need { }"
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        message, _, place = str(error).rpartition(" (at ")
+        raise InputError(
+            file=file, place=place.rstrip(")"), got=message or str(error), expected="TOML", remedy=remedy
+        ) from None
+    except RecursionError:
+        raise _too_deep(file) from None
+    except (ValueError, OverflowError) as error:  # of int() and of dates, which tomllib lets through
+        raise InputError(file=file, got=_reason(error), expected="TOML", remedy=remedy) from None
+    _require_plain(table, file)
+    return table
+
+
+def parse_json(text: str, file: object = "", remedy: str = "correct the file") -> Any:
+    """Returns the value that a JSON text stands for."""
+    try:
+        value = json.loads(text, parse_constant=_constant)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            file=file, place=f"line {error.lineno}", got=f"no JSON ({error.msg})", expected="JSON", remedy=remedy
+        ) from None
+    except RecursionError:
+        raise _too_deep(file) from None
+    except ValueError as error:
+        raise InputError(file=file, got=_reason(error), expected="JSON", remedy=remedy) from None
+    _require_plain(value, file)
+    return value
+
+
+def _constant(word: str) -> NoReturn:
+    raise ValueError(f"{word}, which is no number of JSON")
+
+
+def _reason(error: Exception) -> str:
+    text = str(error)
+    # Python's advice to raise its limit of digits helps no user.
+    return "a number of thousands of digits" if "integer string conversion" in text else text
+
+
+def _too_deep(file: object) -> InputError:
+    return InputError(file=file, got="deeper nesting", expected=NESTING, remedy="check that this is the right file")
+
+
+def _require_plain(value: Any, file: object) -> None:
+    # Without recursion: the nesting may be deeper than Python's stack.
+    level = [value]
+    for _ in range(DEPTH + 1):
+        for item in level:
+            if isinstance(item, int) and abs(item) > INTEGER:
+                raise InputError(file=file, got=item, expected=FAR, remedy="correct the number")
+        level = [inner for item in level for inner in _inside(item)]
+        if not level:
+            return
+    raise _too_deep(file)
+
+
+def _inside(value: Any) -> list[Any]:
+    if isinstance(value, dict):
+        return list(value.values())
+    return value if isinstance(value, list) else []
+
+
+KINDS = {
+    stat.S_IFIFO: "a FIFO",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFDIR: "a folder",
+}
+
+
+def require_regular(path: Path, remedy: str = "check the path") -> int:
+    """Returns the size in bytes of the regular file `path`, which is not opened; links are followed."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError) as error:
+        got = getattr(error, "strerror", None) or "a path that cannot be"
+        raise InputError(file=path, got=got, expected="a readable file", remedy=remedy) from None
+    if not stat.S_ISREG(found.st_mode):
+        got = KINDS.get(stat.S_IFMT(found.st_mode), "no regular file")
+        raise InputError(file=path, got=got, expected="a regular file", remedy=remedy)
+    return found.st_size
+
+
+def refuse_irregular(path: Path) -> None:
+    """Raises InputError as `require_regular` does, but not for a missing file or a link to one."""
+    if os.path.lexists(path) and (os.path.exists(path) or not _dangles(path)):
+        require_regular(path)
+
+
+def is_present(path: Path) -> bool:
+    """Returns True if the regular file exists; raises InputError for something else, as a FIFO."""
+    refuse_irregular(path)
+    return os.path.isfile(path)
+
+
+def _dangles(path: Path) -> bool:
+    try:
+        os.stat(path)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
+def read_regular(path: Path, limit: int, remedy: str = "check the path") -> bytes:
+    """Returns the bytes of the regular file `path`, at most `limit`."""
+    size = require_regular(path, remedy)
+    if size > limit:
+        got, expected = f"a file of {size:,} bytes", f"at most {limit:,} bytes"
+        raise InputError(file=path, got=got, expected=expected, remedy="check that this is the right file")
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        got = error.strerror or "no access"
+        raise InputError(file=path, got=got, expected="a readable file", remedy=remedy) from None
