@@ -4,7 +4,7 @@ An episode tracks one whole sequence. An action sets the parameters to search, e
 tracking.parameter_space). With decision_every=None one action before the first frame sets them all, and the episode is
 one step long. Else an action sets those that may change between frames, every `decision_every` frames. Observations are
 statistics of the run. A step's reward is S(frames so far) - S(frames before it), S being the objective of
-`tracking.evaluate` (mean of HOTA and group_F1_hull), 0 for no frames; the rewards sum to it. `import tracking`
+`tracking.evaluate` (mean of HOTA and group_F1), 0 for no frames; the rewards sum to it. `import tracking`
 registers it."""
 
 from __future__ import annotations

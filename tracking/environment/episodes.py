@@ -29,7 +29,7 @@ class Episode:
     """The result of an episode: one tracker on one sequence.
 
     - name, seed: of the source, a scenario or recording.
-    - objective: mean of HOTA and group_F1_hull, or the one that is known; nan if there is nothing to score.
+    - objective: mean of HOTA and group_F1, or the one that is known; nan if there is nothing to score.
     - scores: by key of the catalogue, without those that are nan.
     - frames: number of frames played.
     - seconds_tracking: time in the tracker with the checks of what it returns, s; `reset` included, reading frames not.
@@ -169,7 +169,7 @@ class Rollout:
     def scores(self, every: bool = False) -> dict[str, float]:
         """Returns a dict of the scores of the frames so far by key, without those that are nan.
 
-        every: the whole catalogue; else objective, HOTA and group_F1_hull. The time is added to `seconds_scoring`.
+        every: the whole catalogue; else objective, HOTA and group_F1. The time is added to `seconds_scoring`.
         Raises IncomparableError if the tracks lack the boxes or positions to compare, and InputError if groups must be
         derived in the image and the image scale is 0 or less.
         """

@@ -97,7 +97,7 @@ class SearchPlan:
 
     @property
     def needs_every_score(self) -> bool:
-        """True if some goal is other than objective, HOTA, group_F1_hull and frames/s: all scores must then be
+        """True if some goal is other than objective, HOTA, group_F1 and frames/s: all scores must then be
         computed.
         """
         return any(goal.key not in (*FAST_KEYS, SPEED) for goal in self.goals)

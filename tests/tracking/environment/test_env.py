@@ -396,4 +396,4 @@ def test_video(tmp_path):
 def test_what_it_says_can_be_written_down():
     _, _, info = played(make("group-pda", decision_every=15), seed=1)
     assert json.loads(json.dumps(info))["objective"] == info["objective"]
-    assert set(info["scores"]) == {"objective", "group_F1_hull"}
+    assert set(info["scores"]) == {"objective", "group_F1"}
