@@ -180,11 +180,13 @@ class Rollout:
         return {key: value for key, value in found.items() if value == value}
 
     def _every_score(self, px_per_m: float) -> Mapping[str, float]:
-        from tracking.grouping.grouped_tracks import with_groups
+        from tracking.grouping.foot_points import completed
         from tracking.run import TrackingRun
 
-        tracks = with_groups(self.tracks, self.prepared.context.fps, px_per_m) if self.tracks else ()
-        run, judge = TrackingRun(tuple(tracks), {"detections": self.prepared.mode}), self.opened.judge
+        context, mode, judge = self.prepared.context, self.prepared.mode, self.opened.judge
+        where = {"camera": context.camera, "scene": context.scene}
+        tracks = completed(self.tracks, context.fps, px_per_m, pixels=mode == "image", **where)
+        run = TrackingRun(tracks, {"detections": mode})
         return judge.scorer.evaluate(run, similarity=judge.similarity, frames=len(run))
 
 

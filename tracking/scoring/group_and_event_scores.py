@@ -90,8 +90,8 @@ def tracked_groups(sides: ComparedSides) -> TrackedGroups:
     sides: both sides' people in the scored frames. If the tracker names members, groups of two or more members are
     scored. Otherwise, and for a tracker of whole groups, the true people inside the hull or at most 0.3 m from it are
     the members. A hull with one person inside is not scored, as a person alone is no group. A hull with nobody inside
-    is scored, as a false group. If the truth has no positions on the surface, or its scale is unknown, the members named
-    (if any) stay. `Tracks` whose `groups` is None count as having no groups.
+    is scored, as a false group. If the truth has no positions on the surface, or its scale is unknown, the members
+    named (if any) stay. `Tracks` whose `groups` is None count as having no groups.
     """
     tracks = [t for t in sides.tracks if sides.frames[t.index]]
     frames = np.array([t.index for t in tracks], np.int64)
