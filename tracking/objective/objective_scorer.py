@@ -29,27 +29,28 @@ from tracking.scoring.rows import FrameRows, find_rows
 class ObjectiveScorer:
     """Computes the objective (mean of HOTA and group_F1) of any number of trackers against one truth.
 
-    Made from that Truth and the similarity of people, None by the data. State: scorer, a `Scorer` of the truth, which
-    must not change.
+    Made from that Truth. State: scorer, a `Scorer` of the truth, which must not change.
     """
 
-    def __init__(self, truth: Truth, similarity: Similarity | None = None) -> None:
-        self.scorer, self.similarity = Scorer(truth), similarity
+    def __init__(self, truth: Truth) -> None:
+        self.scorer = Scorer(truth)
 
-    def scores(self, tracks: Sequence[Tracks], px_per_m: float, pixels: bool = False) -> dict[str, float]:
+    def scores(
+        self, tracks: Sequence[Tracks], px_per_m: float, pixels: bool = False, similarity: Similarity | None = None
+    ) -> dict[str, float]:
         """Returns a dict of HOTA, group_F1 and objective over the frames 1 … last, the frame of the last `Tracks`.
 
         The objective is the mean of the other two; if one is nan the other, if both are nan nan. tracks: one tracker's,
-        sorted by frame, no id twice in a frame (not checked); without any, HOTA and objective are 0 and group_F1 is nan
-        if no group is labelled. px_per_m: scale for deriving groups in the image; nan takes the truth's. pixels: the
-        tracker works on pictures. The result equals `evaluate(truth, with_groups(tracks, fps, px_per_m), frames=last)`
-        under these keys. A score is nan where it is nan there: HOTA for a tracker of whole groups, group_F1 without
-        labelled groups.
+        sorted by frame, no id twice in a frame (not checked); without any, HOTA and objective are 0 and group_F1 is
+        nan. px_per_m: scale for deriving groups in the image; nan takes the truth's. pixels: the tracker works on
+        pictures. similarity: of people, None by the data. The result equals that of `evaluate` for the tracks completed
+        with groups (tracking.grouping.foot_points) and frames=last. A score is nan where it is nan there: HOTA for a
+        tracker of whole groups, group_F1 without labelled groups.
 
         Raises IncomparableError if boxes or positions to be compared are missing, and InputError if groups must be
         derived in the image and the scale is 0 or less.
         """
-        (moved,), similarity = in_one_plane(self.scorer.truth, [tracks], [pixels], self.similarity)
+        (moved,), similarity = in_one_plane(self.scorer.truth, [tracks], [pixels], similarity)
         scorer, last = self.scorer.judge(tracks, moved), tracks[-1].index if tracks else 0
         inside = scorer.scored(last)
         sides = scorer.sides([t for t in moved if inside[t.index]], inside)

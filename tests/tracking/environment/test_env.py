@@ -24,6 +24,7 @@ from tracking.config import Config, param
 from tracking.environment.env import OBSERVATIONS, TuningEnv
 from tracking.environment.observation import NAMES
 from tracking.parameter_space import decode, encode
+from tracking.run import TrackingRun
 from tracking.tracker_registry import names
 
 ID = "flockscope/Tuning-v0"
@@ -210,6 +211,25 @@ def test_all_episodes_have_detections_of_one_kind():
             played(env, seed=seed)
     with pytest.raises(InputError, match="bare with truth"):
         make("group-pda", ["cross", boxed, bare])
+
+
+@pytest.mark.parametrize("decision_every", [None, 10])
+def test_people_are_compared_as_asked(decision_every):
+    """The reward is the score of this similarity; without one it is that of the data, here the ground."""
+    found = {}
+    for similarity in (None, "ground", "image"):
+        env = make(similarity=similarity, decision_every=decision_every)
+        _, rewards, info = played(env, seed=1)
+        rollout = env.unwrapped.rollout
+        run = TrackingRun(tuple(rollout.tracks), {"detections": "file"})
+        expected = tracking.evaluate(rollout.truth, run, similarity=similarity)
+        assert rewards.sum() == pytest.approx(expected["objective"], abs=1e-12)
+        found[similarity] = info["scores"]["HOTA"]
+    assert found[None] == found["ground"] != found["image"]
+    with pytest.raises(InputError, match="similarity"):
+        make(similarity="volume")
+    with pytest.raises(InputError, match="no boxes to compare"):
+        played(make("relational", similarity="boxes"), seed=1)
 
 
 def test_from_pixels():

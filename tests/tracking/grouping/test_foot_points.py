@@ -97,9 +97,9 @@ def test_groups_lie_in_the_image(run) -> None:
 @pytest.mark.parametrize("similarity", [None, "image"])
 def test_the_objective_of_boxes_is_that_of_all_scores(scene, run, similarity) -> None:
     bare = without_groups(run)
-    scorer = ObjectiveScorer(scene.truth, similarity)
+    scorer = ObjectiveScorer(scene.truth)
     for last in (1, 12, len(bare)):
-        found = scorer.scores(bare[:last], scene.px_per_m)
+        found = scorer.scores(bare[:last], scene.px_per_m, similarity=similarity)
         expected = Scorer(scene.truth).evaluate(bare[:last], similarity=similarity, frames=last)
         assert [found[k] for k in KEYS] == pytest.approx([expected[k] for k in KEYS], abs=1e-12, nan_ok=True)
 
