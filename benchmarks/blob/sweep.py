@@ -24,7 +24,7 @@ from sim.types import Motion
 from tracking import evaluate, track
 from tracking.stats import mean_interval
 
-SCORES = {"HOTA": "HOTA", "MOTA": "MOTA", "IDF1": "IDF1", "group_F1": "group F1"}
+SCORES = {"HOTA": "HOTA", "MOTA": "MOTA", "IDF1": "IDF1", "group_F1_hull": "group F1"}
 
 
 @dataclass(frozen=True)

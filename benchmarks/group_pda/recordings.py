@@ -37,7 +37,16 @@ from tracking.scoring.frame_weights import weighted_scorers
 from tracking.scoring.people_and_groups import INSIDE
 
 DRAWS = 1000
-KEYS = ("group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP", "group_MOTA", "group_GDSR2", "group_F1", "group_IDSW")
+KEYS = (
+    "group_1-FP",
+    "group_1-FN",
+    "group_GDSR",
+    "group_MOTP",
+    "group_MOTA",
+    "group_GDSR2",
+    "group_F1_hull",
+    "group_IDSW",
+)
 POSITIONS = """the input is the position of every labelled person in each frame (2.5 frames/s) without identities: no
 misses and no false alarms"""
 TABLE_3B = f"""columns of Bazzani et al. 2012, Table 3b. DEEPER-JIGT, on its own BIWI frames: 1-FP 53.8 %,

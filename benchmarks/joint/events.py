@@ -37,12 +37,12 @@ def events(given: argparse.Namespace) -> None:
             " / ".join(f"{np.nansum([row[f'{kind}_{k}'] for row in found]):.1f}" for k in ("TP", "FP", "FN"))
             for kind in ("merge", "split")
         ]
-        means = [float(np.nanmean([row[key] for row in found])) for key in ("event_F1", "group_F1", "pairwise_F1")]
+        means = [float(np.nanmean([row[key] for row in found])) for key in ("event_F1", "group_F1_hull", "pairwise_F1")]
         cells[name] = [*map(tables.number, means), *counts, median_latency(found)]
     columns = ["event F1", "group F1", "pairwise F1", "merges: hits / false / missed", "splits", "latency, s (median)"]
     title = f"{suite}, {len(rows[compared[0].name])} sequences, seeds {seeds_text(given.seeds)}, "
     tables.table(title + f"filter seeds {seeds_text(given.filter_seeds)}", "tracker", columns, cells)
     first, *rest = (v.name for v in compared)
-    keys = {"event F1": "event_F1", "group F1": "group_F1", "pairwise F1": "pairwise_F1", "false events": "false"}
+    keys = {"event F1": "event_F1", "group F1": "group_F1_hull", "pairwise F1": "pairwise_F1", "false events": "false"}
     cells = {f"{first} − {name}": [difference(rows[first], rows[name], key) for key in keys.values()] for name in rest}
     tables.table("differences of means over sequences", "", list(keys), cells)
