@@ -1,4 +1,4 @@
-"""Runs guides from top to bottom in an empty folder: their scripts, files and commands, and compares what they print."""
+"""Runs guides from top to bottom in an empty folder: scripts, files and commands, and compares what they print."""
 
 from __future__ import annotations
 
