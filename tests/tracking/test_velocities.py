@@ -120,10 +120,15 @@ def test_good_velocities_make_no_warning_and_bad_ones_do(merge) -> None:
         track(Numbers, merge, detections="truth", grouping="rule")
         track("blob", merge, grouping="rule")
         for kind in (Differences, Standing):
-            track(kind, merge, detections="file")  # the belief looks at positions only
+            track(on_the_ground(kind), merge, detections="file")  # the belief looks at positions only
+            track(kind, merge, detections="file", grouping="rule")  # boxes are grouped where they stand
     for kind in (Differences, Standing):
         with pytest.warns(UserWarning, match=f"{kind.__name__}: one velocity in 5 differs by .* Report nan"):
-            track(kind, merge, detections="file", grouping="rule")
+            track(on_the_ground(kind), merge, detections="file", grouping="rule")
+
+
+def on_the_ground(kind: type[Numbers]) -> type[Numbers]:
+    return type(kind.__name__, (kind,), {"plane": "ground"})
 
 
 def moving(vel: float, n: int = 40) -> list[Tracks]:

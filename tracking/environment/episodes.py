@@ -201,8 +201,9 @@ class Rollout:
         from tracking.run import TrackingRun
 
         context, mode, judge = self.prepared.context, self.prepared.mode, self.opened.judge
-        where = {"camera": context.camera, "scene": context.scene}
-        tracks = completed(self.tracks, context.fps, px_per_m, pixels=mode == "image", **where)
+        tracks = completed(
+            self.tracks, context.fps, px_per_m, camera=context.camera, scene=context.scene, pixels=mode == "image"
+        )
         run = TrackingRun(tracks, {"detections": mode})
         return judge.scorer.evaluate(run, similarity=self.similarity, frames=len(run))
 

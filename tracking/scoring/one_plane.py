@@ -63,8 +63,8 @@ def in_one_plane(
         return moved, similarity
     if ground:
         return moved, "ground"
-    boxed = truth.camera is None and truth.box is not None and all(boxed(run) for run in runs)
-    return moved, "boxes" if boxed else "image"
+    by_overlap = truth.camera is None and truth.box is not None and all(boxed(run) for run in runs)
+    return moved, "boxes" if by_overlap else "image"
 
 
 def from_pixels(run: Iterable[Tracks]) -> bool:

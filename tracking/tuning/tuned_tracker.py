@@ -66,11 +66,11 @@ class TunedTracker:
             expected = ", ".join(known)
             raise InputError(place="--similarity", got=similarity, expected=expected, remedy="correct it")
         if self.name == RULE:
-            given = {"--detections": (detections, "truth"), "--similarity": (similarity, None)}
-            for place, (got, expected) in given.items():
-                if got != expected:
-                    remedy = "remove the option: the rule is tuned on people whose identity is known"
-                    raise InputError(place=place, got=got, expected=expected or "none", remedy=remedy)
+            remedy = "remove the option: the rule is tuned on people whose identity is known"
+            if detections != "truth":
+                raise InputError(place="--detections", got=detections, expected="truth", remedy=remedy)
+            if similarity is not None:
+                raise InputError(place="--similarity", got=similarity, expected="none", remedy=remedy)
             return
         choose_mode(self.needs, source.open(streams_for(self.tracker, detections)), detections)
 

@@ -229,7 +229,7 @@ def test_people_are_compared_as_asked(decision_every):
     with pytest.raises(InputError, match="similarity"):
         make(similarity="volume")
     with pytest.raises(InputError, match="no boxes to compare"):
-        played(make("relational", similarity="boxes"), seed=1)
+        played(make(TOY, similarity="boxes"), seed=1)
 
 
 def test_from_pixels():

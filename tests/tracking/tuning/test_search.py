@@ -332,17 +332,17 @@ def test_a_storage_that_is_none(tmp_path):
 def test_the_similarity_of_people_is_an_option(tmp_path: Path) -> None:
     """It decides the scores, stands in the written file, and belongs to a study."""
     found = {}
-    for similarity in (None, "image"):
+    for similarity in (None, "boxes"):
         made = tmp_path / f"{similarity}.toml"
         result = tune(**{**tune_arguments(tmp_path), "trials": 1, "tracker": "blob"}, similarity=similarity, out=made)
         found[similarity] = result.validation[0]
         settings = json.loads(made.with_suffix(".json").read_text())["settings"]
         assert settings["similarity"] == (similarity or "by the data")
-        assert ("compared by image" in made.read_text()) == (similarity == "image")
-    assert found[None] != found["image"]
+        assert ("compared by boxes" in made.read_text()) == (similarity == "boxes")
+    assert found[None] != found["boxes"]
     again = {**tune_arguments(tmp_path), "trials": 2, "tracker": "blob"}
     with pytest.raises(InputError, match="similarity"):
-        tune(**again, similarity="ground", out=tmp_path / "image.toml")
+        tune(**again, similarity="ground", out=tmp_path / "boxes.toml")
     with pytest.raises(InputError, match="--similarity"):
         tune(**tune_arguments(tmp_path), similarity="volume")
     with pytest.raises(InputError, match="identity is known"):
