@@ -27,7 +27,16 @@ import numpy as np
 
 from benchmarks.group_pda import columns
 from benchmarks.group_pda.runs import Row, TrackingJob, Variant, measure, with_points
-from benchmarks.support.options import CAMPUS, PETS, add_data, add_seeds, new_parser, one_thread, seeds_text
+from benchmarks.support.options import (
+    CAMPUS,
+    PETS,
+    TOWN_CENTRE,
+    add_data,
+    add_seeds,
+    new_parser,
+    one_thread,
+    seeds_text,
+)
 from benchmarks.support.tables import head, interval, row, signed, table
 from scenarios.loading.resolve import Entry, resolve
 from sim.detector.box_noise import box_errors, seen_shift
@@ -38,7 +47,6 @@ from sim.types import Array
 from tracking.fitting.detection_matching import match_sequence
 from tracking.stats import paired
 
-TOWN_CENTRE = "mot/AVG-TownCentre-first225"
 FOOT = 1  # column of `box_errors`
 DRAWS = 500
 SCENES = ("mixed", "pillar", "crowd", "merge")
