@@ -37,7 +37,8 @@ class CameraSpec(Model):
 
     kind: "pinhole" (perspective) or "top" (orthographic from above). image: width, height, px. fps: frames per second.
     focal_px: focal length, px, and baseline: distance to the right camera, m, 0 = none (both pinhole). tilt_deg: by how
-    much it looks down, 90 = straight down (pinhole). yaw_deg: 0 looks along +y, 90 along -x. px_per_m (kind top),
+    much it looks down, 90 = straight down (pinhole). yaw_deg: 0 looks along +y, 90 along -x; None: of a pinhole camera
+    without height and position the one of eight directions from which people look largest, else 0. px_per_m (kind top),
     height above the ground (m) and position (x, y, m): None: chosen so that all people are in view (height of "top":
     20 m). crop: True accepts people who walk out of view; False: they are an InputError."""
 
@@ -49,7 +50,11 @@ class CameraSpec(Model):
     tilt_deg: Annotated[float, Field(ge=-30, le=90)] = Field(
         40.0, description="angle by which the camera looks down; 90 = straight down"
     )
-    yaw_deg: float = Field(0.0, description="0 looks along +y, positive turns left")
+    yaw_deg: float | None = Field(
+        None,
+        description="0 looks along +y, positive turns left; absent: the direction, out of eight, in which people look "
+        "largest (0 from above, or if height or position is given)",
+    )
     px_per_m: Positive | None = Field(
         None, description="scale, px per m (kind top); absent: chosen so that all people are in view"
     )

@@ -41,7 +41,7 @@ def test_solved_views_show_everybody_and_are_tight(seed: int, tilt: float) -> No
 @pytest.mark.parametrize("seed", range(5))
 def test_a_given_height_or_position_is_kept(seed: int) -> None:
     motion = crowd(seed)
-    free = place_camera(CameraSpec(), motion)
+    free = place_camera(CameraSpec(yaw_deg=0.0), motion)
     tall = place_camera(CameraSpec(height=float(free.position[2]) + 3), motion)
     assert tall.position[2] == free.position[2] + 3
     assert extremes(tall, motion)[1] >= 0
@@ -50,6 +50,30 @@ def test_a_given_height_or_position_is_kept(seed: int) -> None:
     lower = placed.replace(position=placed.position - np.array([0, 0, 0.05]))
     left, top, right_, bottom = extremes(lower, motion)
     assert min(left, top, 640 - right_, 480 - bottom) < MARGIN * 480  # the lowest from which all are seen
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("turn", [0.0, 90.0, 200.0])
+def test_the_camera_looks_from_where_people_are_nearest(seed: int, turn: float) -> None:
+    """People walk along a line, turned: from its ends they look larger than from its side."""
+    along = np.array([np.cos(np.deg2rad(turn)), np.sin(np.deg2rad(turn))])
+    way = np.random.default_rng(seed).uniform(-12, 12, (8, 1)) * along
+    motion = walkers((way + np.array([8, 5])).tolist(), np.tile(along, (8, 1)).tolist(), frames=40)
+    chosen = place_camera(CameraSpec(), motion)
+    heights = [px_per_m_at_centre(place_camera(CameraSpec(yaw_deg=yaw), motion)) for yaw in range(0, 360, 45)]
+    assert px_per_m_at_centre(chosen) >= np.median(heights)
+    assert abs(chosen.rotation[2, :2] @ along) > 0.5 * np.hypot(*chosen.rotation[2, :2])  # within 60 degrees of the way
+    again = place_camera(CameraSpec(), motion.replace(fps=20.0))
+    assert np.array_equal(again.rotation, chosen.rotation)
+
+
+def test_a_view_that_the_scenario_fixes_keeps_yaw_0() -> None:
+    motion = crowd(2)
+    ahead = camera_rotation(np.deg2rad(40), 0.0)
+    for keys in ({"height": 20.0}, {"position": (8.0, -10.0), "crop": True}):
+        assert np.array_equal(place_camera(CameraSpec.model_validate(keys), motion).rotation, ahead)
+    above = place_camera(CameraSpec(kind="top"), motion)
+    assert np.array_equal(above.rotation, camera_rotation(np.pi / 2, 0.0))
 
 
 def test_straight_down_from_a_given_height_is_centred() -> None:
