@@ -1,11 +1,11 @@
 """Where a scenario's camera stands: the closest place from which every body is in view, in closed form.
 
-A direction that the scenario leaves out is the one of eight with the least median depth of the people: the nearer they
-are, the larger they look. With the rotation given, the image's four edges are planes through the camera's centre C with
-fixed inward normals n. A body (ellipsoid with centre c and shape matrix S) is in view if and only if
-n·C <= n·c - sqrt(nᵀ S n) for each edge. Only the least right-hand side b over all bodies and frames matters. C is
-solved in camera coordinates (right, down, forward): the left and right planes limit (right, forward), the upper and
-lower planes limit (down, forward). A height or position that the scenario gives fixes coordinates of C first.
+A direction that the scenario leaves out is the one of eight in which people look largest in the median. With the
+rotation given, the image's four edges are planes through the camera's centre C with fixed inward normals n. A body
+(ellipsoid with centre c and shape matrix S) is in view if and only if n·C <= n·c - sqrt(nᵀ S n) for each edge. Only the
+least right-hand side b over all bodies and frames matters. C is solved in camera coordinates (right, down, forward):
+the left and right planes limit (right, forward), the upper and lower planes limit (down, forward). A height or position
+that the scenario gives fixes coordinates of C first.
 """
 
 from __future__ import annotations
@@ -117,18 +117,20 @@ def _each_second(bodies: RecordedBodies, fps: float) -> RecordedBodies:
 
 def _yaw(spec: CameraSpec, bodies: RecordedBodies) -> float:
     """Return the yaw of a pinhole camera in degrees: the given one; 0 if height or position is given; else the one of
-    YAWS with the least median depth of the bodies, the first of equals.
+    YAWS in which a person of 1.7 m in the place of each body is highest in the median, the first of equals.
     """
     if spec.yaw_deg is not None:
         return spec.yaw_deg
     if spec.height is not None or spec.position is not None:
         return 0.0
 
-    def depth(yaw: float) -> float:
+    def height(yaw: float) -> float:
         camera = _pinhole(spec, bodies, yaw)
-        return float(np.median(turned(camera.rotation[2:], bodies.pos3 - camera.position)))
+        feet = turned(camera.rotation, bodies.pos3 - camera.position)
+        head = feet + PERSON_HEIGHT * camera.rotation[:, 2]
+        return float(np.median(feet[:, 1] / feet[:, 2] - head[:, 1] / head[:, 2]))
 
-    return min(YAWS, key=depth)
+    return max(YAWS, key=height)
 
 
 def _pinhole(spec: CameraSpec, bodies: RecordedBodies, yaw: float) -> Camera:
