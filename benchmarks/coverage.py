@@ -104,7 +104,7 @@ def scenario_text(scene: Scene, seed: int) -> str:
             'schema = 1\nabout = "people pass by, groups meet and part, at random times"',
             f"duration = {duration}\nworld = {{ size = [{SIZE}, {SIZE}] }}",
             f'camera = {{ kind = "top", fps = {FPS}, image = [640, 640] }}',
-            f"sensor = {{ detect_prob = {scene.detect_prob}, clutter_rate = {scene.clutter}, noise_px = 2.0 }}",
+            f"sensor = {{ detect_prob = {scene.detect_prob}, clutter_rate = {scene.clutter} }}",
             f"group = [\n{_rows(groups)}]\nevent = [\n{_rows(events)}]",
         ]
     )

@@ -288,7 +288,13 @@ def test_where_nothing_is_better_the_defaults_stay(tmp_path):
 
 def test_long_settings_are_told_short_and_stored_whole(tmp_path):
     long = "sensor.by_visibility=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]"
-    many = ["sensor.detect_prob=0.9", "sensor.noise_m=0.1", "sensor.noise_px=2.0", "sensor.persistence=0.1", long]
+    many = [
+        "sensor.detect_prob=0.9",
+        "sensor.noise_m=0.1",
+        "sensor.box_noise.scale=2.0",
+        "sensor.persistence=0.1",
+        long,
+    ]
     profile = str(tune(**tune_arguments(tmp_path, trials=1, set=["scenario.duration=2", *many])))
     assert "\nscenes with a detector of 5 settings, duration=2\n" in profile
     given = tune_arguments(tmp_path, trials=1, set=[long, "scenario.duration=2"], out=tmp_path / "found.toml")
