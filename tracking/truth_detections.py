@@ -81,7 +81,7 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
     """
     from pydantic import ValidationError
 
-    from scenarios.loading.sensor_profiles import SensorFile
+    from scenarios.loading.resolve import SensorFile
     from scenarios.loading.validation import input_error
     from sim.detector.sense import sense
     from sim.scene.boxes import with_visibility
