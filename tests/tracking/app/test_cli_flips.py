@@ -493,7 +493,6 @@ OPTIONS = {
     ("score", "tracks"): (BASE["score"], "score {0}/data {0}/perfect"),
     ("score", "similarity"): (BASE["score"] + " --similarity boxes", BASE["score"] + " --similarity ground"),
     ("score", "group_match"): (BASE["score"], BASE["score"] + " --group-match members"),
-    ("score", "against"): (BASE["score"], BASE["score"] + " --against {0}/perfect"),
     ("score", "blocks"): (
         "score {0}/data/flockscope-demo/scene-s40000 {0}/tracks",
         "score {0}/data/flockscope-demo/scene-s40000 {0}/tracks --blocks 5",

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sim.io.files.own_files import GENERATOR
 from tracking.app.commands.score import summary
-from tracking.app.commands.score_ranking import COLUMNS, rank_words
+from tracking.app.commands.score_ranking import rank_words, shown_columns
 from tracking.app.commands.score_tables import SHOWN, SIMILARITY, SequenceScores, number
 from tracking.comparison import ComparedRuns
 from tracking.scoring.catalogue import CATALOGUE
@@ -109,12 +109,7 @@ def demo_page(root: Path, scene: PixelScene, tables: list[RankingTable], section
 def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> str:
     """Returns a ranking as HTML, the oracle first, with links to the best and worst scene of the best tracker."""
     entries = table.compared.to_arrow(table.key).to_pylist()
-    keys = [
-        k
-        for k in COLUMNS
-        if k not in (table.key, table.key.removesuffix("_hull"))
-        and any(math.isfinite(e.get(k, math.nan)) for e in entries)
-    ]
+    keys = shown_columns(entries, table.key)
     rows = []
     for e in entries:
         own = {"mean": e["mean"], "low": e["low"], "high": e["high"]}
@@ -124,7 +119,8 @@ def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> 
     body = f'<div class="wide"><table><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'
     compared = table.compared
     note = f"{len(compared.sequences)} scenes, people compared by {SIMILARITY[compared.similarity]}"
-    return f"<h2>{escape(table.title)}</h2><p>{note}.</p>{body}{_extremes(table, entries[1]['run'], sections, root)}"
+    best = entries[len(compared.oracles)]["run"]
+    return f"<h2>{escape(table.title)}</h2><p>{note}.</p>{body}{_extremes(table, best, sections, root)}"
 
 
 def _extremes(table: RankingTable, run: str, sections: list[ResultSection], root: Path) -> str:
