@@ -73,7 +73,6 @@ def test_what_is_shown_and_stored(made: Path, tmp_path: Path, capsys) -> None:
     assert run([*words, "--csv", str(tmp_path / "all.csv")]) == 0
     short = capsys.readouterr().out
     assert short.startswith("ranking by objective, mean of 6 sequences, input boxes (file)\n")
-    assert " pair" not in short
     assert "parameter gate: good 0.999, bad 0.6" in short
     assert re.search(r"of \d\d rows about \d(\.\d)? would be called sure by chance", short)
     assert "scene-s00003" not in short
