@@ -42,7 +42,7 @@ def interval(mean: float, low: float, high: float, digits: int = 3) -> str:
 
 
 def signed(mean: float, low: float, high: float) -> str:
-    """Returns a difference with its sign and its ends; * means that it is sure, as 0 lies outside, not that it is good."""
+    """Returns a difference with its sign and its ends; * means sure (0 lies outside), not that it is good."""
     if not np.isfinite(mean):
         return "–"
     ends = f" [{low:+.3f}, {high:+.3f}]" if np.isfinite(low) else ""

@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -170,13 +171,16 @@ def _ranked(
 ) -> RankedRuns:
     rankings = {each: comparison.ranking(each) for each in CATALOGUE}
     table, own = comparison.to_arrow(key).to_pylist(), rankings[key]
-    names = [comparison.runs[k] for k in own.order.tolist()]
     pairs = []
-    for i, name in enumerate(names):
-        for other in names[i + 1 :]:
-            scores = {each: _difference(rankings[each], comparison.runs, name, other) for each in CATALOGUE}
-            pairs.append({"run": name, "minus": other, **scores[key], "scores": scores})
+    for name, other in _pairs(comparison, own):
+        scores = {each: _difference(rankings[each], comparison.runs, name, other) for each in CATALOGUE}
+        pairs.append({"run": name, "minus": other, **scores[key], "scores": scores})
     return RankedRuns(comparison, key, own, table, pairs, scenarios, settings, notes)
+
+
+def _pairs(comparison: ComparedRuns, ranking: Ranking) -> list[tuple[str, str]]:
+    """Returns the names of each pair of runs, the better one first."""
+    return list(combinations((comparison.runs[k] for k in ranking.order.tolist()), 2))
 
 
 def _difference(ranking: Ranking, runs: tuple[str, ...], first: str, second: str) -> dict[str, Any]:
@@ -234,7 +238,7 @@ def _text(every: RankedRuns, all_sequences: bool) -> Any:
     match = next(iter(c.scores.values()))[0].group_match
     lines = [
         *differences_words(every.settings),
-        *_verdict(every),
+        *verdict(c, every.key),
         *every.notes,
         f"people compared by {SIMILARITY[c.similarity]}, groups by {GROUP_MATCH[match]}",
         "oracle: true ids on the same input, without false alarms",
@@ -322,12 +326,12 @@ def _score_differences(every: RankedRuns) -> Any:
     keys = [key for key in known if key != "objective" or usual_key(every.comparison) == key]
     rows = {arrow(key): (key, pair["scores"][key]) for key in keys}
     title = printable(f"{pair['run']} minus {pair['minus']}")
-    sure = [chance(len(rows), "row")] if _can_be_sure(every) else []
+    sure = [chance(len(rows), "row")] if _can_be_sure(every.comparison, every.ranking) else []
     return with_title(title, _difference_table("score", rows), "; ".join([LOWER, *sure]))
 
 
-def _can_be_sure(every: RankedRuns) -> bool:
-    return every.comparison.blocks is not None or every.ranking.sequences >= FEWEST
+def _can_be_sure(comparison: ComparedRuns, ranking: Ranking) -> bool:
+    return comparison.blocks is not None or ranking.sequences >= FEWEST
 
 
 def _pair_differences(every: RankedRuns) -> Any:
@@ -346,23 +350,27 @@ def _difference_table(first: str, rows: Mapping[str, tuple[str, Mapping[str, Any
     return table
 
 
-def _verdict(every: RankedRuns) -> list[str]:
+def verdict(comparison: ComparedRuns, key: str) -> list[str]:
     """Returns lines that say in words which runs are surely better, and that the others share ranks."""
-    pairs, count = every.pairs, every.ranking.sequences
+    ranking = comparison.ranking(key)
+    pairs = [
+        {"run": i, "minus": j, **_difference(ranking, comparison.runs, i, j)} for i, j in _pairs(comparison, ranking)
+    ]
     sure = [p for p in pairs if p["sure"]]
     lines = []
     for run in dict.fromkeys(p["run"] for p in sure):
         nearest, *others = (p for p in sure if p["run"] == run)
-        low, mean, high = (number(every.key, x) for x in sorted(abs(nearest[end]) for end in ("mean", "low", "high")))
+        low, mean, high = (number(key, x) for x in sorted(abs(nearest[end]) for end in ("mean", "low", "high")))
         rest = f", and than {printable(', '.join(p['minus'] for p in others))}" if others else ""
         by = f"by {mean} ({low} to {high})"
-        lines.append(f"{printable(run)} is better than {printable(nearest['minus'])} {by}{rest}")
-    if not _can_be_sure(every):
-        hint = "; --blocks 1000 gives intervals of one recording" if len(every.comparison.sequences) == 1 else ""
-        lines.append(f"{counted(count, 'sequence')}: with fewer than {FEWEST} no difference is sure{hint}")
+        lines.append(f"{printable(run)} is surely better than {printable(nearest['minus'])} {by}{rest}")
+    if pairs and not _can_be_sure(comparison, ranking):
+        hint = "; --blocks 1000 gives intervals of one recording" if len(comparison.sequences) == 1 else ""
+        found = counted(ranking.sequences, "sequence")
+        lines.append(f"{found}: with fewer than {FEWEST} no difference is sure{hint}")
     elif len(sure) < len(pairs):
         lines.append("runs with a common rank: no sure difference" if sure else "no run is surely better than another")
-    if every.comparison.blocks is not None:
+    if comparison.blocks is not None:
         lines.append("intervals by weights of blocks of frames")
     if len(pairs) > 1:
         lines.append(f"intervals of differences hold with 95 % for all {len(pairs)} pairs together")
