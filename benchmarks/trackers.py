@@ -22,7 +22,7 @@ from tracking.app.commands.score_tables import number
 from tracking.app.commands.track import track
 from tracking.app.sequence_workers import OpenedAs
 
-SUITE = "quick"
+SUITE = "standard"
 SEEDS = "20000:20001"
 
 

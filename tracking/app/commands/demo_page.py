@@ -113,15 +113,18 @@ def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> 
     rows = []
     for e in entries:
         own = {"mean": e["mean"], "low": e["low"], "high": e["high"]}
-        cells = [escape(e["run"]), rank_words(e), _interval(table.key, own)]
+        name = escape(e["run"])
+        cells = [name if e["first"] else f"<em>{name}</em>", rank_words(e), _interval(table.key, own)]
         rows.append(_cells("td", [*cells, *(number(k, e[k], mean=True) for k in keys)]))
     head = "<tr><th>tracker</th><th>rank</th>" + "".join(map(_heading, [table.key, *keys])) + "</tr>"
     body = f'<div class="wide"><table><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'
     compared = table.compared
-    note = f"{len(compared.sequences)} scenes, people compared by {SIMILARITY[compared.similarity]}"
+    note = (
+        f"{len(compared.sequences)} scenes, people compared by {SIMILARITY[compared.similarity]}; small: 95 % interval"
+    )
     best = entries[len(compared.oracles)]["run"]
     words = "; ".join(verdict(compared, table.key))
-    sure = f"<p><strong>{escape(words)}.</strong></p>" if words else ""
+    sure = f"<p><strong>Result:</strong> {escape(words)}.</p>" if words else ""
     return f"<h2>{escape(table.title)}</h2><p>{note}.</p>{sure}{body}{_extremes(table, best, sections, root)}"
 
 
