@@ -543,6 +543,8 @@ OPTIONS = {
 }
 ELSEWHERE = {
     ("generate", "workers"),  # the same bytes for any number: tests/sim/test_generate.py
+    ("track", "workers"),  # as well: test_sequence_workers.py
+    ("score", "workers"),
     ("generate", "cluster"),  # and on a cluster: tests/sim/test_generate_cluster.py
     ("kitti", "folder"),  # tests/sim/io/export/test_kitti.py
     ("demo", "quick"),  # the long one is for `make demo`
