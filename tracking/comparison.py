@@ -69,7 +69,8 @@ class ComparedRuns:
 
     def rows(self) -> dict[str, list[Scores | None]]:
         """Returns the scores of the oracles, named "oracle from INPUT", then of the runs, one per sequence."""
-        return {**{f"oracle from {name}": row for name, row in self.oracles.items()}, **self.scores}
+        oracles = {f"oracle from {name}": row for name, row in self.oracles.items()}
+        return {**oracles, **{name: [*row] for name, row in self.scores.items()}}
 
     def values(self, key: str) -> Array:
         """Returns a score of the catalogue (R, S) of the runs on the sequences; nan where unknown."""
