@@ -66,7 +66,7 @@ def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence
         )  # fmt: skip
     how = (options.similarity, options.group_match, options.blocks)
     jobs = [ScoringJob((stored,), *how, box_scale=box_scale) for _, stored in matched]
-    found = []
+    found: list[ScoredSequence] = []
     with ProgressMeter("score", len(sequences)) as meter:
         for one in over_sequences(score_sequence, sequences, jobs, source, options.workers):
             meter.step(sequences[len(found)].name)
