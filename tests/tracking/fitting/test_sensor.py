@@ -45,10 +45,12 @@ KNOWN = Sensor(
 
 @cache
 def scenes() -> tuple[tuple[Truth, Any], ...]:
-    """Three streets before a level camera; read-only, whatever a test makes of them."""
+    """Three streets before a level camera that looks along them; read-only, whatever a test makes of them."""
     made = []
     for seed in range(30_000, 30_003):
-        scenario = load("street", set=["camera.tilt_deg=15", "camera.image=[1280, 720]", "duration=25.0"])
+        scenario = load(
+            "street", set=["camera.tilt_deg=15", "camera.yaw_deg=0", "camera.image=[1280, 720]", "duration=25.0"]
+        )
         sequence = simulate(scenario, seed, streams=())
         assert sequence.truth is not None
         made.append((sequence.truth, sequence.camera))
@@ -151,7 +153,8 @@ def test_small_people_and_tails_and_visible_parts_are_told() -> None:
 
 @pytest.mark.parametrize(("points", "box"), [("own", "visible"), ("seen", "visible"), ("foot", "amodal")])
 def test_points_are_told(points: Any, box: Any) -> None:
-    found = fit_matched(seen(Sensor(points=points, box=box, noise_m=0.1, min_visibility=0.0))[:1])
+    small = BoxNoise(scale=0.3)  # with large errors of boxes people are matched with their neighbours' detections
+    found = fit_matched(seen(Sensor(points=points, box=box, noise_m=0.1, min_visibility=0.0, box_noise=small))[:1])
     assert found.points == points
     near(found.noise_m, Sensor().noise_m if points == "foot" else 0.1, 0.01)
 
