@@ -77,7 +77,7 @@ def rows_of_text(folder: Path) -> tuple[str, Read]:
 
 def a_json_file(folder: Path) -> tuple[str, Read]:
     """Events of the greatest size of a JSON file."""
-    from sim.io.store.event_files import read_events
+    from sim.io.store.group_files import read_events
 
     path = folder / "e.json"
     event = '{"kind": "merge", "start": 1, "end": 3, "emitted": 2, "before": [1, 2], "after": [2], "members": [1, 2], '

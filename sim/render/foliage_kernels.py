@@ -1,4 +1,4 @@
-"""Compiled loops for plants in an image (see `sim.render.foliage`).
+"""Compiled loops for plants in an image (see `sim.render.weather`).
 
 `sample_plants` finds where plants can grow, on a coarse grid of pixels. `sway` draws the plants of one frame where the
 wind, in px, has moved them.
