@@ -210,7 +210,7 @@ class Renderer:
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
         canvas = view.take_canvas()
         if view.plants is not None:
-            from sim.render.foliage_kernels import sway
+            from sim.render.weather_kernels import sway
 
             sway(
                 view.empty_canvas, view.empty_scene.plants, view.plant_runs, view.wind(self._time(index)), NODE_STEP,
@@ -244,7 +244,7 @@ class Renderer:
         return image, truth
 
     def _draw_shadows(self, view: CameraView, canvas: FrameCanvas, people: DrawnPeople, seen: PeopleInView) -> None:
-        from sim.render.shadows_kernels import draw_shadows
+        from sim.render.weather_kernels import draw_shadows
 
         fall = seen.shadows
         if fall is None:

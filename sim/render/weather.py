@@ -180,7 +180,7 @@ def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repea
         )  # fmt: skip
     if share == 0:
         return None
-    from sim.render.foliage_kernels import sample_plants
+    from sim.render.weather_kernels import sample_plants
 
     key = int(source.integers(1 << 20))
     width, height = camera.image
