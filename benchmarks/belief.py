@@ -2,11 +2,8 @@
 
     python -m benchmarks.belief recordings [--data FOLDER]
     python -m benchmarks.belief suites [--scenes standard friends-meet …] [--people truth|rough|file|image]
-    python -m benchmarks.belief rates [--scenes street crowd party mixed] [--seeds 20000:20003]
     python -m benchmarks.belief calibration [--scenes streets] [--seeds 20000:20001] [--out CHART.svg]
-    python -m benchmarks.belief decisions [--scenes standard friends-meet …] [--seeds 10000:10001]
     python -m benchmarks.belief ablation --train standard streets … [--seeds 30000:30002] [--check 20000:20001]
-    python -m benchmarks.belief cost
 
 recordings: pairwise F1 on seq_hotel and zara01 from labelled positions, with intervals by blocks of frames; then from
 positions that err by 0.1 m, with 5 % missed, mean over 10 draws. CAVIAR's Meet_WalkTogether1 at its own scale. SPENCER
@@ -16,12 +13,9 @@ suites: pairwise F1, group F1, event F1, merges that are wrong or missed, and se
 over sequences with 95 % intervals, and the paired difference. --people: labelled people
 (truth), the same with positions that err by 0.1 m and 5 % missed (rough), or the tracks of `blob` from stored
 detections (file) or pictures (image).
-rates: pairwise F1 from the same motion at 2.5, 10 and 25 frames/s.
 calibration: probability and share of mates by bin, expected calibration error, all scenes weighing the same; --out:
 the same as a reliability plot.
-decisions: the scores of suites with numbers of the belief's file changed.
 ablation: the fit without each quantity: log loss and F1 on --check seeds, and F1 on the recordings.
-cost: CPU time per frame of `blob` (with the rule), of the belief and of the rule, in `crowd` with 23 and 110 people.
 --grouping FILE.toml: another belief.
 """
 
@@ -29,42 +23,59 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from benchmarks.belonging.transfer import f1
-from benchmarks.grouping import linked_pairs, pairs_in_frames
 from benchmarks.support.chart import Panel, lines
 from benchmarks.support.in_memory import in_memory
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser, seed_range
 from benchmarks.support.tables import head, interval, number, row, signed, table
-from benchmarks.support.timing import best_times
 from scenarios.loading.resolve import Entry, resolve
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Tracks, Truth
-from sim.types import Sequence as Recording
 from tracking import track
 from tracking.fitting.belief import fit_belief, sample_of
 from tracking.fitting.belief_scores import BINS, belief_scores, reliability
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouped_tracks import derive, without_groups
-from tracking.grouping.grouping_choice import Grouping, grouping_of, links_of
+from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.pair_evidence import NAMES, QUANTITIES, TIMES
-from tracking.grouping.tracks_table import tabulate
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals, mean_interval
 
 KEYS = ("pairwise_F1", "group_F1_hull", "event_F1", "merge_latency")
-RATES = {2.5: 20, 10.0: 5, 25.0: 2}
-"""Frame rate and step of frames at 50 frames/s."""
+
+
+def pairs_in_frames(truth: Truth) -> tuple[Ints, Ints, Bools]:
+    """Returns the rows i, j of all pairs of people of one frame, and whether they are labelled as one group."""
+    found = []
+    for index in range(1, truth.length + 1):
+        r = truth.rows(index)
+        i, j = np.triu_indices(r.stop - r.start, 1)
+        found.append((i + r.start, j + r.start))
+    i, j = (np.concatenate(part) for part in zip(*found, strict=True))
+    return i, j, (truth.group[i] >= 0) & (truth.group[i] == truth.group[j])
+
+
+def linked_pairs(truth: Truth, rule: Grouping, i: Ints, j: Ints) -> Bools:
+    """Returns which pairs of rows the rule puts into one group, ."""
+    derived = derive(people_as_tracks(truth), truth.fps, truth.px_per_m, rule)
+    group = np.concatenate([t.group for t in derived])
+    return (group[i] >= 0) & (group[i] == group[j])
+
+
+def f1(weight: Array, frame: Ints, true: Bools, found: Bools) -> Array:
+    """Returns the pairwise F1 of each row of weights (D, frames), (D,); rows of pairs: frame (from 0), true, found."""
+    count = [np.bincount(frame[rows], minlength=weight.shape[1]) for rows in (true & found, true, found)]
+    hits, positives, reported = (weight @ c for c in count)
+    return np.asarray(2 * hits / np.maximum(positives + reported, 1e-9))
 
 
 def spencer(truth: Truth, i: Ints, j: Ints) -> Bools:
@@ -99,7 +110,7 @@ def recordings(data: Path, belief: Belief) -> None:
     for folder in (HOTEL, ZARA):
         truth = _truth(data / folder)
         i, j, same = pairs_in_frames(truth)
-        found = [spencer(truth, i, j), *(linked_pairs(truth, g, i, j)[0] for g in (LinkRule(), belief))]
+        found = [spencer(truth, i, j), *(linked_pairs(truth, g, i, j) for g in (LinkRule(), belief))]
         frame = truth.frame[i] - 1
 
         def scores(weight: Array, found: list[Bools] = found, frame: Ints = frame, same: Bools = same) -> Array:
@@ -115,7 +126,7 @@ def recordings(data: Path, belief: Belief) -> None:
             i, j, same = pairs_in_frames(erring)
             frame = erring.frame[i] - 1
             once = np.ones((1, truth.length))
-            draws.append([f1(once, frame, same, linked_pairs(erring, g, i, j)[0])[0] for g in (LinkRule(), belief)])
+            draws.append([f1(once, frame, same, linked_pairs(erring, g, i, j))[0] for g in (LinkRule(), belief)])
         rule, own = np.mean(draws, axis=0)
         row([f"{Path(folder).name}, 0.1 m, 5 % missed", "–", number(rule), number(own), f"{own - rule:+.3f}", "–"])
     truth = _truth(data / WALK_TOGETHER)
@@ -168,57 +179,9 @@ def suites(names: Sequence[str], seeds: range, belief: Belief, source: str) -> N
         table(title, "", COLUMNS, cells)
 
 
-CHANGES: Mapping[str, Mapping[str, float]] = {
-    "belief": {}, "stay = come = 0": {"stay": 0.0, "come": 0.0}, "stay = 0": {"stay": 0.0}, "come = 0": {"come": 0.0},
-    "come = 2.5": {"come": 2.5}, "stay = 8": {"stay": 8.0}, "memory = 0": {"memory": 0.0},
-    "arrival = 0": {"arrival": 0.0},
-}  # fmt: skip
-
-
-def decisions(names: Sequence[str], seeds: range, belief: Belief) -> None:
-    groupings = {key: replace(belief, **changes) for key, changes in CHANGES.items()}
-    for name in names:
-        found = scores_of(name, seeds, groupings, "truth")
-        base = found["belief"][0]
-        cells = {
-            key: [*_cells(interval if key == "belief" else signed, values if key == "belief" else values - base), text]
-            for key, (values, text) in found.items()
-        }
-        title = (
-            f"{Path(name).stem}, seeds {seeds.start}:{seeds.stop}, {len(base)} sequences; differences from the belief"
-        )
-        table(title, "", COLUMNS, cells)
-
-
 def _cells(write: object, values: Array) -> list[str]:
     ends = mean_interval(values)
     return [write(*map(float, x)) for x in zip(*ends, strict=True)]  # type: ignore[operator]
-
-
-def rates(names: Sequence[str], seeds: range, belief: Belief) -> None:
-    head(["scenes", *(f"{fps:g} frames/s" for fps in RATES)])
-    for name in names:
-        found = []
-        for entry in resolve(name, ["camera.fps=50"]):
-            for seed in seeds:
-                truth = simulate(entry.scenario, seed, entry.repeat, streams=()).truth
-                assert truth is not None
-                found.append([_f1_every(truth, every, belief) for every in RATES.values()])
-        row([Path(name).stem, *(number(x) for x in np.sum(found, axis=0)[:, 0] / np.sum(found, axis=0)[:, 1])])
-
-
-def _f1_every(truth: Truth, every: int, belief: Belief) -> tuple[float, float]:
-    """Returns twice the hits, and the true plus the found pairs, in every n-th frame of a truth; the last of a step of
-    2.5 frames/s counts."""
-    kept = (truth.frame - 1) % every == 0
-    rows = {name: getattr(truth, name)[kept] for name in ("id", "group", "visibility", "pos")}
-    slow = truth.replace(
-        **rows, frame=(truth.frame[kept] - 1) // every + 1, fps=truth.fps / every, vel=None, box=None, truncation=None,
-        length=(truth.length - 1) // every + 1,
-    )  # fmt: skip
-    i, j, same = pairs_in_frames(slow)
-    found = linked_pairs(slow, belief, i, j)[0]
-    return 2.0 * float((same & found).sum()) * every, float(same.sum() + found.sum()) * every
 
 
 def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | None) -> None:
@@ -257,40 +220,14 @@ def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> No
         real = []
         for truth in truths.values():
             i, j, same = pairs_in_frames(truth)
-            found = linked_pairs(truth, belief, i, j)[0]
+            found = linked_pairs(truth, belief, i, j)
             real.append(number(float(f1(np.ones((1, truth.length)), truth.frame[i] - 1, same, found)[0])))
         row([family or "–", *(f"{scores[k]:.4f}" for k in ("log loss", "calibration error", "F1")), *real])
 
 
-CROWDED = [f"group.{name}.repeat=36" for name in ("passers", "stop")] + ["world.size=[28, 28]"]
-"""Keys of `crowd` with about 100 people."""
-
-
-def cost(belief: Belief) -> None:
-    for name, keys in (("crowd", ()), ("crowd", CROWDED)):
-        (entry,) = resolve(name, keys)
-        _cost(simulate(entry.scenario, 20000, entry.repeat, streams=()), belief)
-
-
-def _cost(sequence: Recording, belief: Belief) -> None:
-    truth = sequence.truth
-    assert truth is not None
-    table_ = tabulate(people_as_tracks(truth), truth.fps, truth.px_per_m)
-    works = {
-        "blob with the rule": lambda: track("blob", sequence, detections="file", grouping="rule"),
-        "belief": lambda: links_of(table_, truth.fps, belief),
-        "rule": lambda: links_of(table_, truth.fps, LinkRule()),
-    }
-    head([f"{sequence.name}, {len(truth.frame) / truth.length:.0f} people", "CPU time, ms per frame"])
-    for name, work in works.items():
-        row([name, number(1000 * best_times(work, 3)[0] / truth.length)])
-
-
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument(
-        "mode", choices=["recordings", "suites", "rates", "calibration", "decisions", "ablation", "cost"]
-    )
+    parser.add_argument("mode", choices=["recordings", "suites", "calibration", "ablation"])
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="scenarios, suites or *.toml files")
     parser.add_argument("--train", nargs="+", metavar="NAME", help="ablation: to fit to", default=["standard"])
     parser.add_argument("--people", choices=["truth", "rough", "file", "image"], default="truth", help="suites: whose")
@@ -310,16 +247,10 @@ def _run(args: argparse.Namespace, belief: Belief) -> None:
         recordings(args.data, belief)
     elif args.mode == "suites":
         suites(args.scenes or ["standard", "friends-meet"], args.seeds, belief, args.people)
-    elif args.mode == "rates":
-        rates(args.scenes or ["street", "crowd", "party", "mixed"], args.seeds, belief)
     elif args.mode == "calibration":
         calibration(args.scenes or ["standard"], args.seeds, belief, args.out)
-    elif args.mode == "decisions":
-        decisions(args.scenes or ["standard", "friends-meet"], args.seeds, belief)
-    elif args.mode == "ablation":
-        ablation(args.train, args.seeds, args.check, args.data)
     else:
-        cost(belief)
+        ablation(args.train, args.seeds, args.check, args.data)
 
 
 if __name__ == "__main__":

@@ -2,17 +2,13 @@
 
     python -m benchmarks.realism walking [--seeds 0:40]
     python -m benchmarks.realism recording [--data FOLDER] [--seeds 0:40] [--scenarios street …]
-    python -m benchmarks.realism middle [--data FOLDER] [--seeds 0:40] [--scenarios street …]
     python -m benchmarks.realism replays [--data FOLDER]
 
 walking: free speeds, speeds and shapes of groups that walk alone on open ground, measured from 4 s after the start.
 recording: seq_hotel (BIWI) and scenarios of the catalogue, sampled at 2.5 frames/s with velocities by central
-differences. Printed for each: quantiles (5, 25, 50, 75, 95 %) of the speeds of people who walk (> 0.3 m/s) and of the
+differences. Printed for each: quantiles (5, 50, 95 %) of the speeds of people who walk (> 0.3 m/s) and of the
 closest approach, the least distance of two people of different groups who come within 3 m; then Wasserstein distances
 to the recording in speed and closest approach, and the ratio of the 99 % quantiles of the acceleration.
-middle: medians of rough motion (benchmarks.roughness) of seq_hotel, zara01 and scenarios, these also with the errors of
-a labeller. Then what tells errors of labels from motion: repeated labels, labels on straight lines, and the amplitudes
-of positions along and across the walk by frequency and speed.
 replays: whole recordings replayed at 10 frames/s. `off`: distance of the replay from the labelled position at the time
 of the label (50, 99 %, m). Speeds (50, 99 %, m/s) and accelerations (99 %, m/s²) of the recording are differences of
 its labels at its own rate, those of the replay at 10 frames/s. Events are measured on the labels and on the replay.
@@ -20,7 +16,6 @@ its labels at its own rate, those of the replay at 10 frames/s. Events are measu
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,26 +23,19 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import wasserstein_distance
 
-from benchmarks import roughness
-from benchmarks.belonging.sources import sample
-from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser
-from benchmarks.support.tables import table
+from benchmarks.support.options import HOTEL, PETS, WALK_TOGETHER, add_data, add_seeds, new_parser
+from benchmarks.support.tables import head, number, row
 from scenarios.loading.resolve import load, names
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from sim.crowd.world import run
 from sim.dataset.replay import on_ground, replay
 from sim.io.source import open_source
-from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Motion, Sequence, Truth
-from tracking.tuning.grouping_episodes import SURVEYED, with_label_errors
 
 STEP = 0.4  # s
 WALKING = 0.3  # m/s
 MEETING = 3.0  # m
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-PACES = ((0.8, 1.2), (1.2, 1.6), (1.6, 2.2))  # m/s
-FEW = 30  # walks
-ON_A_LINE = 1e-3  # m/s²: labels on a straight line at constant speed
+QUANTILES = (0.05, 0.5, 0.95)
 OPEN_GROUND = {"schema": 1, "duration": 9.0, "warmup": 4.0, "world": {"size": [60, 20]}}
 
 
@@ -190,84 +178,36 @@ def distances(mine: tuple[Array, Array, Array], real: tuple[Array, Array, Array]
 
 
 def walking(seeds: range) -> None:
+    """Prints the habits of people alone and in groups beside the literature."""
     speed = free_speeds(range(seeds.start, seeds.start + max(1, len(seeds) // 4)))
-    print(f"walking alone: {speed.mean():.2f} ± {speed.std():.2f} m/s ({len(speed)} people)")
     walks = {n: walk_alone(n, seeds) for n in range(1, 7)}
-    means = [walks[n].speed.mean() for n in walks]
-    print("speed of groups of 1 to 6: " + ", ".join(f"{m:.2f}" for m in means) + " m/s")
-    print(f"    each member slows a group by {-np.polyfit(list(walks), means, 1)[0]:.3f} m/s")
-    for n in range(2, 7):
-        print(f"nearest neighbour in groups of {n}: {np.quantile(neighbours(walks[n]), (0.1, 0.5, 0.9)).round(2)} m")
-    print(f"pairs: {np.quantile(abreast(walks[2]), (0.1, 0.5)).round(0)} degrees (10 %, median); 90 is abreast")
+    slower = -np.polyfit(list(walks), [walks[n].speed.mean() for n in walks], 1)[0]
+    near = np.array([np.quantile(neighbours(walks[n]), (0.1, 0.5, 0.9)) for n in range(2, 7)])
+    angle = np.quantile(abreast(walks[2]), (0.1, 0.5))
     behind = middle_behind(walks[3])
-    print(f"triads: middle {np.median(behind):.2f} m behind (median), in {np.mean(behind > 0):.0%} behind")
-    print(f"rows of groups of 4, 5, 6: {', '.join(f'{rows(walks[n]).mean():.2f}' for n in (4, 5, 6))} (mean)")
-    for n in (2, 3, 4):
-        print(f"strangers who pass through a group of {n}: {passes_through(n, seeds).mean():.0%} of {len(seeds)}")
+    through = ", ".join(f"{passes_through(n, seeds).mean():.0%}" for n in (2, 3, 4))
+    head(["habit", "literature", "simulator"])
+    row(["free speed, m/s", "N(1.34, 0.26) (Weidmann 1993)", f"{speed.mean():.2f} ± {speed.std():.2f}"])
+    row(["slower per member, m/s", "0.04–0.08 (Moussaïd et al. 2010)", f"{slower:.3f}"])
+    for q, text in zip((10, 50, 90), near.T, strict=True):
+        row([f"nearest neighbour, {q} %, groups of 2 to 6, m", "0.6–0.9" if q == 50 else "",
+             f"{text.min():.2f}–{text.max():.2f}"])  # fmt: skip
+    row(["pairs, angle to the walk (10 %, median)", "abreast: 90°", f"{angle[0]:.0f}°, {angle[1]:.0f}°"])
+    row(["triads, middle member behind, m", "slightly (Zanlungo & Kanda 2013)",
+         f"{np.median(behind):.2f}, in {np.mean(behind > 0):.0%}"])  # fmt: skip
+    row(["rows of groups of 4, 5, 6", "pairs and triads", ", ".join(f"{rows(walks[n]).mean():.1f}" for n in (4, 5, 6))])
+    row(["strangers who pass through a group of 2, 3, 4", "seldom", through])
 
 
 def recording(folder: Path, scenarios: list[str], seeds: range) -> None:
+    """Prints scenarios beside seq_hotel."""
     real = recording_statistics(str(folder))
+    head(["scene", "speed, m/s (5, 50, 95 %)", "closest approach, m (5, 50, 95 %)", "W of speed, m/s",
+          "W of closest approach, m", "acceleration, ratio"])  # fmt: skip
     for name in ("seq_hotel", *scenarios):
         mine = real if name == "seq_hotel" else scenario_statistics(name, seeds)
-        speed, closest, ratio = distances(mine, real)
-        print(f"{name}: speed {np.quantile(mine[0], QUANTILES).round(2)}, ", end="")
-        if len(mine[1]):
-            print(f"closest {np.quantile(mine[1], QUANTILES).round(2)}, ", end="")
-        print(f"W {speed:.2f} m/s, {closest:.2f} m, acceleration x {ratio:.2f}", flush=True)
-
-
-def middle(data: Path, scenarios: list[str], seeds: range) -> None:
-    rough = {name: roughness.roughness([sample(_labels(data / name))]) for name in (HOTEL, ZARA)}
-    for name in scenarios:
-        truths = [truth for seed in seeds if (truth := simulate(load(name), seed, streams=()).truth) is not None]
-        wrong = [with_label_errors(truth, SURVEYED, seed) for truth, seed in zip(truths, seeds, strict=True)]
-        rough[name] = roughness.roughness(map(sample, truths))
-        rough[f"{name}, label errors"] = roughness.roughness(map(sample, wrong))
-    columns = ["acceleration, m/s²", "above 0.94 Hz along, across, mm", "velocity difference of mates, m/s"]
-    columns += ["spread of their distance, m", "angle of pairs (10, 50 %)"]
-    table("medians", "source", columns, {name: _middle(r) for name, r in rough.items()})
-    columns = ["labels as the one before, standing", "no acceleration, walking or not"]
-    columns += ["error of labels, standing, m"]
-    table("labels", "source", columns, {name: _label_signs(rough[name]) for name in (HOTEL, ZARA)})
-    f = [f"{x:g} Hz" for x in roughness.frequencies()[1:]]
-    table(
-        "amplitude along / across, mm/√Hz", "source, speed", f, {k: v for r in rough.items() for k, v in _spectra(*r)}
-    )
-
-
-def _labels(folder: Path) -> Truth:
-    truth = open_source(folder)[0].truth
-    assert truth is not None
-    return truth
-
-
-def _middle(r: roughness.Roughness) -> list[str]:
-    def median(x: Array) -> str:
-        return f"{np.median(x):.2f}" if len(x) else "–"
-
-    fast = ", ".join(f"{x:.1f}" for x in roughness.fast_part(r.walks)) if len(r.walks) else "–"
-    angle = "{:.0f}, {:.0f}°".format(*np.quantile(r.mates_angle, (0.1, 0.5))) if len(r.mates_angle) else "–"
-    return [median(r.acceleration), fast, f"{np.median(r.mates_velocity):.3f}" if len(r.mates_velocity) else "–",
-            f"{np.median(r.mates_spread):.3f}" if len(r.mates_spread) else "–", angle]  # fmt: skip
-
-
-def _label_signs(r: roughness.Roughness) -> list[str]:
-    error = np.sqrt(np.mean(r.still[:, 1] ** 2))
-    return [f"{r.still[:, 0].mean():.0%}", f"{np.mean(r.acceleration < ON_A_LINE):.0%}", f"{error:.3f}"]
-
-
-def _spectra(name: str, r: roughness.Roughness) -> list[tuple[str, list[str]]]:
-    """Returns a row per range of speeds: square roots of the median power over ln 2, the mean of exponential power."""
-    out = []
-    for low, high in PACES:
-        k = (r.pace >= low) & (r.pace < high)
-        if k.sum() >= FEW:
-            along, across = np.sqrt(np.median(r.walks[k], axis=0) / np.log(2))[:, 1:]
-            out.append(
-                (f"{name}, {low}–{high} m/s", [f"{a:.0f} / {b:.0f}" for a, b in zip(along, across, strict=True)])
-            )
-    return out
+        cells = [", ".join(f"{x:.2f}" for x in np.quantile(v, QUANTILES)) if len(v) else "–" for v in mine[:2]]
+        row([name, *cells, *(number(x, 2) for x in distances(mine, real))])
 
 
 def label_distances(source: Sequence, made: Sequence) -> Array:
@@ -307,36 +247,34 @@ def event_counts(truth: Truth) -> str:
 
 
 def replays(data: Path) -> None:
+    """Prints replays beside their recordings."""
+    head(["recording", "", "off, m (50, 99 %)", "speed, m/s (50, 99 %)", "acceleration, m/s² (99 %)", "events"])
     for name in (HOTEL, WALK_TOGETHER, PETS):
-        source, begun = open_source(data / name, images=False)[0], time.perf_counter()
+        source = open_source(data / name, images=False)[0]
         made = replay(source, ObservationSpec(), streams=())
         labels, truth = source.truth, made.truth
-        spent, origin = time.perf_counter() - begun, made.source["origin"]
         assert labels is not None
         assert truth is not None
         assert truth.pos is not None
         off = np.quantile(label_distances(source, made), (0.5, 0.99))
-        print(f"\n{name}: {made.length} frames, {len(origin['people'])} people, {spent:.1f} s to make")
-        print(f"  smoothing {origin['smoothing']:g} s, off {off[0]:.3f}, {off[1]:.3f} m")
-        for some, pos, what in ((labels, on_ground(labels, source), "recording"), (truth, truth.pos, "replay")):
+        for some, pos, what in ((labels, on_ground(labels, source), "labels"), (truth, truth.pos, "replay")):
             speed, acceleration = speeds_and_accelerations(some.frame, some.id, pos, some.fps)
-            q = (*np.quantile(speed, (0.5, 0.99)), np.quantile(acceleration, 0.99))
-            print(f"  {what:9}  speed {q[0]:.2f}, {q[1]:.2f} m/s, acceleration {q[2]:.2f} m/s²; {event_counts(some)}")
+            fast = ", ".join(f"{x:.2f}" for x in np.quantile(speed, (0.5, 0.99)))
+            away = f"{off[0]:.3f}, {off[1]:.3f}" if what == "replay" else ""
+            row([Path(name).name, what, away, fast, f"{np.quantile(acceleration, 0.99):.2f}", event_counts(some)])
 
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["walking", "recording", "middle", "replays"])
+    parser.add_argument("mode", choices=["walking", "recording", "replays"])
     add_seeds(parser, "0:40")
-    parser.add_argument("--scenarios", nargs="*", default=names(), help="recording, middle: scenarios to compare")
+    parser.add_argument("--scenarios", nargs="*", default=names(), help="recording: scenarios to compare")
     add_data(parser)
     args = parser.parse_args()
     if args.mode == "walking":
         walking(args.seeds)
     elif args.mode == "recording":
         recording(args.data / HOTEL, args.scenarios, args.seeds)
-    elif args.mode == "middle":
-        middle(args.data, args.scenarios, args.seeds)
     else:
         replays(args.data)
 

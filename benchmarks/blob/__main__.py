@@ -1,32 +1,23 @@
-"""`blob`: on boxes beside other trackers, what its options are worth, from pixels, in varied pictures, its management.
+"""`blob`: on boxes beside other trackers, what its options are worth, from pixels.
 
     python -m benchmarks.blob peers [speed] [train] [test] [generated] [real] --peer-python PYTHON [--data FOLDER]
         [--rounds 5] [--scenes 24]
     python -m benchmarks.blob options [--scenes 30]
-    python -m benchmarks.blob coasting [--scenes 30]
     python -m benchmarks.blob pixels [pets] [rendered] [above] [--data FOLDER] [--seeds 0:2]
-    python -m benchmarks.blob sweep [tilt] [shadow] [noise] [light] [--seeds 0:10] [--scenarios cross merge] [--out DIR]
-    python -m benchmarks.blob management
 
-The docstrings of benchmarks/blob/*.py say what each mode prints: boxes.py `peers`; options.py `options`, `coasting`;
-pixels.py `pixels`; sweep.py `sweep`; management.py `management`. Without a part a mode does all its parts (`pixels`:
+The docstrings of benchmarks/blob/*.py say what each mode prints. Without a part a mode does all its parts (`pixels`:
 all but `above`). The speed of `blob` by parts: `python -m benchmarks.speed tracking`.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from benchmarks.blob import boxes, management, options, pixels, sweep
+from benchmarks.blob import boxes, options, pixels
 from benchmarks.support.options import PETS, add_data, add_seeds, new_parser, one_thread
 
 PARTS = {
     "peers": ("speed", "train", "test", "generated", "real"),
     "options": (),
-    "coasting": (),
     "pixels": ("pets", "rendered", "above"),
-    "sweep": tuple(sweep.SWEEPS),
-    "management": (),
 }
 
 
@@ -37,9 +28,7 @@ def main() -> None:
     parser.add_argument("--peer-python", help="peers: interpreter of an environment with `trackers` and `supervision`")
     parser.add_argument("--rounds", type=int, default=5, help="peers: rounds of the timing")
     parser.add_argument("--scenes", type=int, help="synthetic scenes; peers: 24 of train and of test, else 30")
-    add_seeds(parser, None, what="pixels 0:2, sweep 0:10; ")
-    parser.add_argument("--scenarios", nargs="+", default=["merge", "cross", "pass-by", "side-by-side"], help="sweep")
-    parser.add_argument("--out", type=Path, default=Path("pixels"), help="sweep: folder of the charts")
+    add_seeds(parser, "0:2", what="pixels: ")
     add_data(parser)
     args = parser.parse_intermixed_args()
     unknown = set(args.part) - set(PARTS[args.mode])
@@ -51,15 +40,11 @@ def main() -> None:
         one_thread()
         settings = boxes.PeerRun(args.peer_python, args.data, args.rounds, args.scenes or 24)
         boxes.peers(args.part or PARTS["peers"], settings)
-    elif args.mode in ("options", "coasting"):
+    elif args.mode == "options":
         one_thread()
-        {"options": options.options, "coasting": options.coasting}[args.mode](args.scenes or 30)
-    elif args.mode == "pixels":
-        pixels.pixels(args.part or ("pets", "rendered"), args.data / PETS, args.seeds or range(2))
-    elif args.mode == "sweep":
-        sweep.sweep(args.part or PARTS["sweep"], args.scenarios, args.seeds or range(10), args.out)
+        options.options(args.scenes or 30)
     else:
-        management.management()
+        pixels.pixels(args.part or ("pets", "rendered"), args.data / PETS, args.seeds)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,6 @@ import numpy as np
 
 import tracking
 from benchmarks.support.in_memory import people_in_view
-from benchmarks.support.mog2 import MOG2, background_model
 from benchmarks.support.tables import head, row
 from scenarios.loading.resolve import load
 from sim.io.source import open_source
@@ -33,7 +32,6 @@ ABLATIONS: dict[str, dict[str, object]] = {
     "no splitting, no person size": {"split": False},
     "nearest": {"association": "nearest"},
     "axes hardly expected (5 m)": {"person_noise": 5.0},
-    MOG2: {},
     "preset `paper`": dict(BlobConfig.preset("paper").as_dict()),
 }
 SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))
@@ -76,8 +74,7 @@ def pets(folder: Path) -> None:
         head([f"PETS, background {background}", *KEYS, "frames/s"])
         sequence = open_source(folder, images=True, background=background)[0]
         for title, params in ablations.items():
-            with background_model(title):
-                row([title, *scores_and_speed([sequence], params)])
+            row([title, *scores_and_speed([sequence], params)])
     head(["PETS with View_001.xml, background spread:50", *KEYS, "frames/s"])
     sequence = open_source(folder, images=True, camera=folder / "View_001.xml")[0]
     for similarity in ("boxes", "ground"):
@@ -89,8 +86,7 @@ def rendered(seeds: range) -> None:
         made = [rendered_scene(name, tilt, seed, bare) for name, tilt in SCENES for seed in seeds]
         head(["rendered, " + ("bare video" if bare else "camera and empty background"), *KEYS, "frames/s"])
         for title, params in ABLATIONS.items():
-            with background_model(title):
-                row([title, *scores_and_speed(made, params)])
+            row([title, *scores_and_speed(made, params)])
 
 
 def rendered_scene(name: str, tilt: int, seed: int, bare: bool) -> Recording:

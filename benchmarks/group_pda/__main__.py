@@ -4,13 +4,9 @@
 
 scenarios    merging, splitting, crossing, queueing, side by side: lineage, ids, group scores; beside the paper's
              ablation and the rule and the belief over `blob`
-earlier      the tracker less itself at an earlier commit (--commit), paired
 decisions    each decision of the tracker switched off: paired differences
 events       merges and splits of the suites standard and friends-meet
 difference   groups that pass and cross: ids kept against the difference of their velocities; a chart
-real         seq_hotel, zara01, Meet_WalkTogether1, PETS09-S2L1 (--data)
-cost         CPU time of a step against the number of measurements
-consistency  NEES, NIS and whiteness of the centroid's filter
 
 The docstrings of scenes.py (the first three modes), velocity_difference.py, recordings.py, cost.py and consistency.py
 in this folder say what the columns mean. Detections "file" and "truth" are points, "image" the tracker's own foreground
@@ -26,18 +22,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.group_pda import consistency, cost, earlier, recordings, scenes, velocity_difference
-from benchmarks.support.options import add_data, add_seeds, new_parser, one_thread, seeds_text
+from benchmarks.group_pda import scenes, velocity_difference
+from benchmarks.support.options import add_seeds, new_parser, one_thread, seeds_text
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "scenarios": scenes.scenarios,
-    "earlier": earlier.earlier,
     "decisions": scenes.decisions,
     "events": scenes.events,
     "difference": velocity_difference.difference,
-    "real": recordings.real,
-    "cost": cost.cost,
-    "consistency": consistency.consistency,
 }
 
 
@@ -50,15 +42,11 @@ def main() -> None:
     parser.add_argument("--points", choices=("own", "seen", "foot"), help="sensor.points of scenes and suites")
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="keys of scenes and suites")
     parser.add_argument("--only", help="scenes, suites, parts, kinds or differences, separated by commas")
-    parser.add_argument("--commit", default="HEAD", help="earlier: the commit that today is compared with")
     parser.add_argument("--each", action="store_true", help="decisions: scene by scene, too")
     parser.add_argument("--alone", action="store_true", help="scenarios, events: without the ablation and the baseline")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--tracker", default="group-pda", help="another tracker with the same parameters")
-    add_data(parser)
-    parser.add_argument("--out", type=Path, help="difference: the chart, *.svg; real: the video, *.mp4")
-    parser.add_argument("--runs", type=int, default=400, help="consistency: independent runs")
-    parser.add_argument("--rounds", type=int, default=5, help="cost: rounds of which the least time counts")
+    parser.add_argument("--out", type=Path, help="difference: the chart, *.svg")
     parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")
     args = parser.parse_args()
     one_thread()

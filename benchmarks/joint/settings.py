@@ -10,7 +10,6 @@ import numpy as np
 from benchmarks.joint.runs import (
     OTHERS,
     SHARES,
-    Row,
     Variant,
     difference,
     mean_row,
@@ -50,11 +49,6 @@ RULES: Mapping[str, tuple[object, str, object]] = {
     "absence of groups": (People, "absence", _own_absence),
 }
 """Rules without a parameter that the mode ablation switches off: owner, name and replacement by the name of the row."""
-PROCESS = (
-    "", "validity=bayesian", "partition_dynamics=dirichlet",
-    "validity=bayesian partition_dynamics=dirichlet",
-)  # fmt: skip
-"""Settings of the mode process, run with beliefs and without."""
 
 
 def ablation(given: argparse.Namespace) -> None:
@@ -73,22 +67,6 @@ def ablation(given: argparse.Namespace) -> None:
         differences = [difference(rows, base, key) for key in deltas.values()]
         own = dict(zip(OTHERS, others(rows), strict=True))
         tables.row([setting or "defaults", *pooled(rows, "_core")[:4], *(own[name] for name in shown), *differences])
-
-
-def process(given: argparse.Namespace) -> None:
-    """Prints a table: rows are settings with and without beliefs, with differences to the first row of each half."""
-    made = list(sequences(given.seeds))
-    deltas = ("GDSR", "MOTA", "1-FP", "1-FN")
-    tables.head(["setting", *(f"{k}, %" for k in SHARES), *OTHERS, *(f"Δ {k}" for k in deltas), "Δ event F1"])
-    for belief in ("", "belief_rate=0"):
-        base: list[Row] = []
-        for setting in given.only.split(",") if given.only else PROCESS:
-            words = [*given.set, *setting.split(), *belief.split()]
-            rows = [mean_row(measured(s, Variant(""), given.filter_seeds, words)) for s in made]
-            base = base or rows
-            differences = [difference(rows, base, key) for key in (*(f"group_{k}" for k in deltas), "event_F1")]
-            name = " ".join([setting, belief]).strip() or "defaults"
-            tables.row([name, *pooled(rows, "_core")[:4], *others(rows), *differences])
 
 
 def particles(given: argparse.Namespace) -> None:

@@ -10,14 +10,8 @@ hidden       error of one of two people who walk together while nobody sees this
 recordings   error of one member of each labelled group in three recordings (--recordings) who is not detected for 2 s
              in every 6 s; positions err by 0.1 m
 groups       scores of people, groups and events on a suite, beside `blob`; groupings of the same tracks
-reliability  how often people who walk together with a probability belong together, beside the belief; --chart FILE.svg
 ablation     errors, HOTA, IDF1, group and pairwise F1 without each departure from the paper that has a parameter, and
              differences to the defaults
-pixels       scores from pictures without each departure that concerns pixels, and with other constants
-boxes        scores on PETS and TUD-Campus (--recordings) from their detectors' boxes, beside `blob`
-speed        frames per second, errors, effective particles and distinct ancestors against the number of people, with a
-             weight for each person and with one weight
-sums         belief propagation beside exact sums over mappings, on random clusters of people
 
 The error of a frame is the sum, over the true people, of the distance to the track that an optimal assignment gives
 them, at most 2 m, which is also the cost of a missing track. Both filters have the same detections and the same seeds;
@@ -29,7 +23,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from benchmarks.relational import ablation, cost, errors, groups, pixels
+from benchmarks.relational import ablation, errors, groups
 from benchmarks.support.options import add_seeds, new_parser, one_thread
 
 
@@ -37,8 +31,7 @@ def main() -> None:
     parser = new_parser(__doc__)
     modes = {
         "particles": errors.particles, "hidden": errors.hidden, "recordings": errors.recordings,
-        "groups": groups.scores, "reliability": groups.reliability, "ablation": ablation.ablation, "speed": cost.speed,
-        "sums": cost.sums, "pixels": pixels.scores, "boxes": pixels.boxes,
+        "groups": groups.scores, "ablation": ablation.ablation,
     }  # fmt: skip
     parser.add_argument("mode", choices=modes)
     add_seeds(parser, "20000:20030")
@@ -46,13 +39,11 @@ def main() -> None:
     parser.add_argument("--counts", type=lambda x: [int(n) for n in x.split(",")], default=[500, 1000, 2000, 4000])
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of both filters")
     parser.add_argument("--params", help="preset of both filters, as paper")
-    parser.add_argument("--suite", default="standard", help="of modes groups, reliability, ablation and pixels")
+    parser.add_argument("--suite", default="standard", help="of modes groups and ablation")
     parser.add_argument("--entry", metavar="NAME", help="only these entries of the suite, a comma between them")
     parser.add_argument("--only", metavar="SETTING,…", help="mode ablation: these settings beside the defaults")
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="labelled recordings are there")
-    parser.add_argument(
-        "--chart", type=Path, metavar="FILE.svg", help="modes particles, hidden and reliability: draw them"
-    )
+    parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="modes particles and hidden: draw them")
     given = parser.parse_args()
     modes[given.mode](given)
 

@@ -97,7 +97,7 @@ class CameraSpec(Model):
 
 
 class CrowdSpec(Model):
-    """How people walk; the defaults are measured values (docs/experiments/realism.md)."""
+    """How people walk; the defaults are measured values (docs/results/simulation.md)."""
 
     free_speed: Value = Field(FREE_SPEED, description="walking speed of a person alone, m/s")
     spacing: Value = Field(SPACING, description="distance between neighbours in a group, m")

@@ -12,6 +12,7 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.elementary_kernels import exp
+from sim.geometry.sort_kernels import sort_by
 
 # isort: off
 # fmt: off
@@ -74,7 +75,8 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
     for g in range(len(status)):
         live[m] = g
         m += status[g, AVOIDED] > 0.0
-    live = live[:m][np.argsort(status[live[:m], MEAN_X])]
+    live = live[:m]
+    sort_by(status[:, MEAN_X], live)
     rows = np.empty((RADIUS + 1, m))  # columns COUNT … RADIUS of `status` as rows, groups sorted by x
     for s in range(m):
         for k in range(RADIUS + 1):

@@ -47,7 +47,7 @@ def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
     """
     if truth.box is None or truth.visible_box is not None or not len(truth.box):
         return truth
-    from sim.scene.visibility_kernels import sample_visibility
+    from sim.scene.visibility_kernels import COLUMNS, ROWS, sample_visibility
 
     size = np.array(image_size if image_size is not None else image_size_of_boxes(truth.box), dtype=float)
     ellipses = inscribed_outlines(truth.box)
@@ -55,7 +55,7 @@ def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
     seen, truncation, visible_box = sample_visibility(
         frame_starts(truth.frame), np.array(truth.box), np.ascontiguousarray(ellipses.centre),
         packed_inverse(ellipses.shape), -(truth.box[:, 1] + truth.box[:, 3]), np.zeros((len(truth.box), 2)), size,
-        False, np.zeros(3), np.eye(3), nothing, nothing,
+        False, np.zeros(3), np.eye(3), nothing, np.zeros((0, ROWS, COLUMNS), bool),
     )  # fmt: skip
     labelled = bool((truth.visibility < 1).any())
     return truth.replace(

@@ -37,16 +37,19 @@ def measure_visibility(
 
     frame (R,): sorted; people of one frame hide each other. pos3 (R, 3): feet. height (R,). Lens distortion is ignored.
     """
-    from sim.scene.visibility_kernels import sample_visibility
+    from sim.scene.visibility_kernels import COLUMNS, ROWS, behind_stairs, sample_visibility
 
     ellipses = outlines(camera, shapes)
     box = outline_boxes(ellipses)
     solids = solids_of(scene)
+    centre, inverse, pos = np.ascontiguousarray(ellipses.centre), packed_inverse(ellipses.shape), pos3[:, :2].copy()
+    has_eye, eye, unproject = camera.kind == "pinhole", np.array(camera.position, dtype=float), unprojection(camera)
+    behind = np.zeros((0, ROWS, COLUMNS), bool)
+    if has_eye and len(solids.flights):
+        behind = behind_stairs(box, centre, inverse, pos, eye, unproject, only_flights(solids.flights))
     visibility, truncation, visible_box = sample_visibility(
-        frame_starts(frame), box, np.ascontiguousarray(ellipses.centre), packed_inverse(ellipses.shape),
-        occlusion_distance(camera, pos3, height), np.ascontiguousarray(pos3[:, :2]),
-        np.array(camera.image, dtype=float), camera.kind == "pinhole", np.array(camera.position, dtype=float),
-        unprojection(camera), solids, only_flights(solids.flights),
+        frame_starts(frame), box, centre, inverse, occlusion_distance(camera, pos3, height), pos,
+        np.array(camera.image, dtype=float), has_eye, eye, unproject, solids, behind,
     )  # fmt: skip
     return BodyVisibility(box, visibility, truncation, visible_box)
 

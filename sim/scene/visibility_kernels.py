@@ -123,29 +123,47 @@ def _meets_any(d, eye, between, before, solids):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _stairs_before(d, eye, x, y, stairs, hit):  # type: ignore[no-untyped-def]
-    """Returns True if the ray meets stairs or ground before the upright plane through (x, y) that faces the eye."""
-    dx, dy = x - eye[0], y - eye[1]
-    towards = d[0] * dx + d[1] * dy
-    return towards > 0.0 and first_hit(eye, d, stairs, hit) < (dx * dx + dy * dy) / towards
+def behind_stairs(box, centre, inverse, pos, eye, unproject, stairs):  # type: ignore[no-untyped-def]
+    """Returns which samples of R people lie behind stairs, (R, ROWS, COLUMNS); False outside the silhouettes.
+
+    Such a ray meets stairs or ground before the upright plane through pos (R, 2) m that faces the eye. The other
+    arguments are those of `sample_visibility`.
+    """
+    found = np.zeros((len(box), ROWS, COLUMNS), np.bool_)
+    d, hit = np.empty(3), np.empty(HIT_SLOTS)
+    for i in range(len(box)):
+        if not (box[i, WIDTH] > 0 and box[i, HEIGHT] > 0):
+            continue
+        dx, dy = pos[i, 0] - eye[0], pos[i, 1] - eye[1]
+        for r in range(ROWS):
+            v = box[i, TOP] + (r + 0.5) * box[i, HEIGHT] / ROWS
+            for c in range(COLUMNS):
+                u = box[i, LEFT] + (c + 0.5) * box[i, WIDTH] / COLUMNS
+                if _inside(centre, inverse, i, u, v):
+                    at_pixel(unproject, u, v, d)
+                    towards = d[0] * dx + d[1] * dy
+                    if towards > 0.0:
+                        found[i, r, c] = first_hit(eye, d, stairs, hit) < (dx * dx + dy * dy) / towards
+    return found
 
 
 @njit(cache=True)
 def sample_visibility(  # type: ignore[no-untyped-def]
-    starts, box, centre, inverse, distance, pos, image_size, has_eye, eye, unproject, solids, stairs
+    starts, box, centre, inverse, distance, pos, image_size, has_eye, eye, unproject, solids, behind
 ):
     """Returns visibility (R,), truncation (R,) and visible boxes (R, 4) px of R people.
 
     starts (F + 1,): first row of each frame. box (R, 4) px. centre (R, 2, 2) px, inverse (R, 2, 3): of body and head.
     distance (R,): occlusion order, nearest lowest. pos (R, 2) m: feet. has_eye: False for a camera from above, for
-    which solids and stairs hide nobody. unproject (3, 3): `raycast.unprojection`. stairs: Solids of flights only.
+    which solids hide nobody. unproject (3, 3): `raycast.unprojection`. behind: of `behind_stairs`; without rows if
+    there are no stairs.
     """
     rows = len(box)
-    seen, cut, part = np.zeros(rows), np.ones(rows), np.full((rows, 4), np.nan)
+    seen, cut, part = np.zeros(rows), np.ones(rows), np.empty((rows, 4))
+    part[:] = np.nan
     people = np.empty(rows, np.int64)
     between, before = np.empty(len(solids.walls), np.int64), np.empty(len(solids.pillars), np.int64)
-    d, hit = np.empty(3), np.empty(HIT_SLOTS)
-    has_stairs = has_eye and len(stairs.flights) > 0
+    d, has_stairs = np.empty(3), len(behind) > 0
     for f in range(len(starts) - 1):
         for i in range(starts[f], starts[f + 1]):
             left, top, width, height = box[i, LEFT], box[i, TOP], box[i, WIDTH], box[i, HEIGHT]
@@ -157,7 +175,9 @@ def sample_visibility(  # type: ignore[no-untyped-def]
             whole = left >= 0 and top >= 0 and left + width <= image_size[0] and top + height <= image_size[1]
             # Most people are wholly in view with nothing before them.
             if whole and n + n_walls + n_pillars == 0 and not has_stairs:
-                seen[i], cut[i], part[i] = 1.0, 0.0, box[i]
+                seen[i], cut[i] = 1.0, 0.0
+                for k in range(4):  # an assignment of the row takes two seconds to compile
+                    part[i, k] = box[i, k]
                 continue
             total = inside = visible = 0
             all_low_c, all_high_c, all_low_r, all_high_r = COLUMNS, -1, ROWS, -1
@@ -179,11 +199,10 @@ def sample_visibility(  # type: ignore[no-untyped-def]
                         if _inside(centre, inverse, people[k], u, v):
                             hidden = True
                             break
-                    if not hidden and (has_stairs or n_walls + n_pillars):
+                    if not hidden and n_walls + n_pillars:
                         at_pixel(unproject, u, v, d)
                         hidden = _meets_any(d, eye, between[:n_walls], before[:n_pillars], solids)
-                        if not hidden and has_stairs:
-                            hidden = _stairs_before(d, eye, pos[i, 0], pos[i, 1], stairs, hit)
+                    hidden = hidden or (has_stairs and behind[i, r, c])
                     if not hidden:
                         visible += 1
                         low_c, high_c = min(low_c, c), max(high_c, c)

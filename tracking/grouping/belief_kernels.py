@@ -16,7 +16,8 @@ def table_sums(values: Array, mix: Array, bias: float, column: Ints, cut: Ints, 
     table; cut (T + 1,): where each table's knots begin in at (N,) and heights (M, N): the knots, ascending in each
     table, and the log-odds there. Tables are linear between knots and constant beyond the ends.
     """
-    out = np.full(len(values), bias)
+    out = np.empty(len(values))
+    out[:] = bias
     for r in range(len(values)):
         for t in range(len(column)):
             x = values[r, column[t]]

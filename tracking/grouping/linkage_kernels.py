@@ -20,22 +20,26 @@ def linked_groups(
     given, where a person is alone.
     """
     steps, people = label.shape
-    root, place = np.arange(people), np.full(people, -1, np.int64)
+    root, place, size, start, found, member = np.empty((6, people), np.int64)
+    for p in range(people):
+        root[p], place[p] = p, -1
     for s in range(steps):
         before = label[max(s - 1, 0)]
         rows = range(cut[s], cut[s + 1])
-        found = np.empty(2 * len(rows), np.int64)
-        count = 0
         for r in rows:
             if log_odds[r] + _memory(before, a[r], b[r], stay, come) > 0:
-                for p in (a[r], b[r]):
-                    if place[p] < 0:
-                        found[count], place[p] = p, 0
-                        count += 1
+                place[a[r]] = place[b[r]] = 0
                 i, j = _root(root, a[r]), _root(root, b[r])
                 root[max(i, j)] = min(i, j)
-        node = np.sort(found[:count])
-        size, start, total = np.zeros(people, np.int64), np.full(people, -1, np.int64), 0
+        count = 0
+        for p in range(people):
+            if place[p] == 0:
+                found[count] = p
+                count += 1
+        node = found[:count]
+        for p in node:
+            size[p], start[p] = 0, -1
+        total = 0
         for p in node:
             i = _root(root, p)
             place[p] = size[i]
@@ -44,10 +48,11 @@ def linked_groups(
             if root[p] == p:
                 start[p] = total
                 total += size[p] ** 2
-        table, member = np.full(total, unseen), np.empty(count, np.int64)
+        table = np.empty(total)
+        table[:] = unseen
         for r in rows:
             i = _root(root, a[r])
-            if start[i] >= 0 and i == _root(root, b[r]):
+            if place[a[r]] >= 0 and i == _root(root, b[r]):
                 table[start[i] + place[a[r]] * size[i] + place[b[r]]] = log_odds[r]
                 table[start[i] + place[b[r]] * size[i] + place[a[r]]] = log_odds[r]
         for i in node:

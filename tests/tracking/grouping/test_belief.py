@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from tests.test_belonging import walk
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tests import reference_belief as slow
-from tests.test_belonging import walk
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.belief_partition import partition
 from tracking.grouping.grouped_tracks import MEMBERSHIP_KINDS, derive
