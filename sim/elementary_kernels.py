@@ -7,7 +7,6 @@ numba's own np.sort and np.argsort take two seconds to compile wherever they are
 from __future__ import annotations
 
 from sim import elementary
-from sim.arrays import Ints
 from sim.compiler import njit
 from sim.types import Array, Ints
 
