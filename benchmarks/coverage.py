@@ -37,7 +37,7 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.frame_weights import weighted_scorers
 from tracking.stats import block_intervals, mean_interval
 
-KEYS = ("HOTA", "IDF1", "MOTA", "IDSW", "group_F1", "event_F1")
+KEYS = ("HOTA", "IDF1", "MOTA", "IDSW", "group_F1_hull", "event_F1")
 MORE = ("AssA", "GOSPA", "pairwise_F1", "group_HOTA", "group_IDSW", "lineage_accuracy")
 TRACKERS = ("blob", "group-pda")
 FPS, LEAD, SECONDS, TAIL = 5, 25, 300, 30  # of LEAD + SECONDS + TAIL seconds the middle ones are scored
@@ -104,7 +104,7 @@ def scenario_text(scene: Scene, seed: int) -> str:
             'schema = 1\nabout = "people pass by, groups meet and part, at random times"',
             f"duration = {duration}\nworld = {{ size = [{SIZE}, {SIZE}] }}",
             f'camera = {{ kind = "top", fps = {FPS}, image = [640, 640] }}',
-            f"sensor = {{ detect_prob = {scene.detect_prob}, clutter_rate = {scene.clutter}, noise_px = 2.0 }}",
+            f"sensor = {{ detect_prob = {scene.detect_prob}, clutter_rate = {scene.clutter} }}",
             f"group = [\n{_rows(groups)}]\nevent = [\n{_rows(events)}]",
         ]
     )
@@ -216,7 +216,7 @@ def sequences(rows: list[Row], rounds: int = 4000) -> None:
     short = [r for r in rows if r["minutes"] == 1]
     blob, other = ([r for r in short if r["tracker"] == tracker] for tracker in TRACKERS)
     populations = {key: np.array([r[key][0] for r in blob], float) for key in KEYS}
-    for key in ("group_F1", "event_F1"):
+    for key in ("group_F1_hull", "event_F1"):
         populations[f"difference of {key}"] = np.array(
             [a[key][0] - b[key][0] for a, b in zip(blob, other, strict=True)], float
         )

@@ -33,10 +33,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from sim.workers.protocol import THREAD_VARIABLES
-
 from benchmarks.support.options import new_parser
 from sim.versions import versions
+from sim.workers.pool import THREAD_VARIABLES
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "results"

@@ -55,7 +55,7 @@ KINDS = ("merge", "split", "cross", "queue")
 COUNTS = ("TP", "FP", "FN")
 MEANS = {
     "latency, s": "event_latency", "pair F1": "pairwise_F1", "precision": "pairwise_precision",
-    "recall": "pairwise_recall", "group F1": "group_F1", "core": "group_F1_core", "GDSR2": "group_GDSR2",
+    "recall": "pairwise_recall", "group F1": "group_F1_hull", "core": "group_F1_core", "GDSR2": "group_GDSR2",
     "IDSW": "group_IDSW", "lineage": "lineage_accuracy",
 }  # fmt: skip
 EASY = 0.98

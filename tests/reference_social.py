@@ -112,13 +112,16 @@ def groups_without_people(groups, places):
 
 def group_scores(true, est, by):
     """The scores of groups, without HOTA's; true, est: lists of Group, frame by frame."""
-    n_true = n_est = hits = switches = right = clean = found = 0
+    n_true = n_est = hits = switches = right = clean = found = overlapping = 0
     distance, anywhere, size, extent, by_frame, last = [], [], [], [], [], {}
     for a, b in zip(true, est, strict=True):
         s = np.array([[similarity(p, q, by) for q in b] for p in a]).reshape(len(a), len(b))
         nearer = np.array([[1e-9 / (1 + np.linalg.norm(p.pos - q.pos)) for q in b] for p in a]).reshape(s.shape)
         pairs = best_matching(np.where(s > 0, s + nearer, 0.0))
-        found += len(best_matching(np.where(s >= 0.5, s + nearer, 0.0)))
+        alike = np.array([[p.jaccard(q) for q in b] for p in a]).reshape(s.shape)
+        found += len(best_matching(np.where(alike > 0.5, alike, 0.0)))
+        shapes = np.array([[polygon_iou(p.hull, q.hull) for q in b] for p in a]).reshape(s.shape)
+        overlapping += len(best_matching(np.where(shapes >= 0.5, shapes + nearer, 0.0)))
         n_true, n_est, hits = n_true + len(a), n_est + len(b), hits + len(pairs)
         apart = np.array([[np.linalg.norm(p.pos - q.pos) for q in b] for p in a]).reshape(s.shape)
         anywhere += [apart[i, j] for i, j in best_matching(1000 - apart)]
@@ -142,6 +145,7 @@ def group_scores(true, est, by):
         "MOTA": ratio(n_true - misses - false - switches, n_true),
         "IDSW": switches, "TP": hits, "FP": false, "FN": misses,
         "F1": ratio(2 * found, n_true + n_est), "precision": ratio(found, n_est), "recall": ratio(found, n_true),
+        "F1_hull": ratio(2 * overlapping, n_true + n_est),
         "size_error": mean(size), "extent_error": mean(extent),
     }  # fmt: skip
 

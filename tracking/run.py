@@ -100,7 +100,8 @@ def track(
     have a scale of 0 or below. Raises WorkError if the tracker raises an exception or returns wrong tracks, or in mode
     "truth" if an order of a simulated script was not fulfilled.
     """
-    from tracking.grouping.grouped_tracks import late_groups, names_groups, with_groups
+    from tracking.grouping.foot_points import can_stand, completed
+    from tracking.grouping.grouped_tracks import late_groups, names_groups
     from tracking.grouping.velocity_check import velocity_warning
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
@@ -118,8 +119,9 @@ def track(
         if progress is not None:
             progress(frame.index)
     whole = time.perf_counter() - begun
-    scale = prepared.scale(reported)
-    tracks = with_groups(reported, prepared.context.fps, scale.px_per_m, rule)
+    scale, pixels = prepared.scale(reported), prepared.mode == "image"
+    camera, scene = prepared.context.camera, prepared.context.scene
+    tracks = completed(reported, sequence.fps, scale.px_per_m, rule, camera=camera, scene=scene, pixels=pixels)
     named = names_groups(reported)
     if named and chosen is not None:
         warnings.warn(f"{prepared.name} names groups itself: --grouping has no effect", UserWarning, stacklevel=2)
@@ -132,8 +134,8 @@ def track(
                 UserWarning,
                 stacklevel=2,
             )
-        fault = velocity_warning(prepared.name, reported, prepared.context.fps, scale.px_per_m, rule)
-        if fault is not None:
+        fault = velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule)
+        if fault is not None and not can_stand(reported, camera, pixels):  # on the ground no velocity is reported
             warnings.warn(fault, UserWarning, stacklevel=2)
     speed = Speed(len(reported) / spent, len(reported) / whole) if reported else Speed()
     info = run_info(prepared, tracks, seed, sensor or {}, scale, speed)
@@ -155,7 +157,8 @@ def group(
     of a simulated script was not fulfilled. Warns if frame numbers or speeds are hardly right
     (tracking.grouping.plausibility), or velocities are too far from the motion to derive groups.
     """
-    from tracking.grouping.grouped_tracks import with_groups, without_groups
+    from tracking.grouping.foot_points import can_stand, completed
+    from tracking.grouping.grouped_tracks import without_groups
     from tracking.grouping.known_people import known_people
     from tracking.grouping.plausibility import implausible
     from tracking.grouping.velocity_check import velocity_warning
@@ -171,8 +174,10 @@ def group(
     if any(t.plane == "image" and len(t.id) for t in people) and not np.isfinite(scale.px_per_m):
         got, remedy = "people in the image, without its scale", "give --px-per-m, pixels per metre"
         raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
-    tracks = with_groups(people, sequence.fps, scale.px_per_m, rule)
-    fault = velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule)
+    camera, pixels = sequence.camera, run is not None and run.info.get("detections") == "image"
+    tracks = completed(people, sequence.fps, scale.px_per_m, rule, camera=camera, scene=sequence.scene, pixels=pixels)
+    stands = can_stand(people, camera, pixels)  # then no velocity is used
+    fault = None if stands else velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule)
     odd = implausible(sequence.name, people, sequence.fps, scale.px_per_m)
     for text in (*odd, *([] if fault is None else [fault])):
         warnings.warn(text, UserWarning, stacklevel=2)
@@ -188,11 +193,15 @@ def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...
 
     The scale in px per m is the camera's at the image centre, else the sequence's. It is the truth's, from all labelled
     boxes, if the sequence states none or took it from the boxes of the first frames; without any, tracks in the image
-    are returned unchanged, as are tracks marked as derived, or of groups. Raises InputError if the truth cannot be read
-    or tracks in the image have a scale of 0 or below; WorkError if an order of a simulated script was not fulfilled.
+    are returned unchanged, as are tracks marked as derived, or of groups. Boxes of a calibrated sequence, not from
+    pixels, are grouped where they stand on the ground (tracking.grouping.foot_points). Raises InputError if the truth
+    cannot be read or tracks in the image have a scale of 0 or below; WorkError if an order of a simulated script was
+    not fulfilled.
     """
-    from tracking.grouping.grouped_tracks import with_groups
+    from tracking.grouping.foot_points import completed
 
     known = image_scale.before_frames(sequence)
     truth = sequence.truth if known.frames or not np.isfinite(known.px_per_m) else None
-    return with_groups(tracks, sequence.fps, known.px_per_m if truth is None else truth.px_per_m)
+    px_per_m = known.px_per_m if truth is None else truth.px_per_m
+    pixels = getattr(tracks, "info", {}).get("detections") == "image"
+    return completed(tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene, pixels=pixels)

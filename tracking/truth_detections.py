@@ -13,11 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
 from sim.rng import rng
 from sim.types import Detections, FrameTruth, Ints, Sequence, Truth
 
-_PERFECT_SENSOR = {"detect_prob": 1.0, "clutter_rate": 0.0, "noise_px": 0.0, "noise_m": 0.0, "box": "amodal"}
+_PERFECT_SENSOR = {
+    "detect_prob": 1.0,
+    "clutter_rate": 0.0,
+    "box_noise": {"scale": 0.0},
+    "noise_m": 0.0,
+    "box": "amodal",
+}
 _SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
 """Settings by which hidden and small people are detected as well as others."""
 
@@ -76,21 +81,31 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
     """
     from pydantic import ValidationError
 
-    from scenarios.schema.sensor import Sensor
+    from scenarios.loading.resolve import SensorFile
+    from scenarios.loading.validation import input_error
     from sim.detector.sense import sense
     from sim.scene.boxes import with_visibility
 
+    table = {"sensor": _PERFECT_SENSOR | _SEES_ALL | _nested(sensor)}
     try:
-        spec = Sensor.model_validate({**_PERFECT_SENSOR, **_SEES_ALL, **sensor})
+        spec = SensorFile.model_validate(table).sensor
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(["sensor", *map(str, first["loc"])])
-        expected = first["msg"]
-        raise InputError(
-            place=place, got=first["input"], expected=expected, remedy="see docs/reference/formats.md"
-        ) from None
+        raise input_error(error, table, "", {}, SensorFile) from None
     if spec.box == "visible" or spec.by_visibility or spec.occlusion_power or spec.min_visibility:
         truth = with_visibility(truth, sequence.image_size)
     hides_groups, load_people = any(hide.group is not None for hide in spec.hide), sequence.load_people
     people = load_people() if hides_groups and load_people is not None else {}
     return iter(sense(truth, spec, seed, sequence.camera, sequence.image_size, people=people))
+
+
+def _nested(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the settings as a table; "box_noise.scale" becomes the key "scale" of the table "box_noise"."""
+    table: dict[str, Any] = {}
+    for key, value in settings.items():
+        outer, dot, inner = key.partition(".")
+        here = table.get(outer, {})
+        if dot and isinstance(here, dict):
+            table[outer] = {**here, inner: value}
+        else:
+            table[key] = value
+    return table

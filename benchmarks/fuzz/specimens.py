@@ -73,7 +73,7 @@ false_alarms = { life = 1.0, seen = 0.9, at = [[0.1, 0.2], [0.3, 0.4]] }
 miss_memory = [{ share = 0.5, time = 1.0 }]
 """
 OBSERVATION = (
-    "schema = 1\n[camera]\nfps = 5\nheight = 5\nposition = [1, 2]\n[light]\nshadow = 0.1\n[sensor]\nnoise_px=1\n"
+    "schema = 1\n[camera]\nfps = 5\nheight = 5\nposition = [1, 2]\n[light]\nshadow = 0.1\n[sensor.box_noise]\nscale=1\n"
 )
 PARAMS = 'tracker = "blob"\n\n[params]\ngate = 0.99\n'
 CAVIAR = """<?xml version="1.0" encoding="UTF-8"?>

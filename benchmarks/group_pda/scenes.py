@@ -40,7 +40,7 @@ SCENE_COLUMNS: Mapping[str, columns.Column] = {
     "lineage, all events": columns.pooled_lineage,
     "lineage, mean of sequences": columns.mean_of("lineage_accuracy"),
     "ids kept": columns.pooled_ids_kept,
-    "group F1": columns.mean_of("group_F1"),
+    "group F1": columns.mean_of("group_F1_hull"),
     "core": columns.mean_of("group_F1_core"),
     "MOTA": columns.mean_of("group_MOTA"),
     "core ": columns.mean_of("group_MOTA_core"),
@@ -52,7 +52,7 @@ SCENE_COLUMNS: Mapping[str, columns.Column] = {
     "merge F1": columns.mean_of("merge_F1"),
     "split F1": columns.mean_of("split_F1"),
 }
-DECIDED = ("lineage_accuracy", "ids", "group_F1", "group_MOTA", "event_F1", "group_IDSW")
+DECIDED = ("lineage_accuracy", "ids", "group_F1_hull", "group_MOTA", "event_F1", "group_IDSW")
 EVENT_COLUMNS: Mapping[str, columns.Column] = {
     "event F1": columns.mean_of("event_F1"),
     "merge F1, all": columns.pooled_f1("merge"),

@@ -21,7 +21,7 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.prepare import prepare
 from tracking.stats import paired
 
-COLUMNS = ("HOTA", "IDF1", "group_F1", "pairwise_F1")
+COLUMNS = ("HOTA", "IDF1", "group_F1_hull", "pairwise_F1")
 OFFSET = 1_000_000
 """The seed of a filter is that of the scene, and so much more for each further filter seed."""
 

@@ -11,6 +11,7 @@ from sim.workers.pool import THREAD_VARIABLES
 SHARED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 PETS = "mot/PETS09-S2L1-first200"
 CAMPUS = "mot/TUD-Campus"
+TOWN_CENTRE = "mot/AVG-TownCentre-first225"
 HOTEL = "biwi/seq_hotel"
 ZARA = "biwi/zara01"
 WALK_TOGETHER = "caviar/mwt1gt.xml"

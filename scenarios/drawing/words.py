@@ -113,7 +113,7 @@ def order(event: ScriptOrder) -> str:
 def sensor(scenario: Scenario) -> list[str]:
     """Returns lines about the scenario's sensor: detection, noise, visibility, and each occlusion."""
     s = scenario.sensor
-    edges = f"{s.noise_px:g} px on the edges of boxes" if s.box_noise is None else "in proportion to boxes"
+    edges = f"{s.box_noise.scale * s.box_noise.foot[1]:.1%} of the height on the feet of boxes"
     error = f"{s.noise_m:g} m on points"
     points = {"foot": "points under their feet", "seen": f"{error}, more where feet are hidden", "own": error}[s.points]
     chance = f"visibility^{s.occlusion_power:g}" if s.by_visibility is None else "a curve of visibility"

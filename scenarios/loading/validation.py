@@ -18,6 +18,11 @@ from scenarios.schema.scenario import Scenario
 
 NUMBER = "a number, or a distribution such as { normal = [1.3, 0.2] }"
 NAME = "a name: a letter, then letters, digits, '_', '.' or '-'"
+REPLACED = {
+    "noise_px": "errors of boxes are shares of their height: set box_noise.scale (1 = default, 0 = none), or across, "
+    "foot, top and width of box_noise"
+}
+"""Remedies for keys that other keys have replaced."""
 
 
 M = typing.TypeVar("M", bound=BaseModel)
@@ -116,7 +121,8 @@ def _words(error: Any, path: KeyPath, table: Table, model: type[BaseModel]) -> t
     kind, message = error["type"], str(error["msg"])
     if kind == "extra_forbidden":
         known = known_keys(path[:-1], table, model)
-        return f"unknown key {str(path[-1])!r}", "a known key", did_you_mean(str(path[-1]), known)
+        key = str(path[-1])
+        return f"unknown key {key!r}", "a known key", REPLACED.get(key) or did_you_mean(key, known)
     got = _show(error["input"])
     if kind == "missing" and isinstance(path[-1], int):
         return got, f"at least {path[-1] + 1} numbers", "correct the list"

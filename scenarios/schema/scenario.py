@@ -83,7 +83,11 @@ class CameraSpec(Model):
     tilt_deg: Annotated[float, Field(ge=-30, le=90)] = Field(
         40.0, description="angle by which the camera looks down; 90 = straight down"
     )
-    yaw_deg: float = Field(0.0, description="0 looks along +y, positive turns left")
+    yaw_deg: float | None = Field(
+        None,
+        description="0 looks along +y, positive turns left; absent: the direction, out of eight, in which people look "
+        "largest (0 from above, or if height or position is given)",
+    )
     px_per_m: Positive | None = Field(
         None, description="scale, px per m (kind top); absent: chosen so that all people are in view"
     )

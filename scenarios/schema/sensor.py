@@ -43,27 +43,39 @@ class Memory(Model):
 Memories = tuple[Memory, ...]
 
 
+def _check_shares(memory: Memories | None) -> None:
+    """Raises ValueError if the shares of variance of the parts add up to more than 1; None and no part are fine."""
+    if sum(part.share for part in memory or ()) > 1 + 1e-9:
+        raise ValueError("shares whose sum is at most 1")
+
+
 class BoxNoise(Model):
     """Errors of detected boxes in proportion to the box height; each is (mean, standard deviation).
 
     - across: middle, to the right; foot, top: lower and upper edge, downwards; all in box heights.
     - width: logarithm of the width.
-    - occluded: each standard deviation is multiplied by 1 + this × hidden share of the box.
+    - floor_px: least standard deviation of middle, foot and top, px.
+    - scale: factor of all errors, means and floor included; 0 = exact boxes.
+    - occluded: each standard deviation, but not the floor, is multiplied by 1 + this × hidden share of the box.
     - tails: excess kurtosis of the errors, 0 to 30; 0 = normal.
     - memory: parts that change slowly; None: all errors are drawn anew in each frame. Shares above 1 in sum raise
       pydantic.ValidationError.
+
+    The defaults lie among the profiles of three real detectors (docs/reference/detector-profiles.md).
     """
 
     across: MeanAndSd = Field(
-        (0.0, 0.0), description="error of the middle, to the right: mean, standard deviation; box heights"
+        (0.0, 0.045), description="error of the middle, to the right: mean, standard deviation; box heights"
     )
     foot: MeanAndSd = Field(
-        (0.0, 0.0), description="error of the lower edge, downwards: mean, standard deviation; box heights"
+        (0.0, 0.07), description="error of the lower edge, downwards: mean, standard deviation; box heights"
     )
     top: MeanAndSd = Field(
-        (0.0, 0.0), description="error of the upper edge, downwards: mean, standard deviation; box heights"
+        (0.0, 0.06), description="error of the upper edge, downwards: mean, standard deviation; box heights"
     )
-    width: MeanAndSd = Field((0.0, 0.0), description="error of the logarithm of the width: mean, standard deviation")
+    width: MeanAndSd = Field((0.0, 0.18), description="error of the logarithm of the width: mean, standard deviation")
+    floor_px: NonNegative = Field(0.3, description="least standard deviation of middle, lower and upper edge, px")
+    scale: NonNegative = Field(1.0, description="factor of all these errors; 0 = exact boxes")
     occluded: NonNegative = Field(
         0.0, description="each standard deviation is multiplied by 1 + this times the hidden share of the box"
     )
@@ -141,15 +153,14 @@ class Sensor(Model):
       occlusion_power and by min(1, box height in px / (2 small_px)), which is 1 if small_px is 0. Below min_visibility
       it is 0.
     - persistence: correlation of misses 0.1 s apart. clutter_rate: mean number of false alarms per frame.
-    - noise_px: standard deviation of each box edge, px. noise_m: of points along each axis, m.
+    - box_noise: errors of boxes, in box heights. noise_m: standard deviation of points along each axis, m.
     - box: "visible" (boxes of the visible parts) or "amodal" (of whole people). hide: artificial occlusions.
     - points: "seen" (true position with noise_m, displaced by as much as the visible part's foot is from the whole
       body's on the ground), "own" (true position with noise_m), or "foot" (below the noisy box). Without camera or
       boxes all are "own".
     - by_visibility: factors at evenly spaced visibilities from 0 to 1, linear between them, for occlusion_power; below
-      min_visibility the probability is 0 all the same. miss_memory: slow parts of
-      the misses, for persistence. box_noise: errors in box heights, for noise_px. These three are measured and replace
-      the simpler key; None: they do not.
+      min_visibility the probability is 0 all the same. miss_memory: slow parts of the misses, for persistence. Both are
+      measured and replace the simpler key; None: they do not.
     - false_alarms: life, places and sizes; None: one frame, anywhere.
     - true_scores, false_scores: evenly spaced quantiles of the scores of true detections and false alarms; None: not
       measured.
@@ -160,7 +171,7 @@ class Sensor(Model):
 
     detect_prob: Share = Field(0.95, description="probability that a fully visible person of usual size is detected")
     clutter_rate: NonNegative = Field(0.3, description="mean number of false alarms per frame (Poisson)")
-    noise_px: NonNegative = Field(1.5, description="standard deviation of each edge of a box, px")
+    box_noise: BoxNoise = Field(BoxNoise(), description="errors of boxes, in box heights")
     noise_m: NonNegative = Field(0.05, description="standard deviation of points on the ground along each axis, m")
     box: Literal["visible", "amodal"] = Field(
         "visible",
@@ -189,7 +200,6 @@ class Sensor(Model):
     miss_memory: Memories | None = Field(
         None, description="parts of the misses of a person that change slowly; replaces persistence"
     )
-    box_noise: BoxNoise | None = Field(None, description="errors proportional to the box height; replaces noise_px")
     false_alarms: FalseAlarms | None = Field(None, description="life, places and sizes of false alarms")
     true_scores: Curve | None = Field(
         None, description="evenly spaced quantiles of the scores of true detections, 0 to 1"
@@ -210,9 +220,3 @@ class Sensor(Model):
                 raise ValueError("quantiles that do not decrease")
         _check_shares(self.miss_memory)
         return self
-
-
-def _check_shares(memory: Memories | None) -> None:
-    """Raises ValueError if the shares of variance of the parts add up to more than 1; None and no part are fine."""
-    if sum(part.share for part in memory or ()) > 1 + 1e-9:
-        raise ValueError("shares whose sum is at most 1")

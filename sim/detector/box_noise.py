@@ -2,8 +2,8 @@
 
 The four errors of a box are, in order: middle to the right, foot (lower edge) downwards, top edge downwards, all three
 divided by the box height; and the logarithm of the width over the true width. `perturb_boxes` applies them,
-`box_errors` measures them. `move_edges` adds errors in px instead; `seen_shift` gives the error of a foot point if a
-part of the person is hidden.
+`box_errors` measures them. `move_edges` moves each edge by px; `seen_shift` gives the error of a foot point if a part
+of the person is hidden.
 """
 
 from __future__ import annotations
@@ -29,19 +29,24 @@ def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> A
 
     n (R, 4): standard normals for the errors of the middle (to the right), the foot (downwards), the top (downwards),
     all in box heights, and of the logarithm of the width. An error is mean + standard deviation × n; `noise` holds this
-    pair as across, foot, top and width. The standard deviation is multiplied by 1 + `noise.occluded` × hidden share;
-    `noise.tails`, an excess kurtosis, gives n heavier tails. visibility (R,): visible share of each person, 0 to 1.
+    pair as across, foot, top and width. The standard deviation is multiplied by 1 + `noise.occluded` × hidden share; of
+    middle, foot and top it is at least `noise.floor_px`. All errors are multiplied by `noise.scale`. `noise.tails`, an
+    excess kurtosis, gives n heavier tails. visibility (R,): visible share of each person, 0 to 1.
 
     Width and height keep at least 1 px, or their former value if that was less; the middle and the foot stay where the
-    errors put them. A nan box stays nan.
+    errors put them. A nan box stays nan. If `noise.scale` is 0, `box` itself is returned.
     """
+    if not noise.scale:
+        return box
     n = heavy_tailed(n, noise.tails)
     means, sds = np.array([noise.across, noise.foot, noise.top, noise.width]).T
-    e = means + sds * (1.0 + noise.occluded * (1.0 - visibility))[:, None] * n
+    sd = sds * (1.0 + noise.occluded * (1.0 - visibility))[:, None]
     left, top, w, h = box.T
-    middle = left + w / 2 + h * e[:, 0]
-    foot, top = top + h * (1.0 + e[:, 1]), top + h * e[:, 2]
-    width, height = w * exp(e[:, 3]), foot - top
+    px = means[:3] * h[:, None] + np.maximum(sd[:, :3] * h[:, None], noise.floor_px) * n[:, :3]
+    across, down, top_down = noise.scale * px.T
+    wider = noise.scale * (means[3] + sd[:, 3] * n[:, 3])
+    middle, foot, top = left + w / 2 + across, top + h + down, top + top_down
+    width, height = w * exp(wider), foot - top
     width, height = np.maximum(width, np.minimum(w, 1.0)), np.maximum(height, np.minimum(h, 1.0))
     return np.stack([middle - width / 2, foot - height, width, height], axis=1)
 

@@ -7,8 +7,9 @@ person has one random stream and each false alarm another; all are read at the f
 frame more therefore changes no other draw, and a changed setting keeps all draws, so that sweeps over settings are
 paired. Everything is drawn as uniforms (`sim.detector.draws`).
 
-A measured profile (`flockscope fit sensor`) replaces visibility^occlusion_power by a curve. It makes misses and errors
-correlated over time (`sim.detector.correlated_noise`) and errors proportional to the box (`sim.detector.box_noise`).
+Errors of boxes are proportional to the box (`sim.detector.box_noise`). A measured profile (`flockscope fit sensor`)
+replaces visibility^occlusion_power by a curve, and makes misses and errors correlated over time
+(`sim.detector.correlated_noise`).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.detector.box_noise import move_edges, perturb_boxes, seen_shift
+from sim.detector.box_noise import perturb_boxes, seen_shift
 from sim.detector.clutter import false_alarms
 from sim.detector.correlated_noise import CLOCK, correlated_normals, ticks
 from sim.detector.draws import frame_uniforms, interpolated_quantiles, true_scores
@@ -86,7 +87,7 @@ def _true_detections(
     if base is not None:
         seen &= np.isfinite(base).all(axis=1)
     n, u = n[seen], u[seen]
-    box = None if base is None else _with_box_noise(base[seen], truth.visibility[seen], sensor, n[:, EDGES])
+    box = None if base is None else perturb_boxes(base[seen], truth.visibility[seen], sensor.box_noise, n[:, EDGES])
     if truth.pos is not None:
         pos = truth.pos[seen] + sensor.noise_m * n[:, POINT] if sensor.noise_m else truth.pos[seen]
         if base is not None and box is not None and camera is not None:
@@ -143,8 +144,7 @@ def _one_person(id: int, frame: Ints, seed: int, repeat: int, sensor: Sensor, fp
     first, count = int(frame[0]), int(frame[-1] - frame[0]) + 1
     drawn = frame_uniforms(rng(seed, "detect", id, repeat=repeat), first, count, NORMALS + UNIFORMS)
     n, u = normals(drawn[:, :NORMALS]), drawn[:, NORMALS:]
-    of_boxes = None if sensor.box_noise is None else sensor.box_noise.memory
-    parts = ((0, slice(DETECT, DETECT + 1), sensor.miss_memory), (1, EDGES, of_boxes))
+    parts = ((0, slice(DETECT, DETECT + 1), sensor.miss_memory), (1, EDGES, sensor.box_noise.memory))
     for key, columns, memory in parts:
         n[:, columns] = correlated_normals(n[:, columns], memory or (), first, fps, seed, id, key, repeat=repeat)
     if sensor.persistence:
@@ -222,16 +222,3 @@ def _sensed_boxes(truth: Truth, sensor: Sensor) -> Array | None:
     if truth.box is None or truth.visible_box is None or sensor.box == "amodal":
         return truth.box
     return np.where(np.isfinite(truth.visible_box), truth.visible_box, truth.box)
-
-
-def _with_box_noise(box: Array, visibility: Array, sensor: Sensor, n: Array) -> Array:
-    """Return boxes (N, 4), left, top, width, height in px, with the errors of `sensor.box_noise`, else of
-    `sensor.noise_px`.
-
-    n (N, 4): standard normals that draw the errors. `box_noise`: errors in proportion to the box height. `noise_px`:
-    standard deviation in px by which each edge is moved. visibility (N,): visible share, 0 to 1, which only `box_noise`
-    uses. `box` itself is returned if `box_noise` is None and `noise_px` 0.
-    """
-    if sensor.box_noise is not None:
-        return perturb_boxes(box, visibility, sensor.box_noise, n)
-    return move_edges(box, sensor.noise_px * n) if sensor.noise_px else box

@@ -1,10 +1,11 @@
 """Where a scenario's camera stands: the closest place from which every body is in view, in closed form.
 
-With the rotation given, the image's four edges are planes through the camera's centre C with fixed inward normals n. A
-body (ellipsoid with centre c and shape matrix S) is in view if and only if n·C <= n·c - sqrt(nᵀ S n) for each edge.
-Only the least right-hand side b over all bodies and frames matters. C is solved in camera coordinates (right, down,
-forward): the left and right planes limit (right, forward), the upper and lower planes limit (down, forward). A height
-or position that the scenario gives fixes coordinates of C first.
+A direction that the scenario leaves out is the one of eight in which people look largest in the median. With the
+rotation given, the image's four edges are planes through the camera's centre C with fixed inward normals n. A body
+(ellipsoid with centre c and shape matrix S) is in view if and only if n·C <= n·c - sqrt(nᵀ S n) for each edge. Only the
+least right-hand side b over all bodies and frames matters. C is solved in camera coordinates (right, down, forward):
+the left and right planes limit (right, forward), the upper and lower planes limit (down, forward). A height or position
+that the scenario gives fixes coordinates of C first.
 """
 
 from __future__ import annotations
@@ -26,12 +27,13 @@ if TYPE_CHECKING:
 MARGIN = 0.02  # kept free along each image edge, as a share of the image's shorter side
 LOWEST = 0.3  # m: no solved height is lower
 TOP_HEIGHT = 20.0  # m: height of a camera from above if not given; it affects nothing but depth
+YAWS = tuple(range(0, 360, 45))  # degrees: directions to choose from
 TOLERANCE = 1e-6
 
 
 def place_camera(spec: CameraSpec, motion: Motion) -> Camera:
-    """Return the Camera of a scenario; what its settings leave out is solved: position, height, and px_per_m for kind
-    "top".
+    """Return the Camera of a scenario; what its settings leave out is solved: yaw, position, height, and px_per_m for
+    kind "top".
 
     It is placed so that the bodies of all frames are in view and as large as possible, with a margin of 2 % of the
     image's shorter side. No solved height is below 0.3 m. Kind "top" uses the yaw and ignores tilt and baseline; a
@@ -46,7 +48,10 @@ def place_camera(spec: CameraSpec, motion: Motion) -> Camera:
     """
     everybody = recorded_bodies(motion)
     aimed = _bodies_to_fit(everybody, motion, spec.crop)
-    camera = require_camera(_top(spec, aimed) if spec.kind == "top" else _pinhole(spec, aimed), place="camera")
+    made = (
+        _top(spec, aimed) if spec.kind == "top" else _pinhole(spec, aimed, _yaw(spec, _each_second(aimed, motion.fps)))
+    )
+    camera = require_camera(made, place="camera")
     if not spec.crop:
         _check_all_in_view(camera, spec, everybody, motion)
     return camera
@@ -104,14 +109,38 @@ def _edges(rotation: Array, slopes: tuple[float, float]) -> Array:
     return product(np.array([[1, 0, k], [-1, 0, k], [0, 1, m], [0, -1, m]]), rotation)
 
 
-def _pinhole(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
+def _each_second(bodies: RecordedBodies, fps: float) -> RecordedBodies:
+    """Return the bodies of the first frame of each second; all bodies if there are none in these frames."""
+    first = np.floor((bodies.frame - 1) / fps) > np.floor((bodies.frame - 2) / fps)
+    return _select(bodies, first) if first.any() else bodies
+
+
+def _yaw(spec: CameraSpec, bodies: RecordedBodies) -> float:
+    """Return the yaw of a pinhole camera in degrees: the given one; 0 if height or position is given; else the one of
+    YAWS in which a person of 1.7 m in the place of each body is highest in the median, the first of equals.
+    """
+    if spec.yaw_deg is not None:
+        return spec.yaw_deg
+    if spec.height is not None or spec.position is not None:
+        return 0.0
+
+    def height(yaw: float) -> float:
+        camera = _pinhole(spec, bodies, yaw)
+        feet = turned(camera.rotation, bodies.pos3 - camera.position)
+        head = feet + PERSON_HEIGHT * camera.rotation[:, 2]
+        return float(np.median(feet[:, 1] / feet[:, 2] - head[:, 1] / head[:, 2]))
+
+    return max(YAWS, key=height)
+
+
+def _pinhole(spec: CameraSpec, bodies: RecordedBodies, yaw: float) -> Camera:
     """Return a pinhole camera with all bodies in view: at the given position or height, else at the closest place.
 
-    spec: camera settings; its tilt, yaw, focal length and image size are used as they are. A margin of 2 % of the
-    image's shorter side is kept free. A solved height is at least 0.3 m. If the given values leave no such place,
+    spec: camera settings; its tilt, focal length and image size are used as they are. yaw: degrees. A margin of 2 % of
+    the image's shorter side is kept free. A solved height is at least 0.3 m. If the given values leave no such place,
     bodies may be out of view; nothing is raised. There must be at least one body.
     """
-    rotation = camera_rotation(spec.tilt_deg / 180 * np.pi, spec.yaw_deg / 180 * np.pi)
+    rotation = camera_rotation(spec.tilt_deg / 180 * np.pi, yaw / 180 * np.pi)
     slopes = _slopes(spec, MARGIN * min(spec.image))
     normals = _edges(rotation, slopes)
     b = _reach(bodies, normals).min(axis=0)
@@ -197,10 +226,10 @@ def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
     """Return a camera of kind "top": over the middle of the bodies' extent, at the largest scale that shows all bodies.
 
     A margin of 2 % of the image's shorter side is kept free. Half the extent counts as at least 0.1 m. spec: camera
-    settings; a given position (x, y in the world, m), px_per_m or height is used as it is. yaw turns the picture; tilt
-    and baseline are ignored. A height that is not given is 20 m. There must be at least one body.
+    settings; a given position (x, y in the world, m), px_per_m or height is used as it is. yaw turns the picture, 0 if
+    not given; tilt and baseline are ignored. A height that is not given is 20 m. There must be at least one body.
     """
-    rotation = camera_rotation(np.pi / 2, spec.yaw_deg / 180 * np.pi)
+    rotation = camera_rotation(np.pi / 2, (spec.yaw_deg or 0.0) / 180 * np.pi)
     sides = np.concatenate([rotation[:2], -rotation[:2]])
     low_x, low_y, minus_high_x, minus_high_y = _reach(bodies, sides).min(axis=0)
     low, high = np.array([low_x, low_y]), -np.array([minus_high_x, minus_high_y])

@@ -53,7 +53,7 @@ def test_stored_tracks_are_grouped_by_the_scale_of_the_tracker(monkeypatch):
     camera = simulate(load("merge", ["camera.fps=2"]), 40_001).camera
     used = []
     monkeypatch.setattr(
-        "tracking.grouping.grouped_tracks.with_groups", lambda tracks, fps, scale: used.append(scale) or tracks
+        "tracking.grouping.foot_points.with_groups", lambda tracks, fps, scale, rule: used.append(scale) or tracks
     )
     unknown = float("nan")
     for made in (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Sequence, Tracks
@@ -105,6 +106,19 @@ def test_what_a_tracker_writes_reaches_neither_truth_nor_the_next_run(merge, mod
     assert np.array_equal(merge.truth.pos, before[0])
     assert np.array_equal(merge.truth.box, before[1])
     assert all(np.array_equal(a.pos, b.pos) for a, b in zip(clean, again, strict=True))
+
+
+def test_settings_with_dots_are_keys_of_a_table(merge):
+    """One key of box_noise brings its defaults; without any, boxes are exact."""
+    exact, whole, dotted = (
+        [d.box for d in from_truth(merge, sensor, 0)]
+        for sensor in ({"noise_m": 0.1}, {"box_noise": {"scale": 2.0}}, {"box_noise.scale": 2.0})
+    )
+    assert all(map(np.array_equal, whole, dotted))
+    assert not any(map(np.array_equal, whole, exact))
+    for sensor, words in (({"noise_px": 3}, "set box_noise.scale"), ({"noise_m.x": 3}, "sensor.noise_m")):
+        with pytest.raises(InputError, match=words):
+            from_truth(merge, sensor, 0)
 
 
 def test_people_without_a_box_are_not_detected(merge):

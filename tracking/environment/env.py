@@ -4,7 +4,7 @@ An episode tracks one whole sequence. An action sets the parameters to search, e
 tracking.parameter_space). With decision_every=None one action before the first frame sets them all, and the episode is
 one step long. Else an action sets those that may change between frames, every `decision_every` frames. Observations are
 statistics of the run. A step's reward is S(frames so far) - S(frames before it), S being the objective of
-`tracking.evaluate` (mean of HOTA and group_F1_hull), 0 for no frames; the rewards sum to it. `import tracking`
+`tracking.evaluate` (mean of HOTA and group_F1), 0 for no frames; the rewards sum to it. `import tracking`
 registers it."""
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from tracking.episode_source import Source, SourceSpec, sources
 from tracking.keyword_options import documented, from_keywords, option
 from tracking.parameter_space import Space, decode, decode_and_build, encode, space_of
 from tracking.prepare import Params, config_of
+from tracking.scoring.people_comparison import Similarity
 from tracking.tracker_registry import checked, config_class, find
 
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -44,10 +45,11 @@ Floats = NDArray[np.float32]
 @dataclass(frozen=True, kw_only=True)
 class TuningEnvOptions:
     """The keyword arguments of the environment. tracker; suite: what is played; seeds (0 to 99), set: seeds and
-    "key=value" settings of scenarios; detections: the tracker's input, None chooses it; params: to begin with, as for
-    `tracking.track`; decision_every: frames between actions, None: one action per episode; observation: "statistics",
-    "parameters" (both) or "none"; cache: bytes of sequences kept; tracker_seed: the same in all episodes; render_mode:
-    "rgb_array" or None. InputError if one of the three with fixed values is unknown; others are checked when used."""
+    "key=value" settings of scenarios; detections: the tracker's input, None chooses it; similarity: "ground",
+    "image" or "boxes", None by the data; params: to begin with, as for `tracking.track`; decision_every: frames between
+    actions, None: one action per episode; observation: "statistics", "parameters" (both) or "none"; cache: bytes of
+    sequences kept; tracker_seed: the same in all episodes; render_mode: "rgb_array" or None. InputError if one with
+    fixed values is unknown; others are checked when used."""
 
     tracker: AnyTracker = field(metadata=option('Registered name, "file.py:Class", "module:Class" or a class.'))
     suite: SourceSpec | Source = field(
@@ -58,6 +60,9 @@ class TuningEnvOptions:
     set: Iterable[str] = field(default=(), metadata=option('Settings "key=value" of the scenarios.'))
     detections: DetectionMode | None = field(
         default=None, metadata=option("Input of the tracker, the same in all episodes.")
+    )
+    similarity: Similarity | None = field(
+        default=None, metadata=option('How people are compared: "ground", "image" or "boxes"; None: by the data.')
     )
     params: Params = field(
         default=None, metadata=option("Parameters that an episode begins with; the tracker's defaults if None.")
@@ -78,6 +83,7 @@ class TuningEnvOptions:
     def __post_init__(self) -> None:
         _check_choice("observation", self.observation, OBSERVATIONS)
         _check_choice("detections", self.detections, (None, *get_args(DetectionMode)))
+        _check_choice("similarity", self.similarity, (None, *get_args(Similarity)))
         _check_choice("render_mode", self.render_mode, (None, *METADATA["render_modes"]))
 
 
@@ -98,6 +104,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         given = from_keywords(TuningEnvOptions, "TuningEnv", {"tracker": tracker, "suite": suite, **options})
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
         self.tracker_seed, self.decision_every = given.tracker_seed, given.decision_every
+        self.similarity = given.similarity
         self.render_mode, self.observation = given.render_mode, given.observation
         self.config_class = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.config_class, given.params)
@@ -186,8 +193,9 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
 
     def _rollout(self, config: Config, source: Source) -> Rollout:
         return Rollout(
-            self.tracker, source, config, detections=self.mode, tracker_seed=self.tracker_seed, cache=self.cache
-        )
+            self.tracker, source, config, detections=self.mode, tracker_seed=self.tracker_seed, cache=self.cache,
+            similarity=self.similarity,
+        )  # fmt: skip
 
     def _advance(self, upto: int | None) -> bool:
         """Tracks to frame number `upto`, None: the last. Returns True if the sequence has ended. Raises the tracker's

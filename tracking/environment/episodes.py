@@ -11,8 +11,9 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from scenarios.errors import InputError
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
 from tracking.environment.episode_cache import OpenedSource, SourceCache
 from tracking.episode_source import Source, sources
@@ -20,6 +21,9 @@ from tracking.prepare import Params, prepare
 from tracking.time_limit import TimeLimited
 
 __all__ = ["Episode", "Rollout", "Source", "SourceCache", "play", "sources", "streams_for"]
+
+if TYPE_CHECKING:
+    from tracking.scoring.people_comparison import Similarity
 
 AnyTracker = str | type[Tracker] | TimeLimited
 
@@ -29,7 +33,7 @@ class Episode:
     """The result of an episode: one tracker on one sequence.
 
     - name, seed: of the source, a scenario or recording.
-    - objective: mean of HOTA and group_F1_hull, or the one that is known; nan if there is nothing to score.
+    - objective: mean of HOTA and group_F1, or the one that is known; nan if there is nothing to score.
     - scores: by key of the catalogue, without those that are nan.
     - frames: number of frames played.
     - seconds_tracking: time in the tracker with the checks of what it returns, s; `reset` included, reading frames not.
@@ -55,23 +59,25 @@ def play(
     detections: DetectionMode | None = None,
     tracker_seed: int = 0,
     cache: SourceCache | None = None,
-    upto: int | None = None,
     every_score: bool = False,
+    similarity: Similarity | None = None,
 ) -> Episode:
-    """Plays one episode, from the first frame to the last or to frame number `upto`, and returns its result.
+    """Plays one episode and returns its result.
 
     tracker: name, file.py:Class, module:Class, class or TimeLimited. config: its parameters, None for the defaults.
     detections: its input, None chooses one that works. tracker_seed: seed of the tracker's random numbers. cache:
-    keeps the opened source, None keeps nothing. upto: from 1, None plays all. every_score: compute the whole
-    catalogue, else the objective and its two parts. A simulated source is drawn as pictures only if `detections` is
-    "image" or the tracker takes neither boxes nor points. The objective equals that of
-    `tracking.evaluate(sequence.truth, tracking.track(…))` up to that frame.
+    keeps the opened source, None keeps nothing. every_score: compute the whole catalogue, else the objective and its
+    two parts. similarity: how people are compared, None by the data. A simulated source is drawn as pictures only if
+    `detections` is "image" or the tracker takes neither boxes nor points. The objective equals that of
+    `tracking.evaluate(sequence.truth, tracking.track(…), similarity=similarity)`.
 
-    Raises InputError if an argument is wrong, tracker and source do not fit, or the source has no labels, WorkError if
-    the tracker fails, and IncomparableError if its tracks lack the boxes or positions to compare.
+    Raises InputError if an argument is wrong, tracker and source do not fit, the source has no labels, or the tracks
+    lack the boxes or positions to compare; WorkError if the tracker fails.
     """
-    rollout = Rollout(tracker, source, config, detections=detections, tracker_seed=tracker_seed, cache=cache)
-    for _ in rollout.advance(upto):
+    rollout = Rollout(
+        tracker, source, config, detections=detections, tracker_seed=tracker_seed, cache=cache, similarity=similarity
+    )
+    for _ in rollout.advance():
         pass
     return rollout.episode(every_score)
 
@@ -82,6 +88,7 @@ class Rollout:
     - tracker: name, file.py:Class, module:Class or class; config: its parameters, None for the defaults.
     - source: what is played; cache: keeps it opened, None keeps nothing.
     - detections: the tracker's input, None chooses one that works; tracker_seed: of its random numbers.
+    - similarity: how people are compared, None by the data.
 
     State: the prepared tracker; tracks, one `Tracks` per frame so far; last, the last frame, None before the first;
     seconds spent on tracking and scoring. Raises InputError if an argument is wrong, tracker and source do not fit, or
@@ -97,8 +104,9 @@ class Rollout:
         detections: DetectionMode | None = None,
         tracker_seed: int = 0,
         cache: SourceCache | None = None,
+        similarity: Similarity | None = None,
     ) -> None:
-        self.source = source
+        self.source, self.similarity = source, similarity
         streams = streams_for(tracker, detections)
         self.opened: OpenedSource = OpenedSource(source, streams) if cache is None else cache.open(source, streams)
         self.truth: Truth = self.opened.truth
@@ -151,9 +159,7 @@ class Rollout:
     def episode(self, every_score: bool = False) -> Episode:
         """Returns the result of the frames so far; objective is nan if there is nothing to score.
 
-        every_score: compute the whole catalogue, else the objective and its two parts. Raises IncomparableError if the
-        tracks lack the boxes or positions to compare, and InputError if groups must be derived in the image and the
-        image scale is 0 or less.
+        every_score: compute the whole catalogue, else the objective and its two parts. Raises InputError as `scores`.
         """
         scores = self.scores(every_score)
         return Episode(
@@ -169,23 +175,37 @@ class Rollout:
     def scores(self, every: bool = False) -> dict[str, float]:
         """Returns a dict of the scores of the frames so far by key, without those that are nan.
 
-        every: the whole catalogue; else objective, HOTA and group_F1_hull. The time is added to `seconds_scoring`.
-        Raises IncomparableError if the tracks lack the boxes or positions to compare, and InputError if groups must be
-        derived in the image and the image scale is 0 or less.
+        every: the whole catalogue; else objective, HOTA and group_F1. The time is added to `seconds_scoring`.
+        Raises InputError if the tracks lack the boxes or positions to compare, or groups must be derived in the image
+        and the image scale is 0 or less.
         """
+        from tracking.scoring.people_comparison import IncomparableError
+
         start = time.perf_counter()
         px_per_m, pixels = self.prepared.px_per_m(self.tracks), self.prepared.mode == "image"
-        found = self._every_score(px_per_m) if every else self.opened.judge.scores(self.tracks, px_per_m, pixels)
+        try:
+            if every:
+                found: Mapping[str, float] = self._every_score(px_per_m)
+            else:
+                found = self.opened.judge.scores(self.tracks, px_per_m, pixels, self.similarity)
+        except IncomparableError as error:
+            expected, remedy = "what tracks and labels have", "choose another similarity, or other detections"
+            raise InputError(
+                file=self.source.name, place="similarity", got=str(error), expected=expected, remedy=remedy
+            ) from None
         self.seconds_scoring += time.perf_counter() - start
         return {key: value for key, value in found.items() if value == value}
 
     def _every_score(self, px_per_m: float) -> Mapping[str, float]:
-        from tracking.grouping.grouped_tracks import with_groups
+        from tracking.grouping.foot_points import completed
         from tracking.run import TrackingRun
 
-        tracks = with_groups(self.tracks, self.prepared.context.fps, px_per_m) if self.tracks else ()
-        run, judge = TrackingRun(tuple(tracks), {"detections": self.prepared.mode}), self.opened.judge
-        return judge.scorer.evaluate(run, similarity=judge.similarity, frames=len(run))
+        context, mode, judge = self.prepared.context, self.prepared.mode, self.opened.judge
+        tracks = completed(
+            self.tracks, context.fps, px_per_m, camera=context.camera, scene=context.scene, pixels=mode == "image"
+        )
+        run = TrackingRun(tracks, {"detections": mode})
+        return judge.scorer.evaluate(run, similarity=self.similarity, frames=len(run))
 
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:

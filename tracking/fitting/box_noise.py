@@ -52,7 +52,8 @@ def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visi
     "visible": detected boxes enclose the visible part of a person; "amodal": the whole person. The errors across
     (middle), foot and top are in box heights, width is the logarithm of the width; each is (mean, standard deviation),
     rounded to 4 digits. Further fields: `occluded` (growth of the standard deviation with the hidden share), `tails`
-    (excess kurtosis, 0 to 20), `memory` (parts that persist over time, None if there are none).
+    (excess kurtosis, 0 to 20), `memory` (parts that persist over time, None if there are none), and `floor_px`, its
+    default or the least of the three standard deviations at the median box height if that is less.
 
     Detected rows (people in frames) less than a quarter visible count for tails and memory only. Without other detected
     rows all means, standard deviations and `occluded` are 0, and `memory` is None. recordings: matched. Raises
@@ -71,9 +72,11 @@ def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visi
     across, foot, top, width = pairs
     grown = round(best.occluded, 3)
     parts = fit_memory(correlated) if best.sd.max() > 1e-6 else ()
+    heights = np.concatenate([_true(m, kind)[:, 3] for m in recordings])
+    least = float(best.sd[:3].min() * np.median(heights)) if len(heights) else 0.0
     return kind, BoxNoise(
         across=across, foot=foot, top=top, width=width, occluded=grown, tails=_tails(np.concatenate(standardised)),
-        memory=parts or None,
+        floor_px=round(min(BoxNoise().floor_px, least), 4), memory=parts or None,
     )  # fmt: skip
 
 

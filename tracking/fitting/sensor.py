@@ -34,11 +34,10 @@ def fit_sensor(sequences: Iterable[Recording] | Recording) -> Sensor:
 def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
     """Returns the sensor whose errors are like those of the detector on matched recordings, pooled.
 
-    `noise_px` is the median height of the labelled boxes times the root mean square of three standard deviations: of
-    foot, top and middle. `min_visibility` is 0. Without ground positions of labels and detections `points` is
-    "foot", and `noise_m` keeps its default. `true_scores` and `false_scores` are None with fewer than 20
-    scores, `miss_memory` and `false_alarms` if nothing was found. Raises InputError if there are fewer than 50 labelled
-    rows (people in frames) or fewer than 25 of them are detected. Raises AssertionError without labelled boxes.
+    `min_visibility` is 0. Without ground positions of labels and detections `points` is "foot", and `noise_m` keeps its
+    default. `true_scores` and `false_scores` are None with fewer than 20 scores, `miss_memory` and `false_alarms` if
+    nothing was found. Raises InputError if there are fewer than 50 labelled rows (people in frames) or fewer than 25 of
+    them are detected. Raises AssertionError without labelled boxes.
     """
     people, hits = sum(len(m.match) for m in recordings), sum(int(m.hit.sum()) for m in recordings)
     if people < LEAST or hits < LEAST // 2:
@@ -52,14 +51,11 @@ def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
     kind, noise = fit_box_noise(recordings)
     rate, alarms = fit_false_alarms(recordings)
     points, noise_m = fit_points(recordings, kind)
-    height = float(np.median(np.concatenate([m.truth.box[:, 3] for m in recordings if m.truth.box is not None])))
-    edges = height * float(np.sqrt(np.mean(np.square([noise.foot[1], noise.top[1], noise.across[1]]))))
     true = np.concatenate([m.score[m.match[m.hit]] for m in recordings])
     false = np.concatenate([m.score[m.false] for m in recordings])
     return Sensor(
         detect_prob=_digits(detection.best),
         clutter_rate=_digits(rate),
-        noise_px=_digits(edges),
         noise_m=Sensor().noise_m if noise_m is None else _digits(noise_m),
         box=kind,
         min_visibility=0.0,

@@ -19,7 +19,7 @@ OBJECTIVE = in_family(
     "objective",
     share(
         "objective",
-        "mean of HOTA and group_F1_hull, or the one of the two that is known; used for tuning and as reward",
+        "mean of HOTA and group_F1, or the one of the two that is known; used for tuning and as reward",
     ),
 )
 
@@ -115,7 +115,10 @@ GROUPS = in_family(
         count("group_FP", "estimated groups without a match, summed over frames"),
         count("group_FN", "true groups without a match, summed over frames"),
     ),
-    share("group_F1", "2 found / (true + estimated groups); found: matched at similarity 0.5 or more"),
+    share(
+        "group_F1",
+        "2 found / (true + estimated groups); found: more than half of the people of both are in both; the headline",
+    ),
     share("group_precision", "found / estimated groups"),
     share("group_recall", "found / true groups"),
     *(
@@ -153,7 +156,7 @@ def _groups_right(name: str, right: str) -> tuple[Score, ...]:
 
 MEMBERS = in_family(
     "members",
-    share("group_F1_hull", "group_F1 by IoU of hulls, also if groups are matched by members; part of the objective"),
+    share("group_F1_hull", "the same of hulls; found: matched at an IoU of 0.5 or more, which centimetres decide"),
     share("pairwise_F1", "2 right / (true + estimated pairs); a pair is two people of one frame in one group"),
     share("pairwise_precision", "right / estimated pairs; a pair with a track mapped to nobody is false"),
     share("pairwise_recall", "right / true pairs; a pair with a person no track is mapped to is missed"),

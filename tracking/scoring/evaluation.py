@@ -112,9 +112,9 @@ def evaluate(
     tracks: the tracker's `Tracks`, one per frame, in any order; of two with equal frame the later is used. similarity:
     compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"), d being their distance. None follows
     the data, as tracking.scoring.one_plane says. group_match: matches groups by IoU of their hulls ("hull") or
-    Jaccard index of their members ("members"). frames: a number n scores frames 1 … n, a range only its frames, None
-    all frames. A frame without tracks counts as empty. If the labels are clearly sparse, only annotated frames are
-    scored (`annotated_frames`).
+    Jaccard index of their members ("members"); group_F1, group_precision and group_recall are by members in both cases.
+    frames: a number n scores frames 1 … n, a range only its frames, None all frames. A frame without tracks counts as
+    empty. If the labels are clearly sparse, only annotated frames are scored (`annotated_frames`).
 
     Groups and events that the tracks lack come from the default grouping, in the image only if `truth.px_per_m` is
     known. Scores of people are nan for a tracker of whole groups, scores of groups and events if no scored frame has
@@ -307,9 +307,9 @@ def people_scores(pairs: Pairs) -> dict[str, float]:
 
 
 def objective_of(found: Mapping[str, float]) -> float:
-    """Returns the mean of found["HOTA"] and found["group_F1_hull"]; if one is nan the other, if both are nan nan.
+    """Returns the mean of found["HOTA"] and found["group_F1"]; if one is nan the other, if both are nan nan.
 
     Raises KeyError if a key is missing.
     """
-    known = [v for v in (found["HOTA"], found["group_F1_hull"]) if v == v]
+    known = [v for v in (found["HOTA"], found["group_F1"]) if v == v]
     return sum(known) / len(known) if known else float("nan")

@@ -70,7 +70,7 @@ def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Cal
             for part in parts:
                 for key, values in part(padded[rows]).items():
                     out[rows, place[key]] = values
-        out[:, place["objective"]] = mean_of_known(out[:, [place["HOTA"], place["group_F1_hull"]]])
+        out[:, place["objective"]] = mean_of_known(out[:, [place["HOTA"], place["group_F1"]]])
         return out
 
     return score

@@ -15,17 +15,10 @@ from sim.types import Bools, Groups, Ints, Tracks, Truth
 from tracking.scoring.annotated_frames import first_seen, widest_step
 from tracking.scoring.events import COUNTS_AS, HEADLINE, LATE, MatchedEvents, match_events
 from tracking.scoring.events_by_true_people import HULL_TIME, events_of_hulls, tracked_events, true_events
-from tracking.scoring.group_scores import (
-    GroupComparison,
-    GroupMatch,
-    SharedMembers,
-    compare_groups,
-)
 from tracking.scoring.people_and_groups import (
     GroupRows,
     PersonRows,
     Surface,
-    TrueGroups,
     group_rows,
     people_inside,
 )
@@ -81,25 +74,14 @@ class TrackedGroups:
       rows of the true people inside the hull.
     - person (K,): for each of the K memberships of `counted`, the row of the true person, -1 none.
     - named: True if the tracker names members, or follows people and has no groups.
+    - known: False if the tracker names no members, and who is inside its hulls is unknown.
     """
 
     every: GroupRows
     counted: GroupRows
     person: Ints
     named: bool
-
-
-def group_comparisons(
-    true: TrueGroups, tracked: TrackedGroups, shared: SharedMembers, by: GroupMatch
-) -> tuple[GroupComparison | None, GroupComparison | None]:
-    """Returns both sides' groups with their matchings twice: by hull, and as `by` says. The two are one if `by` is
-    "hull".
-
-    shared: numbers of common people, from `shared_members`. A matching by hull is None if `true` is not comparable (has
-    no shapes on the surface).
-    """
-    by_hull = compare_groups(true.groups, tracked.counted, shared, "hull") if true.comparable else None
-    return by_hull, by_hull if by == "hull" else compare_groups(true.groups, tracked.counted, shared, by)
+    known: bool = True
 
 
 def tracked_groups(sides: ComparedSides) -> TrackedGroups:
@@ -108,8 +90,8 @@ def tracked_groups(sides: ComparedSides) -> TrackedGroups:
     sides: both sides' people in the scored frames. If the tracker names members, groups of two or more members are
     scored. Otherwise, and for a tracker of whole groups, the true people inside the hull or at most 0.3 m from it are
     the members. A hull with one person inside is not scored, as a person alone is no group. A hull with nobody inside
-    is scored, as a false group. If the truth has no positions on the surface, the members named (if any) stay. `Tracks`
-    whose `groups` is None count as having no groups.
+    is scored, as a false group. If the truth has no positions on the surface, or its scale is unknown, the members
+    named (if any) stay. `Tracks` whose `groups` is None count as having no groups.
     """
     tracks = [t for t in sides.tracks if sides.frames[t.index]]
     frames = np.array([t.index for t in tracks], np.int64)
@@ -117,10 +99,11 @@ def tracked_groups(sides: ComparedSides) -> TrackedGroups:
     wholes = any(t.unit == "group" for t in tracks)
     if wholes or not len(every.of):
         positions = sides.true.positions_on(sides.surface, "ground")
-        if positions is not None:
+        known = positions is not None and bool(np.isfinite(sides.scale))
+        if positions is not None and known:
             every = people_inside(every, sides.true.rows, positions, sides.scale)
         counted = every.keep(every.count != 1)
-        return TrackedGroups(every, counted, counted.member, not (wholes or len(every)))
+        return TrackedGroups(every, counted, counted.member, not (wholes or len(every)), known or not len(every))
     counted = every.keep(every.count > 1)
     person = _true_rows(every, sides.mapping)
     mapped = replace(every, of=every.of[person >= 0], member=person[person >= 0])

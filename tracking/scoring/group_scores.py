@@ -1,5 +1,8 @@
 """Groups matched one to one in every frame, by hulls or by members, and what their scores count.
 
+A true group is *found* (`groups_found`) if an estimated group has more than half of the people of both in common. This
+needs no matching: of two true groups, which share nobody, at most one has more than half of an estimated group.
+
 Detection follows Bazzani, Cristani & Murino (2012), "Decentralized Particle Filter for Joint Individual-Group
 Tracking": 1-FP and 1-FN (1 - false or missed / true groups), GDSR (share of true groups whose match holds 60 % of their
 members). MOTP (mean distance of centres) and MOTA follow Bernardin & Stiefelhagen (2008). Sums run over labelled
@@ -16,7 +19,7 @@ import numpy as np
 
 from sim.geometry.polygons import iou_pairs, pack
 from sim.types import Array, Bools, Ints
-from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs, compare
+from tracking.scoring.candidate_pairs import EPS, Pairs, compare
 from tracking.scoring.matching import match
 from tracking.scoring.people_and_groups import GroupRows
 
@@ -61,6 +64,20 @@ def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -
     known = i >= 0
     key, count = np.unique(i[known] * len(est) + est.of[known], return_counts=True)
     return SharedMembers(key, count, len(est))
+
+
+def groups_found(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Bools:
+    """Returns which true groups are found, (G,): the Jaccard index of the members with some estimated group is above
+    1/2.
+
+    shared: numbers of common people of `true` and `est`. At 1/2 a pair would be found in a group of twice its size, so
+    one group of everybody would be right wherever two pairs walk. Of several estimated groups that find one true group
+    (hulls may overlap) one counts, as a true group is found once.
+    """
+    i, j = np.divmod(shared.key, max(shared.width, 1))
+    found = np.zeros(len(true), bool)
+    found[i[3 * shared.count > true.count[i] + est.count[j]]] = True
+    return found
 
 
 def group_of_person(groups: GroupRows, people: int) -> Ints:
@@ -135,8 +152,8 @@ class GroupComparison:
     """G true and H estimated groups in frames, with their matchings.
 
     true, est: the groups; shared: numbers of their common people. pairs: all candidate pairs; chosen: the one-to-one
-    matching of all pairs; found: that of pairs of similarity 0.5 or more. nearest (G,): distance (m or px) of each true
-    group to the group matched by distance alone, nan if it has none.
+    matching of all pairs. nearest (G,): distance (m or px) of each true group to the group matched by distance alone,
+    nan if it has none.
     """
 
     true: GroupRows
@@ -144,19 +161,16 @@ class GroupComparison:
     shared: SharedMembers
     pairs: Pairs
     chosen: Pairs
-    found: Pairs
     nearest: Array
 
 
-def compare_groups(true: GroupRows, est: GroupRows, shared: SharedMembers, by: GroupMatch) -> GroupComparison:
-    """Returns both sides' groups with their matchings, by IoU of hulls ("hull") or Jaccard index of members
-    ("members").
+def compare_groups(true: GroupRows, est: GroupRows, shared: SharedMembers, pairs: Pairs) -> GroupComparison:
+    """Returns both sides' groups with the matchings of candidate pairs, from `hull_pairs` or `member_pairs`.
 
     true, est: groups in frames. shared: numbers of their common people, from `shared_members`.
     """
-    pairs = hull_pairs(true, est) if by == "hull" else member_pairs(true, est, shared)
-    chosen, found = (matched_groups(true.pos, est.pos, pairs, least) for least in (0.0, FOUND))
-    return GroupComparison(true, est, shared, pairs, chosen, found, nearest_distances(true, est))
+    chosen = matched_groups(true.pos, est.pos, pairs)
+    return GroupComparison(true, est, shared, pairs, chosen, nearest_distances(true, est))
 
 
 def nearest_distances(true: GroupRows, est: GroupRows) -> Array:

@@ -10,19 +10,14 @@ compared in the image.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from sim.scene.camera import foot_points
-from sim.scene.terrain import height_at
-from sim.truth.group_hulls import box_groups, frame_groups, groups_over_time
-from sim.types import Array, Bools, GroupEvent, Groups, Tracks, Truth
+from sim.truth.group_hulls import groups_over_time
+from sim.types import Tracks, Truth
+from tracking.grouping.foot_points import boxed, can_stand, completed, feet, groups_of_people, moved_events, standing
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.people_comparison import IncomparableError, Similarity, plane_of
-
-CLIMB = 8
-"""Steps in which the height of the ground below a foot point is found."""
 
 
 def grounded(truth: Truth) -> Truth:
@@ -35,7 +30,8 @@ def grounded(truth: Truth) -> Truth:
 def on_feet(truth: Truth) -> Truth:
     """Returns a truth with boxes and a camera with people and groups where the boxes stand on the ground."""
     assert truth.box is not None, "only boxes have feet"
-    pos = _feet(truth.box, truth)
+    assert truth.camera is not None, "only boxes of a calibrated sequence have feet on the ground"
+    pos = feet(truth.box, truth.camera, truth.scene)
     there = np.isfinite(pos).all(axis=1)
     rows = (truth.frame[there], truth.id[there], truth.group[there], pos[there], np.full_like(pos[there], np.nan))
     labelled = truth.groups is not None or truth.groups_px is not None
@@ -50,7 +46,8 @@ def in_one_plane(
 
     truth: as `grounded` returns it. runs: one `Tracks` per frame each, in order; pixels: for each, if it comes from
     pixels. similarity: "ground" or "image" moves all runs there; None follows the data. Tracks that are in the right
-    plane are returned as they are. Those that were moved to the ground are to be compared with `on_feet`.
+    plane are returned as they are, except that groups of boxes of calibrated data are derived on the ground
+    (`completed`). Those that were moved to the ground are to be compared with `on_feet`.
 
     Raises IncomparableError if a run on the ground must be moved to the image, and has no boxes of people.
     """
@@ -59,13 +56,15 @@ def in_one_plane(
         ground = truth.pos is not None and all(
             _can_be_grounded(truth, run, own) for run, own in zip(runs, pixels, strict=True)
         )
-    moved = [_on_ground(truth, run) if ground else _in_image(truth, run) for run in runs]
+    moved = [
+        _on_ground(truth, run) if ground else _in_image(truth, run, own) for run, own in zip(runs, pixels, strict=True)
+    ]
     if similarity is not None:
         return moved, similarity
     if ground:
         return moved, "ground"
-    boxed = truth.camera is None and truth.box is not None and all(_boxed(run) for run in runs)
-    return moved, "boxes" if boxed else "image"
+    by_overlap = truth.camera is None and truth.box is not None and all(boxed(run) for run in runs)
+    return moved, "boxes" if by_overlap else "image"
 
 
 def from_pixels(run: Iterable[Tracks]) -> bool:
@@ -73,63 +72,29 @@ def from_pixels(run: Iterable[Tracks]) -> bool:
     return getattr(run, "info", {}).get("detections") == "image"
 
 
-def _boxed(run: Sequence[Tracks]) -> bool:
-    """Returns True if all people of a run have boxes."""
-    return all(t.box is not None and t.unit == "person" for t in run if len(t.id))
-
-
 def _can_be_grounded(truth: Truth, run: Sequence[Tracks], pixels: bool) -> bool:
     """Returns True if a run is on the ground, or can be moved there: it has boxes, not from pixels, and a camera."""
-    return plane_of(truth, run) != "image" or (truth.camera is not None and _boxed(run) and not pixels)
+    return plane_of(truth, run) != "image" or can_stand(run, truth.camera, pixels)
 
 
 def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
     """Returns a run in the image at the foot points of its boxes; as it is if it is on the ground, or has none."""
-    if plane_of(truth, run) != "image" or truth.camera is None or not _boxed(run):
+    if truth.camera is None or not can_stand(run, truth.camera, pixels=False):
         return run
-    return [_track_on_ground(t, truth) for t in run]
+    return [standing(t, truth.camera, truth.scene) for t in run]
 
 
-def _track_on_ground(t: Tracks, truth: Truth) -> Tracks:
-    pos = np.zeros((0, 2)) if t.box is None else _feet(t.box, truth)
-    moved = t.replace(plane="ground", pos=pos, vel=np.full_like(pos, np.nan), events=_events_at(t, pos))
-    named = t.groups is not None or bool((t.group >= 0).any())
-    return moved.replace(groups=groups_of_people(moved) if named else None)
-
-
-def groups_of_people(t: Tracks) -> Groups:
-    """Returns the groups of tracks of people that follow from `group`: hulls round boxes in the image, else round
-    footprints. People at unknown positions are left out.
-    """
-    there = np.isfinite(t.pos).all(axis=1)
-    rows = (t.id[there], t.group[there], t.pos[there], t.vel[there])
-    if t.plane != "image" or t.box is None:
-        return frame_groups(*rows)
-    return box_groups(np.full(len(rows[0]), t.index), *rows, t.box[there], t.index, 1)[0]
-
-
-def _feet(box: Array, truth: Truth) -> Array:
-    """Returns the ground points x, y (R, 2) in m below boxes (R, 4) px; nan where a box stands on no visible ground."""
-    assert truth.camera is not None, "only boxes of a calibrated sequence have feet on the ground"
-    z = np.zeros(len(box))
-    pos = foot_points(box, z, truth.camera)
-    scene = truth.scene
-    for _ in range(CLIMB if scene is not None and scene.stairs else 0):
-        assert scene is not None
-        z = height_at(scene, pos)
-        pos = foot_points(box, z, truth.camera)
-    return pos
-
-
-def _in_image(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
-    """Returns a run on the ground as one in the image, at the centres of its boxes; as it is if it is in the image.
+def _in_image(truth: Truth, run: Sequence[Tracks], pixels: bool) -> Sequence[Tracks]:
+    """Returns a run on the ground as one in the image, at the centres of its boxes. A run in the image stays there.
 
     Ids, groups and events stay; the hulls of groups are those of their members' boxes. Velocities are nan. Raises
     IncomparableError for tracks of whole groups, and for people without boxes.
     """
     if plane_of(truth, run) == "image":
-        return run
-    if not _boxed(run):
+        if not can_stand(run, truth.camera, pixels) or all(t.derived for t in run):
+            return run
+        return completed(run, truth.fps, truth.px_per_m, camera=truth.camera, scene=truth.scene, pixels=pixels)
+    if not boxed(run):
         what = "groups without people" if any(t.unit == "group" for t in run) else "people without boxes"
         raise IncomparableError(f"runs in the image (px), and one on the ground (m) with {what}")
     return [_track_in_image(t) for t in with_groups(run, truth.fps, truth.px_per_m)]
@@ -138,15 +103,5 @@ def _in_image(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
 def _track_in_image(t: Tracks) -> Tracks:
     box = np.zeros((0, 4)) if t.box is None else t.box
     middle, none = box[:, :2] + box[:, 2:] / 2, np.full((len(box), 2), np.nan)
-    moved = t.replace(plane="image", pos=middle, vel=none, events=_events_at(t, middle))
+    moved = t.replace(plane="image", pos=middle, vel=none, events=moved_events(t.events, t.id, middle))
     return moved.replace(groups=groups_of_people(moved))
-
-
-def _events_at(t: Tracks, pos: Array) -> tuple[GroupEvent, ...]:
-    """Returns the events of t at the mean of their members' new positions (N, 2), nan without any."""
-    return tuple(replace(e, pos=_centre(pos, np.isin(t.id, e.members))) for e in t.events)
-
-
-def _centre(pos: Array, rows: Bools) -> tuple[float, float]:
-    x, y = pos[rows].mean(axis=0) if rows.any() else (float("nan"), float("nan"))
-    return float(x), float(y)

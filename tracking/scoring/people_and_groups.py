@@ -230,8 +230,9 @@ def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale:
     def inside(i: Ints, j: Ints) -> tuple[Ints, Array]:
         near = np.flatnonzero((positions[j] >= low[i]).all(axis=1) & (positions[j] <= high[i]).all(axis=1))
         i, j = i[near], j[near]
+        gap = gap_pairs(hulls, points, i, j)
         flat = hulls.area[i] <= 0  # a hull of one or two vertices contains no point: only distance counts
-        gap = np.where(flat, edge_distance_pairs(hulls, points, i, j), gap_pairs(hulls, points, i, j))
+        gap[flat] = edge_distance_pairs(hulls, points, i[flat], j[flat])
         kept = near[gap <= INSIDE * scale]
         return kept, np.ones(len(kept))
 

@@ -11,20 +11,32 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from sim.types import Array, Bools, Ints
+from tracking.scoring.candidate_pairs import FOUND
 from tracking.scoring.events import HEADLINE, MatchedEvents, same_lineage
 from tracking.scoring.group_and_event_scores import (
     ComparedSides,
     TrackedGroups,
     compared_events,
-    group_comparisons,
     near_changes,
     tracked_groups,
     unknown_kinds,
 )
 from tracking.scoring.group_detection import weighted_detection
-from tracking.scoring.group_scores import GroupComparison, GroupMatch, correct, shared_members, sizes, switch_frames
+from tracking.scoring.group_scores import (
+    GroupComparison,
+    GroupMatch,
+    compare_groups,
+    correct,
+    groups_found,
+    hull_pairs,
+    matched_groups,
+    member_pairs,
+    shared_members,
+    sizes,
+    switch_frames,
+)
 from tracking.scoring.pairwise_membership import pair_counts
-from tracking.scoring.people_and_groups import TrueGroups
+from tracking.scoring.people_and_groups import GroupRows, TrueGroups
 from tracking.scoring.position_errors import gaussian_wasserstein
 from tracking.scoring.weighted_people_scores import weighted_hota
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, mean_of_known, ratio
@@ -36,24 +48,35 @@ def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: Group
     ("merge_F1" …, "event_…") and lineage ("lineage_…"), (D,) by the keys of the catalogue.
 
     sides: both sides in the scored frames, people mapped. true: the true groups in these frames. by: matches groups by
-    "hull" (IoU) or by "members" (Jaccard index). Core frames are the labelled frames more than 1 s away from the start
-    of every true merge, split, form or dissolve.
+    "hull" (IoU) or by "members" (Jaccard index) for all scores of groups but F1, precision and recall, which are by
+    members, and F1_hull. Core frames are the labelled frames more than 1 s away from the start of every true merge,
+    split, form or dissolve.
 
-    Keys are missing if the truth lacks data. group_F1_hull, and with by = "hull" all group scores, are missing if
-    `true` is not comparable (has no shapes on the surface). Scores of events and lineage are missing if the truth has
-    no events, those of crossings and queues if the tracker says nothing of them (`unknown_kinds`), and G-MITRE if the
-    tracker names no members.
+    Keys are missing if the truth lacks data. group_F1_hull, and with by = "hull" all scores of groups that depend on
+    it, are missing if `true` is not comparable (has no shapes on the surface). Scores by members are missing if members
+    are unknown (`TrackedGroups.known`). Scores of events and lineage are missing if the truth has no events, those of
+    crossings and queues if the tracker says nothing of them (`unknown_kinds`), and G-MITRE if the tracker names no
+    members.
     """
-    size = len(sides.frames)
+    size, core = len(sides.frames), sides.frames & ~near_changes(sides.truth)
     tracked = tracked_groups(sides)
-    shared = shared_members(true.groups, tracked.counted, tracked.person, len(sides.true.rows))
-    by_hull, chosen = group_comparisons(true, tracked, shared, by)
-    parts = [_pairwise(true, tracked, size), *weighted_detection(sides, true.groups, tracked, shared)]
-    if by_hull is not None:
-        parts.append(_renamed(_detection(by_hull, sides.frames), {"F1": "group_F1_hull"}))
-    if chosen is not None:
-        for frames, end in ((sides.frames, ""), (sides.frames & ~near_changes(sides.truth), "_core")):
-            parts.append(_renamed(weighted_groups(chosen, frames), None, end))
+    groups, est = true.groups, tracked.counted
+    shared = shared_members(groups, est, tracked.person, len(sides.true.rows))
+    hulls = hull_pairs(groups, est) if true.comparable else None
+    pairs = hulls if by == "hull" else member_pairs(groups, est, shared) if tracked.known else None
+    parts: list[WeightedScores] = []
+    if tracked.known:
+        parts += [_pairwise(true, tracked, size), *weighted_detection(sides, groups, tracked, shared)]
+        found = groups.rows.frame[groups_found(groups, est, shared)]
+        for frames, end in ((sides.frames, ""), (core, "_core")):
+            parts.append(_renamed(_detection(groups, est, found, frames), None, end))
+    if hulls is not None:
+        overlapping = matched_groups(groups.pos, est.pos, hulls, FOUND).frame
+        parts.append(_renamed(_detection(groups, est, overlapping, sides.frames), {"F1": "group_F1_hull"}))
+    if pairs is not None:
+        compared = compare_groups(groups, est, shared, pairs)
+        for frames, end in ((sides.frames, ""), (core, "_core")):
+            parts.append(_renamed(weighted_groups(compared, frames), None, end))
     if sides.truth.events is not None:
         matched, unknown = compared_events(sides, tracked), unknown_kinds(sides)
         parts.append(weighted_events([m for m in matched if m.kind not in unknown], sides.truth.fps, size))
@@ -93,14 +116,16 @@ def _f1_and_parts(s: Mapping[str, Array]) -> dict[str, Array]:
     }
 
 
-def _detection(compared: GroupComparison, frames: Bools) -> WeightedScores:
+def _detection(true: GroupRows, est: GroupRows, found: Ints, frames: Bools) -> WeightedScores:
     """Returns a function from weights (D, size) to F1, precision and recall of groups in the frames f where frames[f]
-    is true. A hit is a match of similarity 0.5 or more.
+    is true.
+
+    found (K,): frame number of each true group that is found.
     """
-    sums, found = FrameSums(len(frames)), compared.found
-    sums.add("true", _kept(compared.true.rows.frame, frames))
-    sums.add("est", _kept(compared.est.rows.frame, frames))
-    sums.add("hits", _kept(found.frame, frames))
+    sums = FrameSums(len(frames))
+    sums.add("true", _kept(true.rows.frame, frames))
+    sums.add("est", _kept(est.rows.frame, frames))
+    sums.add("hits", _kept(found, frames))
 
     def score(weights: Array) -> dict[str, Array]:
         return _f1_and_parts(sums.of(weights))
@@ -116,8 +141,8 @@ def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
     """Returns a function from weights (D, size) to the scores of groups over the frames f where frames[f] is true, (D,)
     by key.
 
-    Keys: 1-FP, 1-FN, 1-FP_frames, 1-FN_frames, GDSR, GDSR2, MOTP, MSE, MOTP_ungated, MOTA, IDSW, TP, FP, FN, F1,
-    precision, recall, those of `hota` (HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr, LocA), size_error, extent_error.
+    Keys: 1-FP, 1-FN, 1-FP_frames, 1-FN_frames, GDSR, GDSR2, MOTP, MSE, MOTP_ungated, MOTA, IDSW, TP, FP, FN, those of
+    `hota` (HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr, LocA), size_error, extent_error.
     The catalogue explains them with "group_" in front. 1-FP_frames and 1-FN_frames are 1 - the mean over frames of
     false (missed) groups / max(true groups, 1); Bazzani et al. (2012) leave open whether they mean these or the ratios
     of sums. compared: both sides' groups with their matchings. A switch has the weight of the later match. MOTP,
@@ -125,7 +150,6 @@ def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
     neither side has a group in these frames.
     """
     true, est, sums = compared.true, compared.est, _sums_of_groups(compared, frames)
-    detection = _detection(compared, frames)
     hota = weighted_hota(compared.pairs.in_frames(frames), len(frames))
     groups = bool(frames[true.rows.frame].any() or frames[est.rows.frame].any())
 
@@ -144,7 +168,6 @@ def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
             **{key: mean(s, key) for key in ("MOTP", "MSE", "MOTP_ungated", "size_error", "extent_error")},
             "MOTA": ratio(n - misses - false - s["IDSW"], n),
             "IDSW": s["IDSW"], "TP": hits, "FP": false, "FN": misses,
-            **detection(weights),
             **({key: np.where(nothing, np.nan, v) for key, v in hota(weights).items()} if groups else {}),
         }  # fmt: skip
 

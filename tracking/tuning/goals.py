@@ -15,7 +15,7 @@ from tracking.environment.episodes import Episode
 SPEED = "frames/s"
 """Key of the tracker's speed. It is the only goal that differs between two runs of the same episode."""
 
-FAST_KEYS = ("objective", "HOTA", "group_F1_hull")
+FAST_KEYS = ("objective", "HOTA", "group_F1")
 """Scores that every episode has; other scores need the whole catalogue to be computed."""
 
 

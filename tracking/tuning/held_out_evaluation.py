@@ -24,7 +24,7 @@ from tracking.tuning.search_plan import SearchPlan
 if TYPE_CHECKING:
     from tracking.tuning.study import SearchStudy
 
-COMPARED_KEYS = ("objective", "HOTA", "group_F1_hull", "pairwise_F1", "event_F1")
+COMPARED_KEYS = ("objective", "HOTA", "group_F1", "pairwise_F1", "event_F1")
 """Scores that are compared on the test scenes beside the goals."""
 
 STORED = "judged "
@@ -93,7 +93,7 @@ class HeldOutEvaluator:
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
         """Returns the comparisons of the config with the defaults, suite by suite of the tests, and notes (texts).
 
-        Compared are the goals, objective, HOTA, group_F1_hull, pairwise_F1 and event_F1, without scores that no
+        Compared are the goals, objective, HOTA, group_F1, pairwise_F1 and event_F1, without scores that no
         sequence has. A suite on which the config causes an error has a note instead of comparisons. An error of the
         defaults, errors of the workers, and InputError for a test suite that cannot be read are raised.
         """
@@ -139,7 +139,7 @@ def stored_in_study(study: SearchStudy, play: PlayEpisodes) -> PlayEpisodes:
     play: play(sources, values, every_score) yields one result per source, the episode or the error of these parameters.
     A set is known by its sources, parameters and `every_score`. A set with an error, which ends with it, or one that
     its taker did not read to the end, is not stored. New and stored episodes have only these scores: the goals,
-    objective, HOTA, group_F1_hull, pairwise_F1 and event_F1.
+    objective, HOTA, group_F1, pairwise_F1 and event_F1.
     """
     kept = {*COMPARED_KEYS, *(goal.key for goal in study.plan.goals)}
 

@@ -11,6 +11,7 @@ from tracking.keyword_options import check_ranges, option
 
 if TYPE_CHECKING:
     from sim.types import DetectionMode, Tracker
+    from tracking.scoring.people_comparison import Similarity
 
 Scenes = str | Path | Sequence[str | Path]
 """A suite, a scenario, a TOML file, or a list of these."""
@@ -34,6 +35,7 @@ class TuneOptions:
     - check: second suite to test on; "" takes friends-meet or crossing, None takes none.
     - objective: scores to improve, the first decides; () takes the tracker's own.
     - detections: the tracker's input; None: "file" if it takes boxes or points, else "image" ("truth" for grouping).
+    - similarity: how people are compared, "ground", "image" or "boxes"; None: by the data, as `evaluate` does.
     - set: "key=value" settings that stay fixed; only: parameters to search, () takes all tunable ones.
     - out: TOML file for the result, None writes none.
     - storage: journal file or Optuna URL of the study, None for a journal beside `out` (memory without `out`); study:
@@ -75,6 +77,9 @@ class TuneOptions:
     )
     detections: DetectionMode | None = field(
         default=None, metadata=option("Input of the tracker; file if absent and the tracker can use it.")
+    )
+    similarity: Similarity | None = field(
+        default=None, metadata=option("How true and tracked people are compared; by the data if absent.")
     )
     set: Iterable[str] = field(
         default=(),

@@ -15,6 +15,7 @@ from typing import Any
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from sim.types import DetectionMode, Tracker
 from tracking.environment.episodes import Episode, Source, SourceCache
+from tracking.scoring.people_comparison import Similarity
 from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
 CACHE_BYTES = 512 * 2**20
@@ -32,6 +33,7 @@ class EpisodeTask:
     - every_score: True to compute the whole catalogue of scores.
     - code: hash of the tracker's file where the search runs, "" if there is no file.
     - step_timeout: seconds that each `reset` and `step` may take, None for no limit.
+    - similarity: how people are compared, None by the data.
     """
 
     tracker: str | type[Tracker]
@@ -41,6 +43,7 @@ class EpisodeTask:
     every_score: bool
     code: str
     step_timeout: float | None = None
+    similarity: Similarity | None = None
 
 
 EpisodeOrError = Episode | FlockscopeError
@@ -50,7 +53,11 @@ PlayEpisodes = Callable[[Sequence[Source], dict[str, Any], bool], Generator[Epis
 
 @contextmanager
 def episode_player(
-    tracker: TunedTracker, detections: DetectionMode, workers: int = 1, cluster: str | None = None
+    tracker: TunedTracker,
+    detections: DetectionMode,
+    workers: int = 1,
+    cluster: str | None = None,
+    similarity: Similarity | None = None,
 ) -> Iterator[PlayEpisodes]:
     """Opens the workers for the time of the context and returns the function play(sources, values, every_score).
 
@@ -58,7 +65,7 @@ def episode_player(
     (values by name) or the source caused. It goes on after an error. Nothing is played before its first result is
     taken. When its taker stops, no further episode is begun.
     detections: the tracker's input, "image", "file" or "truth". workers: number of processes, 1 for this process;
-    cluster: address of a dask scheduler, None for no cluster.
+    cluster: address of a dask scheduler, None for no cluster. similarity: how people are compared.
 
     Raises InputError if a class is to be played by other processes, if `workers` is below 1, or if the address is wrong
     or dask is missing. Raises WorkError if no scheduler answers. The function raises WorkError if workers are lost or
@@ -77,7 +84,7 @@ def episode_player(
         ) -> Generator[EpisodeOrError, None, None]:
             given, limit = (values, detections, every_score, tracker.code), tracker.limited
             timeout = None if limit is None else limit.seconds
-            tasks = [EpisodeTask(tracker.tracker, s, *given, timeout) for s in sources]
+            tasks = [EpisodeTask(tracker.tracker, s, *given, timeout, similarity) for s in sources]
             if in_this_process:
                 yield from (_attempt(task, tracker, source_cache) for task in tasks)
             else:
@@ -111,7 +118,8 @@ def _tracker_and_cache(
 
 def _attempt(task: EpisodeTask, tracker: TunedTracker, source_cache: SourceCache) -> EpisodeOrError:
     try:
-        return tracker.play(task.source, task.values, task.detections, source_cache, task.every_score)
+        given = (task.source, task.values, task.detections, source_cache, task.every_score, task.similarity)
+        return tracker.play(*given)
     except OrderError as error:  # the scene's fault, whatever the parameters
         return Episode(task.source.name, task.source.seed, float("nan"), {}, 0, 0.0, 0.0, error.line())
     except FlockscopeError as error:

@@ -97,10 +97,12 @@ class TuningResult:
         """
         plan, seeds = self.plan, self.plan.seeds
         names = ", ".join(goal.key for goal in plan.goals)
+        chosen_similarity = plan.options.similarity
+        compared = "" if chosen_similarity is None else f", people compared by {chosen_similarity}"
         every = len(self.trials) * len(plan.training)
         counts = f"{self.pruned} given up early, {self.impossible} impossible"
         lines = [
-            f"{plan.tracker_name} tuned on {plan.suite_name}, detections {plan.detections}, for {names}",
+            f"{plan.tracker_name} tuned on {plan.suite_name}, detections {plan.detections}, for {names}{compared}",
             f"{counted(len(self.trials), 'trial')}, {self.episodes} of {every} episodes played, {counts}; "
             f"training seeds {seeds_text(seeds.training)}, validation {seeds_text(seeds.validation)}, "
             f"test {seeds_text(seeds.test)}",

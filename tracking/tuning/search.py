@@ -74,7 +74,7 @@ def _search(options: TuneOptions) -> TuningResult:
     name = options.study or (target.stem if target is not None else "flockscope")
     with (
         open_study(plan, storage, name) as study,
-        episode_player(plan.tracker, plan.detections, options.workers, options.cluster) as play,
+        episode_player(plan.tracker, plan.detections, options.workers, options.cluster, options.similarity) as play,
     ):
         run_trials(study, play, progress)
         report = partial(progress, options.trials, options.trials)

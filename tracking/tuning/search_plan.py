@@ -97,7 +97,7 @@ class SearchPlan:
 
     @property
     def needs_every_score(self) -> bool:
-        """True if some goal is other than objective, HOTA, group_F1_hull and frames/s: all scores must then be
+        """True if some goal is other than objective, HOTA, group_F1 and frames/s: all scores must then be
         computed.
         """
         return any(goal.key not in (*FAST_KEYS, SPEED) for goal in self.goals)
@@ -143,8 +143,9 @@ class SearchPlan:
     def identity(self) -> dict[str, Any]:
         """Returns a dict of everything that the value of a trial depends on; a study is resumed only if it is the same.
 
-        Keys: tracker, code, versions, suite, seeds, motions, detections, objective, searched, ranges, fixed, prune,
-        seed. Long lists are given as hashes. Validation and test seeds, and the number of trials, are not part of it.
+        Keys: tracker, code, versions, suite, seeds, motions, detections, similarity, objective, searched, ranges,
+        fixed, prune, seed. Long lists are given as hashes. Validation and test seeds, and the number of trials, are not
+        part of it.
         Raises InputError if a training scene cannot be read.
         """
         return {
@@ -155,6 +156,7 @@ class SearchPlan:
             "seeds": seeds_text(self.seeds.training),
             "motions": _digest(source.key for source in self.training),
             "detections": self.detections,
+            "similarity": self.options.similarity or "by the data",
             "objective": ", ".join(goal.key for goal in self.goals),
             "searched": ", ".join(p.name for p in self.space),
             "ranges": _digest(repr(p) for p in self.space),
@@ -194,7 +196,7 @@ def search_plan(options: TuneOptions) -> SearchPlan:
     keys = (options.objective,) if isinstance(options.objective, str) else tuple(options.objective)
     goals = goals_of(keys or (tracker.objective,))
     plan = SearchPlan(options, tracker, base, space, suite, check, seeds, goals, detections, scene_settings)
-    tracker.check_input(plan.training[0], detections)
+    tracker.check_input(plan.training[0], detections, options.similarity)
     return plan
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, cast, get_args
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source, SourceCache, play, streams_for
 from tracking.grouping.link_rule import LinkRule
+from tracking.scoring.people_comparison import Similarity
 from tracking.time_limit import TimeLimited
 
 RULE = LinkRule.tracker
@@ -51,33 +52,44 @@ class TunedTracker:
             return "truth"
         return "file" if {"boxes", "points"} & {*self.needs} else "image"
 
-    def check_input(self, source: Source, detections: DetectionMode) -> None:
-        """Raises InputError if the tracker cannot work on this source with these detections, or if the source cannot be
-        opened.
+    def check_input(self, source: Source, detections: DetectionMode, similarity: Similarity | None) -> None:
+        """Raises InputError if the tracker cannot work on this source with these detections, if there is no such
+        similarity, or if the source cannot be opened.
 
-        detections: "image", "file" or "truth". The baseline rule of groups works with "truth" only; its source is not
-        opened. Otherwise returns None.
+        detections: "image", "file" or "truth". The baseline rule of groups works with "truth" and without a chosen
+        similarity only; its source is not opened. Otherwise returns None.
         """
         from tracking.detection_mode import choose_mode
 
+        known = get_args(Similarity)
+        if similarity not in (None, *known):
+            expected = ", ".join(known)
+            raise InputError(place="--similarity", got=similarity, expected=expected, remedy="correct it")
         if self.name == RULE:
+            remedy = "remove the option: the rule is tuned on people whose identity is known"
             if detections != "truth":
-                remedy = "remove the option: the rule is tuned on people whose identity is known"
                 raise InputError(place="--detections", got=detections, expected="truth", remedy=remedy)
+            if similarity is not None:
+                raise InputError(place="--similarity", got=similarity, expected="none", remedy=remedy)
             return
         choose_mode(self.needs, source.open(streams_for(self.tracker, detections)), detections)
 
     def play(
-        self, source: Source, values: dict[str, Any], detections: DetectionMode, cache: SourceCache, every_score: bool
+        self,
+        source: Source,
+        values: dict[str, Any],
+        detections: DetectionMode,
+        cache: SourceCache,
+        every_score: bool,
+        similarity: Similarity | None = None,
     ) -> Episode:
         """Returns one episode with the parameters `values` (by name, defaults for others), from the first frame to the
         last.
 
         The tracker's own seed is the seed of the source. detections: the tracker's input. cache: keeps the opened
-        source. every_score: compute the whole catalogue of scores. The baseline rule ignores `detections` and
-        `every_score`. Raises InputError if the parameters are refused, tracker and source do not fit, or the source has
-        no labels; WorkError if the tracker fails; IncomparableError if its tracks lack the boxes or positions to
-        compare.
+        source. every_score: compute the whole catalogue of scores. similarity: how people are compared. The baseline
+        rule ignores these three. Raises InputError if the parameters are refused, tracker and source do not fit, the
+        source has no labels, or the tracks lack the boxes or positions to compare; WorkError if the tracker fails.
         """
         if self.name == RULE:
             from tracking.tuning.grouping_episodes import play_rule
@@ -85,7 +97,7 @@ class TunedTracker:
             return play_rule(source, LinkRule.from_dict(values), cache)
         return play(
             self.limited or self.tracker, source, values, detections=detections, tracker_seed=source.seed, cache=cache,
-            every_score=every_score,
+            every_score=every_score, similarity=similarity,
         )  # fmt: skip
 
 

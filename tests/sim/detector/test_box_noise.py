@@ -28,9 +28,28 @@ def test_errors_grow_with_occlusion() -> None:
     assert e.std(axis=0) == pytest.approx(2.5 * np.array([0.05, 0.04, 0.06, 0.1]), rel=0.03)
 
 
+def test_scale_multiplies_all_errors() -> None:
+    box, n = some(500)
+    e, twice = (
+        box_errors(perturb_boxes(box, np.ones(500), NOISE.model_copy(update={"scale": k}), n), box) for k in (1, 2)
+    )
+    assert twice == pytest.approx(2 * e)
+
+
+def test_small_boxes_are_off_by_the_floor() -> None:
+    _, n = some()
+    box = np.tile([100.0, 100.0, 1.5, 4.0], (len(n), 1))  # shares alone would be 0.18, 0.28 and 0.24 px
+    moved = perturb_boxes(box, np.ones(len(n)), BoxNoise(floor_px=0.5), n)
+    assert (box_errors(moved, box)[:, :3] * 4.0).std(axis=0) == pytest.approx([0.5] * 3, rel=0.03)
+    assert (box_errors(moved, box)[:, 3]).std() == pytest.approx(BoxNoise().width[1], rel=0.05)
+    large = np.tile([100.0, 100.0, 30.0, 100.0], (len(n), 1))
+    floors = [perturb_boxes(large, np.ones(len(n)), BoxNoise(floor_px=f), n) for f in (0.0, 0.5)]
+    assert np.array_equal(*floors)
+
+
 def test_no_noise_moves_nothing_and_no_box_vanishes() -> None:
     box, n = some(500)
-    assert perturb_boxes(box, np.ones(500), BoxNoise(), n) == pytest.approx(box)
+    assert perturb_boxes(box, np.ones(500), BoxNoise(scale=0.0), n) is box
     wild = BoxNoise(foot=(0.0, 3.0), top=(0.0, 3.0), width=(0.0, 5.0))
     assert (perturb_boxes(box, np.ones(500), wild, n)[:, 2:] >= 1.0 - 1e-9).all()
 

@@ -5,6 +5,7 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.schema.sensor import Hide, Sensor
+from sim.detector.box_noise import box_errors
 from sim.detector.clutter import false_alarm_counts
 from sim.detector.sense import detection_probability, sense
 from sim.scene.camera import foot_points
@@ -14,7 +15,7 @@ from tests.reference_sense import above, crowd, pinhole
 
 SIZE = (640, 480)
 PERFECT: dict[str, Any] = {
-    "detect_prob": 1.0, "clutter_rate": 0.0, "noise_px": 0.0, "noise_m": 0.0, "box": "amodal",
+    "detect_prob": 1.0, "clutter_rate": 0.0, "box_noise": {"scale": 0.0}, "noise_m": 0.0, "box": "amodal",
     "occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0,
 }  # fmt: skip
 
@@ -98,20 +99,20 @@ def test_clutter_is_poisson(rate: float) -> None:
 
 def test_noise_has_the_sd_that_was_asked_for() -> None:
     truth = seen(people=20, frames=300)
-    exact, noisy = sense(truth, perfect(), 1), sense(truth, perfect(noise_m=0.2, noise_px=3.0), 1)
+    boxes = {"across": (0, 0.04), "foot": (0, 0.05), "top": (0, 0.03), "width": (0, 0.1)}
+    exact, noisy = sense(truth, perfect(), 1), sense(truth, perfect(noise_m=0.2, box_noise=boxes), 1)
     move = everything(noisy, "pos") - everything(exact, "pos")
     assert move.std(axis=0) == pytest.approx([0.2, 0.2], rel=0.05)
     assert move.mean(axis=0) == pytest.approx([0, 0], abs=0.02)
-    a, b = everything(exact, "box"), everything(noisy, "box")
-    edges = np.column_stack([b[:, :2] - a[:, :2], b[:, :2] + b[:, 2:] - a[:, :2] - a[:, 2:]])
-    assert edges.std(axis=0) == pytest.approx(np.full(4, 3.0), rel=0.05)
-    assert np.abs(np.corrcoef(np.column_stack([edges, move]).T) - np.eye(6)).max() < 0.06
-    assert (everything(sense(truth, perfect(noise_px=200.0), 1), "box")[:, 2:] >= 1).all()
+    errors = box_errors(everything(noisy, "box"), everything(exact, "box"))
+    assert errors.std(axis=0) == pytest.approx([0.04, 0.05, 0.03, 0.1], rel=0.05)
+    assert np.abs(np.corrcoef(np.column_stack([errors, move]).T) - np.eye(6)).max() < 0.06
+    assert (everything(sense(truth, perfect(box_noise={"scale": 20.0}), 1), "box")[:, 2:] >= 1).all()
 
 
 def test_sweeps_share_their_draws() -> None:
     truth = seen(people=8, frames=60)
-    few, many = (sense(truth, perfect(detect_prob=p, noise_m=0.1, noise_px=2.0), 1) for p in (0.6, 0.9))
+    few, many = (sense(truth, perfect(detect_prob=p, noise_m=0.1, box_noise={}), 1) for p in (0.6, 0.9))
     for a, b in zip(few, many, strict=True):
         assert {tuple(row) for row in a.pos} <= {tuple(row) for row in b.pos}
         assert {tuple(row) for row in a.box} <= {tuple(row) for row in b.box}  # type: ignore[union-attr]

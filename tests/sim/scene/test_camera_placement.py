@@ -41,7 +41,7 @@ def test_solved_views_show_everybody_and_are_tight(seed: int, tilt: float) -> No
 @pytest.mark.parametrize("seed", range(5))
 def test_a_given_height_or_position_is_kept(seed: int) -> None:
     motion = crowd(seed)
-    free = place_camera(CameraSpec(), motion)
+    free = place_camera(CameraSpec(yaw_deg=0.0), motion)
     tall = place_camera(CameraSpec(height=float(free.position[2]) + 3), motion)
     assert tall.position[2] == free.position[2] + 3
     assert extremes(tall, motion)[1] >= 0
@@ -50,6 +50,30 @@ def test_a_given_height_or_position_is_kept(seed: int) -> None:
     lower = placed.replace(position=placed.position - np.array([0, 0, 0.05]))
     left, top, right_, bottom = extremes(lower, motion)
     assert min(left, top, 640 - right_, 480 - bottom) < MARGIN * 480  # the lowest from which all are seen
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_camera_looks_from_where_people_look_largest(seed: int) -> None:
+    motion = crowd(seed)
+    t, p = np.nonzero(motion.present)
+    pos3 = np.column_stack([motion.pos[t, p], np.zeros(len(t))])
+
+    def height(camera: Camera) -> float:
+        return float(np.median(person_boxes(camera, pos3, motion.heading[t, p], motion.height[p])[:, 3]))
+
+    tried = [height(place_camera(CameraSpec(yaw_deg=yaw), motion)) for yaw in range(0, 360, 45)]
+    chosen = place_camera(CameraSpec(), motion)
+    assert height(chosen) > 0.97 * max(tried)  # all frames, and people of different height
+    assert np.array_equal(place_camera(CameraSpec(), motion.replace(fps=20.0)).rotation, chosen.rotation)
+
+
+def test_a_view_that_the_scenario_fixes_keeps_yaw_0() -> None:
+    motion = crowd(2)
+    ahead = camera_rotation(np.deg2rad(40), 0.0)
+    for keys in ({"height": 20.0}, {"position": (8.0, -10.0), "crop": True}):
+        assert np.array_equal(place_camera(CameraSpec.model_validate(keys), motion).rotation, ahead)
+    above = place_camera(CameraSpec(kind="top"), motion)
+    assert np.array_equal(above.rotation, camera_rotation(np.pi / 2, 0.0))
 
 
 def test_straight_down_from_a_given_height_is_centred() -> None:

@@ -240,7 +240,7 @@ def test_wrong_settings_of_a_scenario(text, made, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("text", ["gate", "gaet=0.9", "gate=7", "gate=x", "scenario.duration=3", "sensor.noise_px=3"])
+@pytest.mark.parametrize("text", ["gate", "gaet=0.9", "gate=7", "gate=x", "scenario.duration=3", "sensor.noise_m=3"])
 def test_wrong_settings_of_a_tracker(text, made, tmp_path, capsys):
     line = ["track", "blob", str(made / "data"), "--out", str(tmp_path / "out"), "--set", text]
     refused(line, capsys)

@@ -77,6 +77,7 @@ STOP = "group.s.stops=[{ at = [13, 13], stay = 2 }]"
 SERVED = "event.l.goal=[21, 8]"
 
 # key: what is set, then what is set instead ("" for nothing; several apart by ";"): the two outputs must differ.
+MEMORY = "sensor.box_noise.memory=[{ share = 0.5, time = 2 }]"
 KEYS = {
     "name": ("", "name=other"),
     "duration": ("", "duration=10"),
@@ -112,7 +113,16 @@ KEYS = {
     "camera.crop": (LOW, f"{LOW};camera.crop=true"),
     "sensor.detect_prob": ("", "sensor.detect_prob=0.5"),
     "sensor.clutter_rate": ("", "sensor.clutter_rate=2"),
-    "sensor.noise_px": ("", "sensor.noise_px=3"),
+    "sensor.box_noise.across": ("", "sensor.box_noise.across=[0, 0.1]"),
+    "sensor.box_noise.foot": ("", "sensor.box_noise.foot=[0, 0.1]"),
+    "sensor.box_noise.top": ("", "sensor.box_noise.top=[0, 0.1]"),
+    "sensor.box_noise.width": ("", "sensor.box_noise.width=[0, 0.1]"),
+    "sensor.box_noise.floor_px": ("", "sensor.box_noise.floor_px=9"),
+    "sensor.box_noise.scale": ("", "sensor.box_noise.scale=2"),
+    "sensor.box_noise.occluded": ("", "sensor.box_noise.occluded=2"),
+    "sensor.box_noise.tails": ("", "sensor.box_noise.tails=3"),
+    "sensor.box_noise.memory[].share": (MEMORY, MEMORY.replace("0.5", "0.9")),
+    "sensor.box_noise.memory[].time": (MEMORY, MEMORY.replace("2", "1")),
     "sensor.noise_m": ("", "sensor.noise_m=0.2"),
     "sensor.box": ("", "sensor.box=amodal"),
     "sensor.points": ("", "sensor.points=own"),
@@ -208,7 +218,7 @@ TEXT_ONLY = {"schema", "about", "group[].id", "event[](merge).into", "event[](sp
 """Keys that name things within the file, or say what it is."""
 
 
-PROFILE = ("box_noise.", "false_alarms.", "miss_memory[].", "by_visibility", "true_scores", "false_scores")
+PROFILE = ("false_alarms.", "miss_memory[].", "by_visibility", "true_scores", "false_scores")
 """Of `sensor`: a detector's measured errors. What each does: tests/sim/detector."""
 
 
@@ -483,8 +493,8 @@ OPTIONS = {
     ("track", "settings"): (BASE["track"], BASE["track"] + " --set tracker.gate=0.6"),
     ("track", "detections"): (BASE["track"], BASE["track"] + " --detections truth"),
     ("track", "seed"): (
-        BASE["track"] + " --detections truth --set sensor.noise_px=4",
-        BASE["track"] + " --detections truth --set sensor.noise_px=4 --seed 1",
+        BASE["track"] + " --detections truth --set sensor.box_noise.scale=4",
+        BASE["track"] + " --detections truth --set sensor.box_noise.scale=4 --seed 1",
     ),
     ("track", "fps"): (MOT, MOT + " --fps 5"),
     ("track", "px_per_m"): (MOT, MOT + " --px-per-m 10"),

@@ -138,7 +138,7 @@ def test_which_background_is_told(tmp_path, capsys):
         ("--background first:61", ["--background", "60 frames", "61"]),
         ("--detections file", ["needs pixels or boxes", "film", "images"]),
         ("--detections truth", ["needs pixels or boxes", "film", "images"]),
-        ("--detections image --set sensor.noise_px=3", ["sensor"]),
+        ("--detections image --set sensor.noise_m=3", ["sensor"]),
         ("--camera nowhere.json", ["nowhere.json"]),
         ("--fps 0", ["--fps"]),
         ("--px-per-m -2", ["--px-per-m"]),

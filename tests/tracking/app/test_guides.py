@@ -1,4 +1,4 @@
-"""Runs a guide from top to bottom in an empty folder: its scripts, files and commands, and compares what it prints."""
+"""Runs guides from top to bottom in an empty folder: scripts, files and commands, and compares what they print."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.small_videos import picture, write_video
 from tracking.app.cli import run
 
 GUIDES = Path(__file__).resolve().parents[3] / "docs" / "guides"
@@ -18,18 +19,19 @@ SAVED = re.compile(r"Save this as `([^`]+)`")
 def play(text: str, data: bool, capsys: pytest.CaptureFixture[str]) -> list[str]:
     """Runs the blocks in order and returns the commands that ran. data: also those that read the folder `data`.
 
-    python: a script. toml: a file, named in the text before it. text: what the last command printed, to the letter.
+    A block whose preceding text says "Save this as" becomes a file. Others: python is a script, text is what the last
+    command printed, to the letter, sh is not run, and lines of a block without a language are commands.
     """
     done, printed, end = [], "", 0
     for block in BLOCK.finditer(text):
         kind, body, before, end = block[1], block[2], text[end : block.start()], block.end()
-        if kind == "python":
+        if saved := SAVED.findall(before):
+            Path(saved[-1]).write_text(body)
+        elif kind == "python":
             exec(compile(body, "guide", "exec"), {})
-        elif kind == "toml":
-            Path(SAVED.findall(before)[-1]).write_text(body)
         elif kind == "text":
             assert "\n".join(map(str.rstrip, printed.splitlines())) == body.rstrip("\n"), done[-1]
-        elif data or "data/" not in body:
+        elif not kind and (data or "data/" not in body):
             for line in body.splitlines():
                 capsys.readouterr()
                 assert run(shlex.split(line, comments=True)[1:]) == 0, (line, capsys.readouterr().err)
@@ -38,17 +40,34 @@ def play(text: str, data: bool, capsys: pytest.CaptureFixture[str]) -> list[str]
     return done
 
 
+def follow(name: str, data: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    """Plays a guide; with data, all its commands must have run."""
+    text = (GUIDES / f"{name}.md").read_text(encoding="utf-8")
+    done = play(text, data, capsys)
+    assert len(done) >= 2 or name == "python"
+    if data:
+        unrun = re.sub(r"^```sh\n.*?^```$", "", text, flags=re.DOTALL | re.MULTILINE)
+        assert len(done) == len(re.findall("^flockscope ", unrun, re.MULTILINE))
+
+
 def test_who_belongs_together(tmp_path, monkeypatch, capsys):
     """Without recordings."""
     monkeypatch.chdir(tmp_path)
-    text = (GUIDES / "who-belongs-together.md").read_text(encoding="utf-8")
-    assert len(play(text, False, capsys)) >= 2
+    follow("who-belongs-together", False, capsys)
     assert (tmp_path / "walk.html").is_file()
 
 
-def test_who_belongs_together_in_recordings(tmp_path, monkeypatch, capsys, shared_data):
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["generate", "write-a-scenario", "your-own-tracker", "python"])
+def test_without_recordings(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    follow(name, False, capsys)
+
+
+@pytest.mark.parametrize("name", ["who-belongs-together", "recordings"])
+def test_with_recordings(name, tmp_path, monkeypatch, capsys, shared_data):
+    """The folder `data` of the guides, and a video of the reader's."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "data").symlink_to(shared_data)
-    text = (GUIDES / "who-belongs-together.md").read_text(encoding="utf-8")
-    done = play(text, True, capsys)
-    assert len(done) == len(re.findall("^flockscope ", text, re.MULTILINE))
+    write_video(tmp_path / "street.mp4", [picture(k) for k in range(110)])
+    follow(name, True, capsys)

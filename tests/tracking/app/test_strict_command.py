@@ -79,13 +79,13 @@ def test_a_setting_may_replace_one_of_the_profile(tmp_path: Path, capsys) -> Non
     """--sensor is a file of keys; --set is stronger."""
     write_short_scene(tmp_path, "0:1")
     profile = tmp_path / "sensor.toml"
-    profile.write_text("[sensor]\nclutter_rate = 1.5\nnoise_px = 3\n")
+    profile.write_text("[sensor]\nclutter_rate = 1.5\nnoise_m = 3\n")
     options = ["--sensor", str(profile), "--set", "sensor.clutter_rate=0.5", "--streams", "none"]
     line = ["generate", str(tmp_path / "scene.toml"), "--seeds", "7", "--out", str(tmp_path / "data"), *options]
     assert run(line) == 0
     text = next((tmp_path / "data").glob("*/*-s00007/scenario.toml"))
     assert "clutter_rate = 0.5" in text.read_text()
-    assert "noise_px = 3" in text.read_text()
+    assert "noise_m = 3" in text.read_text()
     tracked = ["track", "blob", str(tmp_path / "data"), "--out", str(tmp_path / "run"), "--detections", "truth"]
     assert run([*tracked, *options[:4]]) == 0, capsys.readouterr().err
 

@@ -24,6 +24,7 @@ from tracking.config import Config, param
 from tracking.environment.env import OBSERVATIONS, TuningEnv
 from tracking.environment.observation import NAMES
 from tracking.parameter_space import decode, encode
+from tracking.run import TrackingRun
 from tracking.tracker_registry import names
 
 ID = "flockscope/Tuning-v0"
@@ -212,6 +213,25 @@ def test_all_episodes_have_detections_of_one_kind():
         make("group-pda", ["cross", boxed, bare])
 
 
+@pytest.mark.parametrize("decision_every", [None, 10])
+def test_people_are_compared_as_asked(decision_every):
+    """The reward is the score of this similarity; without one it is that of the data, here the ground."""
+    found = {}
+    for similarity in (None, "ground", "image"):
+        env = make(similarity=similarity, decision_every=decision_every)
+        _, rewards, info = played(env, seed=1)
+        rollout = env.unwrapped.rollout
+        run = TrackingRun(tuple(rollout.tracks), {"detections": "file"})
+        expected = tracking.evaluate(rollout.truth, run, similarity=similarity)
+        assert rewards.sum() == pytest.approx(expected["objective"], abs=1e-12)
+        found[similarity] = info["scores"]["HOTA"]
+    assert found[None] == found["ground"] != found["image"]
+    with pytest.raises(InputError, match="similarity"):
+        make(similarity="volume")
+    with pytest.raises(InputError, match="no boxes to compare"):
+        played(make(TOY, similarity="boxes"), seed=1)
+
+
 def test_from_pixels():
     tiny = ["camera.fps=5", "duration=2", "camera.image=[160,120]"]
     env = make("group-pda", "cross", set=tiny, detections="image", decision_every=5, render_mode="rgb_array")
@@ -396,4 +416,4 @@ def test_video(tmp_path):
 def test_what_it_says_can_be_written_down():
     _, _, info = played(make("group-pda", decision_every=15), seed=1)
     assert json.loads(json.dumps(info))["objective"] == info["objective"]
-    assert set(info["scores"]) == {"objective", "group_F1_hull"}
+    assert set(info["scores"]) == {"objective", "group_F1"}

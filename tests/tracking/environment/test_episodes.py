@@ -44,7 +44,7 @@ def test_the_objective_of_a_beginning(name, cache):
             pass
         expected = tracking.evaluate(sequence.truth, run, frames=frame)["objective"]
         assert rollout.episode().objective == pytest.approx(expected, abs=1e-12, nan_ok=True)
-    assert rollout.episode().objective == play(name, CROSS, cache=cache, upto=99).objective
+    assert rollout.episode().objective == play(name, CROSS, cache=cache).objective
 
 
 def test_parameters_reach_the_tracker(cache):

@@ -88,8 +88,6 @@ def correlation(memory: tuple[Memory, ...], lag: float) -> float:
 
 def test_noise_comes_back() -> None:
     found, known = fitted().box_noise, KNOWN.box_noise
-    assert found is not None
-    assert known is not None
     for name, absolute in (("across", 0.004), ("foot", 0.006), ("top", 0.006), ("width", 0.02)):
         near(getattr(found, name), getattr(known, name), absolute)
     near(found.occluded, 1.0, 0.25)
@@ -146,7 +144,6 @@ def test_small_people_and_tails_and_visible_parts_are_told() -> None:
     found = fit_matched(seen(other))
     assert found.small_px == pytest.approx(small, rel=0.25)
     assert found.box == "visible"
-    assert found.box_noise is not None
     assert 3.0 <= found.box_noise.tails <= 14.0
     assert found.miss_memory is None or correlation(found.miss_memory, 0.3) < 0.1
     assert found.false_alarms is None or found.clutter_rate < 0.1
@@ -160,16 +157,16 @@ def test_points_are_told(points: Any, box: Any) -> None:
 
 
 def test_who_never_errs_has_a_clean_profile() -> None:
-    perfect = Sensor(detect_prob=1.0, clutter_rate=0.0, noise_px=0.0, noise_m=0.0, box="amodal", occlusion_power=0.0,
-                     min_visibility=0.0, small_px=0.0)  # fmt: skip
+    perfect = Sensor(detect_prob=1.0, clutter_rate=0.0, box_noise=BoxNoise(scale=0.0), noise_m=0.0, box="amodal",
+                     occlusion_power=0.0, min_visibility=0.0, small_px=0.0)  # fmt: skip
     found = fit_matched(seen(perfect))
     assert found.detect_prob > 0.999
     assert min(found.by_visibility or (0.0,)) > 0.97
     assert found.clutter_rate == 0.0
     assert found.false_alarms is None
     assert found.miss_memory is None
-    assert found.box_noise is not None
     assert max(abs(x) for name in ("across", "foot", "top", "width") for x in getattr(found.box_noise, name)) < 1e-6
+    assert found.box_noise.floor_px == 0.0
     assert found.noise_m == 0.0
     assert found.points == "own"
 

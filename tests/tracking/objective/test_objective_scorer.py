@@ -14,7 +14,7 @@ from tracking.grouping.grouped_tracks import with_groups
 from tracking.objective import ObjectiveScorer
 from tracking.scoring import evaluate
 
-KEYS = ("objective", "HOTA", "group_F1_hull")
+KEYS = ("objective", "HOTA", "group_F1")
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_in_the_image(crowd):
     assert made[5].plane == "image"
     expected = evaluate(flat.truth, with_groups(made, flat.fps, scale))
     same(ObjectiveScorer(flat.truth).scores(made, scale), expected)
-    assert expected["group_F1_hull"] > 0
+    assert expected["group_F1"] > 0
     unboxed = [t.replace(box=None) for t in made]
     same(
         ObjectiveScorer(flat.truth).scores(unboxed, scale), evaluate(flat.truth, with_groups(unboxed, flat.fps, scale))
@@ -106,7 +106,7 @@ def test_wholes_of_every_shape(crowd):
 
 def test_nothing_answered_and_nothing_labelled(crowd):
     scorer = ObjectiveScorer(crowd.truth)
-    assert np.isnan(scorer.scores([], 1.0)["group_F1_hull"]) or scorer.scores([], 1.0)["group_F1_hull"] == 0
+    assert np.isnan(scorer.scores([], 1.0)["group_F1"]) or scorer.scores([], 1.0)["group_F1"] == 0
     bare = dataclasses.replace(crowd.truth, groups=None, groups_px=None, events=None)
     made, scale = raw("blob", crowd)
     same(ObjectiveScorer(bare).scores(made, scale), evaluate(bare, made))

@@ -102,7 +102,6 @@ def test_equal_to_the_oracle(seed: int, unit: str, by: str) -> None:
     true, est = both_sides(truth, tracks)
     found = evaluate(truth, tracks, group_match=by)
     expected = {f"group_{k}": v for k, v in group_scores(true, est, by).items()} | pairwise_scores(true, est)
-    expected["group_F1_hull"] = group_scores(true, est, "hull")["F1"]
     expected |= right_group_scores(true, est, "right_groups", Fraction(2, 3))
     expected |= right_group_scores(true, est, "exact_groups", Fraction(1))
     if unit == "person":

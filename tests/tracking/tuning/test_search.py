@@ -288,7 +288,13 @@ def test_where_nothing_is_better_the_defaults_stay(tmp_path):
 
 def test_long_settings_are_told_short_and_stored_whole(tmp_path):
     long = "sensor.by_visibility=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]"
-    many = ["sensor.detect_prob=0.9", "sensor.noise_m=0.1", "sensor.noise_px=2.0", "sensor.persistence=0.1", long]
+    many = [
+        "sensor.detect_prob=0.9",
+        "sensor.noise_m=0.1",
+        "sensor.box_noise.scale=2.0",
+        "sensor.persistence=0.1",
+        long,
+    ]
     profile = str(tune(**tune_arguments(tmp_path, trials=1, set=["scenario.duration=2", *many])))
     assert "\nscenes with a detector of 5 settings, duration=2\n" in profile
     given = tune_arguments(tmp_path, trials=1, set=[long, "scenario.duration=2"], out=tmp_path / "found.toml")
@@ -327,3 +333,23 @@ def test_a_storage_that_is_none(tmp_path):
         with pytest.raises(InputError, match="--storage") as caught:
             tune(**tune_arguments(tmp_path), storage=url)
         assert "\n" not in str(caught.value)
+
+
+def test_the_similarity_of_people_is_an_option(tmp_path: Path) -> None:
+    """It decides the scores, stands in the written file, and belongs to a study."""
+    found = {}
+    for similarity in (None, "boxes"):
+        made = tmp_path / f"{similarity}.toml"
+        result = tune(**{**tune_arguments(tmp_path), "trials": 1, "tracker": "blob"}, similarity=similarity, out=made)
+        found[similarity] = result.validation[0]
+        settings = json.loads(made.with_suffix(".json").read_text())["settings"]
+        assert settings["similarity"] == (similarity or "by the data")
+        assert ("compared by boxes" in made.read_text()) == (similarity == "boxes")
+    assert found[None] != found["boxes"]
+    again = {**tune_arguments(tmp_path), "trials": 2, "tracker": "blob"}
+    with pytest.raises(InputError, match="similarity"):
+        tune(**again, similarity="ground", out=tmp_path / "boxes.toml")
+    with pytest.raises(InputError, match="--similarity"):
+        tune(**tune_arguments(tmp_path), similarity="volume")
+    with pytest.raises(InputError, match="identity is known"):
+        tune("grouping", "cross", 1, similarity="image")

@@ -110,9 +110,9 @@ def sparse_notes(scores: list[Scores]) -> list[str]:
 
 
 def usual_key(comparison: ComparedRuns) -> str:
-    """Returns "objective"; "group_F1_hull" if it would mean something else for some runs, which track whole groups."""
+    """Returns "objective"; "group_F1" if it would mean something else for some runs, which track whole groups."""
     people = np.isfinite(comparison.values("HOTA")).any(axis=1)
-    return "group_F1_hull" if people.any() and not people.all() else "objective"
+    return "group_F1" if people.any() and not people.all() else "objective"
 
 
 Source = str | list[tuple[Sequence, StoredTracks]]

@@ -40,7 +40,7 @@ SIMILARITY = {
     "ground": "1 - distance / 2 m on the ground",
     "image": "1 - distance / 2 m in the image",
 }
-GROUP_MATCH = {"hull": "overlap (IoU) of hulls", "members": "common members (Jaccard index)"}
+GROUP_MATCH = {"hull": "overlap (IoU) of hulls (group_F1: common members)", "members": "common members (Jaccard index)"}
 SURFACE = {"ground": "on the ground, m", "image": "in the image, px"}
 
 ENOUGH = 100

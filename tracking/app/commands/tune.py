@@ -17,7 +17,13 @@ from tracking.tuning.options import TuneOptions
 
 SHARED = {"set": Set, "workers": Workers, "cluster": Cluster, "step_timeout": StepTimeout}
 """Options that other commands have, too."""
-TYPES = {"tracker": str, "suite": list[str], "out": Path, "detections": Literal["image", "truth", "file"] | None}
+TYPES = {
+    "tracker": str,
+    "suite": list[str],
+    "out": Path,
+    "detections": Literal["image", "truth", "file"] | None,
+    "similarity": Literal["boxes", "ground", "image"] | None,
+}
 """Types on the command line that do not follow from the default."""
 REQUIRED = ("out", "trials")
 """Options that `tracking.tune` has defaults for and the command has not."""

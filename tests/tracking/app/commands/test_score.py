@@ -95,21 +95,21 @@ def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, 
     line = ["generate", "merge", "--seeds", "3:7", "--streams", "none", "--out", str(tmp_path / "data")]
     assert run(line) == 0
     data, tracks = tmp_path / "data" / "flockscope-train", tmp_path / "tracks"
-    noisy = ["truth", "--set", "sensor.noise_px=3"]
+    noisy = ["truth", "--set", "sensor.box_noise.scale=2"]
     for seed, mode in zip((3, 4, 5), (["file"], ["truth"], noisy), strict=True):
         name = f"merge-s{seed:05d}"
         assert run(["track", "blob", str(data / name), "--detections", *mode, "--out", str(tracks / name)]) == 0
     assert run(["track", "blob", str(data / "merge-s00006"), "--out", str(tmp_path / "other")]) == 0
     (tracks / "merge-s00006.txt").write_bytes((tmp_path / "other" / "tracks.mot.txt").read_bytes())
     found = scored(capsys, tmp_path / "data", tracks)
-    expected = ["file", "truth", "truth (noise_px = 3)", ""]
+    expected = ["file", "truth", "truth (box_noise.scale = 2)", ""]
     assert [row["given"] for row in found["sequences"]] == expected
     assert found["mean"] is None
     assert [(part["given"], part["sequences"]) for part in found["means"]] == [(given, 1) for given in expected]
     assert [part["mean"]["HOTA"]["mean"] for part in found["means"]] == [row["HOTA"] for row in found["sequences"]]
     assert run(["score", str(tmp_path / "data"), str(tracks)]) == 0
     text = capsys.readouterr().out
-    for words in ("file", "truth", "truth (noise_px = 3)", "unknown (no run.json)"):
+    for words in ("file", "truth", "truth (box_noise.scale = 2)", "unknown (no run.json)"):
         assert f"1 of 4 sequences, detections {words}\n" in text
     assert "95 % low" not in text
     against = scored(capsys, made / "data", made / "file", "--against", made / "truth")
@@ -294,7 +294,8 @@ def test_tables(made: Path, capsys) -> None:
     for words in (
         "groups, strict", "groups, core", "\nmembers\n", "\nevents\n",
         "people compared by 1 - distance / 2 m on the ground",
-        "groups compared by overlap (IoU) of hulls, on the ground, m", "in pairs over 2 sequences (fewer than 100",
+        "groups compared by overlap (IoU) of hulls (group_F1: common members), on the ground, m",
+        "in pairs over 2 sequences (fewer than 100",
     ):  # fmt: skip
         assert words in output
     assert max(map(len, output.splitlines())) <= 160

@@ -1,4 +1,4 @@
-"""Compiled connected components of linked people, and Minkowski sums of hulls with the footprint polygon."""
+"""Compiled connected components of linked people."""
 
 from __future__ import annotations
 
@@ -62,36 +62,3 @@ def _spread(p, linked, seen, since, label, stack):  # type: ignore[no-untyped-de
                 label[r] = p
                 stack[n] = r
                 n += 1
-
-
-@njit(cache=True)
-def minkowski_sums(vertex, ends, polygon):  # type: ignore[no-untyped-def]
-    """Returns the Minkowski sums of G convex hulls with one convex polygon: vertices (V, 2), and the index at which
-    each sum ends (G,).
-
-    Hull g is vertex[ends[g - 1] : ends[g]] (hull 0 begins at 0). Hulls and `polygon` (S, 2) are counter-clockwise from
-    their leftmost vertex, the lowest of several. The edges of both are merged by direction. A sum may repeat vertices.
-    An empty hull is not allowed.
-    """
-    out, stop = np.empty((2 * len(vertex) + len(polygon) * len(ends), 2)), np.empty(len(ends), np.int64)
-    n, first = 0, 0
-    for g in range(len(ends)):
-        hull = vertex[first : ends[g]]
-        i, j = 0, 0
-        while i < len(hull) or j < len(polygon):
-            p, q = hull[i % len(hull)], polygon[j % len(polygon)]
-            out[n] = p + q
-            n += 1
-            u, v = hull[(i + 1) % len(hull)] - p, polygon[(j + 1) % len(polygon)] - q
-            turn = u[0] * v[1] - u[1] * v[0]
-            ahead = i < len(hull) and len(hull) > 1 and (j >= len(polygon) or turn >= 0)
-            both = ahead and j < len(polygon) and turn == 0 and u[0] * v[0] + u[1] * v[1] > 0
-            if ahead:
-                i += 1
-            if not ahead or both:
-                j += 1
-            if len(hull) == 1 and j >= len(polygon):
-                i = 1
-        first = ends[g]
-        stop[g] = n
-    return out[:n].copy(), stop

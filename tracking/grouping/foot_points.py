@@ -1,0 +1,110 @@
+"""Boxes of a calibrated camera, tracked in the image, as people on the ground: `standing` moves the tracks to where the
+boxes stand, and `completed` derives groups and events there.
+
+Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. Boxes
+from pixels are never moved, as the foot of a blob is no person's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sim.scene.camera import foot_points
+from sim.scene.terrain import height_at
+from sim.truth.group_hulls import box_groups, frame_groups
+from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks
+from tracking.grouping.grouped_tracks import names_groups, with_groups, with_velocities
+from tracking.grouping.grouping_choice import Grouping
+
+CLIMB = 8
+"""Steps in which the height of the ground below a foot point is found."""
+
+
+def plane_of_run(tracks: Sequence[Tracks]) -> str | None:
+    """Returns the plane of the first `Tracks` with people, else of the first; None for no tracks."""
+    return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else None)
+
+
+def boxed(tracks: Sequence[Tracks]) -> bool:
+    """Returns True if all tracks are of people with boxes."""
+    return all(t.box is not None and t.unit == "person" for t in tracks if len(t.id))
+
+
+def can_stand(tracks: Sequence[Tracks], camera: Camera | None, pixels: bool) -> bool:
+    """Returns True if tracks in the image can be moved to the ground: of people with boxes, with a camera, and not made
+    from pixels.
+    """
+    return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and not pixels
+
+
+def completed(
+    tracks: Sequence[Tracks],
+    fps: float,
+    px_per_m: float,
+    rule: Grouping | None = None,
+    *,
+    camera: Camera | None,
+    scene: Scene | None,
+    pixels: bool,
+) -> tuple[Tracks, ...]:
+    """Returns the tracks of a sequence with groups and events filled in: as `with_groups`, or from where boxes stand.
+
+    camera, scene: of the sequence. pixels: the tracks are made from pixels. Tracks that `can_stand` are grouped on the
+    ground, so that px_per_m has no influence. They stay in the image, with the hulls of groups round boxes.
+    """
+    if camera is None or not can_stand(tracks, camera, pixels) or all(t.derived for t in tracks):
+        return with_groups(tracks, fps, px_per_m, rule)
+    grouped = with_groups([standing(t, camera, scene) for t in tracks], fps, 1.0, rule)
+    named = names_groups(tracks)
+    return tuple(_grouped_as(t, g, named) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True))
+
+
+def _grouped_as(t: Tracks, grouped: Tracks, named: bool) -> Tracks:
+    """Returns the tracks of a frame with the group ids and new events of the same people on the ground."""
+    new = moved_events(grouped.events[len(t.events) :], t.id, t.pos)
+    out = t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
+    return out if named and t.groups is not None else out.replace(groups=groups_of_people(out))
+
+
+def standing(t: Tracks, camera: Camera, scene: Scene | None) -> Tracks:
+    """Returns tracks of boxes in the image as tracks on the ground. Velocities are nan, groups those that t names."""
+    pos = np.zeros((0, 2)) if t.box is None else feet(t.box, camera, scene)
+    events = moved_events(t.events, t.id, pos)
+    moved = t.replace(plane="ground", pos=pos, vel=np.full_like(pos, np.nan), events=events)
+    named = t.groups is not None or bool((t.group >= 0).any())
+    return moved.replace(groups=groups_of_people(moved) if named else None)
+
+
+def groups_of_people(t: Tracks) -> Groups:
+    """Returns the groups of tracks of people that follow from `group`: hulls round boxes in the image, else round
+    footprints. People at unknown positions are left out.
+    """
+    there = np.isfinite(t.pos).all(axis=1)
+    rows = (t.id[there], t.group[there], t.pos[there], t.vel[there])
+    if t.plane != "image" or t.box is None:
+        return frame_groups(*rows)
+    return box_groups(np.full(len(rows[0]), t.index), *rows, t.box[there], t.index, 1)[0]
+
+
+def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:
+    """Returns the ground points x, y (R, 2) in m below boxes (R, 4) px; nan where a box stands on no visible ground."""
+    z = np.zeros(len(box))
+    pos = foot_points(box, z, camera)
+    if scene is not None and scene.stairs:
+        for _ in range(CLIMB):
+            z = height_at(scene, pos)
+            pos = foot_points(box, z, camera)
+    return pos
+
+
+def moved_events(events: Sequence[GroupEvent], id: Ints, pos: Array) -> tuple[GroupEvent, ...]:
+    """Returns the events at the mean of their members' positions, nan without any; id (N,), pos (N, 2): of a frame."""
+    return tuple(replace(e, pos=_centre(pos, np.isin(id, e.members))) for e in events)
+
+
+def _centre(pos: Array, rows: Bools) -> tuple[float, float]:
+    x, y = pos[rows].mean(axis=0) if rows.any() else (float("nan"), float("nan"))
+    return float(x), float(y)
