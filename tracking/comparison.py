@@ -1,7 +1,7 @@
 """Lays the scores of any number of runs side by side: `compare` scores them alike, and `ComparedRuns` ranks them.
 
-People are compared in one way on all sequences and for all runs. The oracle stands beside them: what the best tracker
-could report from the same detections.
+People are compared in one way on all sequences and for all runs. Beside them stands an oracle for each input that the
+runs got: what the best tracker could report from it. The order of the runs has no effect.
 """
 
 from __future__ import annotations
@@ -18,16 +18,35 @@ from scenarios.errors import InputError
 from sim.types import Array, Sequence, Tracks
 from tracking.oracle import oracle
 from tracking.ranking import Ranking, rank
+from tracking.recording_intervals import recording_rankings
 from tracking.run import TrackingRun
+from tracking.run_info import input_name
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer, Scores
+from tracking.scoring.frame_weights import weighted_scorers
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import IncomparableError, Similarity
 
 if TYPE_CHECKING:
     import pyarrow
 
-ORACLE = "oracle"
+UNKNOWN = "unknown"
+"""Stands for the input of tracks without run.json."""
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedSequence:
+    """The scores of R runs on one sequence.
+
+    scores: of each run. inputs: what each run got, in words, "unknown" if it does not say. oracles: by input, in
+    alphabetical order; if no run says what it got, that of the stored detections, else of the labels. blocks: by score,
+    the ranking with intervals by weights of blocks of frames; None without.
+    """
+
+    scores: list[Scores]
+    inputs: list[str]
+    oracles: Mapping[str, Scores]
+    blocks: Mapping[str, Ranking] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,46 +54,59 @@ class ComparedRuns:
     """The scores of R runs on S sequences.
 
     runs: names, in the order given. sequences: names. scores: for each run a list of `Scores`, one per sequence.
-    oracle: those of the oracle. similarity: how people were compared in all of them.
+    inputs: for each run, what it got, in words; several if it got different inputs on different sequences. oracles: for
+    each input, in alphabetical order, the scores of its oracle on each sequence, None where no run got this input.
+    similarity: how people were compared in all of them. blocks: of `ComparedSequence`, for a single recording.
     """
 
     runs: tuple[str, ...]
     sequences: tuple[str, ...]
     scores: Mapping[str, list[Scores]]
-    oracle: list[Scores]
+    inputs: Mapping[str, tuple[str, ...]]
+    oracles: Mapping[str, list[Scores | None]]
     similarity: Similarity
+    blocks: Mapping[str, Ranking] | None = None
+
+    def rows(self) -> dict[str, list[Scores | None]]:
+        """Returns the scores of the oracles, named "oracle from INPUT", then of the runs, one per sequence."""
+        oracles = {f"oracle from {name}": row for name, row in self.oracles.items()}
+        return {**oracles, **{name: [*row] for name, row in self.scores.items()}}
 
     def values(self, key: str) -> Array:
         """Returns a score of the catalogue (R, S) of the runs on the sequences; nan where unknown."""
-        return np.array([[one[key] for one in self.scores[run]] for run in self.runs])
+        return np.array([_values(self.scores[run], key) for run in self.runs])
 
     def ranking(self, key: str = "objective", sequences: SequenceOf[int] | None = None) -> Ranking:
         """Returns the ranking of the runs by a score of the catalogue. sequences: indices of those that count."""
+        if self.blocks is not None:
+            return self.blocks[key]
         values = self.values(key)
         return rank(values if sequences is None else values[:, sequences], CATALOGUE[key].better == "higher")
 
     def to_arrow(self, key: str = "objective") -> pyarrow.Table:
-        """Returns the ranking by a score as a table, one row per run, best first, after the oracle.
+        """Returns the ranking by a score as a table, one row per run, best first, after the oracles.
 
-        Columns: run; first, last: the range of ranks, null for the oracle; mean, low, high: of the score, with its 95 %
-        interval within the score's range; then the mean of every score of the catalogue that is known for some run.
+        Columns: run; input, in words; first, last: the range of ranks, null for oracles; mean, low, high: of the score,
+        with its 95 % interval within the score's range; then the mean of every score of the catalogue that is known for
+        some run.
         """
         import pyarrow as pa
 
-        ranking = self.ranking(key)
+        ranking, rows = self.ranking(key), self.rows()
+        oracles = list(rows)[: len(self.oracles)]
         names = [self.runs[k] for k in ranking.order.tolist()]
-        rows = [self.oracle, *(self.scores[name] for name in names)]
-        of_oracle = rank(np.array([[one[key] for one in self.oracle]]))
+        of_oracles = [rank(_values(rows[name], key)[None]) for name in oracles]
         columns: dict[str, Any] = {
-            "run": [ORACLE, *names],
-            "first": [None, *ranking.first.tolist()],
-            "last": [None, *ranking.last.tolist()],
+            "run": [*oracles, *names],
+            "input": [*self.oracles, *(", ".join(self.inputs[name]) for name in names)],
+            "first": [*[None] * len(oracles), *ranking.first.tolist()],
+            "last": [*[None] * len(oracles), *ranking.last.tolist()],
         }
         for part in ("mean", "low", "high"):
-            ends = np.concatenate([getattr(of_oracle, part), getattr(ranking, part)])
+            ends = np.concatenate([*(getattr(one, part) for one in of_oracles), getattr(ranking, part)])
             columns[part] = np.clip(ends, CATALOGUE[key].low, CATALOGUE[key].high).tolist()
         for each in CATALOGUE:
-            means = [_mean(np.array([one[each] for one in row])) for row in rows]
+            means = [_mean(_values(rows[name], each)) for name in columns["run"]]
             if np.isfinite(means).any():
                 columns[each] = means
         return pa.table(columns)
@@ -82,6 +114,10 @@ class ComparedRuns:
     def to_pandas(self, key: str = "objective") -> Any:
         """Returns the table of `to_arrow` as a data frame of pandas, which must be installed."""
         return self.to_arrow(key).to_pandas()
+
+
+def _values(scores: SequenceOf[Scores | None], key: str) -> Array:
+    return np.array([float("nan") if one is None else one[key] for one in scores])
 
 
 def _mean(values: Array) -> float:
@@ -95,17 +131,19 @@ def compare(
     *,
     similarity: Similarity | None = None,
     group_match: GroupMatch = "hull",
+    blocks: int = 0,
 ) -> ComparedRuns:
-    """Returns the scores of several runs on the same labelled sequences, all compared alike, and those of the oracle.
+    """Returns the scores of several runs on the same labelled sequences, all compared alike, and those of the oracles.
 
     runs: by name, the tracks of each sequence in the order of `sequences`, as `track` returns them. similarity: of
     people, "boxes", "ground" or "image"; None: by the data (tracking.scoring.one_plane). group_match: of groups, by
-    "hull" or "members".
+    "hull" or "members". blocks: number of draws of blocks of frames for the intervals of a single recording; 0: none.
 
     Raises InputError if a run lacks a sequence, a sequence lacks labels, the sequences are not comparable in one way,
-    or runs cannot be compared with the truth or with each other.
+    runs cannot be compared with the truth or with each other, or `blocks` is given for several sequences.
     """
     given = list(sequences)
+    check_blocks(blocks, len(given))
     tracks = {name: list(run) for name, run in runs.items()}
     for name, run in tracks.items():
         if len(run) != len(given):
@@ -114,40 +152,74 @@ def compare(
                 remedy="give one run for each sequence, in their order",
             )  # fmt: skip
     found = [
-        compare_one(sequence, [run[k] for run in tracks.values()], similarity, group_match)
+        compare_one(sequence, [run[k] for run in tracks.values()], similarity, group_match, blocks)
         for k, sequence in enumerate(given)
     ]
     return joined(list(tracks), [sequence.name for sequence in given], found)
 
 
-def joined(names: SequenceOf[str], sequences: SequenceOf[str], found: SequenceOf[list[Scores]]) -> ComparedRuns:
+def check_blocks(blocks: int, sequences: int) -> None:
+    """Raises InputError if intervals by blocks of frames are asked for more than one sequence."""
+    if blocks and sequences > 1:
+        raise InputError(
+            place="--blocks", got=f"{sequences} sequences", expected="a single recording",
+            remedy="leave it out: the interval over sequences is shown anyway",
+        )  # fmt: skip
+
+
+def joined(names: SequenceOf[str], sequences: SequenceOf[str], found: SequenceOf[ComparedSequence]) -> ComparedRuns:
     """Returns the comparison of runs with these names; found: for each sequence, the result of `compare_one`.
 
     Raises InputError if people were not compared in one way on all sequences.
     """
     ways: dict[Similarity, str] = {}
-    for sequence, row in zip(sequences, found, strict=True):
-        ways.setdefault(row[0].similarity, sequence)
+    for sequence, one in zip(sequences, found, strict=True):
+        ways.setdefault(one.scores[0].similarity, sequence)
     if len(ways) > 1:
         got = ", ".join(f"{way} ({name})" for way, name in ways.items())
         raise InputError(
             place="--similarity", got=f"sequences whose people are compared in different ways: {got}",
             expected="one way for all", remedy="give --similarity, or score them apart",
         )  # fmt: skip
-    oracles, *rest = ([row[k] for row in found] for k in range(len(names) + 1))
-    scores = dict(zip(names, rest, strict=True))
-    return ComparedRuns(tuple(names), tuple(sequences), scores, oracles, next(iter(ways), "ground"))
+    scores = {name: [one.scores[k] for one in found] for k, name in enumerate(names)}
+    inputs = {name: tuple(dict.fromkeys(one.inputs[k] for one in found)) for k, name in enumerate(names)}
+    oracles = {
+        name: [one.oracles.get(name) for one in found] for name in sorted({n for one in found for n in one.oracles})
+    }
+    blocks = found[0].blocks if len(found) == 1 else None
+    return ComparedRuns(
+        tuple(names), tuple(sequences), scores, inputs, oracles, next(iter(ways), "ground"), blocks
+    )  # fmt: skip
 
 
 def compare_one(
-    sequence: Sequence, runs: SequenceOf[SequenceOf[Tracks]], similarity: Similarity | None, group_match: GroupMatch
-) -> list[Scores]:
-    """Returns the scores of the oracle and of each run of one sequence, all compared alike. Raises InputError as
-    `compare`."""
-    info = next((run.info for run in runs if isinstance(run, TrackingRun) and run.info), {})
+    sequence: Sequence,
+    runs: SequenceOf[SequenceOf[Tracks]],
+    similarity: Similarity | None,
+    group_match: GroupMatch,
+    blocks: int = 0,
+    oracles: bool = True,
+) -> ComparedSequence:
+    """Returns the scores of each run of one sequence, and of the oracles of their inputs, all compared alike.
+
+    oracles: False leaves them out. Raises InputError as `compare`.
+    """
+    infos = [run.info if isinstance(run, TrackingRun) else {} for run in runs]
+    inputs = [input_name(info) for info in infos]
     with scorer_of(sequence) as scorer:
-        best = oracle(sequence, info, similarity)
-        return scorer.evaluate_all([best, *runs], similarity=similarity, group_match=group_match)
+        given = {name: info for name, info in sorted(zip(inputs, infos, strict=True), key=lambda one: one[0]) if name}
+        if not given:
+            given = {"stored detections" if sequence.has_detections else "labels": {}}
+        best = {name: oracle(sequence, info, similarity) for name, info in given.items()} if oracles else {}
+        rows: list[SequenceOf[Tracks]] = [*best.values(), *runs]
+        found = scorer.evaluate_all(rows, similarity=similarity, group_match=group_match)
+        drawn = None
+        if blocks:
+            assert sequence.truth is not None, "a scorer has checked it"
+            weighted = weighted_scorers(sequence.truth, rows, similarity, group_match)[len(best) :]
+            drawn = recording_rankings(sequence.truth, weighted, blocks)
+    own = dict(zip(best, found, strict=False))
+    return ComparedSequence(found[len(best) :], [name or UNKNOWN for name in inputs], own, drawn)
 
 
 @contextmanager

@@ -9,14 +9,16 @@ A tracker lists in `needs` what it can work with: pixels, stereo, boxes, points.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
 
 import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Detections, Frame, Sequence
 from tracking.tracks_check import finite
+
+InputKind = Literal["points", "boxes", "pixels", "stereo"]
 
 
 def runs_own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
@@ -78,6 +80,18 @@ def _contents(sequence: Sequence) -> str:
         "truth": sequence.load_truth is not None,
     }
     return ", ".join(name for name, there in parts.items() if there) or "nothing"
+
+
+def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, frames: Iterable[Frame]) -> InputKind:
+    """Return what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points".
+
+    frames: as the tracker gets them, without pictures; ignored in mode "image". Detections on the ground have points,
+    and boxes beside them if there is a camera. A tracker that does not take points works on the boxes.
+    """
+    if mode == "image":
+        return "pixels" if "pixels" in needs and sequence.has_images else "stereo"
+    in_image = any(f.detections is not None and f.detections.plane == "image" for f in frames)
+    return "boxes" if in_image or "points" not in needs else "points"
 
 
 def frames_with_detections(

@@ -1,8 +1,9 @@
 """The oracle of a sequence: the detections that a tracker got, with the ids and groups of the true people they match.
 
 It is the best that any tracker can report from these detections without smoothing: no false alarm, no switch, the true
-groups and events of the people who were detected. What it lacks in a score is the detector's, not the tracker's. Of
-pixels it has the boxes of what is visible of each person.
+groups and events of the people who were detected. What it lacks in a score is the detector's, not the tracker's. From
+points it has the points, from boxes the boxes, whose foot points suffer where feet are hidden. From pixels it has the
+boxes of what is visible of each person, from stereo pairs the true places of those who are visible.
 """
 
 from __future__ import annotations
@@ -19,31 +20,37 @@ from tracking.grouping.foot_points import groups_of_people
 from tracking.prepare import prepare
 from tracking.run import TrackingRun
 from tracking.scoring.evaluation import Scorer
+from tracking.scoring.one_plane import groups_of_people, in_one_plane
 from tracking.scoring.people_comparison import Similarity
 
 
 class _Detections:
-    """A tracker that reports every detection as a track of one frame."""
+    """A tracker that reports each detection as a track of one frame: the box if it needs only boxes, else the point."""
 
-    needs: tuple[str, ...] = ("boxes", "points")
+    def __init__(self, needs: tuple[str, ...]) -> None:
+        self.needs = needs
 
     def reset(self, context: Context, seed: int) -> None:
         pass
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         assert detections is not None, "a tracker of boxes or points gets detections"
-        count, dims = detections.pos.shape
+        pos, plane, box = detections.pos, detections.plane, detections.box
+        if self.needs == ("boxes",) and box is not None:
+            pos, plane = box[:, :2] + box[:, 2:] / 2, "image"
+        count, dims = pos.shape
         id, alone = np.arange(count), np.full(count, -1)
         vel, cov = np.full((count, dims), np.nan), np.full((count, 2 * dims, 2 * dims), np.nan)
-        rows = (id, alone, detections.pos, vel, cov, detections.box, detections.score)
-        return Tracks(frame.index, frame.t, detections.plane, "person", *rows, Groups.none())
+        rows = (id, alone, pos, vel, cov, box, detections.score)
+        return Tracks(frame.index, frame.t, plane, "person", *rows, Groups.none())
 
 
 def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None) -> TrackingRun:
     """Returns the oracle's tracks of a sequence with truth.
 
-    given: the content of run.json of the run beside which it stands: "detections" (the mode), "sensor" and "seed" say
-    what that tracker got; {} stands for the stored detections, else the labels. similarity: as of `evaluate`.
+    given: the content of run.json of the run beside which it stands: "input", "detections" (the mode), "sensor" and
+    "seed" say what that tracker got; {} stands for the stored detections, else the labels. similarity: as of
+    `evaluate`.
 
     Raises InputError if the sequence has no such detections.
     """
@@ -52,13 +59,19 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
     mode: DetectionMode = given.get("detections") or ("file" if sequence.has_detections else "truth")
     info = {"tracker": "oracle", "detections": mode, "sensor": given.get("sensor") or {}}
     if mode == "image":
-        seen = (_visible(truth, index) for index in range(1, truth.length + 1))
+        visible = _visible_places if given.get("input") == "stereo" else _visible_boxes
+        seen = (visible(truth, index) for index in range(1, truth.length + 1))
         return TrackingRun(tuple(_with_events(t, truth) for t in seen), info)
-    seed = given.get("seed") or 0
-    prepared = prepare(_Detections(), sequence, detections=mode, sensor=given.get("sensor"), seed=seed)
+    seed = (given.get("seed") or 0) if given.get("sensor") else 0  # without errors it only shuffles the detections
+    boxes = given.get("input") == "boxes" and sequence.camera is not None  # without a camera boxes have no foot points
+    needs = ("boxes",) if boxes else ("boxes", "points")
+    prepared = prepare(_Detections(needs), sequence, detections=mode, sensor=given.get("sensor"), seed=seed)
     prepared.reset(seed)
     reported = [prepared.tracker.step(f, f.detections) for f in prepared.frames() if f.index <= truth.length]
-    (compared,) = Scorer(truth).compare([reported], similarity, None)
+    scorer = Scorer(truth)
+    # Boxes are moved first: then they are matched with the true places, with which trackers on the ground are compared.
+    moved, _ = in_one_plane(scorer.truth, [reported], [False], similarity)
+    (compared,) = scorer.compare(moved, similarity, None)
     sides, true = compared.sides, compared.sides.true
     cuts = np.cumsum([0, *(len(t.id) for t in sides.tracks)]).tolist()
     rows = [sides.mapping[a:b] for a, b in pairwise(cuts)]
@@ -76,7 +89,18 @@ def _named(t: Tracks, id: Ints, group: Ints, row: Ints) -> Tracks:
     )  # fmt: skip
 
 
-def _visible(truth: Truth, index: int) -> Tracks:
+def _visible_places(truth: Truth, index: int) -> Tracks:
+    """Returns the true places on the ground of the people visible in one frame, with true ids and groups."""
+    assert truth.pos is not None, "people before a calibrated pair have places"
+    rows = np.arange(len(truth.id))[truth.rows(index)]
+    rows = rows[truth.visibility[rows] > 0]
+    none = np.full((len(rows), 2), np.nan)
+    who = (truth.id[rows], truth.group[rows])
+    cov, score = np.full((len(rows), 4, 4), np.nan), np.ones(len(rows))
+    return Tracks(index, (index - 1) / truth.fps, "ground", "person", *who, truth.pos[rows], none, cov, None, score)
+
+
+def _visible_boxes(truth: Truth, index: int) -> Tracks:
     """Returns the boxes of what is visible of each person in one frame, with true ids and groups."""
     box = truth.box if truth.visible_box is None else truth.visible_box
     assert box is not None, "people in pictures have boxes"

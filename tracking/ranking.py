@@ -1,9 +1,10 @@
 """Ranks runs that were scored on the same sequences: means, paired differences, and ranges of ranks.
 
 Two runs are parted if the paired interval of their difference does not hold 0. The intervals of all pairs hold together
-with 95 %: Student's, at the level 5 % / number of pairs (Bonferroni). With two runs it is the usual paired interval. A
-run's rank range goes from 1 + the number of runs that are surely better, to the number of runs that are not surely
-worse. Runs that nothing parts share their ranks.
+with 95 %: Student's, at the level 5 % / number of pairs (Bonferroni). With two runs it is the usual paired interval. On
+a single recording the intervals come from weights of its frames (tracking.recording_intervals). A run's rank range goes
+from 1 + the number of runs that are surely better, to the number of runs that are not surely worse. Runs that nothing
+parts share their ranks.
 """
 
 from __future__ import annotations
@@ -13,18 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.stats import FEWEST, LEVEL, mean_interval
+from tracking.stats import FEWEST, joint_level, mean_interval, student
 
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """R runs in order of their means, best first; runs of equal mean in the order given.
+    """R runs in order of their means, best first; runs of equal mean in the order given. A mean is over sequences, or
+    the score of a single recording.
 
-    - order (R,): index of each run as given. mean, low, high (R,): mean over sequences and its own 95 % interval.
+    - order (R,): index of each run as given. mean, low, high (R,): the mean and its own 95 % interval.
     - first, last (R,): the range of ranks, from 1.
     - less, less_low, less_high (R, R): mean of run i minus run j over the same sequences, with the joint interval.
     - better (R, R): run i is surely better than run j.
-    - sequences: number of sequences in which all scores are known; only these count.
+    - sequences: number of sequences in which all scores are known; only these count. 1 for a single recording.
     """
 
     order: Ints
@@ -49,30 +51,39 @@ def rank(values: Array, upwards: bool = True) -> Ranking:
     known = np.isfinite(values).all(axis=0)
     scores = values[:, known]
     runs, count = scores.shape
-    less, low, high = _joint_intervals(scores)
-    ahead = low > 0 if upwards else high < 0
-    better = ahead & (count >= FEWEST)
-    mean, own_low, own_high = mean_interval(scores.T) if count else (np.full(runs, np.nan),) * 3
+    own = mean_interval(scores.T) if count else (np.full(runs, np.nan),) * 3
+    return ordered(own, _joint_intervals(scores), upwards, count, sure=count >= FEWEST)
+
+
+def ordered(
+    own: tuple[Array, Array, Array], pairs: tuple[Array, Array, Array], upwards: bool, count: int, sure: bool = True
+) -> Ranking:
+    """Returns the ranking of R runs by their means and intervals.
+
+    own: mean, low, high (R,). pairs: mean differences (R, R), row minus column, and the ends of their joint intervals.
+    count: number of sequences. sure: False if no difference is to be called sure.
+    """
+    mean, own_low, own_high = own
+    less, low, high = pairs
+    runs = len(mean)
+    better = (low > 0 if upwards else high < 0) & sure
     order = np.argsort(-mean if upwards else mean, kind="stable")
     first, last = 1 + better.sum(axis=0), runs - better.sum(axis=1)
-    pairs = np.ix_(order, order)
-    own = mean[order], own_low[order], own_high[order]
+    both = np.ix_(order, order)
+    alone = mean[order], own_low[order], own_high[order]
     ranks = first[order], last[order]
-    return Ranking(order, *own, *ranks, less[pairs], low[pairs], high[pairs], better[pairs], count)
+    return Ranking(order, *alone, *ranks, less[both], low[both], high[both], better[both], count)
 
 
 def _joint_intervals(scores: Array) -> tuple[Array, Array, Array]:
     """Returns the mean differences (R, R) of runs' scores (R, S), row minus column, and the ends of their intervals,
     which hold all together with the probability LEVEL. The ends are nan for fewer than two sequences.
     """
-    from scipy.special import stdtrit
-
     runs, count = scores.shape
     if count < 2:
         unknown = np.full((runs, runs), np.nan)
         return scores.sum(axis=1)[:, None] - scores.sum(axis=1) if count else unknown, unknown, unknown
-    pairs = max(runs * (runs - 1) // 2, 1)
-    t = stdtrit(count - 1, 1 - (1 - LEVEL) / (2 * pairs))
+    t = student(count - 1, joint_level(runs * (runs - 1) // 2))
     difference = scores[:, None] - scores[None]
     less = difference.mean(axis=2)
     half = t * difference.std(axis=2, ddof=1) / np.sqrt(count)

@@ -6,16 +6,18 @@ This module says how long a block is, and on which scale the error of each score
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import numpy as np
 
 from sim.types import Array, Ints, Truth
+from tracking.ranking import Ranking, ordered
 from tracking.scoring.annotated_frames import annotated_frames
-from tracking.scoring.catalogue import ALL
+from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.scoring.catalogue_entries import Score
 from tracking.scoring.rows import numbered
-from tracking.stats import DRAWS, Scale, block_intervals
+from tracking.stats import DRAWS, LEVEL, Scale, block_intervals, joint_level
 
 
 def scale_of(score: Score) -> Scale:
@@ -57,6 +59,37 @@ def recording_differences(
         return first(weights) - second(weights)
 
     return block_intervals(difference, truth.length, truth.fps, _presence(truth), draws)
+
+
+def recording_rankings(
+    truth: Truth, scores: Sequence[Callable[[Array], Array]], draws: int = DRAWS
+) -> dict[str, Ranking]:
+    """Returns the ranking of R runs of one recording by each score of the catalogue.
+
+    scores: of each run, as `score` in `recording_intervals`. All get the same weights in each draw. The intervals of
+    all pairs hold together with 95 %.
+    """
+    runs, keys = len(scores), len(ALL)
+    pairs = list(combinations(range(runs), 2))
+
+    def columns(weights: Array) -> Array:
+        own = [score(weights) for score in scores]
+        return np.hstack([*own, *(own[i] - own[j] for i, j in pairs)])
+
+    plain: Scale = "plain"
+    scales = [*SCALES * runs, *[plain] * (len(pairs) * keys)]
+    levels = np.repeat([*[LEVEL] * runs, *[joint_level(len(pairs))] * len(pairs)], keys)
+    ends = block_intervals(columns, truth.length, truth.fps, _presence(truth), draws, scales, levels)
+    own, less = (np.array(ends).reshape(3, -1, keys)[:, part] for part in (slice(runs), slice(runs, None)))
+    found = {}
+    for k, (key, entry) in enumerate(CATALOGUE.items()):
+        of_pairs = np.zeros((3, runs, runs))
+        for n, (i, j) in enumerate(pairs):
+            mean, low, high = less[:, n, k]
+            of_pairs[:, i, j], of_pairs[:, j, i] = (mean, low, high), (-mean, -high, -low)
+        mean, low, high = own[:, :, k]
+        found[key] = ordered((mean, low, high), tuple(of_pairs), entry.better == "higher", 1)  # type: ignore[arg-type]
+    return found
 
 
 def _presence(truth: Truth) -> float:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from sim.types import Sequence, Tracks
+from tracking.detection_mode import input_kind
 from tracking.image_scale import ImageScale
 from tracking.prepare import PreparedTracker
 
@@ -45,7 +46,8 @@ def run_info(
     tracks: of the whole run, one `Tracks` per frame, possibly none. seed: of the run. sensor: settings of mode "truth",
     empty if none. scale: of the image, by which groups were derived; nan is stored as None.
 
-    Keys: tracker (name); config (values by name, {} without); seed; sequence (name); detections (the mode); sensor;
+    Keys: tracker (name); config (values by name, {} without); seed; sequence (name); detections (the mode); input
+    ("points", "boxes", "pixels" or "stereo"); sensor;
     plane (of the first tracks, None without); boxes ("measured", "projected" or "none"); fps; px_per_m;
     px_per_m_frames (number of first frames whose boxes gave the scale, 0 for none); background (text on the sample,
     None without); causal (True if there is a frame from which on no later frame is used); causal_from (the first such
@@ -62,6 +64,7 @@ def run_info(
         "config": prepared.config.as_dict() if prepared.config else {},
         "seed": seed,
         "detections": prepared.mode,
+        "input": input_kind(prepared.tracker.needs, prepared.mode, prepared.sequence, prepared.frames_given or ()),
         "sensor": dict(sensor),
         "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
         **_facts(prepared.sequence, tracks, scale, begins),
@@ -82,6 +85,7 @@ def known_people_info(sequence: Sequence, tracks: SequenceOf[Tracks], scale: Ima
         "config": {},
         "seed": None,
         "detections": "truth",
+        "input": "boxes" if len(tracks) and tracks[0].plane == "image" else "points",
         "sensor": {},
         "background": None,
     }
@@ -136,6 +140,19 @@ def input_summary(info: Mapping[str, Any]) -> str:
     more += [f"{key} = {value}" for key, value in list((sensor or {}).items())[:SENSOR_SETTINGS_SHOWN]]
     more += [f"{len(sensor) - SENSOR_SETTINGS_SHOWN} more"] if sensor and len(sensor) > SENSOR_SETTINGS_SHOWN else []
     return f"{mode} ({', '.join(more)})" if more else str(mode or "")
+
+
+def input_name(info: Mapping[str, Any]) -> str:
+    """Return what a tracker worked on, from the content of its run.json, as "pixels" or "boxes (file)"; "" if unknown.
+
+    Runs of one sequence with the same name got the same input: detections degraded by sensor settings have these and
+    their seed in it.
+    """
+    kind, mode, sensor = (info.get(key) for key in ("input", "detections", "sensor"))
+    if kind is None:
+        return ""
+    more = [*(f"{key} = {value}" for key, value in sensor.items()), f"seed {info.get('seed')}"] if sensor else []
+    return str(kind) if mode == "image" else f"{kind} ({', '.join([str(mode), *more])})"
 
 
 def _versions() -> dict[str, str]:

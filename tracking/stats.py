@@ -55,13 +55,18 @@ def mean_interval(values: Array) -> tuple[Array, Array, Array]:
     return mean, mean - half, mean + half
 
 
-def student(degrees: Array | float) -> Array:
+def student(degrees: Array | float, level: Array | float = LEVEL) -> Array:
     """Return the t with which Student's t, of so many degrees of freedom (above 0), lies within +- t with probability
-    LEVEL; the shape is that of `degrees`.
+    `level`; of the shape that both have together.
     """
     from scipy.special import stdtrit
 
-    return np.asarray(stdtrit(degrees, (1 + LEVEL) / 2))
+    return np.asarray(stdtrit(degrees, (1 + np.asarray(level)) / 2))
+
+
+def joint_level(count: int) -> float:
+    """Return the level of each of `count` intervals that hold all together with probability LEVEL (Bonferroni)."""
+    return 1 - (1 - LEVEL) / max(count, 1)
 
 
 def paired(first: Array, second: Array) -> tuple[Array, Array, Array]:
@@ -95,13 +100,14 @@ def block_intervals(
     likeness: float = 1.0,
     draws: int = DRAWS,
     scales: Sequence[Scale] | None = None,
+    levels: Array | float = LEVEL,
 ) -> tuple[Array, Array, Array]:
-    """Return the scores (K,) of one recording, and the low and the high ends (K,) of their 95 % intervals.
+    """Return the scores (K,) of one recording, and the low and the high ends (K,) of their intervals.
 
     score: takes weights (D, frames) of the frames, and returns scores (D, K), nan where undefined. It is called twice:
     with weights of 1, and with `draws` draws. frames: number in the recording; fps: frames per second. likeness:
     the number of frames for which errors persist. scales: the values that each score can have; None: any, as for a
-    difference of two trackers under equal weights.
+    difference of two trackers under equal weights. levels: confidence level of the intervals, one or (K,).
 
     A draw puts together blocks of consecutive frames (circular block bootstrap, Politis & Romano 1992); a frame's
     weight is how often it was drawn. With K blocks, the standard error s is the standard deviation over draws times
@@ -121,11 +127,11 @@ def block_intervals(
         return whole, ends[0], ends[1]
     drawn = np.asarray(score(block_weights(frames, block, draws, np.random.default_rng(0))), float)
     known = np.isfinite(drawn)
-    t = float(student(blocks - 1)) * sqrt(blocks / (blocks - 1))
+    t = np.broadcast_to(student(blocks - 1, levels) * sqrt(blocks / (blocks - 1)), whole.shape)
     for k in np.flatnonzero(np.isfinite(whole) & (known.mean(axis=0) >= 1 - UNKNOWN_DRAWS)).tolist():
         error = float(drawn[known[:, k], k].std(ddof=1))
         if error > 1e-12 * max(1.0, abs(whole[k])):
-            ends[:, k] = _ends(whole[k], t * error, scales[k] if scales else "plain")
+            ends[:, k] = _ends(whole[k], float(t[k]) * error, scales[k] if scales else "plain")
     return whole, ends[0], ends[1]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from tracking.stats import wilson
+from tracking.stats import LEVEL, wilson
 
 EXACT = 1e-12  # a difference nearer to 0 is due to rounding
 
@@ -28,6 +28,10 @@ def table(title: str, first: str, columns: Sequence[str], rows: Mapping[str, Seq
     head([first, *columns])
     for name, cells in rows.items():
         row([name, *cells])
+    differences = [cell for cells in rows.values() for cell in cells if cell[:1] in ("+", "-") and "[" in cell]
+    if differences:
+        chance = (1 - LEVEL) * len(differences)
+        print(f"\n* a sure difference, in the direction of its sign; of {len(differences)} some {chance:.2g} by chance")
 
 
 def interval(mean: float, low: float, high: float, digits: int = 3) -> str:
@@ -38,7 +42,7 @@ def interval(mean: float, low: float, high: float, digits: int = 3) -> str:
 
 
 def signed(mean: float, low: float, high: float) -> str:
-    """Returns a difference with its sign and its ends; * means that 0 lies outside."""
+    """Returns a difference with its sign and its ends; * means sure (0 lies outside), not that it is good."""
     if not np.isfinite(mean):
         return "–"
     ends = f" [{low:+.3f}, {high:+.3f}]" if np.isfinite(low) else ""

@@ -53,15 +53,37 @@ def test_of_pixels_the_oracle_has_what_is_visible(scene) -> None:
     assert sum(len(t.id) for t in run) == len(scene.truth.id) - hidden
 
 
-def test_compare_ranks_runs_and_shows_the_oracle() -> None:
+def test_from_boxes_the_oracle_has_their_feet(scene) -> None:
+    """Boxes of what is visible end above hidden feet."""
+    points, boxes = (evaluate(scene.truth, oracle(scene, {"input": kind})) for kind in ("points", "boxes"))
+    assert points.similarity == boxes.similarity == "ground"
+    assert boxes["HOTA"] < points["HOTA"]
+    assert (boxes["FP"], boxes["IDSW"]) == (0, 0)
+
+
+def test_from_stereo_pairs_the_oracle_has_the_visible_people(scene) -> None:
+    run = oracle(scene, {"detections": "image", "input": "stereo"})
+    found = evaluate(scene.truth, run)
+    assert found.similarity == "ground"
+    assert found["FN"] == sum(scene.truth.visibility == 0)
+
+
+def test_compare_ranks_runs_and_shows_an_oracle_for_each_input() -> None:
     scenes = [simulate(load("split"), seed) for seed in range(2)]
     runs = {name: [track(name, scene, detections="file") for scene in scenes] for name in ("blob", "relational")}
+    poor = {"detections": "truth", "sensor": {"detect_prob": 0.5}}
+    runs |= {str(seed): [track("blob", scene, seed=seed, **poor) for scene in scenes] for seed in (4, 5)}
     found = tracking.compare(scenes, runs)
     table = found.to_arrow("HOTA").to_pydict()
-    assert table["run"][0] == "oracle"
-    assert set(table["run"][1:]) == {"blob", "relational"}
-    assert table["first"] == [None, 1, 1]
-    assert table["mean"][1] >= table["mean"][2]
+    names = ["boxes (file)", *(f"boxes (truth, detect_prob = 0.5, seed {n})" for n in (4, 5)), "points (file)"]
+    assert table["run"][:4] == [f"oracle from {name}" for name in names]
+    assert set(table["run"][4:]) == {*runs}
+    assert dict(zip(table["run"], table["input"], strict=True))["relational"] == "points (file)"
+    assert table["first"] == [*[None] * 4, *[1] * 4]
+    assert table["mean"][4:] == sorted(table["mean"][4:], reverse=True)
+    assert table["mean"][1] != table["mean"][2]
+    again = tracking.compare(scenes, dict(reversed(runs.items())))
+    assert repr(again.to_arrow("HOTA").to_pydict()) == repr(table)
     for name, row in runs.items():
         expected = np.mean([evaluate(s.truth, run)["HOTA"] for s, run in zip(scenes, row, strict=True)])
         assert table["HOTA"][table["run"].index(name)] == pytest.approx(expected)

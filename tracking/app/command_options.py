@@ -26,6 +26,7 @@ from tracking.app.shared_options import (
     People,
     PersonClass,
     Probabilities,
+    Processes,
     Rule,
     Scale,
     Set,
@@ -90,6 +91,7 @@ class TrackOptions:
     None if not given. background: "first:N" or "spread:N", the frames that a background model is trained on; None if
     not given. step_timeout: seconds that each reset and step of the tracker may take; None: no limit.
     person_class: class of people in MOT texts; None: 1. box_scale: factor of the boxes in MOT texts; None: 1.
+    workers: number of processes.
     """
 
     tracker: Tracker
@@ -108,6 +110,7 @@ class TrackOptions:
     step_timeout: StepTimeout = None
     person_class: PersonClass = None
     box_scale: BoxFactor = None
+    workers: Processes = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,11 +140,11 @@ class ScoreOptions:
 
     truth: path. tracks: paths of runs or texts, or names of tracker classes; several are ranked. similarity: how people
     are compared, "boxes", "ground" or "image"; None: by the data. group_match: how groups are compared, by "hull" or
-    "members". against: other tracks whose scores are subtracted; None: none. blocks: number of draws of blocks of
-    frames for the intervals of a single recording; 0: no such intervals. by: the score that ranks several runs; None:
-    objective, or the part of it that all have. all: show each sequence of a ranking. csv: file for all scores of a
-    ranking. fps: frames per second; None: the recording's own. px_per_m: pixels per metre; None if not given.
-    person_class: class of people in MOT texts; None: 1. box_scale: factor of the boxes in MOT texts; None: 1.
+    "members". blocks: number of draws of blocks of frames for the intervals of a single recording; 0: no such
+    intervals. by: the score that ranks several runs; None: objective, or the part of it that all have. all: show each
+    sequence of a ranking. csv: file for all scores of a ranking. fps: frames per second; None: the recording's own.
+    px_per_m: pixels per metre; None if not given. person_class: class of people in MOT texts; None: 1. box_scale:
+    factor of the boxes in MOT texts; None: 1. workers: number of processes.
     """
 
     truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")]
@@ -159,9 +162,6 @@ class ScoreOptions:
     group_match: Annotated[
         Literal["hull", "members"], typer.Option("--group-match", help="How true and estimated groups are compared.")
     ] = "hull"
-    against: Annotated[
-        Path | None, typer.Option("--against", metavar="TRACKS", help="Other tracks, whose scores are subtracted.")
-    ] = None
     blocks: Annotated[
         int,
         typer.Option(
@@ -182,6 +182,7 @@ class ScoreOptions:
     px_per_m: Scale = None
     person_class: PersonClass = None
     box_scale: BoxFactor = None
+    workers: Processes = 1
 
 
 @dataclass(frozen=True, kw_only=True)

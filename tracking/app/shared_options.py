@@ -53,6 +53,7 @@ Detector = Annotated[
 Workers = Annotated[
     int, typer.Option("--workers", min=1, help="Processes. On a cluster: the least number of tasks at a time.")
 ]
+Processes = Annotated[int, typer.Option("--workers", min=1, help="Processes that share the sequences.")]
 Cluster = Annotated[
     str | None,
     typer.Option("--cluster", metavar="tcp://HOST:PORT", help="Scheduler of a dask cluster that does the work."),

@@ -503,7 +503,6 @@ OPTIONS = {
     ("score", "tracks"): (BASE["score"], "score {0}/data {0}/perfect"),
     ("score", "similarity"): (BASE["score"] + " --similarity boxes", BASE["score"] + " --similarity ground"),
     ("score", "group_match"): (BASE["score"], BASE["score"] + " --group-match members"),
-    ("score", "against"): (BASE["score"], BASE["score"] + " --against {0}/perfect"),
     ("score", "blocks"): (
         "score {0}/data/flockscope-demo/scene-s40000 {0}/tracks",
         "score {0}/data/flockscope-demo/scene-s40000 {0}/tracks --blocks 5",
@@ -554,6 +553,8 @@ OPTIONS = {
 }
 ELSEWHERE = {
     ("generate", "workers"),  # the same bytes for any number: tests/sim/test_generate.py
+    ("track", "workers"),  # as well: test_sequence_workers.py
+    ("score", "workers"),
     ("generate", "cluster"),  # and on a cluster: tests/sim/test_generate_cluster.py
     ("kitti", "folder"),  # tests/sim/io/export/test_kitti.py
     ("demo", "quick"),  # the long one is for `make demo`

@@ -25,7 +25,7 @@ MISTAKES = {
     ),
     "score {0}/data {0}/data/flockscope-train": ("got a generated dataset, no tracks;",),
     "score {0}/data {0}/data/flockscope-train/scene-s00000": ("got a generated dataset, no tracks;",),
-    "score {0}/data {0}/run --against {0}/data": ("got a generated dataset, no tracks;",),
+    "score {0}/data {0}/run {0}/data": ("got a generated dataset, no tracks;",),
     "score {0}/run {0}/data": ("{0}/run: got tracks, what `flockscope track` wrote;", "swap the arguments"),
     "score {0}/run/scene-s00000 {0}/data": ("scene-s00000: got tracks, what", "swap the arguments"),
     "view {0}/run {0}/data --out {0}/x": ("{0}/run: got tracks, what", "swap the arguments"),

@@ -58,7 +58,7 @@ def readers(data: Path, tracks: Path, out: Path) -> list[list[object]]:
     """Every command that reads tracks."""
     return [
         ["score", data, tracks],
-        ["score", data, tracks, "--against", tracks],
+        ["score", data, tracks, f"{tracks}/."],
         ["view", data, tracks, "--video", "none", "--out", out / "pages"],
         ["overlay", data, tracks, "--out", out / "films"],
     ]

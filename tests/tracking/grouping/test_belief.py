@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from tests.test_belonging import walk
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
@@ -14,6 +13,18 @@ from tracking.grouping.grouped_tracks import MEMBERSHIP_KINDS, derive
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.pair_evidence import NAMES, evidence, frames_per_step, step_positions
 from tracking.grouping.pair_probabilities import pair_probabilities
+
+
+def walk(seed: int, frames: int, people: int):
+    """Frame, id and position of people some of whom stand, come late, are missed for a while, and go."""
+    r = np.random.default_rng(seed)
+    speed = r.normal(0, 0.8, (people, 2)) * (np.arange(people) > 1)[:, None]
+    pos = r.uniform(0, 6, (people, 2)) + np.cumsum(speed / 2.5 + r.normal(0, 0.03, (frames, people, 2)), axis=0)
+    begin, end = r.integers(0, 6, people), r.integers(12, frames + 1, people)
+    there = (np.arange(frames)[:, None] >= begin) & (np.arange(frames)[:, None] < end)
+    there &= r.random(there.shape) > 0.1
+    frame, column = np.nonzero(there)
+    return frame + 1, r.permutation(100)[:people][column], pos[frame, column]
 
 
 def places(seed, frames=30, people=7, seconds=0.2):

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from sim.io.files.own_files import GENERATOR
 from tracking.app.commands.score import summary
-from tracking.app.commands.score_ranking import COLUMNS, rank_words
-from tracking.app.commands.score_tables import SHOWN, SIMILARITY, SequenceScores, number
+from tracking.app.commands.score_ranking import rank_words, shown_columns, verdict
+from tracking.app.commands.score_tables import SHOWN, SIMILARITY, SequenceScores, arrow, number
 from tracking.comparison import ComparedRuns
 from tracking.scoring.catalogue import CATALOGUE
 
@@ -28,9 +28,9 @@ video { display: block; width: 100%; border-radius: 8px }
 """
 INTRO = """<h1>flockscope demo</h1>
 <p>Scenes in which groups merge, split, cross and queue were simulated, tracked and scored. Trackers that got the same
-input are ranked: those that no interval parts share a rank, and the oracle shows what the best tracker could report
-from these detections. Point at a heading to read what it means; a dash means that there is nothing to score, for
-example people where a tracker reports only groups.</p>
+input are ranked. Trackers that share a rank have no sure difference; the oracle is the best that the input allows
+without smoothing. Point at a heading to read what it means; ↓ marks scores where lower is better. A dash means that
+there is nothing to score, for example people where a tracker reports only groups.</p>
 """
 FROM_PIXELS = """<h2>One scene, from its pictures</h2>
 <p>The same {frames} frames were tracked by background subtraction. The videos show trails, groups, events; thin white
@@ -109,22 +109,23 @@ def demo_page(root: Path, scene: PixelScene, tables: list[RankingTable], section
 def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> str:
     """Returns a ranking as HTML, the oracle first, with links to the best and worst scene of the best tracker."""
     entries = table.compared.to_arrow(table.key).to_pylist()
-    keys = [
-        k
-        for k in COLUMNS
-        if k not in (table.key, table.key.removesuffix("_hull"))
-        and any(math.isfinite(e.get(k, math.nan)) for e in entries)
-    ]
+    keys = shown_columns(entries, table.key)
     rows = []
     for e in entries:
         own = {"mean": e["mean"], "low": e["low"], "high": e["high"]}
-        cells = [escape(e["run"]), rank_words(e), _interval(table.key, own)]
+        name = escape(e["run"])
+        cells = [name if e["first"] else f"<em>{name}</em>", rank_words(e), _interval(table.key, own)]
         rows.append(_cells("td", [*cells, *(number(k, e[k], mean=True) for k in keys)]))
     head = "<tr><th>tracker</th><th>rank</th>" + "".join(map(_heading, [table.key, *keys])) + "</tr>"
     body = f'<div class="wide"><table><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'
     compared = table.compared
-    note = f"{len(compared.sequences)} scenes, people compared by {SIMILARITY[compared.similarity]}"
-    return f"<h2>{escape(table.title)}</h2><p>{note}.</p>{body}{_extremes(table, entries[1]['run'], sections, root)}"
+    note = (
+        f"{len(compared.sequences)} scenes, people compared by {SIMILARITY[compared.similarity]}; small: 95 % interval"
+    )
+    best = entries[len(compared.oracles)]["run"]
+    words = "; ".join(verdict(compared, table.key))
+    sure = f"<p><strong>Result:</strong> {escape(words)}.</p>" if words else ""
+    return f"<h2>{escape(table.title)}</h2><p>{note}.</p>{sure}{body}{_extremes(table, best, sections, root)}"
 
 
 def _extremes(table: RankingTable, run: str, sections: list[ResultSection], root: Path) -> str:
@@ -200,7 +201,7 @@ def _heading(key: str) -> str:
     """
     score = CATALOGUE[key]
     unit = f" [{score.unit}]" if score.unit not in ("1", "count") else ""
-    return f'<th title="{escape(score.meaning)}">{escape(key)}{unit}</th>'
+    return f'<th title="{escape(score.meaning)}">{escape(arrow(key))}{unit}</th>'
 
 
 def _interval(key: str, mean: dict[str, float]) -> str:

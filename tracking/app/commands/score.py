@@ -2,195 +2,85 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.box_columns import BoxScale, parse_box_scale
-from sim.io.source import open_source
+from sim.io.formats.box_columns import parse_box_scale
 from sim.types import Array, Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.run_differences import Differences, differences_words, run_differences
-from tracking.app.commands.score_ranking import is_class, ranking, sparse_notes, warn_misread
-from tracking.app.commands.score_tables import Means, SequenceScores, detections_words, difference_table, tables
+from tracking.app.commands.score_ranking import is_class, ranking, short_notes, sparse_notes
+from tracking.app.commands.score_tables import Means, SequenceScores, tables
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
 from tracking.app.progress import ProgressMeter
+from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import find_tracks, match_tracks
-from tracking.comparison import scorer_of
-from tracking.recording_intervals import recording_differences, recording_intervals
-from tracking.run import TrackingRun
-from tracking.run_info import input_summary
+from tracking.comparison import check_blocks
 from tracking.scoring.catalogue import ALL, CATALOGUE
-from tracking.scoring.frame_weights import weighted_scorers
-from tracking.scoring.group_scores import GroupMatch
-from tracking.scoring.people_comparison import Similarity
-from tracking.stats import SURE, mean_interval, paired
-
-INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{seconds:.4g}} s"
-MOVED = "all tracks are compared {plane}"
-SURFACE_WORDS = {"ground": "on the ground, boxes by their foot points", "image": "in the image, as some lie there"}
-
-
-@dataclass(frozen=True)
-class ComparisonMethod:
-    """How tracks are compared with the truth.
-
-    similarity: of people, "boxes" (overlap), "ground" or "image" (distance); None: by the data. group_match: of groups,
-    by "hull" (overlap) or "members" (common people).
-    """
-
-    similarity: Similarity | None = None
-    group_match: GroupMatch = "hull"
-
-
-DEFAULT = ComparisonMethod()
+from tracking.stats import mean_interval
 
 
 def score(options: ScoreOptions) -> CommandResult:
-    """Scores every sequence of the truth with its tracks; with --against also the differences, these minus the other
-    tracks. Several tracks, or a tracker class, are ranked (`score_ranking.ranking`).
+    """Scores every sequence of the truth with its tracks. Several tracks, or a tracker class, are ranked
+    (`score_ranking.ranking`).
 
     The result's data: "sequences" (scores of each); "means" (of each set of equal detections: "given", "sequences",
-    "mean"); "mean" (the only one of them, else None); "notes". With --against also "difference" by key, "against" (the
-    others' detections) and "differences" (in what the runs differ).
+    "mean"); "mean" (the only one of them, else None); "notes".
 
     Raises InputError if a file is wrong, if a sequence has no tracks or no labels, if truth and tracks cannot be
-    compared as asked, if two runs cannot be compared in one plane, or if --blocks is given for several sequences.
+    compared as asked, or if --blocks is given for several sequences.
     """
-    sequences = open_source(
-        options.truth, fps=options.fps, px_per_m=options.px_per_m, images=False, person_class=options.person_class
-    )
+    source = OpenedAs(
+        options.truth, options.fps, options.px_per_m, images=False, person_class=options.person_class
+    )  # fmt: skip
+    sequences = source.open()
+    check_blocks(options.blocks, len(sequences))
     if len(options.tracks) > 1 or is_class(options.tracks[0]):
-        return ranking(options, sequences)
-    method = ComparisonMethod(options.similarity, options.group_match)
-    paths = [Path(options.tracks[0]), *([] if options.against is None else [options.against])]
-    if options.blocks and len(sequences) > 1:
-        raise InputError(
-            place="--blocks", got=f"{len(sequences)} sequences", expected="a single recording",
-            remedy="leave it out: the interval over sequences is shown anyway",
-        )  # fmt: skip
-    box_scale = None if options.box_scale is None else parse_box_scale(options.box_scale)
-    scored = _score_all(sequences, paths, method, box_scale)
-    rows, *others = ([each[k].row for each in scored] for k in range(len(paths)))
-    notes = [
-        *sparse_notes([row.scores for row in rows]),
-        *dict.fromkeys(each[0].note for each in scored if each[0].note),
+        return ranking(options, source, sequences)
+    scored = _score_all(options, source, sequences)
+    rows = [
+        SequenceScores(sequence.name, one.scores[0], one.given[0])
+        for sequence, one in zip(sequences, scored, strict=True)
     ]
+    notes = [*sparse_notes([row.scores for row in rows]), *dict.fromkeys(one.note for one in scored if one.note)]
     if options.blocks:
-        means, differences = _block_intervals(sequences[0], scored[0], method, options.blocks)
-        result = _result([(rows, means)], [*notes, *_short_notes(sequences[0])])
-    else:
-        result = _result([(part, summary(part)) for part in _by_detections(rows)], notes)
-        differences = None if not others else _paired_differences(rows, others[0])
-    if differences is None:
-        return result
-    found = run_differences([(these.run.info, against.run.info) for these, against in scored])
-    return _with_differences(result, differences, found, len(rows), _givens(others[0]))
+        return _result([(rows, _block_means(scored[0]))], [*notes, *short_notes(sequences[0], rows[0].scores)])
+    return _result([(part, summary(part)) for part in _by_detections(rows)], notes)
 
 
-@dataclass(frozen=True)
-class ScoredRun:
-    """A run of one sequence with its scores. run: the tracks as they were compared, and the content of run.json.
-    note: what was done to compare them with another run, "" if nothing.
+def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) -> list[ScoredSequence]:
+    """Returns the only run of each sequence, in order, scored. Shows progress on stderr.
+
+    Raises InputError if a sequence has no tracks or no labels, a file is wrong, or the tracks cannot be compared as
+    asked.
     """
-
-    row: SequenceScores
-    run: TrackingRun
-    note: str = ""
-
-
-def _score_all(
-    sequences: list[Sequence], paths: list[Path], method: ComparisonMethod, box_scale: BoxScale | None
-) -> list[list[ScoredRun]]:
-    """Returns for each sequence, in order, its run at or below each of the one or two paths, scored.
-
-    box_scale: factors of x and y of the boxes of texts among the tracks. Two runs of a sequence are compared with the
-    truth in one plane and by one similarity. Warns about tracks that hardly match any label. Raises InputError if a
-    sequence has no tracks or no labels, a file is wrong, or the tracks cannot be compared as asked. Shows progress on
-    stderr.
-    """
-    matched = [match_tracks(sequences, find_tracks(path)) for path in paths]
-    if box_scale is not None and all(stored.info for pairs in matched for _, stored in pairs):
+    matched = match_tracks(sequences, find_tracks(Path(options.tracks[0])))
+    box_scale = None if options.box_scale is None else parse_box_scale(options.box_scale)
+    if box_scale is not None and all(stored.info for _, stored in matched):
         raise InputError(
             place="--box-scale", got="runs of `flockscope track`", expected="a text of another program",
             remedy="give --box-scale to `flockscope track`",
         )  # fmt: skip
-    found = []
+    how = (options.similarity, options.group_match, options.blocks)
+    jobs = [ScoringJob((stored,), *how, box_scale=box_scale) for _, stored in matched]
+    found: list[ScoredSequence] = []
     with ProgressMeter("score", len(sequences)) as meter:
-        for pairs in zip(*matched, strict=True):
-            sequence = pairs[0][0]
-            runs = [stored.read(sequence, box_scale) for _, stored in pairs]
-            warn_misread(sequence, runs)
-            found.append(_scored_alike(sequence, runs, method))
-            meter.step(sequence.name)
+        for one in over_sequences(score_sequence, sequences, jobs, source, options.workers):
+            meter.step(sequences[len(found)].name)
+            found.append(one)
     return found
 
 
-def _scored_alike(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMethod) -> list[ScoredRun]:
-    """Returns the runs of a sequence with their scores, all compared in one plane and by one similarity."""
-    rows = score_runs(sequence, runs, method)
-    moved = {"ground" if run[0].plane != "image" else "image" for run in runs if len(run)} - {rows[0].scores.surface}
-    note = MOVED.format(plane=SURFACE_WORDS[rows[0].scores.surface]) if moved else ""
-    return [ScoredRun(row, run, note) for row, run in zip(rows, runs, strict=True)]
-
-
-def _paired_differences(rows: list[SequenceScores], others: list[SequenceScores]) -> Means:
-    """Returns by key the mean difference, rows minus others in pairs, with its interval and "pairs", their number."""
-    first, second = _values(others), _values(rows)
-    found = _by_key(paired(first, second))
-    pairs = np.isfinite(second - first).sum(axis=0).tolist()
-    return {key: {**d, "pairs": n} for (key, d), n in zip(found.items(), pairs, strict=True)}
-
-
-def _block_intervals(
-    sequence: Sequence, scored: list[ScoredRun], method: ComparisonMethod, draws: int
-) -> tuple[Means, Means | None]:
-    """Returns the scores of the first run by key, with 95 % intervals of a single recording, and the differences to the
-    second run, if any, first minus second under equal weights.
-
-    draws: number of draws of weights. AssertionError without truth.
-    """
-    truth = sequence.truth
-    assert truth is not None
-    scorers = weighted_scorers(truth, [each.run for each in scored], method.similarity, method.group_match)
-    found = _by_key(recording_intervals(truth, scorers[0], draws))
-    if len(scored) == 1:
-        return found, None
-    return found, _by_key(recording_differences(truth, scorers[0], scorers[1], draws))
-
-
-def score_run(sequence: Sequence, run: TrackingRun, method: ComparisonMethod = DEFAULT) -> SequenceScores:
-    """Returns the scores of one run, as `score_runs` does."""
-    (row,) = score_runs(sequence, [run], method)
-    return row
-
-
-def score_runs(sequence: Sequence, runs: list[TrackingRun], method: ComparisonMethod = DEFAULT) -> list[SequenceScores]:
-    """Returns the scores of runs of one sequence, compared alike, with the words of run.json on their detections.
-
-    method: how people and groups are compared. Raises InputError if the sequence has no labels or cannot be compared in
-    this way, or the scale in px per m is not above 0 where groups are derived in the image, or an id
-    occurs twice in one frame.
-    """
-    with scorer_of(sequence) as scorer:
-        scores = scorer.evaluate_all(runs, similarity=method.similarity, group_match=method.group_match)
-    return [
-        SequenceScores(sequence.name, found, input_summary(run.info)) for found, run in zip(scores, runs, strict=True)
-    ]
-
-
-def _short_notes(sequence: Sequence) -> list[str]:
-    """Returns a list with one note if the recording lasts less than 60 s, so that its intervals are only indicative;
-    else [].
-
-    AssertionError without truth.
-    """
-    assert sequence.truth is not None
-    seconds = sequence.truth.length / sequence.fps
-    return [INDICATIVE.format(seconds=seconds)] if seconds < SURE else []
+def _block_means(scored: ScoredSequence) -> Means:
+    """Returns the scores of the only run of a recording by key, with their intervals by blocks of frames."""
+    assert scored.compared.blocks is not None
+    return {
+        key: {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
+        for key, r in scored.compared.blocks.items()
+    }
 
 
 def _by_detections(rows: list[SequenceScores]) -> list[list[SequenceScores]]:
@@ -231,27 +121,6 @@ def _row_data(row: SequenceScores) -> dict[str, Any]:
     s = row.scores
     chosen = {"similarity": s.similarity, "surface": s.surface, "group_match": s.group_match, "given": row.given}
     return {"name": row.sequence, **chosen, "frames_scored": s.frames, "label_step": s.step, **s}
-
-
-def _with_differences(
-    result: CommandResult, differences: Means, found: Differences, sequences: int, against: list[str]
-) -> CommandResult:
-    """Returns the result with differences to other tracks added, as a table and as "difference", "differences" and
-    "against" of the data.
-
-    differences: of scores by key, with interval. found: in what the runs differ; these lines come first. sequences:
-    number of pairs. against: the detections that the other trackers got.
-    """
-    from rich.console import Group
-    from rich.text import Text
-
-    return CommandResult(
-        {**result.data, "difference": differences, "differences": found, "against": against},
-        Group(
-            Text("\n".join(differences_words(found, sequences)) + "\n"), result.text, "",
-            difference_table(differences, sequences), f"--against: detections {detections_words(against)}",
-        ),
-    )  # fmt: skip
 
 
 def summary(rows: list[SequenceScores]) -> Means:

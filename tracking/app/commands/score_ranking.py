@@ -1,101 +1,122 @@
-"""`flockscope score TRUTH TRACKS TRACKS…`: a ranking of any number of runs, with the oracle above it."""
+"""`flockscope score TRUTH TRACKS TRACKS…`: a ranking of any number of runs, below the oracles of their inputs."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.printable import counted, printable
+from scenarios.printable import counted, printable, shortened
 from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import GROUP_MATCH, SHOWN, SIMILARITY, empty_table, number, with_title
-from tracking.app.commands.track import TrackerSetup
+from tracking.app.commands.run_differences import differences_words, run_differences
+from tracking.app.commands.score_tables import (
+    GROUP_MATCH,
+    LOWER,
+    SHOWN,
+    SIMILARITY,
+    TABLES,
+    arrow,
+    chance,
+    empty_table,
+    number,
+    with_title,
+)
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
 from tracking.app.progress import ProgressMeter
-from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
-from tracking.comparison import ORACLE, ComparedRuns, compare_one, joined
+from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.stored_tracks import find_tracks, match_tracks
+from tracking.comparison import ComparedRuns, joined
 from tracking.ranking import Ranking, rank
-from tracking.run import TrackingRun
-from tracking.run_info import input_summary
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scores
-from tracking.scoring.misreading import likely_misreading
-from tracking.stats import FEWEST
+from tracking.stats import FEWEST, SURE
 
 COLUMNS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")
 """Scores beside the one that ranks."""
 
+INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{seconds:.4g}} s"
+LONGEST_INPUT = 40
+"""Characters of an input that a table shows at most."""
+
 
 @dataclass(frozen=True)
 class RankedRuns:
-    """A comparison of runs by one score. scenarios: for each name of a scenario the indices of its sequences. given:
-    by run, the detections that it got, in words.
+    """A comparison of runs by one score, and what is shown of it, each computed once.
+
+    key: the score. ranking: by it. table: rows of `ComparedRuns.to_arrow`, the oracles first. pairs: the difference of
+    each pair of runs, the better one first. scenarios: for each name of a scenario the indices of its sequences.
+    settings: in what the runs differ. notes: further lines.
     """
 
     comparison: ComparedRuns
     key: str
+    ranking: Ranking
+    table: list[dict[str, Any]]
+    pairs: list[dict[str, Any]]
     scenarios: Mapping[str, list[int]]
-    given: Mapping[str, list[str]]
+    settings: list[dict[str, Any]]
+    notes: list[str]
 
 
-def ranking(options: ScoreOptions, sequences: list[Sequence]) -> CommandResult:
+def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) -> CommandResult:
     """Scores several runs on all sequences, and ranks them.
 
-    The result's data: "by" (the score that ranks), "similarity", "sequences" (names), "ranking" (a dictionary for the
-    oracle, then for each run, best first: "run", "first", "last", "mean", "low", "high", "detections", "scores": means
-    of all scores), "differences" (of each pair of runs: "run", "minus", "mean", "low", "high", "sure"), "scenarios"
-    (means by scenario and run), "scores" (by run and sequence).
+    source: how the sequences were opened. The result's data: "by" (the score that ranks), "similarity", "sequences"
+    (names), "ranking" (a dictionary for each oracle, then for each run, best first: "run", "input", "first", "last",
+    "mean", "low", "high", "scores": means of all scores), "differences" (of each pair of runs: "run", "minus", "mean",
+    "low", "high", "sure", and "scores": "mean", "low", "high", "sure" of each score), "settings" (in what the runs
+    differ), "scenarios" (means by scenario and run), "scores" (by run and sequence), "notes".
 
     Raises InputError as `score`.
     """
-    refused = {"--blocks": options.blocks, "--against": options.against, "--box-scale": options.box_scale}
-    for option, value in refused.items():
-        if value:
-            raise InputError(
-                place=option, got=counted(len(options.tracks), "run"), expected="one run, or one text",
-                remedy="leave it out",
-            )  # fmt: skip
+    if options.box_scale:
+        raise InputError(
+            place="--box-scale", got=counted(len(options.tracks), "run"), expected="one text", remedy="leave it out"
+        )
     if options.by is not None and (options.by not in CATALOGUE or CATALOGUE[options.by].better == "neither"):
         raise InputError(
             place="--by", got=options.by, expected="a score with a better direction, such as HOTA",
             remedy="docs/reference/metrics.md lists them",
         )  # fmt: skip
-    runs = {name: _source(text, sequences) for name, text in _names(options.tracks).items()}
-    found, given = [], {name: list[str]() for name in runs}
+    names = _names(options.tracks)
+    runs = [[text] * len(sequences) if is_class(text) else _stored(text, sequences) for text in names.values()]
+    how = (options.similarity, options.group_match, options.blocks)
+    jobs = [ScoringJob(sources, *how, oracles=True) for sources in zip(*runs, strict=True)]
+    found: list[ScoredSequence] = []
     with ProgressMeter("score", len(sequences)) as meter:
-        for k, sequence in enumerate(sequences):
-            tracks = {name: _tracks(source, sequence, k) for name, source in runs.items()}
-            warn_misread(sequence, list(tracks.values()))
-            for name, run in tracks.items():
-                given[name].append(input_summary(run.info) or "unknown (no run.json)")
-            found.append(compare_one(sequence, list(tracks.values()), options.similarity, options.group_match))
-            meter.step(sequence.name)
-    comparison = joined(list(runs), [sequence.name for sequence in sequences], found)
+        for one in over_sequences(score_sequence, sequences, jobs, source, options.workers):
+            meter.step(sequences[len(found)].name)
+            found.append(one)
+    comparison = joined(list(names), [s.name for s in sequences], [one.compared for one in found])
+    notes = [*sparse_notes([one.scores[0] for one in found]), *dict.fromkeys(one.note for one in found if one.note)]
+    if options.blocks:
+        notes += short_notes(sequences[0], found[0].scores[0])
+    settings = run_differences({name: [one.infos[k] for one in found] for k, name in enumerate(names)})
     scenarios: dict[str, list[int]] = {}
     for k, sequence in enumerate(sequences):
         scenarios.setdefault(_scenario(sequence), []).append(k)
-    every = RankedRuns(comparison, options.by or usual_key(comparison), scenarios, given)
+    every = _ranked(comparison, options.by or usual_key(comparison), scenarios, settings, notes)
     if options.csv is not None:
-        _write_csv(options.csv, every)
+        _write_csv(options.csv, comparison)
     return CommandResult(_data(every), _text(every, options.all))
 
 
-def warn_misread(sequence: Sequence, runs: list[TrackingRun]) -> None:
-    """Warns about tracks that hardly match any label, with what would."""
-    for run in runs:
-        if sequence.truth is not None:
-            text = likely_misreading(sequence.truth, run, size=sequence.image_size, given="run" if run.info else "text")
-            if text:
-                warnings.warn(f"{sequence.name}: {text}", stacklevel=2)
+def short_notes(sequence: Sequence, scores: Scores) -> list[str]:
+    """Returns a list with one note if the recording lasts less than 60 s, so that its intervals are only indicative;
+    else [].
+    """
+    seconds = scores.length / sequence.fps
+    return [INDICATIVE.format(seconds=seconds)] if seconds < SURE else []
 
 
 def sparse_notes(scores: list[Scores]) -> list[str]:
@@ -115,10 +136,6 @@ def usual_key(comparison: ComparedRuns) -> str:
     return "group_F1" if people.any() and not people.all() else "objective"
 
 
-Source = str | list[tuple[Sequence, StoredTracks]]
-"""The text that names a tracker class, or the stored tracks of each sequence."""
-
-
 def _names(texts: list[str]) -> dict[str, str]:
     """Returns the texts on the command line by a short name: of the class, folder or file; the whole text if two share
     it. Raises InputError if a text is given twice.
@@ -135,14 +152,8 @@ def is_class(text: str) -> bool:
     return ":" in text and not Path(text).exists()
 
 
-def _source(text: str, sequences: list[Sequence]) -> Source:
-    return text if is_class(text) else match_tracks(sequences, find_tracks(Path(text)))
-
-
-def _tracks(source: Source, sequence: Sequence, k: int) -> TrackingRun:
-    if isinstance(source, str):
-        return TrackerSetup(source, detections="file" if sequence.has_detections else None).run(sequence)
-    return source[k][1].read(sequence)
+def _stored(text: str, sequences: list[Sequence]) -> list[Any]:
+    return [stored for _, stored in match_tracks(sequences, find_tracks(Path(text)))]
 
 
 def _scenario(sequence: Sequence) -> str:
@@ -151,31 +162,35 @@ def _scenario(sequence: Sequence) -> str:
     return name if dash and set(seed) <= set("0123456789-r") else sequence.name
 
 
-def _entries(every: RankedRuns) -> list[dict[str, Any]]:
-    """Returns the oracle, then the runs from the best on, as dictionaries of the result's data."""
-    table = every.comparison.to_arrow(every.key).to_pylist()
-    own = ("run", "first", "last", "mean", "low", "high")
-    return [
-        {
-            **{key: row[key] for key in own},
-            "detections": list(dict.fromkeys(every.given.get(row["run"], []))),
-            "scores": {key: row.get(key, math.nan) for key in CATALOGUE},
-        }
-        for row in table
-    ]
+def _ranked(
+    comparison: ComparedRuns,
+    key: str,
+    scenarios: Mapping[str, list[int]],
+    settings: list[dict[str, Any]],
+    notes: list[str],
+) -> RankedRuns:
+    rankings = {each: comparison.ranking(each) for each in CATALOGUE}
+    table, own = comparison.to_arrow(key).to_pylist(), rankings[key]
+    pairs = []
+    for name, other in _pairs(comparison, own):
+        scores = {each: _difference(rankings[each], comparison.runs, name, other) for each in CATALOGUE}
+        pairs.append({"run": name, "minus": other, **scores[key], "scores": scores})
+    return RankedRuns(comparison, key, own, table, pairs, scenarios, settings, notes)
 
 
-def _pairs(every: RankedRuns) -> list[dict[str, Any]]:
-    """Returns the difference of each pair of runs, the better one first, with its joint interval."""
-    found = every.comparison.ranking(every.key)
-    names = [every.comparison.runs[k] for k in found.order.tolist()]
-    return [
-        {
-            "run": names[i], "minus": names[j], "mean": float(found.less[i, j]), "low": float(found.less_low[i, j]),
-            "high": float(found.less_high[i, j]), "sure": bool(found.better[i, j]),
-        }
-        for i in range(len(names)) for j in range(i + 1, len(names))
-    ]  # fmt: skip
+def _pairs(comparison: ComparedRuns, ranking: Ranking) -> list[tuple[str, str]]:
+    """Returns the names of each pair of runs, the better one first."""
+    return list(combinations((comparison.runs[k] for k in ranking.order.tolist()), 2))
+
+
+def _difference(ranking: Ranking, runs: tuple[str, ...], first: str, second: str) -> dict[str, Any]:
+    """Returns the difference of two runs, first minus second. "sure": False, or if the first is "better" or "worse"."""
+    places = {runs[k]: place for place, k in enumerate(ranking.order.tolist())}
+    i, j = places[first], places[second]
+    sure = "better" if ranking.better[i, j] else "worse" if ranking.better[j, i] else False
+    ends = (ranking.less, ranking.less_low, ranking.less_high)
+    mean, low, high = (float(part[i, j]) for part in ends)
+    return {"mean": mean, "low": low, "high": high, "sure": sure}
 
 
 def _by_scenario(every: RankedRuns) -> dict[str, Ranking]:
@@ -184,21 +199,26 @@ def _by_scenario(every: RankedRuns) -> dict[str, Ranking]:
 
 def _data(every: RankedRuns) -> dict[str, Any]:
     c = every.comparison
-    scenarios = {
-        name: {c.runs[k]: float(m) for k, m in zip(found.order.tolist(), found.mean, strict=True)}
-        for name, found in _by_scenario(every).items()
-    }
-    scores = {ORACLE: c.oracle, **c.scores}
+    own = ("run", "input", "first", "last", "mean", "low", "high")
     return {
         "by": every.key,
         "similarity": c.similarity,
         "sequences": list(c.sequences),
-        "ranking": _entries(every),
-        "differences": _pairs(every),
-        "scenarios": scenarios,
-        "scores": {
-            run: {name: dict(one) for name, one in zip(c.sequences, rows, strict=True)} for run, rows in scores.items()
+        "ranking": [
+            {**{key: row[key] for key in own}, "scores": {key: row.get(key, math.nan) for key in CATALOGUE}}
+            for row in every.table
+        ],
+        "differences": every.pairs,
+        "settings": every.settings,
+        "scenarios": {
+            name: {c.runs[k]: float(m) for k, m in zip(found.order.tolist(), found.mean, strict=True)}
+            for name, found in _by_scenario(every).items()
         },
+        "scores": {
+            run: {name: dict(one) for name, one in zip(c.sequences, row, strict=True) if one is not None}
+            for run, row in c.rows().items()
+        },
+        "notes": every.notes,
     }
 
 
@@ -209,107 +229,163 @@ def _text(every: RankedRuns, all_sequences: bool) -> Any:
     if len(every.scenarios) > 1:
         parts.append(_scenario_table(every))
     if all_sequences:
-        parts.append(_sequence_table(every))
+        parts.append(_sequence_table(every.comparison))
+    if len(every.pairs) == 1:
+        parts.append(_score_differences(every))
+    elif every.pairs:
+        parts.append(_pair_differences(every))
     c = every.comparison
     match = next(iter(c.scores.values()))[0].group_match
     lines = [
-        *_verdict(every),
-        *sparse_notes(c.oracle),
+        *differences_words(every.settings),
+        *verdict(c, every.key),
+        *every.notes,
         f"people compared by {SIMILARITY[c.similarity]}, groups by {GROUP_MATCH[match]}",
-        f"{ORACLE}: true ids on the same detections, without false alarms",
+        "oracle: true ids on the same input, without false alarms",
     ]
     return Group(*parts, "\n".join(lines))
 
 
 def _ranking_table(every: RankedRuns) -> Any:
-    entries = _entries(every)
-    keys = [
-        k
-        for k in COLUMNS
-        if k not in (every.key, every.key.removesuffix("_hull")) and any(math.isfinite(e["scores"][k]) for e in entries)
-    ]
-    inputs = {text for e in entries for text in e["detections"]}
+    keys = shown_columns(every.table, every.key)
+    inputs = {row["input"] for row in every.table[len(every.comparison.oracles) :]}
     table = empty_table()
     for name in ("rank", "run"):
         table.add_column(name, no_wrap=True)
-    for name in (every.key, "95 % interval", *keys):
+    for name in (arrow(every.key), "95 % interval", *keys):
         table.add_column(name, justify="right", no_wrap=True)
     if len(inputs) > 1:
-        table.add_column("detections", overflow="fold")
-    for e in entries:
-        cells = [rank_words(e), printable(e["run"]), number(every.key, e["mean"], mean=True), _interval(every.key, e)]
-        cells += [number(k, e["scores"][k], mean=True) for k in keys]
-        cells += [printable(", ".join(e["detections"]))] if len(inputs) > 1 else []
-        table.add_row(*cells, style="dim" if e["first"] is None else None)
-    detections = "" if len(inputs) > 1 else f", detections {printable(next(iter(inputs)))}"
-    title = f"ranking by {every.key}, mean of {counted(len(every.comparison.sequences), 'sequence')}{detections}"
-    return with_title(title, table)
+        table.add_column("input", overflow="fold")
+    for row in every.table:
+        cells = [rank_words(row), printable(shortened(row["run"], 2 * LONGEST_INPUT))]
+        cells += [number(every.key, row["mean"], mean=True), _interval(every.key, row)]
+        cells += [number(k, row[k], mean=True) for k in keys]
+        cells += [printable(shortened(row["input"], LONGEST_INPUT))] if len(inputs) > 1 else []
+        table.add_row(*cells, style="dim" if row["first"] is None else None)
+    count = len(every.comparison.sequences)
+    of = f"mean of {counted(count, 'sequence')}" if count > 1 else "one sequence"
+    given = f"input {printable(next(iter(inputs)))}" if len(inputs) == 1 else f"{len(inputs)} different inputs"
+    foot = "" if len(inputs) == 1 else "runs that got different inputs: a rank compares trackers with their inputs"
+    return with_title(f"ranking by {every.key}, {of}, {given}", table, foot)
 
 
-def rank_words(entry: Mapping[str, Any]) -> str:
-    """Returns the range of ranks of a row of a ranking in words; "" for the oracle."""
-    first, last = entry["first"], entry["last"]
+def shown_columns(table: list[dict[str, Any]], key: str) -> list[str]:
+    """Returns which of `COLUMNS` a ranking by `key` shows beside it: those that are known for some row."""
+    others = [k for k in COLUMNS if k not in (key, key.removesuffix("_hull"))]
+    return [k for k in others if any(math.isfinite(row.get(k, math.nan)) for row in table)]
+
+
+def rank_words(row: Mapping[str, Any]) -> str:
+    """Returns the range of ranks of a row of a ranking in words; "" for an oracle."""
+    first, last = row["first"], row["last"]
     return "" if first is None else str(first) if first == last else f"{first}–{last}"
 
 
-def _interval(key: str, entry: Mapping[str, Any]) -> str:
-    if not math.isfinite(entry["low"]):
+def _interval(key: str, ends: Mapping[str, Any]) -> str:
+    if not math.isfinite(ends["low"]):
         return ""
-    return f"{number(key, entry['low'], mean=True)} to {number(key, entry['high'], mean=True)}"
+    return f"{number(key, ends['low'], mean=True)} to {number(key, ends['high'], mean=True)}"
 
 
 def _scenario_table(every: RankedRuns) -> Any:
-    """Returns a table of the mean of the ranking score by scenario and run; the best of a row has a star if sure."""
+    """Returns a table of the mean of the ranking score by scenario, oracle and run; the best run has a star if sure."""
     c, table = every.comparison, empty_table()
-    names = [c.runs[k] for k in c.ranking(every.key).order.tolist()]
-    for name in ("scenario", "sequences", ORACLE, *names):
-        table.add_column(printable(name), justify="left" if name == "scenario" else "right", no_wrap=True)
+    shown = [row["run"] for row in every.table]
+    for name in ("scenario", "sequences", *shown):
+        title = printable(shortened(name, LONGEST_INPUT))
+        table.add_column(title, justify="left" if name == "scenario" else "right", no_wrap=True)
+    scores = c.rows()
     for scenario, found in _by_scenario(every).items():
         rows = every.scenarios[scenario]
-        best = rank(np.array([[c.oracle[k][every.key] for k in rows]])).mean[0]
         means = {c.runs[k]: m for k, m in zip(found.order.tolist(), found.mean.tolist(), strict=True)}
+        for name in shown[: len(c.oracles)]:
+            values = [math.nan if (one := scores[name][k]) is None else one[every.key] for k in rows]
+            means[name] = float(rank(np.array([values])).mean[0])
         alone = c.runs[found.order[0]] if found.last[0] == 1 and len(c.runs) > 1 else None
-        cells = [number(every.key, means[name], mean=True) + ("*" if name == alone else "") for name in names]
-        table.add_row(printable(scenario), str(len(rows)), number(every.key, best, mean=True), *cells)
-    return with_title(f"{every.key} by scenario; * surely the best of the row", table)
+        cells = [number(every.key, means[name], mean=True) + ("*" if name == alone else "") for name in shown]
+        table.add_row(printable(scenario), str(len(rows)), *cells)
+    foot = f"* surely better than every other run; {chance(len(every.scenarios), 'row')}"
+    return with_title(f"{arrow(every.key)} by scenario", table, foot)
 
 
-def _sequence_table(every: RankedRuns) -> Any:
-    c, table = every.comparison, empty_table()
-    for name in ("sequence", "run", *SHOWN):
+def _sequence_table(c: ComparedRuns) -> Any:
+    table, rows = empty_table(), c.rows()
+    for name in ("sequence", "run", *map(arrow, SHOWN)):
         table.add_column(name, justify="left" if name in ("sequence", "run") else "right", no_wrap=True)
     for k, sequence in enumerate(c.sequences):
-        for name, one in ((ORACLE, c.oracle[k]), *((run, c.scores[run][k]) for run in c.runs)):
-            table.add_row(printable(sequence), printable(name), *(number(key, one[key]) for key in SHOWN))
+        for name, row in rows.items():
+            if (one := row[k]) is not None:
+                table.add_row(printable(sequence), printable(name), *(number(key, one[key]) for key in SHOWN))
     return with_title("each sequence", table)
 
 
-def _verdict(every: RankedRuns) -> list[str]:
+def _score_differences(every: RankedRuns) -> Any:
+    """Returns a table of the differences of all scores of the only pair of runs."""
+    (pair,) = every.pairs
+    known = [key for keys in TABLES.values() for key in keys if math.isfinite(pair["scores"][key]["mean"])]
+    keys = [key for key in known if key != "objective" or usual_key(every.comparison) == key]
+    rows = {arrow(key): (key, pair["scores"][key]) for key in keys}
+    title = printable(f"{pair['run']} minus {pair['minus']}")
+    sure = [chance(len(rows), "row")] if _can_be_sure(every.comparison, every.ranking) else []
+    return with_title(title, _difference_table("score", rows), "; ".join([LOWER, *sure]))
+
+
+def _can_be_sure(comparison: ComparedRuns, ranking: Ranking) -> bool:
+    return comparison.blocks is not None or ranking.sequences >= FEWEST
+
+
+def _pair_differences(every: RankedRuns) -> Any:
+    """Returns a table of the differences of each pair of runs in the score that ranks."""
+    rows = {printable(f"{pair['run']} minus {pair['minus']}"): (every.key, pair) for pair in every.pairs}
+    return with_title(f"differences, {arrow(every.key)}", _difference_table("runs", rows))
+
+
+def _difference_table(first: str, rows: Mapping[str, tuple[str, Mapping[str, Any]]]) -> Any:
+    table = empty_table()
+    for name in (first, "difference", "95 % interval", ""):
+        table.add_column(name, justify="left" if name in (first, "") else "right", no_wrap=True)
+    for name, (key, d) in rows.items():
+        sure = f"surely {d['sure']}" if d["sure"] else ""  # of the run named first
+        table.add_row(name, number(key, d["mean"], mean=True), _interval(key, d), sure)
+    return table
+
+
+def verdict(comparison: ComparedRuns, key: str) -> list[str]:
     """Returns lines that say in words which runs are surely better, and that the others share ranks."""
-    pairs, count = _pairs(every), every.comparison.ranking(every.key).sequences
+    ranking = comparison.ranking(key)
+    pairs = [
+        {"run": i, "minus": j, **_difference(ranking, comparison.runs, i, j)} for i, j in _pairs(comparison, ranking)
+    ]
     sure = [p for p in pairs if p["sure"]]
     lines = []
     for run in dict.fromkeys(p["run"] for p in sure):
         nearest, *others = (p for p in sure if p["run"] == run)
-        low, mean, high = (number(every.key, x) for x in sorted(abs(nearest[end]) for end in ("mean", "low", "high")))
+        low, mean, high = (number(key, x) for x in sorted(abs(nearest[end]) for end in ("mean", "low", "high")))
         rest = f", and than {printable(', '.join(p['minus'] for p in others))}" if others else ""
         by = f"by {mean} ({low} to {high})"
-        lines.append(f"{printable(run)} is better than {printable(nearest['minus'])} {by}{rest}")
-    if count < FEWEST:
-        lines.append(f"{counted(count, 'sequence')}: with fewer than {FEWEST} no difference is sure")
+        lines.append(f"{printable(run)} is surely better than {printable(nearest['minus'])} {by}{rest}")
+    if pairs and not _can_be_sure(comparison, ranking):
+        hint = "; --blocks 1000 gives intervals of one recording" if len(comparison.sequences) == 1 else ""
+        found = counted(ranking.sequences, "sequence")
+        lines.append(f"{found}: with fewer than {FEWEST} no difference is sure{hint}")
     elif len(sure) < len(pairs):
         lines.append("runs with a common rank: no sure difference" if sure else "no run is surely better than another")
-    return [*lines, f"intervals of differences hold with 95 % for all {counted(len(pairs), 'pair')} together"]
+    if comparison.blocks is not None:
+        lines.append("intervals by weights of blocks of frames")
+    if len(pairs) > 1:
+        lines.append(f"intervals of differences hold with 95 % for all {len(pairs)} pairs together")
+    return lines
 
 
-def _write_csv(path: Path, every: RankedRuns) -> None:
-    """Writes one row per sequence and run (the oracle, too) with every score of the catalogue."""
+def _write_csv(path: Path, c: ComparedRuns) -> None:
+    """Writes one row per sequence and run (oracles, too) with every score of the catalogue."""
     from sim.io.files.atomic import write_file
 
-    c, text = every.comparison, io.StringIO()
+    text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["sequence", "run", *CATALOGUE])
     for k, sequence in enumerate(c.sequences):
-        for name, one in ((ORACLE, c.oracle[k]), *((run, c.scores[run][k]) for run in c.runs)):
-            writer.writerow([sequence, name, *("" if math.isnan(v) else repr(v) for v in one.values())])
+        for name, row in c.rows().items():
+            if (one := row[k]) is not None:
+                writer.writerow([sequence, name, *("" if math.isnan(v) else repr(v) for v in one.values())])
     write_file(path, text.getvalue().encode())

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from scenarios.printable import printable
+from scenarios.printable import counted, printable
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scores
-from tracking.stats import FEWEST
+from tracking.stats import LEVEL
 
 SHOWN = ("HOTA", "MOTA", "IDF1", "group_F1", "group_GDSR2", "group_MOTA", "pairwise_F1", "event_F1", "event_latency")
 """The keys that are shown where there is room for one line only."""
@@ -43,8 +43,8 @@ SIMILARITY = {
 GROUP_MATCH = {"hull": "overlap (IoU) of hulls (group_F1: common members)", "members": "common members (Jaccard index)"}
 SURFACE = {"ground": "on the ground, m", "image": "in the image, px"}
 
-ENOUGH = 100
-"""A difference over fewer sequences than this is called an indication."""
+LOWER = "↓ lower is better"
+"""The meaning of the arrow in headings."""
 
 Means = dict[str, dict[str, float]]
 """By key: "mean", and "low" and "high" of its 95 % interval; nan where unknown."""
@@ -70,12 +70,12 @@ def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), 
     """
     from rich.console import Group
 
-    detections = f"detections {detections_words([rows[0].given])}"
+    detections = f"detections {printable(rows[0].given) or 'unknown (no run.json)'}"
     people = _any_known(PEOPLE[1:], means)
     titles = TABLES if people else GROUP_TRACKER_TABLES
     known = {title: keys for title, keys in titles.items() if _any_known(keys, means)}
     parts = [_table(title, keys, rows, means) for title, keys in known.items()]
-    lines = [detections, *_comparison_lines(rows, people, "groups, strict" in known)]
+    lines = [LOWER, detections, *_comparison_lines(rows, people, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
         lines.append("intervals by weights of blocks of frames")
     partial = len(rows) < total
@@ -85,11 +85,6 @@ def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), 
 
 def _any_known(keys: Sequence[str], means: Means) -> bool:
     return any(math.isfinite(means[key]["mean"]) for key in keys)
-
-
-def detections_words(given: Sequence[str]) -> str:
-    """Returns the detections that trackers got, in words, separated by commas; "unknown (no run.json)" for ""."""
-    return ", ".join(printable(words) or "unknown (no run.json)" for words in given)
 
 
 def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> Any:
@@ -107,10 +102,13 @@ def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means:
 
 
 def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
-    """Returns the key as the heading of a column; with its unit if that depends on where people are compared."""
+    """Returns the key as the heading of a column; with its unit if that depends on where people are compared, and with
+    an arrow if lower is better.
+    """
     unit = "/".join(dict.fromkeys("m" if row.scores.surface == "ground" else "px" for row in rows))
     short = key.removeprefix("group_").removesuffix("_core")
-    return f"{short} ({unit})" if CATALOGUE[key].unit == "m | px" else short
+    named = f"{short} ({unit})" if CATALOGUE[key].unit == "m | px" else short
+    return named + arrow(key).removeprefix(key)
 
 
 def empty_table() -> Any:
@@ -145,36 +143,14 @@ def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) ->
     return [*lines, f"groups compared by {each(GROUP_MATCH, 'group_match')}, {each(SURFACE, 'surface')}"]
 
 
-def difference_table(differences: Means, sequences: int) -> Any:
-    """Returns a rich table of the differences to other tracks, with a star where the interval does not hold zero.
-
-    differences: by key, with "mean", "low" and "high" of the 95 % interval, and over sequences "pairs", the number of
-    pairs in which the score is known. Keys with an unknown mean are left out. With fewer than 6 pairs there is no star,
-    and a line below says so. sequences: number of pairs; 1 stands for one recording in blocks of frames. The title
-    calls 2 to 99 an indication.
-    """
-    over = "the same frames" if sequences == 1 else f"{sequences} sequences"
-    title = f"these tracks minus --against, in pairs over {over}"
-    title += "" if sequences >= ENOUGH or sequences == 1 else f" (fewer than {ENOUGH}: an indication)"
-    table, few = empty_table(), False
-    for name in ("score", "difference", "95 % low", "95 % high", ""):
-        table.add_column(name, justify="left" if name == "score" else "right")
-    for key in (key for keys in TABLES.values() for key in keys):
-        d = differences[key]
-        if math.isfinite(d["mean"]):
-            cells = (number(key, d[part], mean=True) for part in ("mean", "low", "high"))
-            table.add_row(key, *cells, "*" if is_sure(d) else "")
-            few = few or d.get("pairs", FEWEST) < FEWEST
-    foot = f"no star below {FEWEST} pairs: so few cannot show a sure difference" if few and sequences > 1 else ""
-    return with_title(title, table, foot)
+def arrow(key: str) -> str:
+    """Returns the key of a score, with an arrow downwards if lower is better."""
+    return f"{key} ↓" if CATALOGUE[key].better == "lower" else key
 
 
-def is_sure(difference: Mapping[str, float]) -> bool:
-    """Returns True if a difference has an interval without zero and, over sequences, at least 6 pairs.
-
-    difference: "low" and "high" (nan: unknown), and over sequences "pairs".
-    """
-    return difference.get("pairs", FEWEST) >= FEWEST and (difference["low"] > 0 or difference["high"] < 0)
+def chance(count: int, what: str) -> str:
+    """Returns in words how many of so many rows would be called sure by chance. what: a row's name, in the singular."""
+    return f"of {counted(count, what)} about {(1 - LEVEL) * count:.2g} would be called sure by chance"
 
 
 def number(key: str, value: float, *, mean: bool = False) -> str:

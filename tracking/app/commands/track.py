@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.run_folders import run_folders
+from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.run import TrackingRun
@@ -23,7 +26,7 @@ from tracking.run_info import input_summary
 from tracking.time_limit import TimeLimited
 
 ROW_KEYS = (
-    "sequence", "detections", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames",
+    "sequence", "detections", "input", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames",
     "frames_per_second", "whole_frames_per_second",
 )  # fmt: skip
 """What --json repeats of each run.json."""
@@ -63,8 +66,8 @@ class TrackerSetup:
 
 
 def track(options: TrackOptions) -> CommandResult:
-    """Tracks every sequence of the source and stores the tracks, one sequence after the other; returns a line for each
-    run.
+    """Tracks every sequence of the source and stores the tracks; returns a line for each run. The tracks are the same
+    for any number of workers.
 
     The tracks of a source that is one sequence go to --out, those of a dataset's sequences to --out/<sequence name>.
     The result's data: "tracker", and "runs", a dictionary for each with keys of its run.json, "tracks" (number of ids)
@@ -77,18 +80,18 @@ def track(options: TrackOptions) -> CommandResult:
     error stay.
     """
     from sim.io.files.atomic import lock_folder
-    from sim.io.source import open_source
-    from sim.io.store.run_seal import reject_foreign, tracked_hash
+    from sim.io.store.run_seal import reject_foreign
     from tracking.tracker_registry import find
 
     setup = _setup(options)
     option_parsing.output_folder(options.out)
     needs = find(setup.tracker).needs
     pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
-    sequences = open_source(
-        options.source, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=pictures,
-        background=options.background, person_class=options.person_class, box_scale=options.box_scale,
+    source = OpenedAs(
+        options.source, options.fps, options.px_per_m, options.camera, pictures, options.background,
+        options.person_class, options.box_scale,
     )  # fmt: skip
+    sequences = source.open()
     folders = run_folders(sequences, options.source, options.out)
     rows = []
     with lock_folder(options.out):
@@ -96,12 +99,41 @@ def track(options: TrackOptions) -> CommandResult:
             reject_foreign(folder)
         _check_modes(setup, needs, sequences, options.background)
         with setup.limited or nullcontext(), ProgressMeter("track", _total_frames(sequences)) as meter:
-            for sequence, folder in zip(sequences, folders, strict=True):
-                tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
-                run = setup.run(sequence, lambda index, name=sequence.name: meter.step(name))  # type: ignore[misc]
-                run.write(folder, sequence)
-                rows.append(_row(run, folder))
+            if min(options.workers, len(sequences)) == 1:
+                for sequence, folder in zip(sequences, folders, strict=True):
+                    step = partial(_step, meter, sequence.name)
+                    rows.append(_track_sequence(setup, sequence, folder, step))
+            else:
+                given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
+                jobs = [(given, folder) for folder in folders]
+                for row in over_sequences(_track_in_worker, sequences, jobs, source, options.workers):
+                    meter.step(row["sequence"], row["frames"])
+                    rows.append(row)
     return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(map(_line, rows)))
+
+
+def _step(meter: ProgressMeter, name: str, _: int) -> None:
+    meter.step(name)
+
+
+def _track_sequence(
+    setup: TrackerSetup, sequence: Sequence, folder: Path, progress: Callable[[int], None] | None = None
+) -> dict[str, Any]:
+    from sim.io.store.run_seal import tracked_hash
+
+    tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
+    run = setup.run(sequence, progress)
+    run.write(folder, sequence)
+    return _row(run, folder)
+
+
+def _track_in_worker(sequence: Sequence, job: tuple[bytes, Path]) -> dict[str, Any]:
+    return _track_sequence(_unpickled_setup(job[0]), sequence, job[1])
+
+
+@cache
+def _unpickled_setup(options: bytes) -> TrackerSetup:
+    return _setup(pickle.loads(options))
 
 
 def _setup(options: TrackOptions) -> TrackerSetup:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.io.store.track_files import write_tracks
 from sim.sequence import simulate
@@ -16,9 +15,6 @@ from sim.types import Sequence, Tracks
 from tests.groups_as_wholes import wholes
 from tracking import track
 from tracking.app.cli import run
-from tracking.app.commands.score import score_run
-from tracking.app.commands.score_tables import is_sure
-from tracking.run import TrackingRun
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.one_plane import in_one_plane
@@ -112,9 +108,6 @@ def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, 
     for words in ("file", "truth", "truth (box_noise.scale = 2)", "unknown (no run.json)"):
         assert f"1 of 4 sequences, detections {words}\n" in text
     assert "95 % low" not in text
-    against = scored(capsys, made / "data", made / "file", "--against", made / "truth")
-    assert (against["means"][0]["given"], against["against"]) == ("file", ["truth"])
-    assert against["mean"] == against["means"][0]["mean"]
 
 
 @pytest.mark.slow
@@ -147,39 +140,6 @@ def test_the_mean_has_every_key_and_an_interval(made: Path, capsys) -> None:
     assert one["low"] is one["high"] is None
 
 
-def test_differences_are_taken_sequence_by_sequence(made: Path, capsys) -> None:
-    found = scored(capsys, made / "data", made / "truth", "--against", made / "file")
-    other = scored(capsys, made / "data", made / "file")
-    own = [a["HOTA"] - b["HOTA"] for a, b in zip(found["sequences"], other["sequences"], strict=True)]
-    mean, low, high = (float(v[0]) for v in mean_interval(np.array(own)[:, None]))
-    assert found["difference"]["HOTA"] == pytest.approx({"mean": mean, "low": low, "high": high, "pairs": 2})
-    assert mean > 0
-    same = scored(capsys, made / "data", made / "file", "--against", made / "file")
-    assert {v for d in same["difference"].values() for key, v in d.items() if key != "pairs"} <= {0.0, None}
-    assert same["differences"] == []
-
-
-def test_no_star_for_fewer_than_six(made: Path, capsys) -> None:
-    """Both sequences are better from the truth: a bootstrap of two pairs called every such difference sure."""
-    assert run(["score", str(made / "data"), str(made / "truth"), "--against", str(made / "file")]) == 0
-    output = capsys.readouterr().out
-    assert "no star below 6 pairs" in output
-    assert not [line for line in output.splitlines() if line.rstrip().endswith("*")]
-    certain = {"low": 0.1, "high": 0.2}
-    assert [is_sure({**certain, "pairs": n}) for n in (2, 5, 6, 100)] == [False, False, True, True]
-    assert is_sure(certain), "blocks of one recording"
-    assert not is_sure({"low": -0.1, "high": 0.2, "pairs": 10})
-    assert not is_sure({"low": float("nan"), "high": float("nan")})
-
-
-def test_what_differs_comes_first(made: Path, capsys) -> None:
-    found = scored(capsys, made / "data", made / "truth", "--against", made / "file")
-    assert found["differences"] == [{"what": "detections", "these": "truth", "against": "file", "sequences": 2}]
-    assert run(["score", str(made / "data"), str(made / "truth"), "--against", str(made / "file")]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[:2] == ["these tracks and --against differ in", "  detections: truth / file"]
-
-
 def seen(scene: Sequence) -> list[Tracks]:
     """blob's tracks at the centres of their boxes in the image."""
     (moved,), _ = in_one_plane(scene.truth, [track("blob", scene, detections="file")], [False], "image")
@@ -192,22 +152,6 @@ def in_image(folder: Path, scene: Sequence, detections: str) -> Path:
     answers, place = seen(scene), folder / "merge-s00005"
     write_tracks(place, answers, fps=scene.fps, camera=scene.camera, scene=scene.scene, info=info)
     return folder
-
-
-def test_runs_are_compared_in_one_plane(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
-    """One run is from pixels, the other on the ground: metres were subtracted from pixels."""
-    data = made / "data" / "flockscope-train" / "merge-s00005"
-    image = in_image(tmp_path / "image", scene, "image")
-    alone = scored(capsys, data, made / "file")["sequences"][0]
-    assert (alone["similarity"], alone["surface"]) == ("ground", "ground")
-    for paths in ([made / "file", image], [image, made / "file"]):
-        found = scored(capsys, data, paths[0], "--against", paths[1])
-        (row,) = found["sequences"]
-        assert (row["similarity"], row["surface"]) == ("image", "image")
-        assert row["GOSPA"] > 5 * alone["GOSPA"], "px"
-        assert {d["mean"] for key, d in found["difference"].items() if key in ("GOSPA", "HOTA", "group_F1")} == {0.0}
-        assert "all tracks are compared in the image" in found["notes"][0]
-        assert {"plane", "detections"} <= {d["what"] for d in found["differences"]}
 
 
 def test_boxes_are_compared_by_their_feet_where_the_camera_is_known(
@@ -226,48 +170,6 @@ def test_boxes_are_compared_by_their_feet_where_the_camera_is_known(
         assert row["HOTA"] > scored(capsys, data, path, "--similarity", "boxes")["sequences"][0]["HOTA"] + 0.05
 
 
-def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
-    data, folder = made / "data" / "flockscope-train" / "merge-s00005", tmp_path / "wholes"
-    write_tracks(folder / "merge-s00005", wholes(scene, "ground"), fps=scene.fps)
-    image = in_image(tmp_path / "image", scene, "image")
-    assert run(["score", str(data), str(folder), "--against", str(image)]) == 2
-    error = capsys.readouterr().err
-    assert "runs in the image (px), and one on the ground (m) with groups without people" in error
-    assert run(["score", str(data), str(folder), "--against", str(made / "file")]) == 0
-
-
-def test_every_score_lies_in_its_interval_of_one_recording(made: Path, capsys) -> None:
-    """Resampled frames were joined, and each join was a switch: IDSW 24 had the interval [46, 76]."""
-    one = made / "data" / "flockscope-train" / "merge-s00005"
-    found = scored(capsys, one, made / "file", "--against", made / "truth", "--blocks", "200")
-    known = 0
-    for means in (found["mean"], found["difference"]):
-        for key, m in means.items():
-            if m["low"] is not None:
-                known += 1
-                assert m["low"] <= m["mean"] <= m["high"], key
-    assert known > 60
-    assert found["mean"]["group_IDSW"]["mean"] > 0
-
-
-@pytest.mark.slow
-def test_blocks_of_a_single_recording(made: Path, capsys) -> None:
-    one = made / "data" / "flockscope-train" / "merge-s00005"
-    found = scored(capsys, one, made / "truth", "--against", made / "file", "--blocks", "20")
-    (row,) = found["sequences"]
-    for key in ("HOTA", "pairwise_F1", "MOTA"):
-        mean, difference = found["mean"][key], found["difference"][key]
-        assert mean["mean"] == row[key]
-        assert mean["low"] < mean["high"]
-        assert difference["low"] <= difference["high"]
-    assert found["difference"]["HOTA"]["low"] > 0
-    assert found["mean"]["event_F1"] == {"mean": row["event_F1"], "low": None, "high": None}
-    again = scored(capsys, one, made / "truth", "--against", made / "file", "--blocks", "20")
-    assert again == found
-    same = scored(capsys, one, made / "file", "--against", made / "file", "--blocks", "5")["difference"]
-    assert {v for d in same.values() for v in d.values()} <= {0.0, None}
-
-
 def test_a_short_recording_is_an_indication_only(made: Path, capsys, monkeypatch) -> None:
     """The scene lasts under a minute; with the border below its length it is long enough."""
     one = [made / "data" / "flockscope-train" / "merge-s00005", made / "file"]
@@ -276,26 +178,71 @@ def test_a_short_recording_is_an_indication_only(made: Path, capsys, monkeypatch
     assert run(["score", *map(str, one), "--blocks", "2"]) == 0
     assert "indicative under 60 s" in " ".join(capsys.readouterr().out.split())
     assert scored(capsys, *one)["notes"] == []
-    monkeypatch.setattr("tracking.app.commands.score.SURE", 5.0)
+    monkeypatch.setattr("tracking.app.commands.score_ranking.SURE", 5.0)
     assert scored(capsys, *one, "--blocks", "2")["notes"] == []
     assert run(["score", *map(str, one), "--blocks", "2"]) == 0
     assert "indicative" not in capsys.readouterr().out
 
 
 def test_blocks_are_for_a_single_recording(made: Path, capsys) -> None:
-    assert run(["score", str(made / "data"), str(made / "file"), "--blocks", "5"]) == 2
-    assert "2 sequences" in capsys.readouterr().err
+    for runs in ([made / "file"], [made / "file", made / "truth"]):
+        assert run(["score", str(made / "data"), *map(str, runs), "--blocks", "5"]) == 2
+        assert "2 sequences" in capsys.readouterr().err
+
+
+def test_two_runs_of_one_recording(made: Path, capsys) -> None:
+    """Resampled frames were joined, and each join was a switch: IDSW 24 had the interval [46, 76]."""
+    one = made / "data" / "flockscope-train" / "merge-s00005"
+    found = scored(capsys, one, made / "truth", made / "file", "--blocks", "200")
+    (pair,), alone = found["differences"], scored(capsys, one, made / "truth", "--blocks", "200")["mean"]
+    assert (pair["run"], pair["minus"]) == ("truth", "file")
+    known = 0
+    for key, d in pair["scores"].items():
+        if d["low"] is not None:
+            known += 1
+            assert d["low"] <= d["mean"] <= d["high"], key
+    assert known > 30
+    assert pair["scores"]["HOTA"]["low"] > 0
+    assert pair["scores"]["HOTA"]["sure"] == "better"
+    assert (pair["scores"]["GOSPA"]["mean"] < 0, pair["scores"]["GOSPA"]["sure"]) == (True, "better")
+    best = next(row for row in found["ranking"] if row["run"] == "truth")
+    assert [best[part] for part in ("mean", "low", "high")] == [alone["objective"][p] for p in ("mean", "low", "high")]
+    assert scored(capsys, one, made / "file", made / "truth", "--blocks", "200") == found
+
+
+def test_runs_are_compared_in_one_plane(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
+    """One run is from pixels, the other on the ground: metres were subtracted from pixels."""
+    data = made / "data" / "flockscope-train" / "merge-s00005"
+    image = in_image(tmp_path / "image", scene, "image")
+    alone = scored(capsys, data, made / "file")["sequences"][0]
+    assert (alone["similarity"], alone["surface"]) == ("ground", "ground")
+    found = scored(capsys, data, made / "file", image)
+    assert found["similarity"] == "image"
+    (scores,) = found["scores"]["file"].values()
+    assert scores["GOSPA"] > 5 * alone["GOSPA"], "px"
+    (pair,) = found["differences"]
+    assert {pair["scores"][key]["mean"] for key in ("GOSPA", "HOTA", "group_F1")} == {0.0}
+    assert "all tracks are compared in the image" in found["notes"][0]
+
+
+def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
+    data, folder = made / "data" / "flockscope-train" / "merge-s00005", tmp_path / "wholes"
+    write_tracks(folder / "merge-s00005", wholes(scene, "ground"), fps=scene.fps)
+    image = in_image(tmp_path / "image", scene, "image")
+    assert run(["score", str(data), str(folder), str(image)]) == 2
+    error = capsys.readouterr().err
+    assert "runs in the image (px), and one on the ground (m) with groups without people" in error
+    assert run(["score", str(data), str(folder), str(made / "file")]) == 0
 
 
 def test_tables(made: Path, capsys) -> None:
     capsys.readouterr()
-    assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "truth")]) == 0
+    assert run(["score", str(made / "data"), str(made / "file")]) == 0
     output = capsys.readouterr().out
     for words in (
         "groups, strict", "groups, core", "\nmembers\n", "\nevents\n",
         "people compared by 1 - distance / 2 m on the ground",
-        "groups compared by overlap (IoU) of hulls (group_F1: common members), on the ground, m",
-        "in pairs over 2 sequences (fewer than 100",
+        "groups compared by overlap (IoU) of hulls (group_F1: common members), on the ground, m", "FP ↓", "↓ lower is better",
     ):  # fmt: skip
         assert words in output
     assert max(map(len, output.splitlines())) <= 160
@@ -314,23 +261,9 @@ def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:
     assert "strict" not in output
 
 
-def test_other_tracks_must_be_there(made: Path, capsys) -> None:
-    assert run(["score", str(made / "data"), str(made / "file"), "--against", str(made / "nothing")]) == 2
-    assert "nothing" in capsys.readouterr().err
-
-
 def test_lengths_are_printed_with_their_unit(made: Path, tmp_path: Path, capsys) -> None:
     (tmp_path / "S.txt").write_text("1,1,10,20,40,100,1\n2,1,12,20,40,100,1\n")
     assert run(["score", str(tmp_path / "S.txt"), str(tmp_path / "S.txt"), "--fps", "10"]) == 0
     assert "GOSPA (px)" in capsys.readouterr().out
     assert run(["score", str(made / "data"), str(made / "truth")]) == 0
     assert "GOSPA (m)" in capsys.readouterr().out
-
-
-def test_an_id_twice_in_a_frame_names_the_sequence() -> None:
-    sequence = simulate(load("merge"), 5, streams=())
-    tracks = track("blob", sequence)
-    first = next(k for k, t in enumerate(tracks) if len(t.id) > 1)
-    twice = tracks[first].replace(id=np.zeros(len(tracks[first].id), np.int64))
-    with pytest.raises(InputError, match=rf"{sequence.name}.*tracks: id 0 is twice in frame {first + 1}"):
-        score_run(sequence, TrackingRun((*tracks[:first], twice, *tracks[first + 1 :]), tracks.info))

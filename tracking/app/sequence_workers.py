@@ -1,0 +1,102 @@
+"""Runs a function over the sequences of a source, in this process or in several; results come in order either way."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from collections.abc import Sequence as SequenceOf
+from dataclasses import asdict, dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+from scenarios.errors import FlockscopeError, WorkError
+from sim.io.source import open_source
+from sim.types import Sequence
+
+J = TypeVar("J")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class OpenedAs:
+    """A source with the options of `open_source`, so that another process can open it again."""
+
+    path: Path
+    fps: float | None = None
+    px_per_m: float | None = None
+    camera: Path | None = None
+    images: bool = True
+    background: str | None = None
+    person_class: int | None = None
+    box_scale: str | None = None
+
+    def open(self) -> list[Sequence]:
+        """Returns the sequences of the source. Raises InputError as `open_source`."""
+        return open_source(**asdict(self))
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    source: OpenedAs
+    index: int
+    function: Callable[[Sequence, Any], Any]
+    job: Any
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    value: Any = None
+    error: FlockscopeError | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def over_sequences(
+    function: Callable[[Sequence, J], R],
+    sequences: SequenceOf[Sequence],
+    jobs: SequenceOf[J],
+    source: OpenedAs,
+    workers: int,
+) -> Iterator[R]:
+    """Yields function(sequence, job) for each sequence and its job, in order.
+
+    sequences: all of the source. workers: number of processes; with 1 this process does the work. Other processes get
+    function and job as pickles and open the source once. Warnings of the function are given here, in order. Raises the
+    error of the first sequence that fails, in order; no sequence is begun after it is raised, and those under way are
+    finished. Raises WorkError, naming the sequence, if three processes died of one.
+    """
+    from sim.workers.start import results_in_order, start_workers
+
+    workers = min(workers, len(sequences))
+    if workers <= 1:
+        yield from map(function, sequences, jobs)
+        return
+    tasks = [_Task(source, k, function, job) for k, job in enumerate(jobs)]
+
+    def lost(task: _Task, error: WorkError) -> _Outcome:
+        return _Outcome(error=WorkError(**{**error.as_dict(), "place": sequences[task.index].name}))
+
+    with start_workers(workers) as run:
+        for outcome in results_in_order(partial(run, on_loss=lost), _outcome, tasks):  # type: ignore[arg-type]
+            for text in outcome.warnings:
+                warnings.warn(text, stacklevel=2)
+            if outcome.error is not None:
+                raise outcome.error
+            yield outcome.value
+
+
+def _outcome(task: _Task) -> _Outcome:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        try:
+            value, error = task.function(_opened(task.source)[task.index], task.job), None
+        except FlockscopeError as failure:
+            value, error = None, failure
+    return _Outcome(value, error, tuple(str(w.message) for w in caught if issubclass(w.category, UserWarning)))
+
+
+@cache
+def _opened(source: OpenedAs) -> list[Sequence]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the first process has given them
+        return source.open()
