@@ -81,8 +81,6 @@ def test_stairs_service_and_turn(path: Path) -> None:
             "lead=2",
         ],
     )
-    assert "≡≡" in text(scenario)
-    assert "▣" in text(scenario)
     assert "turned by 0 to 360°, mirrored by a coin, 2 s further on" in text(scenario)
     assert {"stairs, +1.5 m", "service"} <= set(words_of(svg(scenario)))
 
