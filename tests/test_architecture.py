@@ -16,6 +16,7 @@ SCORING = (
     "scenarios.limits",
     "tracking.scoring",
     "tracking.grouping.grouped_tracks",
+    "tracking.grouping.foot_points",
     "scenarios.errors",
     "sim.arrays",
     "sim.types",

@@ -20,7 +20,7 @@ from tracking.grouping.foot_points import groups_of_people
 from tracking.prepare import prepare
 from tracking.run import TrackingRun
 from tracking.scoring.evaluation import Scorer
-from tracking.scoring.one_plane import groups_of_people, in_one_plane
+from tracking.scoring.one_plane import in_one_plane
 from tracking.scoring.people_comparison import Similarity
 
 

@@ -242,7 +242,8 @@ def test_tables(made: Path, capsys) -> None:
     for words in (
         "groups, strict", "groups, core", "\nmembers\n", "\nevents\n",
         "people compared by 1 - distance / 2 m on the ground",
-        "groups compared by overlap (IoU) of hulls (group_F1: common members), on the ground, m", "FP ↓", "↓ lower is better",
+        "groups compared by overlap (IoU) of hulls (group_F1: common members), on the ground, m",
+        "FP ↓", "↓ lower is better",
     ):  # fmt: skip
         assert words in output
     assert max(map(len, output.splitlines())) <= 160
