@@ -37,7 +37,7 @@ from benchmarks.support.timing import best_times, machine_load
 from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
 from sim.io.source import open_source
-from sim.render import people_kernels, renderer, shadows_kernels
+from sim.render import people_kernels, renderer, weather_kernels
 from sim.render.renderer import Renderer, make_renderer
 from sim.scene.camera_placement import place_camera
 from sim.sequence import simulate
@@ -75,7 +75,7 @@ ASKED: dict[str, Callable[[Renderer], Callable[[int], object]]] = {
 }
 RENDERING: Parts = {
     "places, outlines": [(renderer.FrameBatch, name) for name in ("__init__", "people", "in_view")],
-    "shadows": [(shadows_kernels, "draw_shadows")],
+    "shadows": [(weather_kernels, "draw_shadows")],
     "people": [(people_kernels, "draw_people")],
     "blur, light, noise": [(renderer.Renderer, "_finish")],
     "truth of pixels": [(renderer, "pixel_truth")],

@@ -119,7 +119,7 @@ def _run(folder: Path) -> None:
 
 
 def _events(folder: Path) -> None:
-    from sim.io.store.event_files import read_events
+    from sim.io.store.group_files import read_events
 
     read_events(folder / "events.json")
 
@@ -131,13 +131,13 @@ def _groups(folder: Path) -> None:
 
 
 def _near(folder: Path) -> None:
-    from sim.io.store.event_files import read_near
+    from sim.io.store.group_files import read_near
 
     read_near(folder / "near.csv")
 
 
 def _script(folder: Path) -> None:
-    from sim.io.store.event_files import read_script
+    from sim.io.store.group_files import read_script
 
     read_script(folder / "script.json")
 

@@ -1,4 +1,4 @@
-"""Says in words what is in a scenario: values, people, orders with their triggers, camera and sensor."""
+"""Says in words what is in a scenario, not simulating it: values, people, orders, triggers, camera and sensor."""
 
 from __future__ import annotations
 
@@ -128,3 +128,21 @@ def sensor(scenario: Scenario) -> list[str]:
     ]
     lines += [f"hides {h.group or 'everybody'} from {h.start:g} to {h.end:g} s" for h in s.hide]
     return lines
+
+
+def text(scenario: Scenario) -> str:
+    """Returns a description of a scenario for people, as lines of text: setting, people, orders, sensor."""
+    lines = [
+        scenario.name,
+        *([scenario.about] if scenario.about else []),
+        "",
+        *setting(scenario),
+        "",
+        "People",
+    ]
+    wide = max(len(group.id) for group in scenario.group)
+    lines += [f"  {group.id:<{wide}}  {people(group)}" for group in scenario.group]
+    lines += ["", "Orders"] + ([] if scenario.event else ["  none"])
+    for k, event in enumerate(scenario.event):
+        lines += [f"  {k + 1} {event.id}  {order(event)}", f"      {trigger(event.when)}"]
+    return "\n".join([*lines, "", "Sensor", *("  " + line for line in sensor(scenario)), ""])

@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from scenarios.schema.scenario import QueueOrder
+from scenarios.schema.scenario import DoorSpec, QueueOrder, WorldSpec
 from scenarios.schema.values import FixedPoint
-from scenarios.schema.world import DoorSpec, WorldSpec
 
 WallSegment = tuple[float, float, float, float]
 DOOR_TOLERANCE = 0.05  # m

@@ -11,8 +11,7 @@ from math import sqrt
 import numpy as np
 
 from sim.compiler import njit
-from sim.elementary_kernels import exp
-from sim.geometry.sort_kernels import sort_by
+from sim.elementary_kernels import exp, sort_by
 
 # isort: off
 # fmt: off

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenarios.schema.world import WorldSpec
+from scenarios.schema.scenario import WorldSpec
 from sim.elementary import dot, length
 from sim.types import Array, Bools, Scene, Stairs
 

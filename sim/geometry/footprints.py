@@ -8,7 +8,7 @@ each is the furthest point) share an angle.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -36,11 +36,7 @@ def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
 
     pos (R, 2) m: the members of group 0, then those of group 1, …; count (G,): how many each has. None may be nan.
     """
-    hulls: list[Array] = [np.zeros((0, 2))] * len(count)
-    for groups, members in _groups_of_equal_size(pos, count):
-        for group, hull in zip(groups, _minkowski_sums(*_gift_wrap(members)), strict=True):
-            hulls[group] = hull
-    return hulls
+    return _hulls(pos, count, lambda members: _minkowski_sums(*_gift_wrap(members)))
 
 
 def position_hulls(pos: Array, count: Ints) -> list[Array]:
@@ -48,21 +44,21 @@ def position_hulls(pos: Array, count: Ints) -> list[Array]:
 
     pos (R, 2), count (G,): as of `footprint_hulls`.
     """
+    return _hulls(pos, count, lambda members: list(_gift_wrap(members)[0]))
+
+
+def _hulls(pos: Array, count: Ints, hulls_of: Callable[[Array], list[Array]]) -> list[Array]:
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
-    for groups, members in _groups_of_equal_size(pos, count):
-        for group, hull in zip(groups, _gift_wrap(members)[0], strict=True):
-            hulls[group] = hull
-    return hulls
-
-
-def _groups_of_equal_size(pos: Array, count: Ints) -> Iterator[tuple[Ints, Array]]:
-    """Yields up to CHUNK groups of equal size n: their indices (K,), and members' positions (K, n, 2)."""
     first = np.cumsum(count) - count
+    # Groups of equal size n together, up to CHUNK of them.
     for n in np.unique(count[count > 0]):
         every = np.flatnonzero(count == n)
         for low in range(0, len(every), CHUNK):
             groups = every[low : low + CHUNK]
-            yield groups, pos[first[groups, None] + np.arange(n)]
+            members = pos[first[groups, None] + np.arange(n)]
+            for group, hull in zip(groups, hulls_of(members), strict=True):
+                hulls[group] = hull
+    return hulls
 
 
 def _gift_wrap(pos: Array) -> tuple[Array, Array, Array]:

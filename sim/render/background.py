@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.render.foliage import Foliage
-from sim.render.illumination import Illumination
+from sim.render.weather import Foliage, Illumination
 from sim.rng import rng
 from sim.scene.raycast import pixel_rays, signed_scale, solids_of
 from sim.types import Camera, Scene

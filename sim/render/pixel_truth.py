@@ -1,15 +1,59 @@
-"""The exact truth of one frame's pixels (`types.PixelTruth`), and masks (H, W) of single people, visible or whole.
+"""The exact truth of one frame's pixels: disparities of a stereo pair, and what an id map tells of each person.
 
-The truth is measured in an id map (H, W), which holds the id of the person that each pixel shows. It has each person's
-number of visible pixels, the box round them in px, and the number of the connected region of people.
+The disparity of a point is u_left - u_right = f B / depth: focal length f in px, baseline B and depth in m; nan where
+the right camera does not see the point. An id map (H, W) holds the id of the person that each pixel shows. From it
+follow each person's number of visible pixels, the box round them in px, the number of the connected region of people
+(`types.PixelTruth`), and masks (H, W) of single people, visible or whole.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from sim.render.camera_view import CameraView
+from sim.render.canvas import FrameCanvas
+from sim.render.people import DrawnPeople, ProjectedPeople
 from sim.scene.body import bodies_at, outlines, packed_inverse
 from sim.types import Array, Bools, Camera, Ints, Motion, PixelTruth
+
+
+def empty_scene_disparities(left: CameraView, right: CameraView) -> Array:
+    """Returns the disparities (H, W) px of the empty scene between two views, at the left view's pixels."""
+    from sim.render import pixel_truth_kernels as kernels
+
+    out = np.empty((left.height, left.width))
+    kernels.empty_scene_disparities(
+        left.geometry.depth, _scale(left, right), right.rays.origin, right.rays.direction, left.solids, out
+    )
+    return out
+
+
+def frame_disparities(
+    empty: Array,
+    right: CameraView,
+    canvas: FrameCanvas,
+    ids: Ints,
+    people: DrawnPeople,
+    in_left: ProjectedPeople,
+    in_right: ProjectedPeople,
+) -> Array:
+    """Returns the disparities (H, W) px of a frame with people, at the left view's pixels.
+
+    empty (H, W): those of the empty scene. canvas: the left view's, with people drawn. ids (H, W): the people it shows.
+    """
+    from sim.render import pixel_truth_kernels as kernels
+
+    out = empty.copy()
+    kernels.add_people(
+        canvas.depth, ids, in_left.outlines.bounds, people.id, right.camera.focal_px[0] * right.camera.baseline,
+        in_right.start, in_right.step, in_right.outlines.middle, in_right.outlines.inverse, in_right.nearest_depth,
+        right.geometry.depth, right.rays.origin, right.rays.direction, right.solids, out,
+    )  # fmt: skip
+    return out
+
+
+def _scale(left: CameraView, right: CameraView) -> float:
+    return left.camera.focal_px[0] * float(np.linalg.norm(right.camera.position - left.camera.position))
 
 
 def pixel_truth(ids: Ints, bounds: Ints, id: Ints, amodal: Ints, disparity: Array | None) -> PixelTruth:

@@ -1,6 +1,8 @@
-"""Compiled counts over an id map (H, W), which holds the id of the person that each pixel shows.
+"""Compiled disparities of a stereo pair, u_left - u_right in px at the left image's pixels, and counts over an id map.
 
-They give each person's number of visible pixels, the box round these pixels, and which people touch in the image.
+First the disparities of the empty scene, then those of people; nan where the right camera does not see the point, as it
+is hidden or outside the right image, and for sky. The counts over an id map (H, W), which holds the id of the person
+that each pixel shows: each person's visible pixels, the box round them, and which people touch in the image.
 """
 
 from __future__ import annotations
@@ -8,8 +10,107 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
-from sim.geometry.union_find_kernels import find_root
+from sim.elementary_kernels import find_root
 from sim.render.canvas import END_COLUMN, END_ROW, FIRST_COLUMN, FIRST_ROW
+from sim.render.canvas_kernels import ellipse_row
+from sim.scene.body import XX, XY, YY
+from sim.scene.raycast import HIT_SLOTS
+from sim.scene.raycast_kernels import at_pixel, first_hit
+
+SAME = 1e-3  # m: a point in front by less than this counts as the same point
+
+
+@njit(cache=True, error_model="numpy")
+def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # type: ignore[no-untyped-def]
+    """Sets out (H, W) to the disparities scale / depth of the empty scene, at the left camera's pixels.
+
+    depth (H, W) m: of the left view. scale: px m. origin, direction (3, 3): PixelRays of the right camera.
+    """
+    height, width = depth.shape
+    any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
+    o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
+    for v in range(height):
+        for u in range(width):
+            z = depth[v, u]
+            x = u + 0.5 - scale / z
+            out[v, u] = scale / z if z < np.inf and x >= 0.0 else np.nan
+            if any_solid and out[v, u] == out[v, u]:
+                at_pixel(origin, x, v + 0.5, o)
+                at_pixel(direction, x, v + 0.5, d)
+                if first_hit(o, d, solids, hit) < z - SAME:
+                    out[v, u] = np.nan
+
+
+@njit(cache=True, error_model="numpy")
+def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-def]
+    """Returns True if the right camera's ray at u = x px meets part e of person i before depth z (m)."""
+    a = b = c = 0.0
+    for k in range(3):
+        p, d = start[i, e, k, 0] * x + row[k], step[i, e, k, 0] * x + row[3 + k]
+        a += d * d
+        b += p * d
+        c += p * p
+    root = b * b - a * (c - 1.0)
+    return root >= 0.0 and (-b - np.sqrt(root)) / a < z - SAME
+
+
+@njit(cache=True, error_model="numpy")
+def _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, solids, out):  # type: ignore[no-untyped-def]
+    """Sets out (H, W) to the disparity at the pixels of people; nan where the right camera does not see the point."""
+    width = depth.shape[1]
+    any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
+    o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
+    for i in range(len(id)):
+        for v in range(bounds[i, FIRST_ROW], bounds[i, END_ROW]):
+            for u in range(bounds[i, FIRST_COLUMN], bounds[i, END_COLUMN]):
+                if ids[v, u] != id[i]:
+                    continue
+                z = depth[v, u]
+                x = u + 0.5 - scale / z
+                out[v, u] = scale / z if x >= 0.0 else np.nan
+                if any_solid and x >= 0.0:
+                    j = int(x)
+                    if min(right_depth[v, max(j - 1, 0)], right_depth[v, j], right_depth[v, min(j + 1, width - 1)]) < z:
+                        at_pixel(origin, x, v + 0.5, o)
+                        at_pixel(direction, x, v + 0.5, d)
+                        if first_hit(o, d, solids, hit) < z - SAME:
+                            out[v, u] = np.nan
+
+
+@njit(cache=True, error_model="numpy")
+def add_people(  # type: ignore[no-untyped-def]
+    depth, ids, bounds, id, scale, start, step, middle, inverse, nearest, right_depth, origin, direction, solids, out
+):
+    """Adds N people to out (H, W), on entry the disparities of the empty scene, at the left camera's pixels.
+
+    depth (H, W) m, ids (H, W), bounds (N, 4), id (N,): of the left image, with people. scale: px m. The rest is the
+    right camera's: start, step (N, 2, 3, 3), middle (N, 2, 2) px, inverse (N, 2, 3), nearest (N, 2) m: of bodies and
+    heads; right_depth (H, W) m: of the empty scene; origin, direction (3, 3): PixelRays.
+    """
+    height, width = depth.shape
+    row = np.empty(6)
+    _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, solids, out)
+    for i in range(len(id)):
+        # Pixels that a person hides from the right camera become nan.
+        for e in range(2):
+            mu, mv, most = middle[i, e, 0], middle[i, e, 1], scale / nearest[i, e]
+            a, b, c = inverse[i, e, XX], inverse[i, e, XY], inverse[i, e, YY]
+            half = np.sqrt(a / (a * c - b * b))
+            if not half >= 0.0:
+                continue
+            for v in range(max(int(mv - half), 0), min(int(mv + half) + 1, height)):
+                x0, x1 = ellipse_row(v + 0.5 - mv, a, b, c)
+                if x0 > x1:
+                    continue
+                low, high = mu + x0, mu + x1
+                for k in range(3):
+                    row[k] = start[i, e, k, 1] * (v + 0.5) + start[i, e, k, 2]
+                    row[3 + k] = step[i, e, k, 1] * (v + 0.5) + step[i, e, k, 2]
+                for u in range(max(int(low), 0), min(int(high + most) + 1, width)):
+                    x = u + 0.5 - out[v, u]  # a nan is in no range
+                    if low <= x <= high and _part_is_before(x, i, e, start, step, row, depth[v, u]):
+                        out[v, u] = np.nan
+
 
 LEFT, RIGHT, TOP, BOTTOM = range(4)  # columns of `edges`
 

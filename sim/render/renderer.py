@@ -15,16 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
-from sim.render.blur_noise import blur_weights, noise_offsets, noise_pool
-from sim.render.camera_view import NODE_STEP, CameraView
+from sim.render.camera_view import NODE_STEP, CameraView, blur_weights, noise_offsets, noise_pool
 from sim.render.canvas import UNIT, FrameCanvas
-from sim.render.clothing import clothing_atlas
-from sim.render.disparity import empty_scene_disparities, frame_disparities
-from sim.render.foliage import Foliage, grow_plants
-from sim.render.illumination import Illumination, draw_illumination
-from sim.render.people import DrawnPeople, ProjectedPeople, people_of_frames, project_people, take_rows
-from sim.render.pixel_truth import pixel_truth
+from sim.render.people import DrawnPeople, ProjectedPeople, clothing_atlas, people_of_frames, project_people, take_rows
+from sim.render.pixel_truth import empty_scene_disparities, frame_disparities, pixel_truth
 from sim.render.shadows import PeopleShadows, people_shadows, sunlit_shares
+from sim.render.weather import Foliage, Illumination, draw_illumination, grow_plants
 from sim.scene import camera as cameras
 from sim.types import BACKGROUNDS, Array, Camera, Frame, Image, Motion, PixelTruth
 
@@ -214,7 +210,7 @@ class Renderer:
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
         canvas = view.take_canvas()
         if view.plants is not None:
-            from sim.render.foliage_kernels import sway
+            from sim.render.weather_kernels import sway
 
             sway(
                 view.empty_canvas, view.empty_scene.plants, view.plant_runs, view.wind(self._time(index)), NODE_STEP,
@@ -248,7 +244,7 @@ class Renderer:
         return image, truth
 
     def _draw_shadows(self, view: CameraView, canvas: FrameCanvas, people: DrawnPeople, seen: PeopleInView) -> None:
-        from sim.render.shadows_kernels import draw_shadows
+        from sim.render.weather_kernels import draw_shadows
 
         fall = seen.shadows
         if fall is None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.compiler import njit
-from sim.geometry.union_find_kernels import find_root
+from sim.elementary_kernels import find_root
 from sim.types import Array, Bools, Ints
 
 Labels = NDArray[np.int32]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
-from sim.geometry.union_find_kernels import find_root
+from sim.elementary_kernels import find_root
 from sim.types import Array, Ints
 from tracking.filters.ellipse_overlap_kernels import overlap
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
-from sim.geometry.union_find_kernels import find_root
+from sim.elementary_kernels import find_root
 from sim.types import Array, Bools, Ints
 from tracking.filters.component_regions_kernels import WEIGHT, XX, XY, YY, X, Y, closure, fit, meet, pool
 

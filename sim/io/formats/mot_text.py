@@ -17,8 +17,7 @@ import numpy as np
 
 from sim.arrays import repeated_ids
 from sim.io.formats.box_columns import BoxScale, corner_doubt, require_pixels
-from sim.io.formats.mot_ground import ground_positions, require_metres
-from sim.io.formats.mot_people import labelled_people, of_class, unscored_rows
+from sim.io.formats.mot_people import ground_positions, labelled_people, of_class, require_metres, unscored_rows
 from sim.io.formats.mot_table import MotTable, read_table
 from sim.io.formats.velocity import differentiate
 from sim.scene.boxes import scale_of_all_boxes

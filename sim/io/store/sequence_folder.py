@@ -23,7 +23,7 @@ from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.stored_pictures import NO_PICTURES, StoredPictures, WrittenPictures, write_pictures
 from sim.io.store import truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
-from sim.io.store.event_files import read_script
+from sim.io.store.group_files import read_script
 from sim.io.store.manifest import (
     MANIFEST,
     REDO,

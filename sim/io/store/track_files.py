@@ -21,13 +21,11 @@ from scenarios.errors import InputError
 from sim.io.files import tables
 from sim.io.files.atomic import hold_lock, replace_sealed
 from sim.io.formats.box_columns import BoxScale, require_pixels
-from sim.io.formats.mot_ground import ground_positions, require_metres
-from sim.io.formats.mot_people import of_class
+from sim.io.formats.mot_people import ground_positions, of_class, require_metres
 from sim.io.formats.mot_table import MotTable, read_table
 from sim.io.formats.mot_text import ground_cells, reject_duplicate_ids, unit_scores
 from sim.io.formats.velocity import chords
-from sim.io.store.event_files import event_dict, read_events
-from sim.io.store.group_files import groups_bytes, groups_csv, read_groups_csv
+from sim.io.store.group_files import event_dict, groups_bytes, groups_csv, read_events, read_groups_csv
 from sim.io.store.run_seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
 from sim.io.store.track_tables import RunRows, flatten, read_track_table, track_table
 from sim.io.store.truth_files import with_ground_height

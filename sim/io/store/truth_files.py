@@ -16,8 +16,17 @@ from scenarios.limits import FRAME_RATES, FRAMES, SCALES
 from scenarios.reading import is_present
 from sim.io.files.tables import REDO, Column, StoredTable, nan_to_none, read_table, table_bytes
 from sim.io.formats.mot_text import ground_cells
-from sim.io.store.event_files import events_bytes, near_bytes, read_events, read_near, read_script, script_bytes
-from sim.io.store.group_files import groups_bytes, groups_csv, read_groups
+from sim.io.store.group_files import (
+    events_bytes,
+    groups_bytes,
+    groups_csv,
+    near_bytes,
+    read_events,
+    read_groups,
+    read_near,
+    read_script,
+    script_bytes,
+)
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Detections, Groups, Scene, Truth
 

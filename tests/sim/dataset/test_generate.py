@@ -36,7 +36,7 @@ def simulate(scenario, seed, repeat, streams=(), stride=1):
             os.kill(os.getpid(), signal.SIGKILL)
     return fakes.sequence(seed + 100 * repeat)
 
-sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate)
+sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate, observe=None)
 from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate

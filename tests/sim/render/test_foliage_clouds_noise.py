@@ -10,9 +10,8 @@ from scenarios.errors import InputError
 from scenarios.schema.picture import Light, Picture
 from sim.hashing import canonical_hash
 from sim.render.camera_view import NODE_STEP
-from sim.render.illumination import draw_illumination
-from sim.render.random_fields import moving_pattern, oscillation
 from sim.render.renderer import make_renderer
+from sim.render.weather import draw_illumination, moving_pattern, oscillation
 from sim.types import BACKGROUNDS, Camera, Motion, Scene
 from tests.reference_sense import above, crowd, pinhole
 

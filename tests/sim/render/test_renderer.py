@@ -206,7 +206,7 @@ def test_light_changes_as_it_is_told() -> None:
 
 
 def test_drift_has_its_sd_and_time_constant() -> None:
-    from sim.render.illumination import draw_illumination
+    from sim.render.weather import draw_illumination
 
     t = np.linspace(0, 40, 81)
     log = np.array(

@@ -80,15 +80,16 @@ def _is_suite(name: str) -> bool:
 
 
 def _explain_scenario(scenario: Scenario, drawing: Path | None) -> CommandResult:
-    from scenarios.drawing import explain
+    from scenarios.drawing.plan_svg import svg
+    from scenarios.drawing.words import text
 
-    words = explain.text(scenario)
+    words = text(scenario)
     data = {"name": scenario.name, "about": scenario.about, "text": words, "toml": dump(scenario)}
     if drawing is None:
         return CommandResult(data, words)
     from sim.io.files.atomic import write_file
 
-    write_file(output_file(drawing, ".svg"), explain.svg(scenario).encode())
+    write_file(output_file(drawing, ".svg"), svg(scenario).encode())
     return CommandResult({**data, "drawing": drawing}, f"{words}\n{drawing}")
 
 

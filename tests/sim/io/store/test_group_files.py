@@ -6,8 +6,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.store.camera_files import read_scene
-from sim.io.store.event_files import read_events, read_near, read_script
-from sim.io.store.group_files import read_groups_csv
+from sim.io.store.group_files import read_events, read_groups_csv, read_near, read_script
 
 EVENT = {"kind": "merge", "start": 1, "end": 3, "emitted": None, "before": [-1, 2], "after": [2], "members": [1, 2],
          "pos": [1.5, None]}  # fmt: skip
