@@ -1,19 +1,21 @@
-"""docs/reference/scenario-files.md is correct: its example loads, and it lists the catalogue and every key."""
+"""docs/reference/scenario-files.md lists the catalogue, the suites and every key. The example of the guide loads."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-from scenarios.loading.resolve import load, names, suite_names
+from scenarios.loading.resolve import load, names, resolve, suite_names
+from scenarios.loading.suites import about, find_suite
 from tracking.app.commands.scenario_keys import list_keys
 
-DOC = (Path(__file__).resolve().parents[3] / "docs" / "reference" / "scenario-files.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+DOC = (DOCS / "reference" / "scenario-files.md").read_text(encoding="utf-8")
 
 
 def test_example(tmp_path: Path) -> None:
-    example = re.findall(r"^```toml\n(.*?)^```$", DOC, re.DOTALL | re.MULTILINE)
-    assert len(example) == 1
+    guide = (DOCS / "guides" / "write-a-scenario.md").read_text(encoding="utf-8")
+    example = re.findall(r"^```toml\n(.*?)^```$", guide, re.DOTALL | re.MULTILINE)
     (tmp_path / "example.toml").write_text(example[0])
     assert [e.id for e in load(tmp_path / "example.toml").event] == ["m1", "s1"]
 
@@ -22,7 +24,12 @@ def test_catalogue() -> None:
     rows = re.findall(r"^\| `([a-z-]+)` \|", DOC, re.MULTILINE)
     assert rows == names()
     assert all(f"| `{name}` | {load(name).about} |" in DOC for name in rows)
-    assert all(f"`{name}`" in DOC for name in suite_names())
+
+
+def test_suites() -> None:
+    rows = re.findall(r"^\| suite `(.+)` \| (\d+) \| (.+) \|$", DOC, re.MULTILINE)
+    suites = [(name, find_suite(name)) for name in suite_names()]
+    assert rows == [(name, str(len(resolve(f"suite:{name}"))), about(file)) for name, file in suites]
 
 
 def test_keys() -> None:
