@@ -2,14 +2,13 @@
 
 A field is declared as `gate: float = param(0.99, (0.9, 0.9999), "probability", "share of ...")`. Parameters are
 seconds, metres and rates, never frame counts. The search space of `tune`, the action space of the environment and the
-table in the docs are read from the declarations. Sets of values with a name (first defaults, presets) are TOML files:
+table in the docs are read from the declarations. Presets are TOML files:
 tracking.parameter_files.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ from scenarios.errors import InputError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import closest
 from sim.io.files.numeric_text import read_number
-from tracking.parameter_files import file_of, first_defaults, preset_file, presets, read, toml_text
+from tracking.parameter_files import file_of, preset_file, presets, read, toml_text
 from tracking.user_code import tracker_failed, user_code
 
 Scale = Literal["linear", "log", "int", "categorical"]
@@ -33,9 +32,8 @@ class Param:
 
     name; default; unit and meaning: texts for the docs. scale: "linear", "log", "int" or "categorical". low, high:
     range, both ends allowed; -inf and inf if scale is "categorical". choices: the allowed values if scale is
-    "categorical", else empty. online: it may change between two frames. tunable: searches may change it. before: its
-    value in the frozen first defaults if their file lacks it; None: not declared. sees: "pixels" or "points" if it has
-    an effect only with these, else "".
+    "categorical", else empty. online: it may change between two frames. tunable: searches may change it.
+    sees: "pixels" or "points" if it has an effect only with these, else "".
     """
 
     name: str
@@ -48,7 +46,6 @@ class Param:
     choices: tuple[Value, ...] = ()
     online: bool = True
     tunable: bool = True
-    before: Value | None = None
     sees: str = ""
 
     @property
@@ -100,14 +97,12 @@ class ParamUse(TypedDict, total=False):
     """Optional keywords of `param`: where and when the parameter is used.
 
     online: True (default) if it may change between two frames. tunable: True (default) if searches may change it.
-    before: for a parameter that is missing in the frozen first defaults, the value with which the tracker behaves as it
-    did then; None (default): not declared. sees: "pixels" or "points" if it has an effect only with these, and searches
-    over others leave it out; "" (default): it has an effect with both.
+    sees: "pixels" or "points" if it has an effect only with these, and searches over others leave it out; "" (default):
+    it has an effect with both.
     """
 
     online: bool
     tunable: bool
-    before: Value | None
     sees: Literal["", "pixels", "points"]
 
 
@@ -123,7 +118,7 @@ def param(
 
     values: (low, high), both allowed, or the choices if scale is "categorical". unit, meaning: texts for the docs.
     scale: how a search moves: "linear" or "log" for numbers, "int" for whole numbers, "categorical" for choices. use:
-    keywords online, tunable, before, sees, described at ParamUse. The default itself is checked only when a config is
+    keywords online, tunable, sees, described at ParamUse. The default itself is checked only when a config is
     created. Raises ValueError if the `values` of a number are not two.
     """
     categorical = scale == "categorical"
@@ -198,21 +193,6 @@ class Config:
         that are not allowed or contradict each other.
         """
         return cls.from_dict(read(path, cls.tracker), path)
-
-    @classmethod
-    def frozen(cls) -> Self:
-        """Return the first defaults of the tracker, from tracking/frozen/NAME.toml, against which tuning is judged.
-
-        NAME is the class's `tracker`. A parameter that the file lacks has its `before` if the class itself declares it,
-        and its default if it is inherited. Raises AssertionError if a lacking parameter that the class declares has no
-        `before`. Raises InputError if the file is missing or wrong.
-        """
-        path = first_defaults(cls.tracker)
-        first = read(path, cls.tracker)
-        own = inspect.get_annotations(cls)
-        later = {n: p.before if n in own else p.default for n, p in cls.params().items() if n not in first}
-        assert None not in later.values(), f"a parameter that {path.name} lacks declares what it was before: {later}"
-        return cls.from_dict(first | later, path)
 
     @classmethod
     def preset(cls, name: str) -> Self:

@@ -12,8 +12,6 @@ particles   friends-meet: accuracy and frames/s over N_x and N_z (--chart FILE.s
 events      a suite (--suite): event F1, hits, false alarms, misses and latency, beside group-pda and the default
             grouping over blob and particle
 ablation    friends-meet: scores without each departure from the paper that has a parameter, paired differences
-process     friends-meet: the Dirichlet process as validity and as dynamics of partitions, with and without beliefs,
-            paired differences to the paper's validity and events
 
 A row of table2 holds a sequence's scores, means over filter seeds. Group scores are pooled over the frames of all
 sequences together, strict and core, and of the first variant by kind of sequence; differences are of the means over
@@ -34,7 +32,6 @@ def main() -> None:
     modes = {
         "table2": table2.table2, "recordings": recordings.recordings, "classifier": event_classifier.classifier,
         "particles": settings.particles, "events": events.events, "ablation": settings.ablation,
-        "process": settings.process,
     }  # fmt: skip
     parser.add_argument("mode", choices=modes)
     add_seeds(parser, "20000:20001")
@@ -43,9 +40,7 @@ def main() -> None:
     parser.add_argument("--suite", help="of the modes events (standard) and ablation (friends-meet)")
     parser.add_argument("--recordings", action="store_true", help="mode classifier: labelled recordings (--data)")
     parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="mode particles: draw it")
-    parser.add_argument(
-        "--only", help="table2, recordings, events: variants; ablation, process: settings; separated by commas"
-    )
+    parser.add_argument("--only", help="table2, recordings, events: variants; ablation: settings; separated by commas")
     add_data(parser)
     given = parser.parse_args()
     modes[given.mode](given)

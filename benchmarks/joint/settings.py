@@ -1,4 +1,4 @@
-"""Scores on friends-meet with other parameters: departures, the Dirichlet process, numbers of particles."""
+"""Scores on friends-meet with other parameters: departures, numbers of particles."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from tracking.papers.joint.people import People
 COUNTS = (10, 25, 50, 100)
 DEPARTURES = (
     "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
-    "size_std=1.5", "size_std=50", "lag=0.1", "normaliser=sampled",
+    "size_std=1.5", "size_std=50", "lag=0.1",
     "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
-    "estimate=histogram", "validity=bayesian", "validity=bayesian evidence_rate=20", "partition_dynamics=dirichlet",
+    "estimate=histogram",
 )  # fmt: skip
 """Settings of the mode ablation."""
 
@@ -50,17 +50,13 @@ RULES: Mapping[str, tuple[object, str, object]] = {
     "absence of groups": (People, "absence", _own_absence),
 }
 """Rules without a parameter that the mode ablation switches off: owner, name and replacement by the name of the row."""
-PROCESS = (
-    "", "validity=bayesian", "partition_dynamics=dirichlet",
-    "validity=bayesian partition_dynamics=dirichlet",
-)  # fmt: skip
-"""Settings of the mode process, run with beliefs and without."""
 
 
 def ablation(given: argparse.Namespace) -> None:
     """Prints a table: rows are settings and `RULES` switched off, columns scores pooled over frames and paired
     differences to the defaults."""
-    made, base = list(sequences(given.seeds, given.suite or "friends-meet")), []
+    made = list(sequences(given.seeds, given.suite or "friends-meet"))
+    base: list[Row] = []
     deltas = {"GDSR": "group_GDSR", "MOTA": "group_MOTA", "event F1": "event_F1", "false events": "false"}
     shown = "event F1", "of the least person"
     tables.head(["setting", *(f"{name}, %" for name in SHARES), *shown, *(f"Δ {name}" for name in deltas)])
@@ -73,22 +69,6 @@ def ablation(given: argparse.Namespace) -> None:
         differences = [difference(rows, base, key) for key in deltas.values()]
         own = dict(zip(OTHERS, others(rows), strict=True))
         tables.row([setting or "defaults", *pooled(rows, "_core")[:4], *(own[name] for name in shown), *differences])
-
-
-def process(given: argparse.Namespace) -> None:
-    """Prints a table: rows are settings with and without beliefs, with differences to the first row of each half."""
-    made = list(sequences(given.seeds))
-    deltas = ("GDSR", "MOTA", "1-FP", "1-FN")
-    tables.head(["setting", *(f"{k}, %" for k in SHARES), *OTHERS, *(f"Δ {k}" for k in deltas), "Δ event F1"])
-    for belief in ("", "belief_rate=0"):
-        base: list[Row] = []
-        for setting in given.only.split(",") if given.only else PROCESS:
-            words = [*given.set, *setting.split(), *belief.split()]
-            rows = [mean_row(measured(s, Variant(""), given.filter_seeds, words)) for s in made]
-            base = base or rows
-            differences = [difference(rows, base, key) for key in (*(f"group_{k}" for k in deltas), "event_F1")]
-            name = " ".join([setting, belief]).strip() or "defaults"
-            tables.row([name, *pooled(rows, "_core")[:4], *others(rows), *differences])
 
 
 def particles(given: argparse.Namespace) -> None:

@@ -68,7 +68,6 @@ class LinkRule(Config):
         (0.0, 1.0),
         "m/s",
         "two people who are both slower than this are not near; 0: standing people can be linked",
-        before=0.0,
     )
     diverge: float = param(
         NEVER,
@@ -76,7 +75,6 @@ class LinkRule(Config):
         "m/s",
         "a pair farther than `near` whose velocities differ by more than this is apart, too; 10: never",
         "log",
-        before=NEVER,
     )
     smooth: float = param(
         0.0,

@@ -88,14 +88,12 @@ class BlobConfig(BackgroundSettings):
         (0.0, 10.0),
         "s",
         "replaces report_coast, if longer, for a track that is hidden or merged with others in one box (ours)",
-        before=0.0,
     )
     report_credit: float = param(
         0.33,
         (0.0, 10.0),
         "",
         "a missed track is reported for at most this share of the time in which it was measured (ours)",
-        before=1.0,
     )
 
     split: bool = param(
@@ -104,7 +102,6 @@ class BlobConfig(BackgroundSettings):
         "",
         "from pixels: people who share a blob are separated by templates (ours)",
         "categorical",
-        before=True,
         sees="pixels",
     )
     evidence: float = param(
@@ -113,7 +110,6 @@ class BlobConfig(BackgroundSettings):
         "nats",
         "from pixels: log-likelihood of a template with full support; d^2 / 2 of its place is subtracted (ours)",
         "log",
-        before=10.0,
         sees="pixels",
     )
     track_support: float = param(
@@ -121,7 +117,6 @@ class BlobConfig(BackgroundSettings):
         (0.02, 0.8),
         "share",
         "from pixels: least foreground share in the part of a confirmed track's template that no other covers (ours)",
-        before=0.3,
         sees="pixels",
     )
     entry_support: float = param(
@@ -129,7 +124,6 @@ class BlobConfig(BackgroundSettings):
         (0.1, 0.9),
         "share",
         "from pixels: least support of the template of a new person or of a tentative track (ours)",
-        before=0.5,
         sees="pixels",
     )
     person_noise: float = param(
@@ -138,7 +132,6 @@ class BlobConfig(BackgroundSettings):
         "m",
         "from pixels: standard deviation of people's sizes about the size expected at their place (ours)",
         "log",
-        before=0.15,
         sees="pixels",
     )
     angle_noise: float = param(
@@ -147,7 +140,6 @@ class BlobConfig(BackgroundSettings):
         "deg",
         "from pixels: standard deviation of a measured direction, in addition to that of the blob's moments",
         "log",
-        before=8.0,
         sees="pixels",
     )
     angle_rate: float = param(
@@ -156,7 +148,6 @@ class BlobConfig(BackgroundSettings):
         "deg/s^0.5",
         "from pixels: random walk of the direction: its standard deviation after one second",
         "log",
-        before=15.0,
         sees="pixels",
     )
     most_foreground: float = param(
@@ -164,7 +155,6 @@ class BlobConfig(BackgroundSettings):
         (0.05, 1.0),
         "share",
         "from pixels: a frame with a larger share of foreground is not measured (ours)",
-        before=0.6,
         sees="pixels",
     )
 

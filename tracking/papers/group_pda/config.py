@@ -115,7 +115,6 @@ class GroupPdaConfig(BackgroundSettings):
         (0.0, 5.0),
         "",
         "from pixels: weight of colours in the log masses (future work of sec. 6; ours)",
-        before=0.0,
         sees="pixels",
     )
 
@@ -123,7 +122,10 @@ class GroupPdaConfig(BackgroundSettings):
         0.5, (0.05, 3.0), "m/s", "largest difference of velocities at which groups merge (ours, in place of SR_v)"
     )
     merge_doubt: float = param(
-        0.0, (0.0, 1.0), "", "standard deviations of the difference that are added to merge_velocity (ours)", before=0.0
+        0.0,
+        (0.0, 1.0),
+        "",
+        "standard deviations of the difference that are added to merge_velocity (ours)",
     )
     merge_time: float = param(
         0.5, (0.0, 3.0), "s", "time for which groups must be near with like velocities before they merge (ours)"
@@ -172,7 +174,6 @@ class GroupPdaConfig(BackgroundSettings):
         "s",
         "from points: time for which a missed member stands in at its predicted place; from both: a new group near a "
         "member measured so lately is its group's child (ours)",
-        before=0.0,
         sees="points",
     )
     carry_reach: float = param(
@@ -180,7 +181,6 @@ class GroupPdaConfig(BackgroundSettings):
         (0.05, 2.0),
         "m",
         "from points: a member is measured if a point is within this distance of its predicted place (ours)",
-        before=0.4,
         sees="points",
     )
 

@@ -6,9 +6,7 @@ writes; it names the command, the seeds and the scores of the fit.
 
 from __future__ import annotations
 
-import math
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -22,31 +20,14 @@ from tracking.detect.background_settings import BackgroundSettings
 FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8"))[
     "params"
 ]
-FITTED_MIXTURE: dict[str, float] = tomllib.loads(
-    Path(__file__).with_name("dirichlet_process.toml").read_text(encoding="utf-8")
-)["params"]
 TERMS = (
     "distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "bias",
 )  # fmt: skip
 """Terms of the event classifier, in the order of the features of group_events_kernels."""
-MIXTURE = ("concentration", "spread_degrees", "place_spread", "velocity_spread")
-"""Parameters of the Dirichlet process mixture, in the order of its slots in cluster_evidence_kernels."""
-
-
-def mixture_of(values: Mapping[str, float]) -> Array:
-    """Return the Dirichlet process mixture (4,), as cluster_evidence_kernels.LOG_NEW and the following; values: by the
-    names of MIXTURE."""
-    concentration, *rest = (values[name] for name in MIXTURE)
-    return np.array([math.log(concentration), *rest])
 
 
 def _weight(event: str, term: str, unit: str, meaning: str) -> Any:
     return param(FITTED[f"{event}_{term}"], (-100.0, 100.0), unit, f"{event}: {meaning}", tunable=False)
-
-
-def _mixture(name: str, values: tuple[float, float], unit: str, meaning: str) -> Any:
-    value = FITTED_MIXTURE[name]
-    return param(value, values, unit, f"Dirichlet process: {meaning} (ours)", "log", before=value)
 
 
 @dataclass(frozen=True)
@@ -109,7 +90,6 @@ class JointConfig(BackgroundSettings):
         (0.0, 1.0),
         "share",
         "of the group's mean velocity in a member's motion, the rest is the own velocity; 1: eq. 5 (below 1: ours)",
-        before=1.0,
     )
     point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")
     pixel_noise: float = param(
@@ -128,27 +108,14 @@ class JointConfig(BackgroundSettings):
         sees="pixels",
     )
 
-    validity: str = param(
-        "davies-bouldin",
-        ("davies-bouldin", "bayesian"),
-        "",
-        "davies-bouldin: the paper's cluster validity; bayesian: log p(Z, X) of a Dirichlet process mixture (ours)",
-        "categorical",
-        before="davies-bouldin",
-    )
     validity_rate: float = param(
         20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"
     )
-    evidence_rate: float = param(
-        4.0,
+    belief_rate: float = param(
+        20.0,
         (0.0, 100.0),
         "1/s",
-        "of validity bayesian: weight of log p(Z, X) in p(Z | X), per second; splits and new people keep the "
-        "Davies-Bouldin index with validity_rate (ours)",
-        before=4.0,
-    )
-    belief_rate: float = param(
-        20.0, (0.0, 100.0), "1/s", "weight of the beliefs of pairs in log p(Z | X), per second (ours)", before=0.0
+        "weight of the beliefs of pairs in log p(Z | X), per second (ours)",
     )
     belief_memory: float = param(
         0.2,
@@ -156,44 +123,11 @@ class JointConfig(BackgroundSettings):
         "share",
         "of the belief's `stay`, which is added for people who were reported in one group, and of `come`, which is "
         "taken from the others (ours)",
-        before=0.0,
-    )
-    normaliser: str = param(
-        "energy",
-        ("energy", "sampled"),
-        "",
-        "energy: eq. 4 as printed; sampled: p(Z | X) has the mean 1 over the partitions of a particle (ours)",
-        "categorical",
     )
     scatter: float = param(
         0.5, (0.05, 2.0), "m", "s_0: prior scatter of a cluster, as of one person more (ours)", "log"
     )
     apart: float = param(2.0, (0.5, 10.0), "m", "D_0: distance of a virtual other cluster (ours)", "log")
-
-    partition_dynamics: str = param(
-        "classifier",
-        ("classifier", "dirichlet"),
-        "",
-        "classifier: merges and splits of groups; dirichlet: labels of people drawn from an online Dirichlet process "
-        "mixture (ours, after the authors' later paper)",
-        "categorical",
-        online=False,
-        before="classifier",
-    )
-    concentration: float = _mixture(
-        "concentration", (1e-8, 10.0), "1/(m^2 (m/s)^2)", "c, concentration times the density of the prior of means"
-    )
-    spread_degrees: float = _mixture(
-        "spread_degrees", (0.5, 1000.0), "", "nu, degrees of freedom of the prior of a component's variance of places"
-    )
-    place_spread: float = _mixture("place_spread", (0.05, 5.0), "m", "s, scale of this prior, per axis")
-    velocity_spread: float = _mixture(
-        "velocity_spread", (0.02, 5.0), "m/s", "s_v, standard deviation of velocities in a component, per axis"
-    )
-    redraw_rate: float = param(
-        1.0, (0.05, 20.0), "1/s", "Dirichlet process: rate at which a person's label is drawn anew (ours)", "log",
-        before=1.0,
-    )  # fmt: skip
 
     lag: float = param(
         0.4, (0.05, 3.0), "s",
@@ -272,11 +206,6 @@ class JointConfig(BackgroundSettings):
     def scales(self) -> Array:
         """The scales (2,) of the validity, as partition_kernels has them: s_0, D_0."""
         return np.array([self.scatter, self.apart])
-
-    @property
-    def mixture(self) -> Array:
-        """The Dirichlet process mixture (4,), as mixture_of has it."""
-        return mixture_of({name: getattr(self, name) for name in MIXTURE})
 
     def rules(self, dt: float, lag: float) -> Array:
         """Return the rules (6,) of events in a step of dt s, as group_events_kernels has them.

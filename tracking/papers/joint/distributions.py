@@ -10,14 +10,8 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.filters.person_streams import NOBODY, Keys, PersonStreams
-from tracking.papers.joint import (
-    cluster_evidence_kernels,
-    dirichlet_process_kernels,
-    group_events_kernels,
-    partition_kernels,
-)
+from tracking.papers.joint import group_events_kernels, partition_kernels
 from tracking.papers.joint.config import JointConfig
-from tracking.papers.joint.decentralised_filter import log_sum
 from tracking.papers.joint.individuals import Proposal, precision_of, process_noise
 from tracking.papers.joint.individuals_kernels import group_dynamics, own_dynamics
 
@@ -90,19 +84,12 @@ class FrameModel:
         return np.asarray(out - own.sum(axis=1)[:, None])
 
     def groups(self, new: Array, x: Array, z: Ints) -> Ints:
-        """Step 7: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7, or the Dirichlet process (ours); uniform over all
-        partitions in VAR2 and VAR3."""
+        """Step 7: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7; uniform over all partitions in VAR2 and VAR3."""
         c, shape = self.config, z.shape
         out = z.copy()
         if c.variant in ("VAR2", "VAR3"):
             partition_kernels.uniform_partitions(
                 stam_cumulated(shape[2]), self._of_partitions(shape, np.append(self.key, NOBODY), 1)[..., 0], out
-            )  # fmt: skip
-            return out
-        if c.partition_dynamics == "dirichlet":
-            chance = np.full(shape[2], -math.expm1(-c.redraw_rate * self.dt))
-            dirichlet_process_kernels.propose(
-                newest(new), out, chance, self._of_partitions(shape, self.key, 2), c.mixture
             )  # fmt: skip
             return out
         late, early = newest(new), np.ascontiguousarray(x[..., -STATE:])
@@ -119,25 +106,19 @@ class FrameModel:
         return drawn.reshape(shape[0], shape[1], len(key), columns)
 
     def energy(self, new: Array, z: Ints) -> Array:
-        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), or log p(Z_t, X_t) of the Dirichlet process mixture
-        (ours), both with a weight per second, plus the belief of the pairs in one group (ours); 0 in VAR3."""
+        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), per second, plus the belief of the pairs in one group
+        (ours); 0 in VAR3."""
         c = self.config
         out = np.zeros(z.shape[:2])
         if c.variant == "VAR3":
             return out
-        if c.validity == "bayesian":
-            cluster_evidence_kernels.log_evidences(newest(new), z, c.mixture, out)
-            out *= c.evidence_rate * self.dt
-        else:
-            partition_kernels.validities(newest(new), z, c.scales, out)
-            out *= -c.validity_rate * self.dt
+        partition_kernels.validities(newest(new), z, c.scales, out)
+        out *= -c.validity_rate * self.dt
         if c.belief_rate > 0:
             worth = np.empty_like(out)
             partition_kernels.pair_sums(self.belief, z, worth)
             out += c.belief_rate * self.dt * worth
-        if c.normaliser == "sampled":
-            out -= log_sum(out)[:, None] - math.log(z.shape[1])
-        return np.asarray(out)
+        return out
 
 
 def newest(x: Array) -> Array:

@@ -30,9 +30,6 @@ Departures, all ours:
 - People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
   features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
 - p(Z | X) also has the beliefs of pairs (`tracking.grouping.pair_belief`), with a memory of the groups reported.
-- Options: log p(Z, X) of a Dirichlet process mixture as cluster validity (cluster_evidence_kernels), and the process in
-  place of events (dirichlet_process_kernels), as the authors have it later: Bazzani, Zanotto, Cristani, Murino, "Joint
-  individual-group modeling for tracking", IEEE PAMI 37(4), 2015. Both are reconstructions.
 - In eq. 5 a member moves with a share of the group's velocity and the rest of the own one.
 - The partition is that of least Binder loss. A member who is missed stays. Ids follow the identity rule; onsets of
   events are dated back.
@@ -57,11 +54,11 @@ from tracking.papers.joint import decentralised_filter, estimate, partition_kern
 from tracking.papers.joint.belief_memory import remembered
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
-from tracking.papers.joint.distributions import BIRTHS, PARTITIONS, RESAMPLING, STATE, FrameModel
+from tracking.papers.joint.distributions import BIRTHS, PARTITIONS, PLACING, RESAMPLING, STATE, FrameModel, newest
+from tracking.papers.joint.division_kernels import place_newcomers
 from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
-from tracking.papers.joint.placement import place
 from tracking.papers.joint.reported_events import OWN_EVENTS, ReportedEvents
 
 
@@ -253,7 +250,10 @@ class Joint:
         self.belief.add(self.nested.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
         self.health.add(past.shape[1])
         if c.newcomers == "validity":
-            place(self.nested, c, self.frames * self.dt, self.streams, key)
+            n = self.nested
+            drawn = self.streams.uniforms(PLACING, key, n.log_q.size, 2).reshape(*n.log_q.shape, len(key), 2)
+            uniforms = np.ascontiguousarray(drawn[..., 0])
+            place_newcomers(newest(n.x), n.z, uniforms, c.validity_rate * self.frames * self.dt, c.scales)
 
     def _report(self, frame: Frame, seen: Bools) -> Tracks:
         """Returns the Tracks of the frame, on the ground in m, in the image in px; seen (K,): who was measured."""

@@ -50,7 +50,6 @@ class ParticleConfig(BackgroundSettings):
         (0.0, 3.0),
         "",
         "resampled particles are drawn apart by a kernel of so many optimal widths; 0: none (ours)",
-        before=0.0,
     )
     weights: str = param(
         "factorised",
@@ -58,7 +57,6 @@ class ParticleConfig(BackgroundSettings):
         "",
         "factorised: people have weights of their own (ours); joint: a particle has one weight (the paper)",
         "categorical",
-        before="joint",
     )
 
     noise_scale: float = param(
@@ -117,7 +115,6 @@ class ParticleConfig(BackgroundSettings):
         (0.0, 0.6),
         "m",
         "half the width of a body that hides others from a known camera; 0: nobody does (ours)",
-        before=0.0,
     )
     detect_prob: float = param(
         0.95, (0.3, 1.0), "probability", "that a person who was measured in the last frame is measured (ours)"
@@ -153,7 +150,6 @@ class ParticleConfig(BackgroundSettings):
         "left out; whole: each blob is one detection (ours)",
         "categorical",
         sees="pixels",
-        before="whole",
     )
     most_foreground: float = param(
         0.6,
@@ -213,7 +209,6 @@ class RelationalConfig(ParticleConfig):
         "s",
         "time constant with which people who walk together approach their mean velocity (ours); 0: they have it "
         "(sec. 3.2)",
-        before=0.0,
     )
     common_noise: float = param(
         0.8,
@@ -221,7 +216,6 @@ class RelationalConfig(ParticleConfig):
         "share",
         "of the variance of the velocity's noise, that people who walk together have in common (ours); 0: none "
         "(sec. 3.2)",
-        before=0.0,
     )
     relation_evidence: str = param(
         "belief",
@@ -231,7 +225,6 @@ class RelationalConfig(ParticleConfig):
         "so far; state: their distance and velocity difference in the particle (ours)",
         "categorical",
         online=False,
-        before="state",
     )
     relation_rate: float = param(
         1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"

@@ -104,7 +104,7 @@ class StereoConfig(BackgroundSettings):
         0.15, (0.05, 20.0), "m",
         "from pixels: a feature counts in the mean by the inverse of the features' density on the ground, with a "
         "kernel of this standard deviation; the largest: all features nearly alike (ours)",
-        "log", before=20.0, sees="pixels",
+        "log", sees="pixels",
     )  # fmt: skip
 
     radius: float = param(

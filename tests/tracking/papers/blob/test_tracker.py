@@ -281,7 +281,8 @@ def test_pieces_are_found_by_a_track_narrower_than_one_always_seen():
 
 
 @pytest.mark.parametrize(
-    "config", [BlobConfig(), BlobConfig.frozen(), BlobConfig(confirm_ratio=1.05, tentative_time=0.1)]
+    "config",
+    [BlobConfig(), BlobConfig(association="nearest", gate=0.99), BlobConfig(confirm_ratio=1.05, tentative_time=0.1)],
 )
 @pytest.mark.parametrize("fps", [2.5, 7.0, 10.0, 25.0])
 def test_whoever_is_always_seen_is_confirmed(config, fps):

@@ -317,12 +317,6 @@ def test_no_id_is_used_twice_and_events_speak_of_known_ones() -> None:
     assert len(gone) >= 4
 
 
-def test_the_first_defaults_stand_in_a_file() -> None:
-    first = GroupPdaConfig.frozen()
-    assert (first.carry_time, first.merge_velocity, first.pixel_radius) == (0.0, 0.5, 0.4)
-    assert ids(track(crossing(0), first)) == {1, 2}
-
-
 def clouds(seed: int, speed: float, count: int = 40) -> list[Array]:
     """Two clouds of points that fly through each other; speed: the difference of their velocities, m/s."""
     r = np.random.default_rng(seed)
