@@ -32,7 +32,6 @@ ABLATIONS: dict[str, dict[str, object]] = {
     "blob": {},
     "no splitting, no person size": {"split": False},
     "nearest": {"association": "nearest"},
-    "axes hardly expected (5 m)": {"person_noise": 5.0},
     MOG2: {},
     "preset `paper`": dict(BlobConfig.preset("paper").as_dict()),
 }

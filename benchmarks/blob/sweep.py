@@ -50,7 +50,7 @@ SWEEPS = {
         {str(d): [f"light.shadow={d}"] for d in (0, 0.3, 0.5, 0.7)},
         {
             "pixels": PIXELS,
-            "no shadow classes": ("image", {"dark": 1.0, "bright": 1.0}),
+            "no shadow class": ("image", {"dark": 1.0}),
             MOG2: PIXELS,
         },
     ),
@@ -69,8 +69,7 @@ SWEEPS = {
         },
         {
             "pixels": PIXELS,
-            "no global gain": ("image", {"gain": "none"}),
-            "one rate, 20 s": ("image", {"foreground_time": 20.0}),
+            "as trained": ("image", {"background": "trained"}),
         },
     ),
 }

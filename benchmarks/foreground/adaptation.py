@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,21 +13,34 @@ import cv2
 import numpy as np
 
 from benchmarks.support.chart import Panel, lines
+from benchmarks.support.replaced_code import replaced_code
 from scenarios import load
 from sim import simulate
 from sim.types import Sequence
+from tracking.detect import background
 from tracking.detect.background import BACKGROUND, Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
 
 SECONDS, CHANGE, DRAWN = 900, 60, 6
 """s: length of the video, time of the change, step between drawn points."""
 RATES = {
-    "two rates: 20 s, 200 s": BackgroundSettings(),
-    "one rate: 20 s": BackgroundSettings(foreground_time=20.0),
-    "one rate: 200 s": BackgroundSettings(background_time=200.0),
-    "20 s, foreground left alone": BackgroundSettings(foreground_time=1e9),
+    "two rates: 20 s, 200 s": (20.0, 10.0),
+    "one rate: 20 s": (20.0, 1.0),
+    "one rate: 200 s": (200.0, 1.0),
+    "20 s, foreground left alone": (20.0, math.inf),
 }
-GAINS = {"two rates: 20 s, 200 s": BackgroundSettings(), "gain not followed": BackgroundSettings(gain="none")}
+"""Time constant of background pixels, s, and how many times as slowly foreground adapts."""
+
+
+class FixedGain(Background):
+    """The model without the gain of each frame."""
+
+    def _estimate_gain(self, image: np.ndarray) -> np.ndarray:
+        del image
+        return self.gain
+
+
+GAINS = {"two rates: 20 s, 200 s": Background, "gain not followed": FixedGain}
 Alter = Callable[[np.ndarray, int], np.ndarray]
 """An empty frame and its time, s, to the frame with the change."""
 
@@ -64,15 +78,17 @@ def _empty_frames(sample: np.ndarray, seed: int) -> Iterator[np.ndarray]:
 
 
 def _foreground_share(
-    sample: np.ndarray, frames: Iterator[np.ndarray], where: np.ndarray, settings: BackgroundSettings,
+    sample: np.ndarray, frames: Iterator[np.ndarray], where: np.ndarray, rates: tuple[float, float],
     protected: np.ndarray | None = None,
 ) -> list[float]:  # fmt: skip
     """Returns the share of the pixels `where` that is called foreground, one value per frame."""
-    model, curve = Background(sample, 1.0, settings), []
-    for frame in frames:
-        classes = model.classify(frame)
-        curve.append(float(fused_foreground(classes)[where].mean()))
-        model.adapt(frame, classes, protected)
+    time, slower = rates
+    model, curve = Background(sample, 1.0, BackgroundSettings(background_time=time)), []
+    with replaced_code([(background, "FOREGROUND_SLOWER", slower)]):
+        for frame in frames:
+            classes = model.classify(frame)
+            curve.append(float(fused_foreground(classes)[where].mean()))
+            model.adapt(frame, classes, protected)
     return curve
 
 
@@ -102,7 +118,7 @@ def _changes(seed: int) -> list[Panel]:
         return np.where((mask & (t >= CHANGE))[..., None], shown, frame)
 
     wide = cv2.dilate(mask.astype(np.uint8), np.ones((9, 9), np.uint8)).astype(bool)
-    protected = {"two rates, place protected": (BackgroundSettings(), wide)}
+    protected = {"two rates, place protected": ((20.0, 10.0), wide)}
     return [
         _panel("A lamp is switched on", with_lamp, _spot(size) > 0.5, sample, seed),
         _panel("A thing is carried away", with_thing, thing, sample, seed),
@@ -112,15 +128,15 @@ def _changes(seed: int) -> list[Panel]:
 
 def _panel(
     title: str, alter: Alter, where: np.ndarray, sample: np.ndarray, seed: int,
-    more: dict[str, tuple[BackgroundSettings, np.ndarray]] | None = None,
+    more: dict[str, tuple[tuple[float, float], np.ndarray]] | None = None,
 ) -> Panel:  # fmt: skip
-    """Returns the curves of one change; more: further curves, by settings and protected pixels."""
+    """Returns the curves of one change; more: further curves, by rates and protected pixels."""
     trained = np.stack([alter(frame, 0) for frame in sample])
-    ways = {name: (settings, None) for name, settings in RATES.items()} | (more or {})
+    ways = {name: (rates, None) for name, rates in RATES.items()} | (more or {})
     curves = {}
-    for name, (settings, protected) in ways.items():
+    for name, (rates, protected) in ways.items():
         frames = (alter(f, t) for t, f in zip(range(SECONDS), _empty_frames(sample, seed), strict=False))
-        curves[name] = _foreground_share(trained, frames, where, settings, protected)
+        curves[name] = _foreground_share(trained, frames, where, rates, protected)
     _print_times(title, curves)
     drawn = {name: curve[::DRAWN] for name, curve in curves.items()}
     return Panel(title, range(0, SECONDS, DRAWN), drawn, "s", "share called foreground", (0.0, 1.02))
@@ -140,8 +156,8 @@ def _changing_light(seed: int) -> Panel:
     sequence = _simulated("lights", seed)
     sample = sequence.background()
     curves: dict[str, list[float]] = {}
-    for name, settings in GAINS.items():
-        model, curve = Background(sample, sequence.fps, settings), []
+    for name, kind in GAINS.items():
+        model, curve = kind(sample, sequence.fps), []
         for frame in sequence:
             classes = model.classify(frame.image)
             model.adapt(frame.image, classes)

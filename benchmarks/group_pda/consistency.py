@@ -1,11 +1,11 @@
 """Mode `consistency` of `benchmarks.group_pda`: do the covariances of the centroid's filter match its errors?
 
 The centroid of one group moves by the filter's own model: constant velocity and white acceleration. Its members are
-    redrawn   all drawn anew in each frame, Gaussian about the centroid; the filter `centroid_noise = "redrawn"` fits
-    fixed     at fixed offsets of mean 0, each seen with probability 0.75; the filter `centroid_noise = "people"` fits
+    redrawn   all drawn anew in each frame, Gaussian about the centroid; the filter without `corrections` fits
+    fixed     at fixed offsets of mean 0, each seen with probability 0.75; the filter with `corrections` fits
     spaced    as fixed, but 0.75 m apart as people are, not Gaussian about the centroid
-Redrawn and fixed members are also tracked by the other filter, which should fall outside its bands; there the miss
-hypothesis is off, because it would lose the group. Missed members are carried along in the last rows only. Columns:
+Redrawn and fixed members are also tracked by the other filter, which should fall outside its bands. Missed
+members are carried along in the last rows only. Columns:
 normalised estimation error squared (NEES) at single frames over independent runs, of the state (position, velocity;
 expected 4) and of the position alone (2); normalised innovation squared (NIS; 2) and autocorrelations r of the
 innovations (0), over all frames from the first of these on. Brackets: 95 % bands; * outside.
@@ -36,13 +36,13 @@ PLAIN: Mapping[str, object] = {"carry_time": 0.0}
 ALL_SEEN: Mapping[str, object] = {"detect_prob": 1.0}
 SOME_SEEN: Mapping[str, object] = {"detect_prob": SEEN}
 CASES: Mapping[str, tuple[str, int, Mapping[str, object]]] = {
-    "redrawn members, filter redrawn": ("redrawn", PEOPLE, {**PLAIN, **ALL_SEEN, "centroid_noise": "redrawn"}),
+    "redrawn members, filter redrawn": ("redrawn", PEOPLE, {**PLAIN, **ALL_SEEN, "corrections": False}),
     "fixed members, filter people": ("fixed", PEOPLE, {**PLAIN, **SOME_SEEN}),
-    "mismatch: redrawn members, filter people": ("redrawn", PEOPLE, {**PLAIN, **ALL_SEEN, "miss": False}),
+    "mismatch: redrawn members, filter people": ("redrawn", PEOPLE, {**PLAIN, **ALL_SEEN}),
     "mismatch: fixed members, filter redrawn": (
         "fixed",
         PEOPLE,
-        {**PLAIN, **SOME_SEEN, "miss": False, "centroid_noise": "redrawn"},
+        {**PLAIN, **SOME_SEEN, "corrections": False},
     ),
     "4 spaced members, the unseen carried along": ("spaced", 4, SOME_SEEN),
     "9 spaced members, the unseen carried along": ("spaced", 9, SOME_SEEN),

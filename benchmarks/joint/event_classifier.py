@@ -22,7 +22,7 @@ from tracking.fitting.joint_events import (
     event_scores,
     log_probabilities,
 )
-from tracking.papers.joint.config import FITTED, TERMS, JointConfig
+from tracking.papers.joint.config import FITTED, JointConfig
 
 CHORD = 0.5  # s over which velocities of boxes are measured
 
@@ -49,7 +49,7 @@ def report(title: str, parts: Iterable[EventRows], fps: float) -> None:
     tables.table(
         "weight of each feature times its standard deviation over the rows",
         "",
-        TERMS,
+        [f"{name}, {when}" for when in ("early", "late") for name in ("distance", "velocity", "spread")] + ["constant"],
         {name: [f"{w:+.2f}" for w in row] for name, row in zip(CLASSES, weights, strict=False)},
     )
     most = log_probabilities(rows, FITTED).argmax(axis=1)

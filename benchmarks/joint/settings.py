@@ -29,7 +29,7 @@ COUNTS = (10, 25, 50, 100)
 DEPARTURES = (
     "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
     "size_std=1.5", "size_std=50", "lag=0.1",
-    "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
+    "algorithm=paper", "alpha=0", "alpha=0.5", "algorithm=paper size_std=1.5",
     "estimate=histogram",
 )  # fmt: skip
 """Settings of the mode ablation."""

@@ -20,7 +20,7 @@ from tracking.detect import divided_blobs
 from tracking.prepare import prepare
 
 SETTINGS = (
-    "", "blobs=whole", "pixel_noise=0.08", "pixel_noise=0.3", "FEWEST=0", "FEWEST=0.5", "MOST=0.5", "MOST=1", "LEAST=0",
+    "", "pixel_noise=0.08", "pixel_noise=0.3", "FEWEST=0", "FEWEST=0.5", "MOST=0.5", "MOST=1", "LEAST=0",
     "LEAST=0.5",
 )  # fmt: skip
 """Parameters in small letters; constants of tracking.detect.divided_blobs in capitals."""

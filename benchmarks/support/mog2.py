@@ -63,5 +63,5 @@ class Mog2:
 
 def background_model(curve: str) -> AbstractContextManager[None]:
     """Returns a context within which trackers from pixels use MOG2 if the curve is named so, else the five classes."""
-    mog2 = [(foreground, "Background", Mog2), (foreground, "NEVER", 0.0)]  # ghosts are not looked for
+    mog2 = [(foreground, "Background", Mog2), (foreground, "Ghosts", lambda *_: None)]  # ghosts are not looked for
     return replaced_code(mog2 if curve == MOG2 else [])

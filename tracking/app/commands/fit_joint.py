@@ -38,6 +38,5 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
     body = [f"{name} = {value}" for name, value in params.items()]
     text = "\n".join([*(f"# {line}" for line in (words, *lines)), 'tracker = "joint"', "", "[params]", *body, ""])
     write_file(out, text.encode())
-    shown = [f"{name:<22}  {value:9.4f}" for name, value in params.items()]
-    result = "\n".join([*lines, "", *shown, "", f"→ {out}: use it as --params {out}"])
+    result = "\n".join([*lines, "", *body, "", f"→ {out}: use it as --params {out}"])
     return CommandResult({"file": out, "params": params, **scores}, result)

@@ -20,6 +20,7 @@ from tracking.filters import kalman, track_uncertainty
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.track_management import LARGEST_SCALE, TrackedPeople
 
+ANGLE_RATE = 15.0  # deg/s^0.5, random walk of the direction: its standard deviation after one second
 RELAXATION = 0.5  # s, time constant with which axes return to the expected ones
 HEADING = 6.0  # seen from straight above, the direction turns with the heading: so many times faster than a body leans
 
@@ -43,7 +44,7 @@ class TrackedEllipses(TrackedPeople):
         they are."""
         super().follow(config, dynamics)
         self.largest_log_det += 2 * dynamics.noise.size * np.log(LARGEST_SCALE)
-        rate = config.angle_rate * (HEADING if self.top else 1.0)
+        rate = ANGLE_RATE * (HEADING if self.top else 1.0)
         self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
 
     def predict(self) -> None:

@@ -14,7 +14,7 @@ from sim.types import Array, Bools, Detections, Frame, Ints
 from tracking import image_scale
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
-from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.track_management import TrackedPeople
 
 INSIDE = 0.8  # share of a box that must lie in a larger predicted box to be a piece of that track's person
@@ -38,7 +38,7 @@ class BoxUpdater:
 
         self.config = config
         self.noise, self.asymptote = self.people.noise, self.people.asymptote
-        shares = 1 - np.array([config.gate, config.orphan_gate, config.confirm_gate])
+        shares = 1 - np.array([config.gate, config.orphan_gate, CONFIRM_GATE])
         self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)  # largest d^2 at these shares (eq. 10)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:

@@ -27,11 +27,16 @@ from tracking.detect.foreground import Foreground
 from tracking.detect.person_size import PersonSize
 from tracking.filters import kalman
 from tracking.papers.blob import blob_pieces, box_geometry, new_people
-from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 from tracking.papers.blob.measured_ellipses import Measured
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 
+EVIDENCE = 10.0  # nats, log-likelihood of a template with full support; d^2 / 2 of its place is subtracted
+TRACK_SUPPORT = 0.3  # least foreground share in the part of a confirmed track's template that no other covers
+ENTRY_SUPPORT = 0.5  # least support of the template of a new person or of a tentative track
+PERSON_NOISE = 0.15  # m, standard deviation of people's sizes about the size expected at their place
+ANGLE_NOISE = np.radians(8.0) ** 2  # rad^2, variance of a measured direction beside that of the blob's moments
 SHARED = 0.35  # share of a predicted box that a blob's box must cover for the track to be expected in the blob
 UPRIGHT = 25.0  # deg, standard deviation of the direction of a person measured by an upright template
 EXTENT = 0.75, 1.3  # least and largest height and width of a template relative to the expected person
@@ -44,8 +49,8 @@ class PixelUpdater:
 
     State: foreground, the pipeline with its background model; size, the size of a person at each place; people, the
     table of tracks; config; context, of the sequence; gates, confirm_gates (2,): largest squared Mahalanobis distance
-    d^2, without and with direction, of an association and of a measurement that may confirm a track; angle_noise:
-    variance of a measured direction, rad^2; upright_var: that of an upright template, inf from straight above.
+    d^2, without and with direction, of an association and of a measurement that may confirm a track; upright_var:
+    variance of the direction of an upright template, rad^2, inf from straight above.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:
@@ -61,7 +66,7 @@ class PixelUpdater:
             image_scale.required(context.px_per_m)
         self.people, self.context = people, context
         self.size = PersonSize(context)
-        self.foreground = Foreground(context, config, config.most_foreground)
+        self.foreground = Foreground(context, config)
         self.foreground.learn_person_size(self.size, context.background)
         self._take_scale()
         self.upright_var = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
@@ -70,19 +75,16 @@ class PixelUpdater:
     def follow(self, config: BlobConfig) -> None:
         """Replace the config, which `people` must follow already; background and person size stay as learned. Gates are
         computed anew."""
-        self.foreground.follow(config, config.most_foreground)
+        self.foreground.follow(config)
         self._set(config)
 
     def _set(self, config: BlobConfig) -> None:
-        """Keep the config and compute from it the gates (largest d^2, squared Mahalanobis distance, without and with
-        direction) and angle_noise, the variance of a measured direction, rad^2."""
         from scipy.special import chdtri
 
         self.config = config
         # largest d^2 at these shares, for 4 degrees of freedom (no direction) and 5 (eq. 10)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
-        self.confirm_gates = chdtri(np.array([4, 5]), 1 - config.confirm_gate)
-        self.angle_noise = np.radians(config.angle_noise) ** 2
+        self.confirm_gates = chdtri(np.array([4, 5]), 1 - CONFIRM_GATE)
 
     def _take_scale(self) -> None:
         """If the context has no scale (nan), use the learned one, px per m, for foreground and tracks; the context
@@ -97,7 +99,7 @@ class PixelUpdater:
     def step(self, frame: Frame, detections: Detections | None) -> None:
         """Update the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used.
 
-        If the picture is missing or implausible (more than most_foreground of it is foreground), no track is measured.
+        If the picture is missing or implausible (too much of it is foreground), no track is measured.
         An implausible picture still adapts the background. Raises InputError if the picture's size or dtype is not that
         of the background sample; the tracks are then already predicted.
         """
@@ -148,12 +150,12 @@ class PixelUpdater:
         associated; with `split`, and once the size of people is reliable, other foreground is divided among the tracks
         by templates (upright ellipses). Else all blobs are associated. Foreground that no track explains starts tracks.
         """
-        people, c = self.people, self.config
+        people = self.people
         expected = people.upright_boxes()
-        split = c.split and self.size.reliable
+        split = self.config.split and self.size.reliable
         lone = self._lone_people(found, expected) if split else np.ones(len(found), bool)
         columns = lone.nonzero()[0]
-        z, angle_var = found.ellipse[columns], found.angle_var[columns] + self.angle_noise
+        z, angle_var = found.ellipse[columns], found.angle_var[columns] + ANGLE_NOISE
         made, taken, d2 = self._associate(z, angle_var)
         unexplained = np.delete(z, taken, 0)
         if not split:
@@ -165,7 +167,7 @@ class PixelUpdater:
             scene.mark_explained(found.label, columns)
             for confirmed in (True, False):
                 made = made.joined(self._measure_by_templates(scene, expected, made.rows, confirmed))
-            entered = box_geometry.centred(new_people.find_new_people(scene, self.size, c.entry_support))
+            entered = box_geometry.centred(new_people.find_new_people(scene, self.size, ENTRY_SUPPORT))
             unexplained = np.concatenate([unexplained, self._person_ellipses(entered)])
         away = people.update(made.rows, made.z, made.noise, made.angle_var)
         if split:
@@ -179,12 +181,12 @@ class PixelUpdater:
     def _relax_sizes(self) -> None:
         """Move the axes of all tracks, in place, a step towards those of a person at their places.
 
-        Axes do not change where a person's size is unknown. `person_noise` (m) is the spread of people about it.
+        Axes do not change where a person's size is unknown.
         """
         at = box_geometry.standing(self.people.upright_boxes())
         axes = self.size.axes(at[:, :2])
         rows = np.flatnonzero(np.isfinite(axes).all(1))
-        self.people.relax_axes(rows, -np.sort(-axes[rows]), self.config.person_noise**2)
+        self.people.relax_axes(rows, -np.sort(-axes[rows]), PERSON_NOISE**2)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
         """Returns flags (M,): True for each blob of `found` that is taken for one person.
@@ -258,7 +260,7 @@ class PixelUpdater:
         for row in np.unique(owner[owner >= 0]).tolist():
             mine = (owner == row) | (np.arange(len(found)) == own.get(row, -1))
             whole, var = blob_pieces.union(found.area[mine], found.ellipse[mine])
-            z, angle_var = whole[None], np.array([var + self.angle_noise])
+            z, angle_var = whole[None], np.array([var + ANGLE_NOISE])
             if self.size.reliable and not self.size.one_person(blob_pieces.hull(found.box[mine]), z)[0]:
                 continue
             away = self._gated(self.people.innovations(z, self._gated_direction(angle_var))[0], angle_var)[row, 0]
@@ -281,7 +283,7 @@ class PixelUpdater:
         whose template has too little support (foreground of its own) is left out. The variances grow with the inverse
         square of the visible share; those of h and w are BLIND = 25 times larger still.
         """
-        people, c = self.people, self.config
+        people = self.people
         open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == confirmed), rows)
         at = box_geometry.standing(self._person_boxes(expected[open_rows]))
         size = self.size.at(at[:, :2])
@@ -289,8 +291,8 @@ class PixelUpdater:
         at[:, 2:] = np.clip(at[:, 2:], EXTENT[0] * size, EXTENT[1] * size)
         var = (people.bank[kalman.VAR, open_rows] + people.noise)[:, :2]
         spread = np.sqrt(var) * people.scale[open_rows, None]
-        at = scene.fit_places(at, spread, c.evidence)
-        keep = scene.prune(at, c.track_support if confirmed else c.entry_support, pieces=confirmed)
+        at = scene.fit_places(at, spread, EVIDENCE)
+        keep = scene.prune(at, TRACK_SUPPORT if confirmed else ENTRY_SUPPORT, pieces=confirmed)
         at = at[keep]
         support, visible = scene.support(at), scene.visible_share(at)
         noise = people.noise / np.maximum(visible, LEAST_SHOWN)[:, None] ** 2

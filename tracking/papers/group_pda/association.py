@@ -16,7 +16,7 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.components import linked
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.group_bank import GroupBank
-from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 FASTEST = 2.0
 """m/s: nobody walks faster than this relative to a group (walking distance)."""
@@ -57,10 +57,10 @@ def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:
     """Return the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2).
 
     Departure: the paper's is Sigma alone. H P H' is the part of P for the centroid, r the standard deviation of a
-    point, I the unit matrix. w grows at `split_speed` while a group has no feasible association. bank: of the G
+    point, I the unit matrix. w grows at SPLIT_SPEED while a group has no feasible association. bank: of the G
     groups. In the squared unit of the points.
     """
-    wider = np.square(scaled.scale * scaled.config.split_speed * bank.null_time)
+    wider = np.square(scaled.scale * (SPLIT_SPEED if scaled.config.corrections else 0.0) * bank.null_time)
     return np.asarray(bank.extent + bank.P[:, :2, :2] + (scaled.point_sd**2 + wider)[:, None, None] * np.eye(2))
 
 

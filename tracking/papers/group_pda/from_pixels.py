@@ -17,6 +17,8 @@ from tracking.papers.group_pda.config import GroupPdaConfig
 
 WIDTH_PER_HEIGHT = 0.3
 """Width over height of a person in the image if there is no camera."""
+GRID = 0.1
+"""m: distance of the points of the grid."""
 LEAST_SINE_TILT = 0.2
 """Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured."""
 
@@ -35,18 +37,16 @@ class ForegroundPoints:
     def __init__(self, config: GroupPdaConfig, context: Context) -> None:
         assert context.background is not None
         self.config = config
-        self.foreground = Foreground(context, config, config.most_foreground)
+        self.foreground = Foreground(context, config)
         self.scale = required(_learned(self.foreground, context) if np.isnan(context.px_per_m) else context.px_per_m)
         self.foreground.px_per_m = self.scale
-        self.step = max(1, round(config.grid * self.scale))
+        self.step = max(1, round(GRID * self.scale))
         self.person = _person(context.camera, self.scale)
 
     def follow(self, config: GroupPdaConfig) -> None:
-        """Replace the config: settings of the background model and grid step change; what the model learned and the
-        scale stay."""
+        """Replace the config: settings of the background model change; what the model learned and the scale stay."""
         self.config = config
-        self.foreground.follow(config, config.most_foreground)
-        self.step = max(1, round(config.grid * self.scale))
+        self.foreground.follow(config)
 
     @property
     def people_per_point(self) -> float:
@@ -60,8 +60,7 @@ class ForegroundPoints:
         return np.asarray(np.eye(2) * np.square(self.person / 4), np.float64)
 
     def points(self, image: Image, outlines: list[Array]) -> Array | None:
-        """Return the grid points (M, 2) u, v in px that are foreground; None if more is foreground than
-        `most_foreground`.
+        """Return the grid points (M, 2) u, v in px that are foreground; None if too much is foreground.
 
         image (H, W, 3) BGR uint8. outlines: points (V, 2) u, v in px round each group. The background model learns from
         the picture except inside their convex hulls, so that people who stand still do not become background. M may be

@@ -15,7 +15,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_mass_kernels as kernels
-from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import SPEED_PRIOR, ScaledParameters
 
 LISTS = ("members", "recent_points")
 """Fields of GroupBank that are lists, not arrays."""
@@ -131,7 +131,7 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     points (M, 2); weights (M,): people that each point stands for; group (M,): 0, 1, … without gaps, or -1 for no
     group; t: time of the frame, s. Centroid and size are the weighted mean and sum. The extent is the covariance,
     shrunk towards the prior and divided by the gate factor (both ours). The centroid's variance is point_sd^2 (1 + 1 /
-    size), that of the velocity speed_prior^2. No member is `known` yet. The bank is empty if no point has a group.
+    size), that of the velocity SPEED_PRIOR^2. No member is `known` yet. The bank is empty if no point has a group.
     """
     count = int(group.max(initial=-1)) + 1
     if not count:
@@ -141,13 +141,13 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     people = np.asarray(np.bincount(g, w, count), float)
     mean = np.stack([np.bincount(g, w * y[:, a], count) for a in range(2)], 1) / people[:, None]
     d = y - mean[g]
-    prior, strength, c = scaled.constraint.prior, scaled.constraint.strength, scaled.config
+    prior, strength = scaled.constraint.prior, scaled.constraint.strength
     square = np.stack([np.bincount(g, w * d[:, a] * d[:, b], count) for a in range(2) for b in range(2)], 1)
     extent = (square.reshape(-1, 2, 2) + strength * prior) / (people + strength)[:, None, None]
     extent /= scaled.kernel_rules[kernels.GATE_FACTOR]
     P = np.zeros((count, 4, 4))
     P[:, [0, 1], [0, 1]] = (scaled.point_sd**2 / np.maximum(people, 1e-3))[:, None] + scaled.point_sd**2
-    P[:, [2, 3], [2, 3]] = (scaled.scale * c.speed_prior) ** 2
+    P[:, [2, 3], [2, 3]] = (scaled.scale * SPEED_PRIOR) ** 2
     many = np.bincount(g, minlength=count).tolist()
     members = [MemberPlaces(d[g == k], np.full(n, t), np.zeros(n, bool)) for k, n in enumerate(many)]
     zero, now = np.zeros(count), np.full(count, t)

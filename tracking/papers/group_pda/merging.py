@@ -138,7 +138,7 @@ def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float)
     close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
     close |= _linked(bank, rows, scaled)
     v, cov = bank.x[rows, 2:], bank.P[rows, 2:, 2:]
-    alike = alike_velocities(v[:, None] - v, cov[:, None] + cov, scaled.config.merge_doubt, scaled)
+    alike = alike_velocities(v[:, None] - v, cov[:, None] + cov, 0.0, scaled)
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]

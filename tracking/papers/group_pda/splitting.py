@@ -17,7 +17,7 @@ from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.event_onsets import split_onset
 from tracking.papers.group_pda.group_bank import GroupBank, newborn
 from tracking.papers.group_pda.missed_members import thinned
-from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 
 def split(
@@ -65,16 +65,15 @@ def children(
 
     points (M, 2), weights (M,): people each stands for; group (M,): part 0, 1, … of each point, -1 none; t: s. The
     parts are newborn from their points, without ids. Departures: they keep the parent's age and colours (a tentative
-    parent's `parent` and `origin`, too), and, with `inherit_velocity`, its velocity, with `split_speed` as further
+    parent's `parent` and `origin`, too), and, with `corrections`, its velocity, with SPLIT_SPEED as further
     standard deviation.
     """
-    c = scaled.config
     parts = newborn(points, weights, group, scaled, t)
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:] = bank.colour_hist[row]
     if bank.id[row] == NO_ID:
         parts.parent[:], parts.origin[:] = bank.parent[row], bank.origin[row]
-    if c.inherit_velocity:
+    if scaled.config.corrections:
         parts.x[:, 2:] = bank.x[row, 2:]
-        parts.P[:, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * c.split_speed) ** 2 * np.eye(2)
+        parts.P[:, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
     return parts

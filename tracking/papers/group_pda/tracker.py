@@ -245,7 +245,7 @@ class GroupPda:
         bank = self.bank
         region = search_regions(bank, scaled)
         d2 = gated_distances(bank, points, region, scaled, t)
-        owner = attached(points, d2, bank, scaled) if self.config.attach else np.full(len(points), -1)
+        owner = attached(points, d2, bank, scaled) if self.config.corrections else np.full(len(points), -1)
         claims = with_missed_members(claimed(points, weights, d2, owner, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         log_ratio = colour_log_ratio(bank, claims.d2, self.colours) if scaled.colour_bins else np.zeros((len(bank), 0))

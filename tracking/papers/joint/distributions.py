@@ -11,7 +11,7 @@ import numpy as np
 from sim.types import Array, Ints
 from tracking.filters.person_streams import NOBODY, Keys, PersonStreams
 from tracking.papers.joint import group_events_kernels, partition_kernels
-from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.config import SCALES, JointConfig
 from tracking.papers.joint.individuals import Proposal, precision_of, process_noise
 from tracking.papers.joint.individuals_kernels import group_dynamics, own_dynamics
 
@@ -52,7 +52,7 @@ class FrameModel:
         shape = x.shape[0], x.shape[1]
         normals = self.streams.normals(MOTION, self.key, shape[0], STATE)
         uniforms = self.streams.uniforms(CHOICES, self.key, shape[0], 1)[..., 0]
-        proposal = Proposal(self.sigma, self.noise, self.dt, c.alpha, c.proposal == "informed")
+        proposal = Proposal(self.sigma, self.noise, self.dt, c.alpha, c.own_weights)
         new, log_w = proposal.draw(old, self.z, normals, uniforms)
         if c.individuals == "measured":
             new, log_w = self._known(x, old), np.zeros(shape)
@@ -96,7 +96,7 @@ class FrameModel:
         uniforms = self._of_partitions(shape, self.key, 3)
         lag = x.shape[-1] // STATE * self.dt
         group_events_kernels.propose(
-            early, late, out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
+            early, late, out, uniforms, c.classifier, c.rules(self.dt, lag), SCALES
         )  # fmt: skip
         return out
 
@@ -112,7 +112,7 @@ class FrameModel:
         out = np.zeros(z.shape[:2])
         if c.variant == "VAR3":
             return out
-        partition_kernels.validities(newest(new), z, c.scales, out)
+        partition_kernels.validities(newest(new), z, SCALES, out)
         out *= -c.validity_rate * self.dt
         if c.belief_rate > 0:
             worth = np.empty_like(out)

@@ -52,7 +52,7 @@ from tracking.grouping.pair_belief import PairBelief
 from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
 from tracking.papers.joint.belief_memory import remembered
-from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SPEED_PRIOR, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import BIRTHS, PARTITIONS, PLACING, RESAMPLING, STATE, FrameModel, newest
 from tracking.papers.joint.division_kernels import place_newcomers
@@ -89,7 +89,7 @@ class Joint:
         """
         c, self.pixels, self.shown = self.config, None, np.zeros((0, 4))
         if context.background is not None:
-            self.pixels = ForegroundBlobs(c, c.most_foreground, context)
+            self.pixels = ForegroundBlobs(c, context)
             context = context.replace(px_per_m=self.pixels.scale)
         self.context = context
         self.frames = max(1, round(c.lag * context.fps))
@@ -112,7 +112,7 @@ class Joint:
         """
         if self.pixels is not None:
             if self.pixels.settings is not self.config:
-                self.pixels.follow(self.config, self.config.most_foreground)
+                self.pixels.follow(self.config)
             detections = self.pixels.detections(frame, self.shown)
         self.streams.frame += 1
         points, sizes = self._points(detections)
@@ -170,7 +170,7 @@ class Joint:
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
         mean, cov = estimate.moments(ahead, weights)
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
-        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, c.largest_distance)
+        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, LARGEST_DISTANCE)
 
     def _filter(self, z: Array) -> None:
         """Steps 4 to 7, 1 and 3; z (K, 2): measured places, nan for none."""
@@ -194,8 +194,8 @@ class Joint:
         if not people:
             return
         uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
-        self.health.weigh(nested, self.config.weights == "joint")
-        if self.config.weights == "joint":
+        self.health.weigh(nested, not self.config.own_weights)
+        if not self.config.own_weights:
             chosen = decentralised_filter.joint_indices(nested, float(uniforms[-1]))
             own = np.repeat(chosen[:, None], people, axis=1)
         else:
@@ -225,8 +225,8 @@ class Joint:
         are confirmed."""
         c, new, frame = self.config, self.newcomers, self.streams.frame
         new.missed += self.dt
-        free = new.measure(points, sizes, self.noise, c.largest_distance)
-        new.start(points[free], None if sizes is None else sizes[free], self.noise, c.speed_prior, frame)
+        free = new.measure(points, sizes, self.noise, LARGEST_DISTANCE)
+        new.start(points[free], None if sizes is None else sizes[free], self.noise, SPEED_PRIOR, frame)
         sure = (new.age >= c.confirm_time - 1e-9) & (new.missed == 0)
         if sure.any():
             self._add(sure)
@@ -253,13 +253,13 @@ class Joint:
             n = self.nested
             drawn = self.streams.uniforms(PLACING, key, n.log_q.size, 2).reshape(*n.log_q.shape, len(key), 2)
             uniforms = np.ascontiguousarray(drawn[..., 0])
-            place_newcomers(newest(n.x), n.z, uniforms, c.validity_rate * self.frames * self.dt, c.scales)
+            place_newcomers(newest(n.x), n.z, uniforms, c.validity_rate * self.frames * self.dt, SCALES)
 
     def _report(self, frame: Frame, seen: Bools) -> Tracks:
         """Returns the Tracks of the frame, on the ground in m, in the image in px; seen (K,): who was measured."""
         n, c, id = self.nested, self.config, self.people.id
         joint = n.weights()
-        weights = n.component_weights() if c.weights == "people" else np.repeat(joint[:, None], len(id), axis=1)
+        weights = n.component_weights() if c.own_weights else np.repeat(joint[:, None], len(id), axis=1)
         mean, cov = estimate.moments(n.x[..., :STATE], weights)
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
         box = boxes_at(pos, self.people.size) if self.plane == "image" else None
@@ -284,7 +284,7 @@ class Joint:
         if not len(id):
             self.together, self.paired = np.zeros((0, 0)), id.copy()
             return []
-        particle = n.rest_weights() if c.weights == "people" else joint
+        particle = n.rest_weights() if c.own_weights else joint
         weights = particle[:, None] * np.exp(n.log_q)
         now = np.empty((len(id), len(id)))
         partition_kernels.co_membership(n.z, weights, now)

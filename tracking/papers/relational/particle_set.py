@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.filters.particles import residual_resample, systematic_resample
+from tracking.filters.particles import residual_resample
 from tracking.papers.relational import particle_set_kernels
 
 Draws = Callable[[Ints], tuple[Array, Array]]
@@ -97,11 +97,11 @@ class ParticleSet:
         """Return the effective number of particles of each slot, (K,)."""
         return np.asarray(1 / particle_set_kernels.column_sums(self.weights, self.weights))
 
-    def resample(self, share: float, scheme: str, width: float, draws: Draws) -> None:
+    def resample(self, share: float, width: float, draws: Draws) -> None:
         """Resample each person whose effective number is at most this share of the particles (sec. 2.1); with one
         weight all people together.
 
-        scheme: "residual" or "systematic". draws: random numbers of people; with one weight the uniforms are those of
+        draws: random numbers of people; with one weight the uniforms are those of
         the first one. width: of the kernel from which equal particles are drawn apart, in units of the optimal width;
         0: none (the paper).
         """
@@ -112,10 +112,7 @@ class ParticleSet:
         chosen = np.empty((self.count, 1 if self.one_weight else len(few)), np.int64)
         for column, person in enumerate(few[: chosen.shape[1]].tolist()):
             weights = np.ascontiguousarray(self.weights[:, person])  # of one column numpy sums in another order
-            if scheme == "residual":
-                chosen[:, column] = residual_resample(weights, uniforms[column])
-            else:
-                chosen[:, column] = systematic_resample(weights, float(uniforms[column, 0]))
+            chosen[:, column] = residual_resample(weights, uniforms[column])
         if self.one_weight:
             for values in (self.pos, self.vel, self.exist, self.ancestor):
                 values[:] = values[chosen[:, 0]]

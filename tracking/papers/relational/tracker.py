@@ -48,7 +48,14 @@ from tracking.detect.point_detections import boxes_at, ordered_points
 from tracking.filters.person_streams import PersonStreams, birth_keys
 from tracking.image_scale import required
 from tracking.papers.relational import sensor, transition_kernels
-from tracking.papers.relational.config import ParticleConfig
+from tracking.papers.relational.config import (
+    BIRTH_DOUBT,
+    BODY_RADIUS,
+    KERNEL_WIDTH,
+    RESAMPLE_SHARE,
+    SPEED_PRIOR,
+    ParticleConfig,
+)
 from tracking.papers.relational.occluders import covered_by_people, hidden_share
 from tracking.papers.relational.particle_diversity import ParticleDiversity
 from tracking.papers.relational.particle_set import ParticleSet
@@ -87,8 +94,7 @@ class Particle:
         self.shown: Tracks | None = None
         self.pixels = None
         if context.background is not None:
-            divide = self.config.blobs == "divided"
-            self.pixels = ForegroundBlobs(self.config, self.config.most_foreground, context, divide)
+            self.pixels = ForegroundBlobs(self.config, context, divide=True)
         if self.pixels is not None:
             self.context = context = context.replace(px_per_m=self.pixels.scale)
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
@@ -108,7 +114,7 @@ class Particle:
         """
         if self.pixels is not None:
             if self.pixels.settings is not self.config:
-                self.pixels.follow(self.config, self.config.most_foreground)
+                self.pixels.follow(self.config)
             known = None if self.shown is None else self.shown.box
             detections = self.pixels.detections(frame, np.zeros((0, 4)) if known is None else known)
         self.streams.frame += 1
@@ -117,8 +123,8 @@ class Particle:
             self._measure(detections)
         self.shown = tracks = self._report(frame)
         if detections is not None:
-            c = self.config
-            self.particles.resample(c.resample_share, c.resampling, c.kernel_width, self._own_draws)
+            one = self.particles.one_weight
+            self.particles.resample(1.0 if one else RESAMPLE_SHARE, 0.0 if one else KERNEL_WIDTH, self._own_draws)
             self.diversity.resample(self.particles)
         return tracks
 
@@ -159,7 +165,7 @@ class Particle:
         )
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
-        behind, self.cut = covered_by_people(p, camera, c.body_radius)
+        behind, self.cut = covered_by_people(p, camera, 0.0 if c.certain_sensor else BODY_RADIUS)
         self.hidden = 1 - (1 - self.hidden) * (1 - behind)
         self._relate()
 
@@ -191,7 +197,7 @@ class Particle:
         self.diversity.weigh(self.particles)
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
-        new = said.nobody >= self.config.birth_doubt
+        new = said.nobody >= BIRTH_DOUBT
         if new.any():
             self._start(points[new], np.full((int(new.sum()), 2), np.nan) if sizes is None else sizes[new])
 
@@ -227,7 +233,7 @@ class Particle:
         p, c, key = self.particles, self.config, birth_keys(points, self.streams.frame)
         draws = self.streams.normals(BIRTHS, key, 2 * p.count, 2).reshape(2, p.count, len(points), 2)
         exist = c.birth_rate * self.dt / (c.birth_rate * self.dt + c.clutter_density)
-        p.add(points + self.noise * draws[0], c.speed_prior * draws[1], exist)
+        p.add(points + self.noise * draws[0], SPEED_PRIOR * draws[1], exist)
         self.slots.add(sizes, key)
         self._relate_newcomers(points)
 

@@ -4,8 +4,8 @@
     m_total = p(y_i | xi_j, P_xi)^k_p p(lambda_i | v_j, P_v)^k_v            (eqs 9 to 11)
 Each point belongs to the group with the largest m_total among those in whose region it lies.
 
-Departures. k_p and k_v are exponents: as factors they cancel. S is the sum of the group's spread Sigma, the covariance
-P of its centroid and that of the point, C_i; the same for velocities.
+Departures. k_p = 1 and k_v are exponents: as factors they cancel. S is the sum of the group's spread Sigma, the
+covariance P of its centroid and that of the point, C_i; the same for velocities.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: Stereo
     near = d2 < config.gate
     g, m, position = g[near], m[near], position[near]
     _, velocity = _log_density(points.vel[m] - x[g][:, VEL], own[g], points.vel_cov[m], VEL, config)
-    total[g, m] = config.position_weight * position + config.velocity_weight * velocity
+    total[g, m] = position + config.velocity_weight * velocity
     inside = np.zeros(total.shape, bool)
     inside[g, m] = True
     return np.where(inside.any(0), total.argmax(0), -1)

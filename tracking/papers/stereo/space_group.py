@@ -25,6 +25,8 @@ from tracking.papers.stereo.measurement import POS, VEL, Measurement, measured_s
 if TYPE_CHECKING:
     from filterpy.kalman import ExtendedKalmanFilter
 
+VELOCITY_SPREAD = 0.25
+"""m/s: standard deviation of velocities that a group's spread is shrunk to (ours)."""
 LEAST_VARIANCE = 1e-6
 """m^2, m^2/s^2: least eigenvalue of a spread."""
 
@@ -101,7 +103,7 @@ def newborn(points: SpacePoints, measurement: Measurement, motion: Motion3D, t: 
     mean, weights = mean_position(points, measurement, config)
     ekf.x[POS, 0], ekf.x[VEL, 0] = mean, points.vel.mean(0)
     ekf.P[np.ix_(POS, POS)] = mean_covariance(points, weights, config)
-    ekf.P[np.ix_(VEL, VEL)] = points.vel_cov.mean(0) / n + config.velocity_spread**2 / n * np.eye(3)
+    ekf.P[np.ix_(VEL, VEL)] = points.vel_cov.mean(0) / n + VELOCITY_SPREAD**2 / n * np.eye(3)
     group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt)
     _place_members(group, points, config)
     return group
@@ -146,7 +148,7 @@ def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
         values, U = np.linalg.eigh(C)
         C = (U * np.maximum(values, 0.0)) @ U.T
     w = config.spread_weight
-    prior = np.square(np.tile([config.person_spread, config.velocity_spread], 3))
+    prior = np.square(np.tile([config.person_spread, VELOCITY_SPREAD], 3))
     return np.asarray((n * C + w * np.diag(prior)) / (n + w)) + LEAST_VARIANCE * np.eye(6)
 
 

@@ -41,6 +41,10 @@ from tracking.papers.stereo.report import ShownFrame, space_tracks
 from tracking.papers.stereo.space_group import SpaceGroup, measure, motion_model, predict
 from tracking.papers.stereo.splitting import split
 
+LEAST_GROUP = 5
+"""From pixels: least number of linked features that form a group."""
+LEAST_FEATURES = 3
+"""From pixels: least number of features that update a group (sec. 3.3)."""
 FEATURE_OUTLINE = 0.5
 """Share of a person's footprint that a feature covers, as features lie all over the body."""
 
@@ -124,11 +128,11 @@ class Stereo:
     def _measure(self, points: SpacePoints, t: float) -> None:
         """Associate the points (sec. 3.3), update and split the groups, and add new ones (sec. 3.4).
 
-        A group with fewer points than `least_features` is predicted only (end of sec. 3.3); these points are not used.
+        A group with fewer points than LEAST_FEATURES is predicted only (end of sec. 3.3); these points are not used.
         """
         c, motion = self.config, self.motion
         radius, least, update = (
-            (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.least_group, c.least_features)
+            (c.point_radius, 1, 1) if self.pictures is None else (c.radius, LEAST_GROUP, LEAST_FEATURES)
         )
         owner = associated(self.groups, points, c)
         children: list[SpaceGroup] = []

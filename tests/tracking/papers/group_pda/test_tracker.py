@@ -139,7 +139,7 @@ def test_groups_that_walk_through_each_other_keep_ids_and_sizes(ranks: tuple[int
 
 
 def test_all_points_in_the_region_make_each_group_both() -> None:
-    config = GroupPdaConfig(association="none", size_time=0.05)
+    config = GroupPdaConfig(association="none", extent_time=0.05)
     made = track(crossing(0), config)
     meeting = slice(35, 40)
     assert sizes(made[15]) == pytest.approx([4, 4])
