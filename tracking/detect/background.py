@@ -145,13 +145,6 @@ class Background:
         self.valid[where] = True
 
     def _estimate_gain(self, image: Image) -> Floats:
-        """Returns the brightness factor (3,) of a frame (H, W, 3) uint8 relative to the model's mean, one per colour
-        channel.
-
-        It is estimated on a grid of pixels that were not foreground in the last classified frame. If no channel has 50
-        usable ones (neither near black nor clipped), all valid pixels of the grid are tried. If no channel has 50 of
-        these, the last gain is returned. The model does not change.
-        """
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
         mean = self.mean[:, *self._grid]
         found = brightness_gain.gain(seen, mean, self._grid_background)
@@ -161,9 +154,6 @@ class Background:
 
 
 def fused_foreground(classes: Image) -> Bools:
-    """Returns True where the class is FOREGROUND or DARK (dark foreground), False for the others (Gonzalez et al.,
-    sec. 3.3).
-
-    classes: pixel classes from `classify`, any shape; the result has the same shape.
-    """
+    """Returns True where the class is FOREGROUND or DARK (dark foreground), False for the others (Gonzalez et al., sec.
+    3.3)."""
     return np.asarray((classes == FOREGROUND) | (classes == DARK))

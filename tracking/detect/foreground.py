@@ -132,11 +132,7 @@ class Foreground:
 
 
 def convex_areas(shape: tuple[int, ...], outlines: list[Array]) -> Bools:
-    """Returns an (H, W) bool mask, True inside and on the convex hull of each outline.
-
-    shape: (H, W). outlines: arrays (V, 2) x, y in px, V at least 1, no nan; coordinates are rounded to whole px, and
-    parts outside the image are cut off. No outlines: False everywhere.
-    """
+    """Returns an (H, W) bool mask, True inside and on the convex hull of each outline."""
     inside = np.zeros(shape, np.uint8)
     for outline in outlines:
         cv2.fillConvexPoly(inside, cv2.convexHull(np.rint(outline).astype(np.int32)), 1)

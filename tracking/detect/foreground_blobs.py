@@ -48,12 +48,7 @@ class ForegroundBlobs:
 
     def detections(self, frame: Frame, people: Array) -> Detections | None:
         """Return the blobs of the frame's picture as detections; None without a picture, or if too much of it is
-        foreground.
-
-        people (N, 4): boxes of the tracked people, left, top, width, height, px. The background model learns from the
-        picture except inside them, so that people who stand still do not become background. Raises InputError if the
-        picture's size or dtype is not the background sample's.
-        """
+        foreground."""
         if frame.image is None:
             return None
         seen = self.foreground.segment(frame.image)

@@ -82,10 +82,7 @@ class BlobConfig(BackgroundSettings):
     )  # fmt: skip
 
     def dynamics(self, fps: float) -> Dynamics:
-        """Returns the nominal filter of x, y, h, w (centre, height, width; m) at `fps` frames per s.
-
-        Raises InputError if its first measurement would confirm a new track.
-        """
+        """Returns the nominal filter of x, y, h, w (centre, height, width; m) at `fps` frames per s."""
         # Acceleration noises are roots of spectral densities, so that a step has sigma = noise / sqrt(dt) (ours).
         root = np.sqrt(fps)
         accel, size = self.accel_noise * root, self.size_accel_noise * root

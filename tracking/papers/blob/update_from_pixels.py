@@ -55,12 +55,7 @@ class PixelUpdater:
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:
         """Learn background and person size from the context's background sample, which must not be None
-        (AssertionError).
-
-        If the context has no scale (px_per_m is nan), it is learned from people who stand alone in the sample; without
-        any it stays unknown, and an image is taken to be 18 m high. Raises InputError if the scale is zero or negative,
-        or if the sample has a wrong shape or dtype, too few frames or shows no background.
-        """
+        (AssertionError)."""
         assert context.background is not None
         if not np.isnan(context.px_per_m):
             image_scale.required(context.px_per_m)
@@ -73,8 +68,7 @@ class PixelUpdater:
         self._set(config)
 
     def follow(self, config: BlobConfig) -> None:
-        """Replace the config, which `people` must follow already; background and person size stay as learned. Gates are
-        computed anew."""
+        """Replace the config, which `people` must follow already; background and person size stay as learned."""
         self.foreground.follow(config)
         self._set(config)
 
@@ -87,22 +81,12 @@ class PixelUpdater:
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - CONFIRM_GATE)
 
     def _take_scale(self) -> None:
-        """If the context has no scale (nan), use the learned one, px per m, for foreground and tracks; the context
-        stays nan.
-
-        While none is learned, the tracks get that of an image 18 m high.
-        """
         if np.isnan(self.context.px_per_m):
             self.foreground.px_per_m = self.size.px_per_m
             self.people.context = self.context.replace(px_per_m=self.foreground.scale)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Update the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used.
-
-        If the picture is missing or implausible (too much of it is foreground), no track is measured.
-        An implausible picture still adapts the background. Raises InputError if the picture's size or dtype is not that
-        of the background sample; the tracks are then already predicted.
-        """
+        """Update the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used."""
         people = self.people
         people.predict()
         people.widen_view(np.zeros((0, 4)))
@@ -126,15 +110,11 @@ class PixelUpdater:
         return None
 
     def _measure_nobody(self, t: float) -> None:
-        """Record a miss of all tracks at time t, s, and delete those missed for too long or outside the image; the
-        others keep the prediction (sec. 4.4)."""
         people = self.people
         people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
         people.delete_tracks(t)
 
     def _protected(self) -> Bools:
-        """Returns a mask (H, W), True in ellipses at the places of confirmed tracks: there the background must not
-        adapt."""
         boxes = self._person_boxes(self.people.upright_boxes()[self.people.confirmed])
         return template_mask(self.foreground.shape, box_geometry.standing(boxes))
 
@@ -144,12 +124,6 @@ class PixelUpdater:
         return self._person_boxes(self.people.upright_boxes()[rows])
 
     def _measure(self, t: float, mask: Bools, found: Blobs) -> None:
-        """Update, confirm, delete and start tracks with the foreground of a frame at time t, s.
-
-        mask (H, W) bool: the cleaned foreground; found: its blobs, connected regions. Blobs of one person are
-        associated; with `split`, and once the size of people is reliable, other foreground is divided among the tracks
-        by templates (upright ellipses). Else all blobs are associated. Foreground that no track explains starts tracks.
-        """
         people = self.people
         expected = people.upright_boxes()
         split = self.config.split and self.size.reliable
@@ -179,81 +153,40 @@ class PixelUpdater:
         people.start_tracks(unexplained, np.ones(len(unexplained)), t)
 
     def _relax_sizes(self) -> None:
-        """Move the axes of all tracks, in place, a step towards those of a person at their places.
-
-        Axes do not change where a person's size is unknown.
-        """
         at = box_geometry.standing(self.people.upright_boxes())
         axes = self.size.axes(at[:, :2])
         rows = np.flatnonzero(np.isfinite(axes).all(1))
         self.people.relax_axes(rows, -np.sort(-axes[rows]), PERSON_NOISE**2)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
-        """Returns flags (M,): True for each blob of `found` that is taken for one person.
-
-        It has one person's size (so False where that is unknown), the image's edge does not cut it, and at most one
-        confirmed track is expected in it. expected (N, 4): boxes of all tracks: centre x, y, height, width, px.
-        """
         one = self.size.one_person(found.box, found.ellipse)
         return np.asarray(one & ~found.cut() & ~self._several_expected(found.box, expected))
 
     def _person_boxes(self, upright: Array) -> Array:
-        """Returns the boxes (N, 4) of people whose ellipses have the bounding boxes `upright` (N, 4).
-
-        Both are centre x, y, height, width, px. Height and width are multiplied by learned factors, the median ratios
-        of a person's box to its ellipse's; the centre stays.
-        """
         return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.box_over_ellipse], 1)
 
     def _person_ellipses(self, box: Array) -> Array:
-        """Returns the ellipses (N, 5) centre x, y, full axes h, w (px, the longer first), theta (rad), of upright
-        people in the boxes `box` (N, 4).
-
-        Boxes are centre x, y, height, width, px; their sides are divided by the learned factors of a person's box over
-        its ellipse. theta, the direction of h, is pi / 2 if h is vertical, else 0.
-        """
         return box_geometry.inscribed_ellipses(np.concatenate([box[:, :2], box[:, 2:] / self.size.box_over_ellipse], 1))
 
     def _several_expected(self, box: Array, expected: Array) -> Bools:
-        """Returns flags (M,): True for each blob in which two or more confirmed tracks are expected.
-
-        box (M, 4): left, top, width, height, px, of the blobs; expected (N, 4): centre x, y, height, width, px, of all
-        tracks. A track is expected in a blob that covers at least SHARED = 0.35 of its box.
-        """
         sure = expected[self.people.confirmed]
         blobs = box_geometry.centred_from_ltwh(box)
         return np.asarray((box_geometry.covered_share(sure, blobs) >= SHARED).sum(0) > 1)
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Measured, Ints, Array]:
-        """Returns the measurements of the associated tracks, one to one, the rows (K,) of z that they use, and d^2 (N,
-        M) of all N tracks and M ellipses, inf outside the gates.
-
-        z (M, 5): centre x, y, axes h, w (px), theta (rad); angle_var (M,): variance of theta, rad^2. The gate, a limit
-        of the squared Mahalanobis distance, has 5 degrees of freedom if the ellipse has a direction, else 4 (eqs 9,
-        10). Seen from straight above it always has 4, as people turn on the spot. Without ellipses or tracks K = 0.
-        """
         d2, log_det = self.people.innovations(z, self._gated_direction(angle_var))
         rows, taken = self.people.associate(self._gated(d2, angle_var), log_det, self.gates[1])
         noise = np.tile(self.people.noise, (len(rows), 1))
         return Measured(rows, z[taken], noise, angle_var[taken], np.ones(len(rows))), taken, d2
 
     def _gated_direction(self, angle_var: Array) -> Array:
-        """Returns variances (M,) of directions for the gate, rad^2: inf (none) from straight above."""
         return np.full(len(angle_var), np.inf) if self.size.above else angle_var
 
     def _gated(self, d2: Array, angle_var: Array) -> Array:
-        """Returns d^2 (N, M) with inf outside the gates of eq. 10; angle_var (M,): variances of directions, rad^2."""
         directed = kalman.directed(self._gated_direction(angle_var)).astype(int)
         return np.where(d2 <= self.gates[directed], d2, np.inf)
 
     def _with_pieces(self, made: Measured, taken: Ints, found: Blobs, d2: Array) -> tuple[Measured, Bools]:
-        """Returns the measurements with the pieces of a person united (blob_pieces), and flags (M,) of the blobs used.
-
-        made, taken: measurements of associated tracks and the blobs that they use; d2 (N, M): squared distances of all
-        tracks and blobs. A blob in no pair may be a piece of the nearest track whose predicted box holds its centre.
-        All pieces of a track and its own blob, if it has one, are replaced by their union. They are so if the union is
-        nearer than the own blob or, without one, inside the gate, and one person where a person's size is reliable.
-        """
         used = np.isin(np.arange(len(found)), taken)
         owner = blob_pieces.owners(found.ellipse, self.people.upright_boxes(), d2, ~used)
         own = dict(zip(made.rows.tolist(), taken.tolist(), strict=True))
@@ -274,15 +207,6 @@ class PixelUpdater:
     def _measure_by_templates(
         self, scene: ExplainedForeground, expected: Array, rows: Ints, confirmed: bool
     ) -> Measured:
-        """Returns template measurements of the confirmed (or, if `confirmed` is False, of the tentative) tracks not in
-        `rows`.
-
-        A template is an upright ellipse; it keeps the track's size, within 0.75 to 1.3 of a person's, and moves to
-        where it explains most foreground. scene: the frame's foreground; the templates are painted into it. expected
-        (N, 4): boxes of all tracks: centre x, y, height, width, px. rows: positions of tracks measured already. A track
-        whose template has too little support (foreground of its own) is left out. The variances grow with the inverse
-        square of the visible share; those of h and w are BLIND = 25 times larger still.
-        """
         people = self.people
         open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == confirmed), rows)
         at = box_geometry.standing(self._person_boxes(expected[open_rows]))

@@ -83,10 +83,7 @@ class GroupBank:
 
     def positions(self, row: int) -> Array:
         """Return the positions (K, 2) x, y of the members of the group in `row`: last measured places, moved with its
-        centroid.
-
-        From pixels they are the vertices of the hull of its points.
-        """
+        centroid."""
         return self.members[row].offset + self.x[row, :2]
 
     def keep(self, kept: Bools) -> None:
@@ -114,11 +111,7 @@ class GroupBank:
 
 def alike_velocities(difference: Array, covariance: Array, doubt: float, scaled: ScaledParameters) -> Bools:
     """Return flags (...): True where two velocities differ by at most `merge_velocity` and `doubt` standard deviations
-    of the difference (ours, in place of SR_v of sec. 3.1).
-
-    difference (..., 2): of the velocities; covariance (..., 2, 2): its covariance; in the unit of the points and s. In
-    an image depth is stretched to metres on the ground. The standard deviation is that along the mean direction.
-    """
+    of the difference (ours, in place of SR_v of sec. 3.1)."""
     metres = scaled.metres_per_unit
     sd = np.sqrt(np.einsum("...aa,a->...", covariance, np.square(metres)) / 2)
     most = scaled.config.merge_velocity + doubt * sd
@@ -126,13 +119,8 @@ def alike_velocities(difference: Array, covariance: Array, doubt: float, scaled:
 
 
 def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float) -> GroupBank:
-    """Return a bank of tentative groups made from points alone (sec. 3.3), with velocity 0, in order of group number.
-
-    points (M, 2); weights (M,): people that each point stands for; group (M,): 0, 1, … without gaps, or -1 for no
-    group; t: time of the frame, s. Centroid and size are the weighted mean and sum. The extent is the covariance,
-    shrunk towards the prior and divided by the gate factor (both ours). The centroid's variance is point_sd^2 (1 + 1 /
-    size), that of the velocity SPEED_PRIOR^2. No member is `known` yet. The bank is empty if no point has a group.
-    """
+    """Return a bank of tentative groups made from points alone (sec. 3.3), with velocity 0, in order of group
+    number."""
     count = int(group.max(initial=-1)) + 1
     if not count:
         return GroupBank.empty(scaled.colour_bins)

@@ -63,12 +63,7 @@ class ScaledParameters:
 def scale_parameters(
     config: GroupPdaConfig, fps: float, scale: float, body_cov: Array | None = None, sine_tilt: float = 1.0
 ) -> ScaledParameters:
-    """Return the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre.
-
-    config: lengths in m, times in s. body_cov (2, 2): covariance of one person's pixels in px^2; None if the points are
-    people. sine_tilt: sine of the camera's tilt, above 0, the factor by which lengths in depth are shortened in the
-    image.
-    """
+    """Return the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre."""
     c, dt, pixels = config, 1 / fps, body_cov is not None
     point_sd = scale * (c.pixel_noise if pixels else c.point_noise)
     prior = (scale * c.person_spread) ** 2 * np.eye(2) if body_cov is None else body_cov
@@ -98,13 +93,6 @@ def scale_parameters(
 def _kernel_rules(
     c: GroupPdaConfig, fps: float, constraint: Constraint, point_sd: float, factor: float, pixels: bool
 ) -> Array:
-    """Returns the array `rules` (19,) of the kernels; its slots are named in association_mass_kernels.
-
-    c: the config; fps: frames per s. constraint: by which points are one group. point_sd: standard deviation of a
-    measured position. factor: share of its covariance that a Gaussian keeps inside the gate, 1 without corrections.
-    pixels: the points are foreground pixels: then a member is always detected. With association "none" there is no miss
-    hypothesis and no freezing.
-    """
     rules = np.zeros(kernels.RULES)
     rules[kernels.GATE], rules[kernels.LINK] = constraint.gate, constraint.link
     rules[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.prior_entries
@@ -128,9 +116,6 @@ def _kernel_rules(
 
 def gate_factor(gate: float) -> float:
     """Return c, below 1: Gaussian points in the plane that lie within the gate have c times the covariance of all
-    points.
-
-    c = F_chi2,4(gate) / F_chi2,2(gate), where gate is the squared Mahalanobis radius, above 0.
-    """
+    points."""
     tail = np.exp(-gate / 2)
     return float((1 - tail * (1 + gate / 2)) / (1 - tail))

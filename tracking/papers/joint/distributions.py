@@ -59,7 +59,6 @@ class FrameModel:
         return np.concatenate([new, x[..., :-STATE]], axis=-1), log_w
 
     def _known(self, x: Array, old: Array) -> Array:
-        """Returns the states (N_x, K, 4) of DEEPER-JIGT.2: places as measured, velocities over the lag."""
         seen = np.isfinite(self.z[:, 0])[:, None]
         place = np.where(seen, self.z, old[..., :2] + self.dt * old[..., 2:])
         frames = x.shape[-1] // STATE
@@ -101,7 +100,6 @@ class FrameModel:
         return out
 
     def _of_partitions(self, shape: tuple[int, ...], key: Keys, columns: int) -> Array:
-        """Returns uniforms (N_x, N_z, K, columns) of people in partitions."""
         drawn = self.streams.uniforms(EVENTS, key, shape[0] * shape[1], columns)
         return drawn.reshape(shape[0], shape[1], len(key), columns)
 

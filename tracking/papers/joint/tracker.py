@@ -158,14 +158,12 @@ class Joint:
         return self.health.summary()
 
     def _points(self, detections: Detections | None) -> tuple[Array, Array | None]:
-        """Returns places (M, 2), m, in order of x, then y, and sizes of boxes (M, 2), px, or None; sets `plane`."""
         if detections is None:
             return np.zeros((0, 2)), None
         self.plane = "image" if detections.plane == "image" else "ground"
         return ordered_points(detections, self.unit)
 
     def _associate(self, points: Array) -> tuple[Ints, Ints]:
-        """Returns rows and columns (R,) of people and their points (M, 2), m, by predicted means and covariances."""
         c, ahead = self.config, moved(self.nested.x[..., :STATE], self.dt)
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
         mean, cov = estimate.moments(ahead, weights)
@@ -173,7 +171,6 @@ class Joint:
         return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, LARGEST_DISTANCE)
 
     def _filter(self, z: Array) -> None:
-        """Steps 4 to 7, 1 and 3; z (K, 2): measured places, nan for none."""
         if not len(z):
             return
         beliefs = remembered(self.belief.log_odds, *self._before(), self.config.belief_memory)
@@ -182,14 +179,11 @@ class Joint:
         self.nested = decentralised_filter.advance(self.nested, model, uniforms)
 
     def _before(self) -> tuple[Ints, Array]:
-        """Returns the group (K,) of each person in the last frame, -1 for alone, and 1.0 for people reported then, else
-        0.0."""
         id = self.people.id
         known = np.isin(id, np.array(sorted(self.identities.people), np.int64)).astype(float)
         return reported_groups.known_groups(self.identities, id), known
 
     def _resample(self) -> None:
-        """Step 2."""
         nested, people = self.nested, len(self.people.id)
         if not people:
             return
@@ -209,7 +203,6 @@ class Joint:
         )  # fmt: skip
 
     def _keep(self, rows: Bools) -> None:
-        """Remove all people but those where `rows` (K,) is True."""
         if rows.all():
             return
         n = self.nested
@@ -221,8 +214,6 @@ class Joint:
         self.health.keep(rows)
 
     def _newcomers(self, points: Array, sizes: Array | None) -> None:
-        """Follow people who are not confirmed, predicted to this frame, with the points (M, 2) of nobody; add those who
-        are confirmed."""
         c, new, frame = self.config, self.newcomers, self.streams.frame
         new.missed += self.dt
         free = new.measure(points, sizes, self.noise, LARGEST_DISTANCE)
@@ -233,8 +224,6 @@ class Joint:
         new.keep(~sure & (new.missed <= c.confirm_time + 1e-9))
 
     def _add(self, rows: Bools) -> None:
-        """Draw the newcomers `rows` into the particles, with straight earlier states: alone in all partitions, or by
-        the validity."""
         n, c, key = self.nested, self.config, self.newcomers.key[rows]
         normals = self.streams.normals(BIRTHS, key, c.particles, STATE)
         if c.individuals == "measured":
@@ -256,7 +245,6 @@ class Joint:
             place_newcomers(newest(n.x), n.z, uniforms, c.validity_rate * self.frames * self.dt, SCALES)
 
     def _report(self, frame: Frame, seen: Bools) -> Tracks:
-        """Returns the Tracks of the frame, on the ground in m, in the image in px; seen (K,): who was measured."""
         n, c, id = self.nested, self.config, self.people.id
         joint = n.weights()
         weights = n.component_weights() if c.own_weights else np.repeat(joint[:, None], len(id), axis=1)
@@ -279,7 +267,6 @@ class Joint:
         )  # fmt: skip
 
     def _groups(self, joint: Array, seen: Bools) -> list[Ints]:
-        """Returns the rows of the members of each group; sets `together`; joint (N_x,): the weights of step 1."""
         n, c, id = self.nested, self.config, self.people.id
         if not len(id):
             self.together, self.paired = np.zeros((0, 0)), id.copy()

@@ -62,10 +62,7 @@ class ParticleSet:
         return particle_set_kernels.column_sums(self.weights, self.exist)
 
     def estimates(self) -> tuple[Array, Array, Array]:
-        """Return means (K, 4) and covariances (K, 4, 4) of x, y, m, vx, vy, m/s, and the existence (K,).
-
-        They are moments over the particles, each weighted by its weight and the person's existence in it.
-        """
+        """Return means (K, 4) and covariances (K, 4, 4) of x, y, m, vx, vy, m/s, and the existence (K,)."""
         mean, cov, exist = np.zeros((self.people, 4)), np.zeros((self.people, 4, 4)), np.zeros(self.people)
         particle_set_kernels.moments(self.pos, self.vel, self.exist, self.weights, mean, cov, exist)
         return mean, cov, exist
@@ -77,11 +74,7 @@ class ParticleSet:
         return label
 
     def share_weights(self, one_weight: bool) -> None:
-        """Give each particle one weight, the product of the people's, or each person weights of the own.
-
-        The latter begins while all weights are equal only, as after resampling: so no weight counts twice. Products
-        that are 0 in all particles, by underflow, become equal weights.
-        """
+        """Give each particle one weight, the product of the people's, or each person weights of the own."""
         if one_weight and not self.one_weight and self.people:
             weights = self.weights.prod(axis=1)
             if not weights.sum() > 0:
@@ -99,12 +92,7 @@ class ParticleSet:
 
     def resample(self, share: float, width: float, draws: Draws) -> None:
         """Resample each person whose effective number is at most this share of the particles (sec. 2.1); with one
-        weight all people together.
-
-        draws: random numbers of people; with one weight the uniforms are those of
-        the first one. width: of the kernel from which equal particles are drawn apart, in units of the optimal width;
-        0: none (the paper).
-        """
+        weight all people together."""
         few = np.flatnonzero(self.effective() <= share * self.count * (1 + 1e-9))
         if not len(few):
             return
@@ -126,13 +114,6 @@ class ParticleSet:
             self._spread(few, width, normals)
 
     def _spread(self, members: Ints, width: float, normals: Array) -> None:
-        """Draw the states of slots `members`, of equal weights, from kernels about the particles (regularised particle
-        filter, Musso et al. 2001; ours); normals (R, 4, P).
-
-        The kernel is normal with h^2 times the covariance of the person's state, of dimension d = 4, and h = width (4 /
-        (P (d + 2)))^(1 / (d + 4)). States are drawn towards their mean before, so that the covariance stays (West
-        1993).
-        """
         h = min(width * (4 / (self.count * 6)) ** (1 / 8), 1.0)
         state = np.concatenate([self.pos[:, members], self.vel[:, members]], axis=2)
         state = np.ascontiguousarray(state.transpose(1, 2, 0))
@@ -179,5 +160,4 @@ class ParticleSet:
 
 
 def _order_key(pairs: Ints) -> Ints:
-    """Returns numbers (N,) by which pairs (N, 2) are in order of j, then i."""
     return np.asarray(pairs[:, 1] * LARGEST + pairs[:, 0])

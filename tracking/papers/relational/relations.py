@@ -38,7 +38,6 @@ class Relational(Particle):
 
     @property
     def _rules(self) -> Array:
-        """The parameters of relations (4,) as transition_kernels has them: RATE, BIAS, DISTANCE, VELOCITY."""
         c = self.config
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
@@ -108,5 +107,4 @@ class Relational(Particle):
 
 
 def _log_odds(belief: PairBelief) -> Array:
-    """Returns the log-odds (K, K) that pairs belong together; -inf for pairs without evidence."""
     return np.where(belief.log_odds == UNSEEN, -np.inf, belief.log_odds)

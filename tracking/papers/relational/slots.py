@@ -39,11 +39,8 @@ class Slots:
         self.key = self.key[rows]
 
     def measure(self, seen: Array, pairs: Array, sizes: Array | None, dt: Array) -> None:
-        """Note who was measured in a frame: those with seen (K,) above 1/2; dt (K,): s by which others count as missed.
-
-        pairs (K, M): probability of each person and detection; sizes (M, 2): width and height of the detected boxes,
-        px, None without boxes. The size follows the most probable box if its pair is more probable than not.
-        """
+        """Note who was measured in a frame: those with seen (K,) above 1/2; dt (K,): s by which others count as
+        missed."""
         self.missed = np.where(seen > 0.5, 0.0, self.missed + dt)
         if sizes is None or not pairs.size:
             return

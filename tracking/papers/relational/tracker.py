@@ -155,7 +155,6 @@ class Particle:
         return required(self.context.px_per_m) if self.plane == "image" else 1.0
 
     def _forecast(self) -> None:
-        """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.streams.normals(MOTION, self.slots.key, p.count, 2)
         shared, coupling, alike, spread = self._coupling()
@@ -176,18 +175,11 @@ class Particle:
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
     def _coupling(self) -> tuple[Array, Array, Array, Array]:
-        """Returns the normals that groups have in common (P, K, 2), and the coupling (2,), the rules (4,) by which
-        partners count, and the spread (N, 2) of the pairs of transition_kernels; people of `particle` have none."""
         return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4), np.zeros((0, 2))
 
-    def _relate(self) -> None:
-        """Draw new relations; people of `particle` have none."""
+    def _relate(self) -> None: ...
 
     def _measure(self, detections: Detections) -> None:
-        """Weigh the particles by a frame's detections; remove people and start new ones.
-
-        Sets `plane`.
-        """
         self.plane = "image" if detections.plane == "image" else "ground"
         points, sizes = ordered_points(detections, self.unit)
         missed = self.slots.missed > 0
@@ -202,34 +194,22 @@ class Particle:
             self._start(points[new], np.full((int(new.sum()), 2), np.nan) if sizes is None else sizes[new])
 
     def _detection_probability(self) -> Array:
-        """Returns the probability (K,) that each person is measured if existing (ours).
-
-        A person who was missed in the last frame is measured again at the rate 1 / hidden_time. A person behind a known
-        pillar or wall, or behind another person, is not measured, except by the paper's sensor, nor counts as missed.
-        """
         c = self.config
         again = c.detect_prob if c.certain_sensor else min(c.detect_prob, -np.expm1(-self.dt / c.hidden_time))
         visible = 1.0 if c.certain_sensor else 1 - self.hidden
         return np.asarray(np.where(self.slots.missed > 0, again, c.detect_prob) * visible)
 
     def _remove(self) -> None:
-        """Remove people who are missed for longer than the time window (sec. 2.1.1) or exist with a low probability."""
         c = self.config
         keep = (self.particles.existence >= c.least_existence) & (self.slots.missed <= c.time_window + 1e-9)
         if not keep.all():
             self._keep(keep)
 
     def _keep(self, rows: Bools) -> None:
-        """Remove all slots but those where `rows` (K,) is True."""
         self.particles.keep(rows)
         self.slots.keep(rows)
 
     def _start(self, points: Array, sizes: Array) -> None:
-        """Add people at detections (secs. 2.1.1, 3.2): points (M, 2) m; sizes (M, 2): of the boxes, px, nan without.
-
-        Place and velocity are normal about the detection and about 0. The existence is the share of new people among
-        new people and false alarms (ours).
-        """
         p, c, key = self.particles, self.config, birth_keys(points, self.streams.frame)
         draws = self.streams.normals(BIRTHS, key, 2 * p.count, 2).reshape(2, p.count, len(points), 2)
         exist = c.birth_rate * self.dt / (c.birth_rate * self.dt + c.clutter_density)
@@ -238,7 +218,6 @@ class Particle:
         self._relate_newcomers(points)
 
     def _own_draws(self, people: Ints) -> tuple[Array, Array]:
-        """Returns uniforms (R, P) and normals (R, 4, P) by which the `people` (R,) are resampled."""
         count, key = self.particles.count, self.slots.key[people]
         uniforms, normals = (
             self.streams.uniforms(RESAMPLING, key, 1, count),
@@ -246,12 +225,9 @@ class Particle:
         )
         return uniforms[0], normals.reshape(len(key), 4, count)
 
-    def _relate_newcomers(self, points: Array) -> None:
-        """Relate the last slots, of new people at `points` (M, 2), m, to others; people of `particle` are alone."""
+    def _relate_newcomers(self, points: Array) -> None: ...
 
     def _report(self, frame: Frame) -> Tracks:
-        """Returns the Tracks of the frame: people who exist with at least `report_existence`, on the ground in m, in
-        the image in px."""
         mean, cov, exist = self.particles.estimates()
         rows = exist >= self.config.report_existence
         self.slots.name(rows)
@@ -263,6 +239,4 @@ class Particle:
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
         return Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
 
-    def _follow(self, state: Array) -> None:
-        """Take note of the mean states (K, 4) of a frame, x, y, m, vx, vy, m/s, nan for people who are not reported;
-        `particle` has no use for them."""
+    def _follow(self, state: Array) -> None: ...

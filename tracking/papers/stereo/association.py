@@ -22,10 +22,7 @@ from tracking.papers.stereo.space_group import SpaceGroup
 
 
 def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: StereoConfig) -> Ints:
-    """Return for each of M points the number of its group in `groups`, (M,), -1 for none (eqs 8 to 11).
-
-    groups: predicted to this frame.
-    """
+    """Return for each of M points the number of its group in `groups`, (M,), -1 for none (eqs 8 to 11)."""
     if not groups or not len(points):
         return np.full(len(points), -1)
     x = np.stack([g.ekf.x[:, 0] for g in groups])
@@ -43,8 +40,6 @@ def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: Stereo
 
 
 def _in_reach(x: Array, own: Array, points: SpacePoints, config: StereoConfig) -> tuple[Ints, Ints]:
-    """Returns groups and points (R,) that may be within the gate: the squared Mahalanobis distance is at least the
-    squared distance over the trace of S. x (G, 6), own (G, 6, 6): states of the groups, and what they add to S."""
     trace, square = np.einsum("gii->g", own[:, POS][:, :, POS]), np.zeros((len(x), len(points)))
     spread = np.einsum("mii->m", points.cov) if config.point_covariance else np.zeros(len(points))
     for d, k in enumerate(POS):
@@ -54,11 +49,6 @@ def _in_reach(x: Array, own: Array, points: SpacePoints, config: StereoConfig) -
 
 
 def _log_density(away: Array, own: Array, cov: Array, part: list[int], config: StereoConfig) -> tuple[Array, Array]:
-    """Returns squared Mahalanobis distances (R,) and log densities (R,), without their constant, of eqs 9 and 10.
-
-    away (R, 3): positions or velocities of points less those of groups; own (R, 6, 6): what the groups add to S; cov
-    (R, 3, 3): of the points; part: the entries of the state.
-    """
     S = own[:, part][:, :, part]
     if config.point_covariance:
         S = S + cov

@@ -15,19 +15,12 @@ from tracking.papers.stereo.space_group import Motion3D, SpaceGroup, newborn
 
 
 def born(points: SpacePoints, group: Ints, measurement: Measurement, motion: Motion3D, t: float) -> list[SpaceGroup]:
-    """Return the tentative groups that free points form (sec. 3.4).
-
-    group (M,): number of each point's group by eq. 12, -1 for none. t: s.
-    """
+    """Return the tentative groups that free points form (sec. 3.4)."""
     return [newborn(points.at(group == k), measurement, motion, t) for k in range(int(group.max(initial=-1)) + 1)]
 
 
 def confirm(groups: list[SpaceGroup], config: StereoConfig, t: float, ids: GroupIds) -> list[WholeGroupEvent]:
-    """Give ids to tentative groups that have been measured for `confirm_time`, and return the events.
-
-    An event is a split if the group is a child of a group that exists, else an enter; its onset is when the group was
-    first seen.
-    """
+    """Give ids to tentative groups that have been measured for `confirm_time`, and return the events."""
     events, alive = [], {g.id for g in groups if g.confirmed}
     for g in groups:
         if g.confirmed or g.last_seen < t or g.measured_time < config.confirm_time - 1e-9:

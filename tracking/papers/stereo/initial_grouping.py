@@ -15,11 +15,7 @@ from sim.types import Array, Ints
 
 
 def sphere_groups(pos: Array, radius: float, least: int) -> Ints:
-    """Return the group of each point, (M,), numbered 0, 1, … in the order of the groups' first points; -1 for none.
-
-    pos (M, 3): m. radius: of the spheres, m, above 0; points exactly 2 r apart are linked. Components of fewer than
-    `least` points form no group.
-    """
+    """Return the group of each point, (M,), numbered 0, 1, … in the order of the groups' first points; -1 for none."""
     M = len(pos)
     if not M:
         return np.zeros(0, np.int64)

@@ -52,13 +52,7 @@ class PicturePoints:
         self.stereo = SubtractionStereo(largest, block)
 
     def points(self, image: Image, right: Image) -> SpacePoints:
-        """Return the features of people as points in space, none if too much is foreground.
-
-        image, right (H, W, 3) BGR uint8. The background model learns from the left picture except where people are, and
-        from all of it if there is too much foreground. Points are moved by `surface_offset` away from the camera,
-        horizontally. Raises InputError if the left picture's size or dtype is not the background sample's, or the right
-        one's size is another.
-        """
+        """Return the features of people as points in space, none if too much is foreground."""
         if right.shape != image.shape:
             expected = f"the left picture's shape {image.shape}"
             raise InputError(place="right picture", got=str(right.shape), expected=expected, remedy="give a pair")
@@ -89,7 +83,7 @@ def moved_away(points: SpacePoints, camera: Camera, offset: float) -> SpacePoint
 
 
 def stereo_camera(camera: Camera | None) -> Camera:
-    """Return the camera of a rectified pair unchanged. Raises InputError if it is None, has no baseline or distorts."""
+    """Return the camera of a rectified pair unchanged."""
     if camera is not None and camera.kind == "pinhole" and camera.baseline > 0 and not camera.radial:
         return camera
     got = "no camera" if camera is None else f"{camera.kind}, baseline {camera.baseline:g}, radial {camera.radial:g}"

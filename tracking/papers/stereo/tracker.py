@@ -110,7 +110,6 @@ class Stereo:
         return space_tracks(self.groups, events, self.config.report_coast, shown)
 
     def _points(self, frame: Frame, detections: Detections | None) -> SpacePoints:
-        """Returns the points of the frame in m, none without information. Sets the plane, from points."""
         if self.pictures is not None:
             if frame.image is None or frame.right is None:
                 self.pictures.features.forget()
@@ -126,10 +125,6 @@ class Stereo:
         return self.links.step(xyz, self.config)
 
     def _measure(self, points: SpacePoints, t: float) -> None:
-        """Associate the points (sec. 3.3), update and split the groups, and add new ones (sec. 3.4).
-
-        A group with fewer points than LEAST_FEATURES is predicted only (end of sec. 3.3); these points are not used.
-        """
         c, motion = self.config, self.motion
         radius, least, update = (
             (c.point_radius, 1, 1) if self.pictures is None else (c.radius, LEAST_GROUP, LEAST_FEATURES)
