@@ -18,6 +18,8 @@ gate starts a track nor pieces of a person whose union is inside (blob_pieces; t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Ints
@@ -29,7 +31,6 @@ from tracking.filters import kalman
 from tracking.papers.blob import blob_pieces, box_geometry, new_people
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
-from tracking.papers.blob.measured_ellipses import Measured
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 
 EVIDENCE = 10.0  # nats, log-likelihood of a template with full support; d^2 / 2 of its place is subtracted
@@ -42,6 +43,26 @@ UPRIGHT = 25.0  # deg, standard deviation of the direction of a person measured 
 EXTENT = 0.75, 1.3  # least and largest height and width of a template relative to the expected person
 BLIND = 25.0  # a template's variance of height and width relative to a lone blob's: they are predicted, not measured
 LEAST_SHOWN = 0.2  # a person of whom a smaller share is visible is measured as if this share were
+
+
+class Measured(NamedTuple):
+    """Measurements of K tracks, one row each; tracks without a measurement have no row.
+
+    rows (K,): table positions of the tracks, from 0, each once, in any order. z (K, 5): ellipse: centre x, y, full axes
+    h, w (px), direction theta of h (rad). noise (K, 4): variances of x, y, h, w, m^2. angle_var (K,): variance of
+    theta, rad^2, inf if it is not measured. support (K,), 0 to 1: foreground less half the background, of the pixels
+    that the template alone covers, over its area; 1 for a blob.
+    """
+
+    rows: Ints
+    z: Array
+    noise: Array
+    angle_var: Array
+    support: Array
+
+    def joined(self, more: Measured) -> Measured:
+        """Returns new Measured with the rows of these measurements followed by those of `more`."""
+        return Measured(*(np.concatenate(pair) for pair in zip(self, more, strict=True)))
 
 
 class PixelUpdater:

@@ -48,10 +48,10 @@ from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
 from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping import reported_groups
+from tracking.grouping.belief import default_belief
 from tracking.grouping.pair_belief import PairBelief
 from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
-from tracking.papers.joint.belief_memory import remembered
 from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SPEED_PRIOR, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import BIRTHS, PARTITIONS, PLACING, RESAMPLING, STATE, FrameModel, newest
@@ -280,3 +280,10 @@ class Joint:
         if c.estimate == "histogram":
             return estimate.histogram_partition(n.z, weights)
         return estimate.binder_partition(self.together, n.z, self._before()[0])
+
+
+def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:
+    """Return the log-odds (K, K) of pairs, more for people who were in one group, and less for others."""
+    belief = default_belief()
+    same = (group[:, None] >= 0) & (group[:, None] == group)
+    return np.asarray(log_odds + share * np.outer(known, known) * np.where(same, belief.stay, -belief.come))

@@ -11,7 +11,7 @@ covariance of its points' positions and velocities; N, the number of its points.
     Sigma <- alpha Sigma + (1 - alpha) C_y                 eq. 7               space_group
     (y - xi)' S^-1 (y - xi) < gamma                        eq. 8               association
     m_total = p(y)^k_p p(lambda)^k_v, the largest wins     eqs 9 to 11         association
-    new groups: points whose spheres overlap               eq. 12              initial_grouping
+    new groups: points whose spheres overlap               eq. 12              births_and_losses
     merging by the full state, weighted by N               eqs 13 to 15        merging
 
 The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in tracking.detect. Departures, all ours:
@@ -30,9 +30,8 @@ from tracking.detect.features import SpacePoints
 from tracking.grouping.whole_groups import GroupIds
 from tracking.image_scale import required
 from tracking.papers.stereo.association import associated
-from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost
+from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost, sphere_groups
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import Measurement, PairMeasurement, PlaceMeasurement
 from tracking.papers.stereo.merging import merge
 from tracking.papers.stereo.picture_points import PicturePoints

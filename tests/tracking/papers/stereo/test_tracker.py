@@ -14,8 +14,8 @@ from tracking.detect.features import SpacePoints
 from tracking.filters.ellipsoid_overlap import separation
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo.association import associated
+from tracking.papers.stereo.births_and_losses import sphere_groups
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import POS, VEL, PairMeasurement, PlaceMeasurement
 from tracking.papers.stereo.merging import merge, overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera

@@ -7,8 +7,7 @@ import pytest
 
 from sim.types import Context, Detections, Frame
 from tests.reference_relational import drawn
-from tracking.papers.relational.particle_diversity import ParticleDiversity
-from tracking.papers.relational.particle_set import ParticleSet
+from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
 from tracking.papers.relational.relations import Relational
 
 
