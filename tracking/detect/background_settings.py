@@ -23,26 +23,16 @@ class BackgroundSettings(Config):
 
     tracker: ClassVar[str] = "background"
 
-    detection_rate: float = param(
-        0.9995, (0.9, 0.999999), "probability",
-        "from pixels: share of the training sample's background that each threshold leaves background", "log",
-        sees="pixels",
-    )  # fmt: skip
-    dark: float = param(
-        0.5, (0.0, 1.0), "", "from pixels: relative brightness; a darkened pixel below it is foreground, else shadow",
-        sees="pixels",
-    )  # fmt: skip
-    background: str = param(
-        "adaptive", ("adaptive", "trained"), "",
-        "from pixels: adaptive: the model follows the light, adapts, mends ghosts, and frames of mostly foreground are "
-        "not measured (ours); trained: it stays as it was trained",
-        "categorical", sees="pixels", online=False,
-    )  # fmt: skip
-    background_time: float = param(
-        20.0, (1.0, 1000.0), "s",
-        "from pixels: time constant with which background adapts; foreground takes ten times as long (ours)", "log",
-        sees="pixels",
-    )  # fmt: skip
+    # fmt: off
+    detection_rate: float = param(0.9995, (0.9, 0.999999), "probability",
+        "from pixels: share of the sample's background that each threshold leaves background", "log", sees="pixels")
+    dark: float = param(0.5, (0.0, 1.0), "",
+        "from pixels: relative brightness; a darkened pixel below it is foreground, else shadow", sees="pixels")
+    background: str = param("adaptive", ("adaptive", "trained"), "",
+        "from pixels: it follows light and scene (ours), or stays as trained", "categorical", sees="pixels", online=False)
+    background_time: float = param(20.0, (1.0, 1000.0), "s",
+        "from pixels: time constant of the background's adaptation; foreground: ten times (ours)", "log", sees="pixels")
+    # fmt: on
 
     @property
     def adaptive(self) -> bool:

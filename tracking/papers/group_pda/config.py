@@ -18,84 +18,48 @@ class GroupPdaConfig(BackgroundSettings):
 
     tracker: ClassVar[str] = "group-pda"
 
+    # fmt: off
     gate: float = param(9.21, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (eq. 2.2)")
-    radius: float = param(
-        0.52, (0.1, 2.0), "m",
-        "from points: r of the region round a point; points nearer than 2 r are linked (R_0, sec. 3.3)", sees="points",
-    )  # fmt: skip
-    person_spread: float = param(
-        0.25, (0.05, 1.0), "m", "from points: standard deviation of the prior that extents are shrunk to (ours)", "log",
-        sees="points",
-    )  # fmt: skip
+    radius: float = param(0.52, (0.1, 2.0), "m",
+        "from points: r of the region round a point; points nearer than 2 r are linked (R_0, sec. 3.3)", sees="points")
+    person_spread: float = param(0.25, (0.05, 1.0), "m",
+        "from points: standard deviation of the prior that extents are shrunk to (ours)", "log", sees="points")
     spread_weight: float = param(3.0, (0.1, 20.0), "people", "weight of that prior, in people (ours)", "log")
-    accel_noise: float = param(
-        0.5, (0.05, 5.0), "m/s^1.5", "standard deviation of the centroid's white acceleration, per root second", "log"
-    )
-    point_noise: float = param(
-        0.06, (0.005, 1.0), "m", "from points: standard deviation of a person's measured position, sensor and gait",
-        "log", sees="points",
-    )  # fmt: skip
-    extent_time: float = param(
-        1.0, (0.05, 20.0), "s", "time constant of extent and number of people, alpha_s and alpha_N of eq. 2.4", "log"
-    )
+    accel_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5",
+        "standard deviation of the centroid's white acceleration, per root second", "log")
+    point_noise: float = param(0.06, (0.005, 1.0), "m",
+        "from points: standard deviation of a person's measured position, sensor and gait", "log", sees="points")
+    extent_time: float = param(1.0, (0.05, 20.0), "s",
+        "time constant of extent and number of people, alpha_s and alpha_N of eq. 2.4", "log")
     count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: the part that does not grow with N", "log")
-    detect_prob: float = param(
-        0.95, (0.3, 1.0), "probability",
-        "from points: that a member is measured in a frame; without carry_time it tells how many members are unseen",
-        sees="points",
-    )  # fmt: skip
-    association: str = param(
-        "pda", ("pda", "nearest", "all", "none"), "",
-        "pda: associations by their masses (sec. 4.2); nearest: shared points go to the most probable group; all: all "
-        "points in the region; none: all points, without group constraint (sec. 5.2.1)",
-        "categorical",
-    )  # fmt: skip
-    corrections: bool = param(
-        True, (True, False), "",
-        "R of members who keep their places, a hypothesis of a miss, extents that rest and are corrected for the gate, "
-        "linked points outside the region, children with the parent's velocity (ours); False: the paper", "categorical",
-    )  # fmt: skip
-    appearance: float = param(
-        0.5, (0.0, 5.0), "", "from pixels: weight of colours in the log masses (future work of sec. 6; ours)",
-        sees="pixels",
-    )  # fmt: skip
-    merge_velocity: float = param(
-        0.5, (0.05, 3.0), "m/s", "largest difference of velocities at which groups merge (ours, in place of SR_v)"
-    )
-    merge_time: float = param(
-        0.5, (0.0, 3.0), "s", "time for which groups must be near with like velocities before they merge (ours)"
-    )
-    split_time: float = param(
-        0.5, (0.0, 3.0), "s",
-        "time without a feasible association, less the measured frames in it, after which a group splits",
-    )  # fmt: skip
-    confirm_time: float = param(
-        0.3, (0.0, 3.0), "s",
-        "a new group is confirmed after so long with measurements and removed after so long without (ours)",
-    )  # fmt: skip
-    coast_time: float = param(
-        1.5, (0.0, 10.0), "s", "time without a measurement after which a group is lost and claims no points (ours)"
-    )
-    recapture_time: float = param(
-        3.0, (0.0, 10.0), "s",
-        "time after the last measurement for which a newborn group that fits takes a group's id over; 0: never (ours)",
-    )  # fmt: skip
-    report_coast: float = param(
-        0.5, (0.0, 5.0), "s", "time after the last measurement for which a group is reported (ours)"
-    )
-    carry_time: float = param(
-        0.9, (0.0, 3.0), "s",
-        "from points: time for which a missed member stands in at its predicted place; from both: a new group near a "
-        "member measured so lately is its group's child (ours)", sees="points",
-    )  # fmt: skip
-    carry_reach: float = param(
-        0.37, (0.05, 2.0), "m",
-        "from points: a member is measured if a point is within this distance of its predicted place (ours)",
-        sees="points",
-    )  # fmt: skip
-    pixel_radius: float = param(
-        0.55, (0.05, 2.0), "m", "from pixels: r of the region round a point (R_0, sec. 3.3)", sees="pixels"
-    )
-    pixel_noise: float = param(
-        0.12, (0.005, 1.0), "m", "from pixels: standard deviation of one silhouette's centroid", "log", sees="pixels"
-    )
+    detect_prob: float = param(0.95, (0.3, 1.0), "probability",
+        "from points: that a member is measured in a frame", sees="points")
+    association: str = param("pda", ("pda", "nearest", "all", "none"), "",
+        "pda: by masses (sec. 4.2); nearest, all: one association; none: no constraint (sec. 5.2.1)", "categorical")
+    corrections: bool = param(True, (True, False), "",
+        "R, misses, rest and gate of extents, linked points, velocity of children (ours)", "categorical")
+    appearance: float = param(0.5, (0.0, 5.0), "",
+        "from pixels: weight of colours in the log masses (future work of sec. 6; ours)", sees="pixels")
+    merge_velocity: float = param(0.5, (0.05, 3.0), "m/s",
+        "largest difference of velocities at which groups merge (ours, in place of SR_v)")
+    merge_time: float = param(0.5, (0.0, 3.0), "s",
+        "time for which groups must be near with like velocities before they merge (ours)")
+    split_time: float = param(0.5, (0.0, 3.0), "s",
+        "time without a feasible association, less the measured frames in it, after which a group splits")
+    confirm_time: float = param(0.3, (0.0, 3.0), "s",
+        "a new group is confirmed after so long with measurements and removed after so long without (ours)")
+    coast_time: float = param(1.5, (0.0, 10.0), "s",
+        "time without a measurement after which a group is lost and claims no points (ours)")
+    recapture_time: float = param(3.0, (0.0, 10.0), "s",
+        "time after the last measurement for which a newborn group that fits takes a group's id over; 0: never (ours)")
+    report_coast: float = param(0.5, (0.0, 5.0), "s",
+        "time after the last measurement for which a group is reported (ours)")
+    carry_time: float = param(0.9, (0.0, 3.0), "s",
+        "from points: time for which a missed member stands in at its predicted place (ours)", sees="points")
+    carry_reach: float = param(0.37, (0.05, 2.0), "m",
+        "from points: a member is measured if a point is so near to its predicted place (ours)", sees="points")
+    pixel_radius: float = param(0.55, (0.05, 2.0), "m",
+        "from pixels: r of the region round a point (R_0, sec. 3.3)", sees="pixels")
+    pixel_noise: float = param(0.12, (0.005, 1.0), "m",
+        "from pixels: standard deviation of one silhouette's centroid", "log", sees="pixels")
+    # fmt: on

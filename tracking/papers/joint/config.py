@@ -44,77 +44,44 @@ class JointConfig(BackgroundSettings):
 
     tracker: ClassVar[str] = "joint"
 
-    particles: int = param(
-        50, (1, 2000), "particles", "N_x, particles of individuals", "int", online=False, tunable=False
-    )
-    partitions: int = param(
-        50, (1, 500), "particles", "N_z, partitions under each particle", "int", online=False, tunable=False
-    )
-    variant: str = param(
-        "full", ("full", "VAR1", "VAR1-standstill", "VAR2", "VAR3"), "",
-        "full: the whole model; VAR1: groups do not move individuals; VAR1-standstill: the same, read literally; VAR2: "
-        "VAR1, and partitions are drawn uniformly; VAR3: VAR2, and partitions have no validity",
-        "categorical", tunable=False,
-    )  # fmt: skip
-    individuals: str = param(
-        "filtered", ("filtered", "measured"), "",
-        "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)", "categorical", tunable=False,
-    )  # fmt: skip
-    algorithm: str = param(
-        "ours", ("ours", "paper"), "",
-        "ours: people are resampled by the own part of the weight, then particles by the rest; the proposal is p(x' | "
-        "x, y); the size prior acts on merges; paper: one weight, normal about the detection, on all events",
-        "categorical",
-    )  # fmt: skip
+    # fmt: off
+    particles: int = param(50, (1, 2000), "particles",
+        "N_x, particles of individuals", "int", online=False, tunable=False)
+    partitions: int = param(50, (1, 500), "particles",
+        "N_z, partitions under each particle", "int", online=False, tunable=False)
+    variant: str = param("full", ("full", "VAR1", "VAR1-standstill", "VAR2", "VAR3"), "",
+        "of Tables 2 and 3: VAR1 moves nobody, VAR2 has no events, VAR3 no validity, either", "categorical", tunable=False)
+    individuals: str = param("filtered", ("filtered", "measured"), "",
+        "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)", "categorical", tunable=False)
+    algorithm: str = param("ours", ("ours", "paper"), "",
+        "paper: a particle has one weight, the proposal is about the detection; ours: neither", "categorical")
     alpha: float = param(0.1, (0.0, 1.0), "share", "of the dynamics in the individuals' proposal")
-    place_noise: float = param(
-        0.25, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma; the paper gives no Sigma", "log"
-    )
+    place_noise: float = param(0.25, (0.01, 2.0), "m/s^0.5",
+        "jitter of the places in Sigma; the paper gives no Sigma", "log")
     velocity_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
-    group_share: float = param(
-        0.25, (0.0, 1.0), "share",
-        "of the group's mean velocity in a member's motion, the rest is the own velocity; 1: eq. 5 (below 1: ours)",
-    )  # fmt: skip
+    group_share: float = param(0.25, (0.0, 1.0), "share",
+        "of the group's mean velocity in a member's motion, the rest is the own velocity; 1: eq. 5 (below 1: ours)")
     point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")
-    pixel_noise: float = param(
-        0.15, (0.005, 2.0), "m", "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log",
-        sees="pixels",
-    )  # fmt: skip
-    validity_rate: float = param(
-        20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"
-    )
-    belief_rate: float = param(
-        20.0, (0.0, 100.0), "1/s", "weight of the beliefs of pairs in log p(Z | X), per second (ours)"
-    )
-    belief_memory: float = param(
-        0.2, (0.0, 2.0), "share",
-        "of the belief's `stay`, which is added for people who were reported in one group, and of `come`, which is "
-        "taken from the others (ours)",
-    )  # fmt: skip
-    lag: float = param(
-        0.4, (0.05, 3.0), "s",
-        "between the two times of the features of events; for another lag the classifier must be fitted anew (ours)",
-        online=False,
-    )  # fmt: skip
-    newcomers: str = param(
-        "validity", ("validity", "alone"), "",
-        "validity: a new person joins the nearest group with the probability of the validity (ours); alone: with label "
-        "0 (the paper)",
-        "categorical",
-    )  # fmt: skip
+    pixel_noise: float = param(0.15, (0.005, 2.0), "m",
+        "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log", sees="pixels")
+    validity_rate: float = param(20.0, (0.0, 500.0), "1/s",
+        "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)")
+    belief_rate: float = param(20.0, (0.0, 100.0), "1/s",
+        "weight of the beliefs of pairs in log p(Z | X), per second (ours)")
+    belief_memory: float = param(0.2, (0.0, 2.0), "share",
+        "of the belief's `stay` for people reported in one group, and of its `come` for others (ours)")
+    lag: float = param(0.4, (0.05, 3.0), "s",
+        "between the two times of the features of events, for which the classifier was fitted (ours)", online=False)
+    newcomers: str = param("validity", ("validity", "alone"), "",
+        "validity: new people may join the nearest group (ours); alone: with label 0 (the paper)", "categorical")
     size_std: float = param(5.0, (0.5, 50.0), "people", "sigma of the prior over group sizes", "log")
-    estimate: str = param(
-        "binder", ("binder", "histogram"), "",
-        "binder: the partition of least expected Binder loss (ours); histogram: Fig. 3", "categorical",
-    )  # fmt: skip
-    confirm_time: float = param(
-        0.3, (0.0, 3.0), "s",
-        "since its first measurement after which a new person is tracked, from the next frame on; it is given up after "
-        "so long without one (ours)",
-    )  # fmt: skip
-    coast_time: float = param(
-        1.0, (0.1, 10.0), "s", "people are removed who are missed for longer, in a group all together (ours)", "log"
-    )
+    estimate: str = param("binder", ("binder", "histogram"), "",
+        "binder: the partition of least expected Binder loss (ours); histogram: Fig. 3", "categorical")
+    confirm_time: float = param(0.3, (0.0, 3.0), "s",
+        "a new person is tracked so long after the first measurement, or given up so long after the last (ours)")
+    coast_time: float = param(1.0, (0.1, 10.0), "s",
+        "people are removed who are missed for longer, in a group all together (ours)", "log")
+    # fmt: on
     merge_weights: tuple[float, ...] = _weights("merge")
     split_weights: tuple[float, ...] = _weights("split")
 

@@ -40,61 +40,39 @@ class ParticleConfig(BackgroundSettings):
 
     tracker: ClassVar[str] = "particle"
 
+    # fmt: off
     particles: int = param(1000, (50, 20000), "particles", "number of particles", "int", online=False, tunable=False)
-    weights: str = param(
-        "factorised", ("factorised", "joint"), "",
-        "factorised: people have weights of their own (ours); joint: a particle has one weight, is resampled in every "
-        "frame and copied as it is (the paper)",
-        "categorical",
-    )  # fmt: skip
-    noise_scale: float = param(
-        3.0, (0.1, 10.0), "", "the standard deviations of the speed table are multiplied by this (ours)", "log"
-    )
-    speed_ends: tuple[float, ...] = param(
-        (0.15, 0.6, 1.0, 1.4), (0.0, 100.0), "m/s", "speed table: upper ends of rows 1 to 4 (column A)", "vector"
-    )
-    drift: tuple[float, ...] = param(
-        (0.0, 0.165, 0.086, 0.047, 0.03), (0.0, 1000.0), "m/s^2", "mean deceleration by row (column B)", "vector"
-    )
-    diffusion: tuple[float, ...] = param(
-        (0.074, 0.238, 0.196, 0.123, 0.094), (0.0, 1000.0), "m/s^1.5",
-        "standard deviation of the velocity per root second, by row (column C)", "vector",
-    )  # fmt: skip
-    point_noise: float = param(
-        0.08, (0.005, 2.0), "m", "from points: standard deviation of a measured position, per axis (sec. 3.3)", "log",
-        sees="points",
-    )  # fmt: skip
-    pixel_noise: float = param(
-        0.15, (0.005, 2.0), "m", "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log",
-        sees="pixels",
-    )  # fmt: skip
-    outlier_share: float = param(
-        0.05, (0.0, 0.5), "share",
-        "measured positions that are displaced, as by partial occlusion; 0: none (ours)",
-    )  # fmt: skip
-    outlier_noise: float = param(
-        0.4, (0.05, 3.0), "m",
-        "standard deviation of a displaced position, per axis, at least that of a position (ours)", "log",
-    )  # fmt: skip
-    detect_prob: float = param(
-        0.95, (0.3, 1.0), "probability", "that a person who was measured in the last frame is measured (ours)"
-    )
-    hidden_time: float = param(
-        2.0, (0.05, 20.0), "s", "mean time until a person who is not measured is measured again (ours)", "log"
-    )
-    clutter_density: float = param(
-        0.002, (0.0, 1.0), "1/m^2", "false alarms per frame and square metre; 0: none (ours)"
-    )
+    weights: str = param("factorised", ("factorised", "joint"), "",
+        "factorised: people have own weights (ours); joint: a particle has one weight (the paper)", "categorical")
+    noise_scale: float = param(3.0, (0.1, 10.0), "",
+        "the standard deviations of the speed table are multiplied by this (ours)", "log")
+    speed_ends: tuple[float, ...] = param((0.15, 0.6, 1.0, 1.4), (0.0, 100.0), "m/s",
+        "speed table: upper ends of rows 1 to 4 (column A)", "vector")
+    drift: tuple[float, ...] = param((0.0, 0.165, 0.086, 0.047, 0.03), (0.0, 1000.0), "m/s^2",
+        "mean deceleration by row (column B)", "vector")
+    diffusion: tuple[float, ...] = param((0.074, 0.238, 0.196, 0.123, 0.094), (0.0, 1000.0), "m/s^1.5",
+        "standard deviation of the velocity per root second, by row (column C)", "vector")
+    point_noise: float = param(0.08, (0.005, 2.0), "m",
+        "from points: standard deviation of a measured position, per axis (sec. 3.3)", "log", sees="points")
+    pixel_noise: float = param(0.15, (0.005, 2.0), "m",
+        "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log", sees="pixels")
+    outlier_share: float = param(0.05, (0.0, 0.5), "share",
+        "measured positions that are displaced, as by partial occlusion; 0: none (ours)")
+    outlier_noise: float = param(0.4, (0.05, 3.0), "m",
+        "standard deviation of a displaced position, per axis, at least that of a position (ours)", "log")
+    detect_prob: float = param(0.95, (0.3, 1.0), "probability",
+        "that a person who was measured in the last frame is measured (ours)")
+    hidden_time: float = param(2.0, (0.05, 20.0), "s",
+        "mean time until a person who is not measured is measured again (ours)", "log")
+    clutter_density: float = param(0.002, (0.0, 1.0), "1/m^2",
+        "false alarms per frame and square metre; 0: none (ours)")
     birth_rate: float = param(0.003, (1e-5, 1.0), "1/(m^2 s)", "new people per square metre and second (ours)", "log")
-    time_window: float = param(
-        3.0, (0.1, 30.0), "s", "a person who is not measured for so long is removed (sec. 2.1.1)", "log"
-    )
-    least_existence: float = param(
-        0.02, (0.0, 0.5), "probability", "a person whose existence is less probable is removed (ours)"
-    )
-    report_existence: float = param(
-        0.5, (0.0, 1.0), "probability", "people whose existence is at least so probable are reported (ours)"
-    )
+    time_window: float = param(3.0, (0.1, 30.0), "s",
+        "a person who is not measured for so long is removed (sec. 2.1.1)", "log")
+    least_existence: float = param(0.02, (0.0, 0.5), "probability",
+        "a person whose existence is less probable is removed (ours)")
+    report_existence: float = param(0.5, (0.0, 1.0), "probability",
+        "people whose existence is at least so probable are reported (ours)")
 
     def check(self) -> None:
         """Refuse a sensor without clutter that misses people."""
@@ -132,24 +110,29 @@ class RelationalConfig(ParticleConfig):
     tracker: ClassVar[str] = "relational"
 
     coupling_time: float = param(
-        0.15, (0.0, 10.0), "s",
-        "time constant with which people who walk together approach their mean velocity (ours); 0: they have it "
-        "(sec. 3.2)",
-    )  # fmt: skip
+        0.15,
+        (0.0, 10.0),
+        "s",
+        "time in which people who walk together approach their mean velocity (ours); 0: they have it (sec. 3.2)",
+    )
     common_noise: float = param(
-        0.8, (0.0, 1.0), "share",
-        "of the variance of the velocity's noise, that people who walk together have in common (ours); 0: none "
-        "(sec. 3.2)",
-    )  # fmt: skip
+        0.8,
+        (0.0, 1.0),
+        "share",
+        "of the velocity noise's variance, common to people who walk together (ours); 0: none (sec. 3.2)",
+    )
     relation_evidence: str = param(
-        "belief", ("belief", "state"), "",
-        "what says how probably a pair walks together in the long run; belief: that of the grouping about their tracks "
-        "so far; state: their distance and velocity difference in the particle (ours)",
-        "categorical", online=False,
-    )  # fmt: skip
+        "belief",
+        ("belief", "state"),
+        "",
+        "who walks together in the long run, by the belief or the particle's state (ours)",
+        "categorical",
+        online=False,
+    )
     relation_rate: float = param(
         1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
     )
     relation_bias: float = param(5.9, (-40.0, 40.0), "", "log odds of walking together at the same place (ours)")
     relation_distance: float = param(3.3, (0.0, 40.0), "1/m", "loss of log odds per metre of distance (ours)")
     relation_velocity: float = param(5.9, (0.0, 40.0), "s/m", "loss of log odds per m/s of velocity difference (ours)")
+    # fmt: on
