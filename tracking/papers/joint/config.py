@@ -50,7 +50,7 @@ class JointConfig(BackgroundSettings):
     partitions: int = param(50, (1, 500), "particles",
         "N_z, partitions under each particle", "int", online=False, tunable=False)
     variant: str = param("full", ("full", "VAR1", "VAR1-standstill", "VAR2", "VAR3"), "",
-        "of Tables 2 and 3: VAR1 moves nobody, VAR2 has no events, VAR3 no validity, either", "categorical", tunable=False)
+        "VAR1: groups move nobody; VAR2: and are uniform; VAR3: and have no validity", "categorical", tunable=False)
     individuals: str = param("filtered", ("filtered", "measured"), "",
         "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)", "categorical", tunable=False)
     algorithm: str = param("ours", ("ours", "paper"), "",
