@@ -31,7 +31,7 @@ class BackgroundSettings(Config):
     background: str = param("adaptive", ("adaptive", "trained"), "",
         "from pixels: it follows light and scene (ours) or stays as trained", "categorical", sees="pixels", online=False)
     background_time: float = param(20.0, (1.0, 1000.0), "s",
-        "from pixels: time constant of background's adaptation; foreground: ten times (ours)", "log", sees="pixels")
+        "from pixels: time constant of background that adapts; foreground: ten times (ours)", "log", sees="pixels")
     # fmt: on
 
     @property
