@@ -29,7 +29,7 @@ class BackgroundSettings(Config):
     dark: float = param(0.5, (0.0, 1.0), "",
         "from pixels: relative brightness; a darkened pixel below it is foreground, else shadow", sees="pixels")
     background: str = param("adaptive", ("adaptive", "trained"), "",
-        "from pixels: it follows light and scene (ours) or stays as trained", "categorical", sees="pixels", online=False)
+        "from pixels: follows light and scene (ours) or stays as trained", "categorical", sees="pixels", online=False)
     background_time: float = param(20.0, (1.0, 1000.0), "s",
         "from pixels: time constant of background that adapts; foreground: ten times (ours)", "log", sees="pixels")
     # fmt: on
