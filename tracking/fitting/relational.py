@@ -80,8 +80,12 @@ def fit_relational(truths: Iterable[Truth], ends: Sequence[float]) -> dict[str, 
     losses = [_log_loss(pairs, weights, rate) for rate in RATES]
     rate = RATES[int(np.argmin(losses))]
     names = ("relation_bias", "relation_distance", "relation_velocity")
-    found = dict(zip(names, weights.tolist(), strict=True))
-    return {"drift": drifts, "diffusion": diffusions, "relation_rate": rate} | found
+    return {
+        "drift": drifts,
+        "diffusion": diffusions,
+        "relation_rate": rate,
+        **dict(zip(names, weights.tolist(), strict=True)),
+    }
 
 
 def velocity_changes(truth: Truth) -> tuple[Array, Array, Array, Array]:

@@ -30,6 +30,8 @@ def fit_relational(options: FitRelationalOptions) -> CommandResult:
     config = RelationalConfig.from_dict(dict(params), out)
     write_file(out, config.to_toml().encode())
     width, body = max(map(len, params)), config.as_dict()
-    lines = [f"{name:<{width}}  {np.round(body[name], 4)}  {RelationalConfig.known(name).unit}" for name in params]
+    lines = [
+        f"{name:<{width}}  {np.round(np.array(body[name]), 4)}  {RelationalConfig.known(name).unit}" for name in params
+    ]
     lines += ["", f"→ {out}: use it as --params {out}"]
     return CommandResult({"file": out, "params": params}, "\n".join(lines))
