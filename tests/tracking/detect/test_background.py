@@ -95,17 +95,21 @@ def test_new_frames_of_the_empty_scene_are_background_at_about_the_detection_rat
 # --- the five classes -------------------------------------------------------------------------------------------------
 
 
-def test_five_classes_of_known_colours():
+@pytest.mark.parametrize("background", ["adaptive", "trained"])
+def test_five_classes_of_known_colours(background, monkeypatch):
+    monkeypatch.setattr(Background, "_estimate_gain", lambda self, _: self.gain)
     mean = np.broadcast_to(np.array([90.0, 100.0, 110.0]), (30, 50, 3))
-    made = model(mean, background="trained")
+    made = model(mean, background=background)
     scales = np.repeat([1.0, 0.6, 0.2, 1.2, 2.3], 10)
     picture = mean * scales[None, :, None]
     picture[20:] = mean[20:] * (1.6, 0.9, 0.3)
     classes = made.classify(np.round(picture).astype(np.uint8))
-    for band, kind in enumerate((BACKGROUND, SHADOW, DARK, HIGHLIGHT, FOREGROUND)):
+    brightest = FOREGROUND if background == "adaptive" else HIGHLIGHT
+    for band, kind in enumerate((BACKGROUND, SHADOW, DARK, HIGHLIGHT, brightest)):
         assert np.all(classes[:20, 10 * band : 10 * band + 10] == kind), band
     assert np.all(classes[20:] == FOREGROUND)
-    assert share(fused_foreground(classes), True) == pytest.approx((20 * 20 + 10 * 50) / 1500)
+    bands = 2 if background == "adaptive" else 1
+    assert share(fused_foreground(classes), True) == pytest.approx((20 * 10 * bands + 10 * 50) / 1500)
 
 
 def test_a_dark_place_that_gets_darker_by_noise_is_no_dark_foreground():

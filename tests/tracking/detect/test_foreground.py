@@ -80,7 +80,7 @@ def test_an_unknown_scale_is_guessed_from_the_images_height(unknown):
 def test_the_sample_shows_how_large_people_are():
     shown = context(np.nan, painted.spread())
     size = PersonSize(shown)
-    Foreground(shown, BackgroundSettings(), 0.6).learn_person_size(size, shown.background)
+    Foreground(shown, BackgroundSettings()).learn_person_size(size, shown.background)
     assert size.px_per_m == pytest.approx(SCALE, rel=0.06)
 
 
