@@ -70,7 +70,7 @@ def measure(sequence: Sequence) -> list[float]:
     from tracking.prepare import prepare
 
     context = prepare("blob", sequence, detections="image").context
-    foreground = Foreground(context, BackgroundSettings(), 1.0)
+    foreground = Foreground(context, BackgroundSettings())
     hit = false = missed = wrong = pieces = regions = frames = 0
     for frame in sequence:
         if frame.index % EVERY:
