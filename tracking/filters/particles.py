@@ -42,7 +42,8 @@ def systematic_resample_rows(weights: Array, uniforms: Array) -> Ints:
     rows, count = weights.shape
     total = np.cumsum(weights, axis=1)
     total /= total[:, -1:]
-    reached = np.ceil(count * total - uniforms[:, None]).astype(np.int64)
+    below_one = np.minimum(uniforms, 1 - 1e-9)  # count less the largest number below 1 is rounded to count - 1
+    reached = np.ceil(count * total - below_one[:, None]).astype(np.int64)
     copies = np.diff(reached, axis=1, prepend=0)
     return np.repeat(np.tile(np.arange(count), rows), copies.ravel()).reshape(rows, count)
 
