@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -42,10 +42,9 @@ class FitRelationalOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FitJointOptions:
-    """Options of the command `fit joint`, which learns how groups of people behave from simulated truth.
+    """Options of the command `fit joint`, which learns the event classifier of `joint` from simulated truth.
 
-    names: scenarios, *.toml files or suites. learn: the weights of the event classifier, or the components of the
-    Dirichlet process mixture. seeds: those fitted to; check: others that the fit is scored with, None:
+    names: scenarios, *.toml files or suites. seeds: those fitted to; check: others that the fit is scored with, None:
     none; each "A:B" (A to B - 1) or one number. out: the TOML file to write.
     """
 
@@ -53,10 +52,6 @@ class FitJointOptions:
     out: Annotated[
         Path, typer.Option("--out", metavar="FILE.toml", help="File to write: parameters of joint, for --params.")
     ]
-    learn: Annotated[
-        Literal["events", "components"],
-        typer.Option(help="events: the classifier of merges and splits; components: the Dirichlet process mixture."),
-    ] = "events"
     seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds of the scenes to fit to.")] = "30000:30002"
     check: Annotated[str | None, typer.Option("--check", metavar="A:B", help="Other seeds, to score the fit with.")] = (
         None

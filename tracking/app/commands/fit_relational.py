@@ -15,6 +15,8 @@ def fit_relational(options: FitRelationalOptions) -> CommandResult:
     Raises InputError if --out is no .toml file or cannot be written, if a name or seeds are wrong, or if the scenes
     have too few people or no groups. Raises WorkError if a script cannot be fulfilled or the disk is full.
     """
+    import numpy as np
+
     from scenarios.loading.resolve import resolve
     from sim.io.files.atomic import write_file
     from tracking.fitting.grouping_scenes import simulated
@@ -27,7 +29,9 @@ def fit_relational(options: FitRelationalOptions) -> CommandResult:
     params = fit((simulated(entry, seed) for entry in entries for seed in seeds), RelationalConfig().speed_ends)
     config = RelationalConfig.from_dict(dict(params), out)
     write_file(out, config.to_toml().encode())
-    width = max(map(len, params))
-    lines = [f"{name:<{width}}  {value:9.4f}  {RelationalConfig.known(name).unit}" for name, value in params.items()]
+    width, body = max(map(len, params)), config.as_dict()
+    lines = [
+        f"{name:<{width}}  {np.round(np.array(body[name]), 4)}  {RelationalConfig.known(name).unit}" for name in params
+    ]
     lines += ["", f"→ {out}: use it as --params {out}"]
     return CommandResult({"file": out, "params": params}, "\n".join(lines))
