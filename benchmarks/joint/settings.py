@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.joint.runs import (
     OTHERS,
     SHARES,
+    Row,
     Variant,
     difference,
     mean_row,
