@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
+from sim.elementary_kernels import sort_by
 from sim.types import Array, Bools, Ints
 from tracking.filters.component_regions_kernels import WEIGHT
 from tracking.filters.components_kernels import AROUND, cells, components, prefixes
@@ -156,16 +157,23 @@ def associate(
 def _ordered_points(
     d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, share: Array, g: int, association: float
 ) -> tuple[Ints, int]:
-    inside = np.flatnonzero((d2 < np.inf) | (owner == g))
-    if association == NEAREST:
-        kept = np.empty(len(inside), np.bool_)
-        for n in range(len(inside)):
-            kept[n] = claimants[inside[n]] < 2 or share[:, inside[n]].argmax() == g
-        inside = inside[kept]
-    shared = claimants[inside] > 1
-    mine, others = inside[~shared], inside[shared]
-    distance = d2[others] - 2 * log_ratio[others] if len(log_ratio) else d2[others]
-    return np.concatenate((mine, others[np.argsort(distance, kind="mergesort")])), len(mine)
+    order, distance = np.empty(len(d2), np.int64), d2.copy()
+    own = shared = 0
+    for shares in (False, True):  # first the points that no other group claims
+        for n in range(len(d2)):
+            if not (d2[n] < np.inf or owner[n] == g) or (claimants[n] > 1) != shares:
+                continue
+            if association == NEAREST and shares and share[:, n].argmax() != g:
+                continue
+            if len(log_ratio):
+                distance[n] = d2[n] - 2 * log_ratio[n]
+            order[own + shared] = n
+            if shares:
+                shared += 1
+            else:
+                own += 1
+    sort_by(distance, order[own : own + shared])
+    return order[: own + shared], own
 
 
 @njit(cache=True)
@@ -176,9 +184,12 @@ def _estimate(
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     seen, mean_age = running_ages(weights, age, start)
     S = np.empty((len(people), 3))
-    log_mass = np.full(len(people), -np.inf)
+    log_mass = np.empty(len(people))
+    log_mass[:] = -np.inf
     unit = weights.mean()  # people that one point stands for: makes m_N a mass of numbers of points
-    evidence = np.concatenate((np.zeros(1), np.cumsum(colour[start:])))
+    evidence = np.zeros(len(colour) - start + 1)
+    for k in range(start, len(colour)):
+        evidence[k - start + 1] = evidence[k - start] + colour[k]
     width = rules[COUNT_SD] ** 2 + (rules[COUNT_SHARE] * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
         if feasible[j] and people[j] > 0:
@@ -196,8 +207,14 @@ def _estimate(
     beta, miss = beta / total, miss / total
     best = int(np.argmax(beta))
     report[INNOVATION_X], report[INNOVATION_Y] = mean[best, 0], mean[best, 1]
-    report[S_XX : S_YY + 1], report[MISS_MASS] = S[best], miss
-    _mix(np.where(seen > 0, beta, 0.0), mean, mean_age, S, x, P)
+    report[MISS_MASS] = miss
+    measured = np.zeros(len(beta))
+    for j in range(len(beta)):
+        if seen[j] > 0:
+            measured[j] = beta[j]
+    for k in range(3):
+        report[S_XX + k] = S[best, k]
+    _mix(measured, mean, mean_age, S, x, P)
     if not rest:
         _adapt(beta, people, cov, extent, size, rules)
     return best if beta.sum() > miss else -1
@@ -223,11 +240,12 @@ def _mix(beta: Array, mean: Array, age: Array, S: Array, x: Array, P: Array) -> 
                 less[a, b] += beta[j] * (gain[a, 0] * PH[b, 0] + gain[a, 1] * PH[b, 1])
                 spread[a, b] += beta[j] * step[a] * step[b]
     for a in range(4):
+        x[a] += shift[a]
         for b in range(4):
-            spread[a, b] -= shift[a] * shift[b]
-    P += spread - less
-    P[:] = (P + P.T) / 2
-    x += shift
+            P[a, b] += spread[a, b] - shift[a] * shift[b] - less[a, b]
+    for a in range(4):
+        for b in range(a):
+            P[a, b] = P[b, a] = (P[a, b] + P[b, a]) / 2
 
 
 @njit(cache=True)

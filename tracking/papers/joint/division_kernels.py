@@ -30,7 +30,8 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
     n, dims = len(members), points.shape[1]
     own = np.empty((n, dims))
     for k in range(n):
-        own[k] = points[members[k]]
+        for d in range(dims):
+            own[k, d] = points[members[k], d]
     sides = candidates(own)
     centre, scatter = np.empty((n, dims)), np.empty(n)
     energy, least = np.empty(len(sides)), np.inf

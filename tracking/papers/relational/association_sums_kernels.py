@@ -172,7 +172,9 @@ def dense_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
         return exact_sum(W, miss, spare, marginals)
     turned = np.empty((m, n))
     log_sum = exact_sum(np.ascontiguousarray(W.T), spare, miss, turned)
-    marginals[:] = turned.T
+    for i in range(n):
+        for j in range(m):
+            marginals[i, j] = turned[j, i]
     return log_sum
 
 

@@ -70,8 +70,20 @@ def free_detections(W: Array, miss: Array) -> Array:
             continue
         count, width = linked(W, k, done, reached, rows, columns)
         if count > 1:
-            _free_of_linked(W, miss, np.sort(rows[:count]), np.sort(columns[:width]), free)
+            _sort(rows[:count])
+            _sort(columns[:width])
+            _free_of_linked(W, miss, rows[:count], columns[:width], free)
     return free
+
+
+@njit(cache=True)
+def _sort(numbers):  # type: ignore[no-untyped-def]
+    for n in range(1, len(numbers)):
+        number, at = numbers[n], n
+        while at > 0 and numbers[at - 1] > number:
+            numbers[at] = numbers[at - 1]
+            at -= 1
+        numbers[at] = number
 
 
 @njit(cache=True)
@@ -93,7 +105,10 @@ def _free_of_linked(W, miss, rows, columns, free):  # type: ignore[no-untyped-de
         others[a] = 0.0
         sparse_sum(others, miss[rows], spare, found)
         for b in range(m):
-            free[rows[a], columns[b]] = max(1.0 - found[:, b].sum(), 0.0)
+            others_have = 0.0
+            for other in range(n):
+                others_have += found[other, b]
+            free[rows[a], columns[b]] = max(1.0 - others_have, 0.0)
 
 
 @njit(cache=True)

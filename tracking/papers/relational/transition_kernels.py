@@ -131,8 +131,9 @@ def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
                 apart, faster = pos[p, i, d] - pos[p, j, d], vel[p, i, d] - vel[p, j, d]
                 first[d], second[d] = first[d] + apart, second[d] + apart * apart
                 first[d + 2], second[d + 2] = first[d + 2] + faster, second[d + 2] + faster * faster
-        twice = 2 * np.maximum(second / particles - (first / particles) ** 2, 0.0)
-        out[k] = twice[0] + twice[1], twice[2] + twice[3]
+        for d in range(4):
+            mean = first[d] / particles
+            out[k, d // 2] += 2 * max(second[d] / particles - mean * mean, 0.0)
     return out
 
 
