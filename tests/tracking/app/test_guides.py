@@ -77,7 +77,7 @@ def test_without_recordings(name, tmp_path, monkeypatch, capsys):
     follow(name, False, capsys)
 
 
-@pytest.mark.parametrize("name", ["who-belongs-together", "recordings"])
+@pytest.mark.parametrize("name", ["who-belongs-together", "recordings", pytest.param("tune", marks=pytest.mark.slow)])
 def test_with_recordings(name, tmp_path, monkeypatch, capsys, shared_data):
     """The folder `data` of the guides, and a video of the reader's."""
     monkeypatch.chdir(tmp_path)
