@@ -20,7 +20,8 @@ def play(text: str, data: bool, capsys: pytest.CaptureFixture[str]) -> list[str]
     """Runs the blocks in order and returns the commands that ran. data: also those that read the folder `data`.
 
     A block whose preceding text says "Save this as" becomes a file. Others: python is a script, text is what the last
-    command printed, to the letter, sh is not run, and lines of a block without a language are commands.
+    command printed, to the letter but for lines that a line "…" stands for, sh is not run, and lines of a block without
+    a language are commands.
     """
     done, printed, end = [], "", 0
     for block in BLOCK.finditer(text):
@@ -30,7 +31,8 @@ def play(text: str, data: bool, capsys: pytest.CaptureFixture[str]) -> list[str]
         elif kind == "python":
             exec(compile(body, "guide", "exec"), {})
         elif kind == "text":
-            assert "\n".join(map(str.rstrip, printed.splitlines())) == body.rstrip("\n"), done[-1]
+            shown = "\n".join(map(str.rstrip, printed.splitlines()))
+            assert shows(body.rstrip("\n"), shown), f"{done[-1]} printed:\n{shown}"
         elif not kind and (data or "data/" not in body):
             for line in body.splitlines():
                 capsys.readouterr()
@@ -38,6 +40,12 @@ def play(text: str, data: bool, capsys: pytest.CaptureFixture[str]) -> list[str]
                 printed = capsys.readouterr().out
                 done.append(line)
     return done
+
+
+def shows(body: str, printed: str) -> bool:
+    """Returns True if a text is what was printed; a line "…" of it stands for one or more lines."""
+    lines = (".*" if line == "…" else re.escape(line) for line in body.splitlines())
+    return re.fullmatch("\n".join(lines), printed, re.DOTALL) is not None
 
 
 def follow(name: str, data: bool, capsys: pytest.CaptureFixture[str]) -> None:
@@ -50,6 +58,11 @@ def follow(name: str, data: bool, capsys: pytest.CaptureFixture[str]) -> None:
         assert len(done) == len(re.findall("^flockscope ", unrun, re.MULTILINE))
 
 
+def test_shows():
+    assert shows("a\n…\nd (1)", "a\nb\nc\nd (1)")
+    assert not shows("a\n…\nd (1)", "a\nb\nc\nd (2)")
+
+
 def test_who_belongs_together(tmp_path, monkeypatch, capsys):
     """Without recordings."""
     monkeypatch.chdir(tmp_path)
@@ -58,13 +71,13 @@ def test_who_belongs_together(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["generate", "write-a-scenario", "your-own-tracker", "python"])
+@pytest.mark.parametrize("name", ["generate", "write-a-scenario", "track-and-score", "your-own-tracker", "python"])
 def test_without_recordings(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     follow(name, False, capsys)
 
 
-@pytest.mark.parametrize("name", ["who-belongs-together", "recordings"])
+@pytest.mark.parametrize("name", ["who-belongs-together", "recordings", pytest.param("tune", marks=pytest.mark.slow)])
 def test_with_recordings(name, tmp_path, monkeypatch, capsys, shared_data):
     """The folder `data` of the guides, and a video of the reader's."""
     monkeypatch.chdir(tmp_path)
