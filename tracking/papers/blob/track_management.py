@@ -2,7 +2,7 @@
 
 Track management of Gonzalez et al. (2006), secs. 4.5 and 5, by rho = sqrt|S| / its asymptote, S the covariance of the
 innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty). Association
-by cost, explained misses, the rules of reporting and the field of view are ours; see tracking.papers.blob.tracker.
+by cost, explained misses, the rules of reporting and the field of view are ours.
 """
 
 from __future__ import annotations

@@ -14,38 +14,13 @@ blob's ellipse.
     gate       z_pred = C A x (x before the prediction)        eq. 8           update_from_boxes, update_from_pixels
                d^2 = (z - z_pred)' S^-1 (z - z_pred) <= q      eqs 9, 10       q: the quantile `gate` of chi2 with 4
                                                                                degrees of freedom, 5 with theta
-    associate  each measurement to its nearest gated track     sec. 4.4        track_management.associate
+    associate  measurements and gated tracks                   sec. 4.4        track_management.associate
     update     y, S, K, x, P                                   eqs 3 to 7      tracking.filters.kalman
     manage     rho = sqrt|S| / asymptote: confirm, delete      secs. 4.5, 5    track_management,
                                                                                tracking.filters.track_uncertainty
     pixels     five classes, cleaning, blobs, ellipses         secs. 3.2, 3.3  tracking.detect
 
-Readings of the paper: eq. 4 needs brackets, P = (I - K C) P; eq. 9 has row and column exchanged; sec. 4.3 compares d^2
-with "the Mahalanobis radius", by which the quantile of chi2 is meant.
-
-Departures, all ours:
-- All tracks are persons. Noises are in metres at the person: the scale of a track is px per m, the longer side of its
-  box being 1.7 m, but half to twice the sequence's scale. From straight above it is the sequence's. Acceleration noises
-  are spectral densities.
-- rho is that of x, y, h, w. theta is not part of it.
-- association = "optimal": one to one, of least total cost d^2 + ln |S|, which is -2 ln N(z; z_pred, S) but for a
-  constant. So a track that was missed for long pays for its wide gate. From boxes ln |S| is that in metres, which is 2
-  ln rho but for a constant; from pixels it is that of ellipse_tracks, with scale and direction. A track left without
-  measurement costs the gate plus the largest ln |S| that any track can have, so that a lone pair inside a gate is
-  always associated.
-- association = "nearest" (the paper's): of several measurements with the same nearest track the nearest updates it.
-- Pieces of one person: a free box in the orphan_gate of a measured track, or inside the predicted box of a confirmed
-  one, starts no track. The orphan_gate is that of a track measured in every frame; the paper uses the gate itself
-  (frame 367). Pieces are fused by their moments if the fused box fits better than a single one.
-- A box that covers several confirmed tracks, at least one of them missed, updates and starts no track. The missed ones
-  among them, and missed tracks hidden behind another track, survive merged_time instead of coast_time, until measured.
-- Detections below score_start continue tracks but start none, and choose after all others (ByteTrack, Zhang et al.
-  2022). With "nearest" such a detection still chooses only its nearest track.
-- Reported are confirmed tracks, and measured tentative ones from the age report_delay on. A missed track is reported
-  for report_coast (hidden or merged ones: report_hidden), but for at most report_credit times the time it was measured,
-  as a rarely measured track is mostly a false alarm. A missed track that is leaving the field of view is not reported.
-  It is deleted when its centre leaves the image, if the image's size is known.
-- From pixels: see update_from_pixels, person_template, new_people and ellipse_tracks.
+Readings of the paper and departures: docs/reference/trackers/blob.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Order of a frame, with the paper's sections: predict (sec. 4.2, eqs 1, 2), gate (sec. 4.3, eqs 8 to 10), associate (sec.
 4.4), fuse the pieces of one person (ours), update (sec. 4.2, eqs 3 to 7), manage the tracks (secs. 4.5, 5;
-track_management). Departures are listed in tracking.papers.blob.tracker. A measurement z is a centred box (x, y, h, w),
+track_management). A measurement z is a centred box (x, y, h, w),
 px, with a score from 0 to 1.
 """
 

@@ -20,47 +20,7 @@ number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or 
 
 The grouping functions G_0, G_x, G_y of points (sec. 3.3, 4.2.1) are in tracking.filters.components.
 
-Departures, all ours.
-
-Search region and update:
-- The covariance of the search region is Sigma plus those of the centroid and of a point, although Sigma, of measured
-  places, contains the latter. The region widens while no association is feasible. Tentative groups have no points that
-  lie in a confirmed group's region.
-- The extent is divided by the share of it that points inside the region have (below 1), and shrunk to a prior, as few
-  people have no covariance.
-  Splitting and merging use the same extents, so that a split group is not merged at once.
-- R of the centroid assumes that members keep their places and that some are not seen. m_N has a width that grows
-  with N, and tails. A miss hypothesis says that no point is the group's.
-- A shared point is a group's with probability proportional to N N(y; xi, S), S of the search region, times that of its
-  colour. Colours also shift its place in the order of shared points. Points in a group's region are claimed, and
-  start no group, also where the miss has most of the mass. Sigma and N rest while many points are probably another
-  group's and while no association is feasible.
-- Attached points: a point in no region that is linked to a group's points is the group's. Missed members: from points,
-  a member that is not measured stands in at its predicted place for a while: a measurement of earlier, moved with the
-  estimated velocity (H, R).
-- Colours are a further mass, from pixels (future work of sec. 6).
-
-Splitting and merging:
-- A split needs `split_time` without a feasible association; measured frames shorten that time, they do not end it. It
-  divides the points in the region that are most probably the group's, not all of Y_G.
-  Children have their parent's velocity. The largest keeps the id. People who walk out of the region are its children.
-- SR_v, the region of like velocities, is a largest difference of velocities in m/s, and R_x must hold for `merge_time`.
-  Regions overlap at 0.9 gamma.
-  Groups whose points are linked are near even if their regions do not overlap. From pixels, groups that are far apart
-  on the ground are not near.
-- Tentative and coasting groups and groups without a feasible association do not merge. P of a merged group is that of
-  a weighted mean.
-- Of two groups that follow the same people for too long, one becomes lost.
-
-Reporting:
-- Groups are tentative at first. They coast without measurements, become lost, and take their id back from a newborn
-  group that fits.
-- Onsets of merges and splits are measured afterwards. In an image seen at an angle, depth counts for more px than
-  it shows.
-
-association="none" is the paper's sec. 5.2.1: a group takes all points in its region, with attached points and missed
-members. There are no masses, no miss hypothesis and no time without feasible associations, so that a group only splits
-when people walk out of its region. Other departures hold, that of groups that follow the same people, too.
+Departures: docs/reference/trackers/group-pda.md.
 """
 
 from __future__ import annotations

@@ -15,25 +15,7 @@ particles of X, N_z partitions under each. The steps of a frame, with the number
 
 p_Nz(X' | X) is the normaliser of step 5. Steps 4 to 7 run when the new frame is there, as the proposal uses it.
 
-Readings of the paper: label 0 is nobody's group: it is left out of eq. 5, each person alone is a cluster of the
-validity, and nobody votes for it. Eq. 4 is used as printed, as an energy. VAR1 has the constant velocity of eq. 3.
-
-Departures, all ours:
-- Detections are points, or blobs, associated with people once for all particles; p(y | x) is normal. Births,
-  confirmation and losses.
-- The proposal is a mixture for each person, not of products. Its second part is p(x' | x, y), the product of dynamics
-  and likelihood. Sigma is made of two noises per root second.
-- Each person is resampled by the own part of the weight, and the partitions by the rest: eq. 5 and the validity. A
-  person then comes from another particle than the partitions, so that the rest hardly selects places. Reported moments
-  have the own part only. A new person joins a group by the validity.
-- The Davies-Bouldin index has a prior scatter and a virtual other cluster, and acts per second.
-- People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
-  features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
-- p(Z | X) also has the beliefs of pairs (`tracking.grouping.pair_belief`), with a memory of the groups reported.
-- In eq. 5 a member moves with a share of the group's velocity and the rest of the own one.
-- The partition is that of least Binder loss. A member who is missed stays. Ids follow the identity rule; onsets of
-  events are dated back.
-The preset `paper` switches off what has a parameter.
+Readings of the paper and departures: docs/reference/trackers/joint.md.
 """
 
 from __future__ import annotations

@@ -11,29 +11,7 @@ together. z are the detections of a frame, w the weights. The steps of a frame:
     estimate  means over particles                                                                   particle_set
     resample  residual sampling                                                 sec. 2.1             filters.particles
 
-Readings of the paper: eq. 2 and eq. 8 condition on all earlier states, s_1:t-1; the last factor of eq. 14 is p(s^a_t-1,
-s^r_t-1 | z_1:t-1), and relations are summed. Table 3 is in m/frame in columns B and C, per axis, and in cm/frame in
-column A. A group has the mean velocity vector of its members; the row of the table is that of this mean's length.
-
-Departures, all ours:
-- The speed table is learned from simulated people without errors; a row is a drift and a diffusion, so that it holds at
-  any frame rate. Table 3, of measured boxes at 25 frames/s, is the preset caviar-25fps.
-- People who walk together approach their mean velocity with a time constant, and have a part of the noise in common. In
-  the paper they have the mean velocity in each frame, and noise of their own. Partners count by how alike they move.
-- Relations change by hazards per second; the paper does not say how. Each pair is a chain of two states, and groups are
-  connected components: this needs no labels, and gives the probability that two people walk together. The equilibrium
-  of a pair is the belief of tracking.grouping about their tracks so far.
-- People have slots that are common to all particles. That a person exists is a probability in each particle, and not
-  drawn: particles with and without each of many newcomers would be few.
-- The sensor has missed people and false alarms. A person not measured in the last frame is measured with a smaller
-  probability, as people are hidden for a while.
-- Nobody is measured, dies or counts as missed behind pillars and walls of a known scene and behind other people. Hidden
-  feet displace a point away from the camera.
-- A detection that is probably nobody's starts a person, who has no weight until the next frame.
-- People have weights of their own (factorised): sums over mappings in which all others are averaged. A missed person
-  has those of the partners as factors. Particles are resampled if they are worth few, and drawn apart by a kernel.
-- Groups are derived from the tracks; the probability that two people walk together is an output of its own.
-The preset `paper` switches off what has a parameter.
+Readings of the paper and departures: docs/reference/trackers/relational.md.
 """
 
 from __future__ import annotations

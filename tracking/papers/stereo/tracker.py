@@ -14,8 +14,8 @@ covariance of its points' positions and velocities; N, the number of its points.
     new groups: points whose spheres overlap               eq. 12              births_and_losses
     merging by the full state, weighted by N               eqs 13 to 15        merging
 
-The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in tracking.detect. Departures, all ours:
-docs/reference/trackers/stereo.md lists them with their parameters.
+The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in tracking.detect. Departures:
+docs/reference/trackers/stereo.md.
 """
 
 from __future__ import annotations
