@@ -168,10 +168,7 @@ def check_blocks(blocks: int, sequences: int) -> None:
 
 
 def joined(names: SequenceOf[str], sequences: SequenceOf[str], found: SequenceOf[ComparedSequence]) -> ComparedRuns:
-    """Returns the comparison of runs with these names; found: for each sequence, the result of `compare_one`.
-
-    Raises InputError if people were not compared in one way on all sequences.
-    """
+    """Returns the comparison of runs with these names; found: for each sequence, the result of `compare_one`."""
     ways: dict[Similarity, str] = {}
     for sequence, one in zip(sequences, found, strict=True):
         ways.setdefault(one.scores[0].similarity, sequence)
@@ -200,10 +197,7 @@ def compare_one(
     blocks: int = 0,
     oracles: bool = True,
 ) -> ComparedSequence:
-    """Returns the scores of each run of one sequence, and of the oracles of their inputs, all compared alike.
-
-    oracles: False leaves them out. Raises InputError as `compare`.
-    """
+    """Returns the scores of each run of one sequence, and of the oracles of their inputs, all compared alike."""
     infos = [run.info if isinstance(run, TrackingRun) else {} for run in runs]
     inputs = [input_name(info) for info in infos]
     with scorer_of(sequence) as scorer:
@@ -224,11 +218,7 @@ def compare_one(
 
 @contextmanager
 def scorer_of(sequence: Sequence) -> Iterator[Scorer]:
-    """Gives a scorer of the sequence's truth; what it cannot compare becomes an InputError that names the sequence.
-
-    Raises InputError if the sequence has no labels, the runs cannot be compared as asked, or an id occurs twice in one
-    frame.
-    """
+    """Gives a scorer of the sequence's truth; what it cannot compare becomes an InputError that names the sequence."""
     if sequence.truth is None:
         raise InputError(
             file=sequence.source.get("path", sequence.name), got="no labels", expected="a sequence with truth",

@@ -19,10 +19,7 @@ PAPERS = Path(__file__).parent / "papers"
 
 
 def constants_table(package: str) -> str:
-    """Return the constants of the package tracking.papers.`package` as a Markdown table, by module and place.
-
-    Raises OSError if there is no such package.
-    """
+    """Returns the constants of the package tracking.papers.`package` as a Markdown table, by module and place."""
     rows = ["| constant | value | module | meaning |", "|---|---|---|---|"]
     for path in sorted((PAPERS / package).glob("*.py")):
         found = _constants(ast.parse(path.read_text(encoding="utf-8")).body)
@@ -31,8 +28,7 @@ def constants_table(package: str) -> str:
 
 
 def _constants(body: list[ast.stmt]) -> Iterator[tuple[str, float, str]]:
-    """Yields name, value and meaning of the constants among the statements of a module; constants that are assigned
-    together share their text."""
+    """Yields name, value and meaning of the constants among the statements of a module."""
     for statement, after in pairwise(body):
         match statement, after:
             case ast.Assign([target], value), ast.Expr(ast.Constant(str(text))):

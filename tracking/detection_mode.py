@@ -22,25 +22,12 @@ InputKind = Literal["points", "boxes", "pixels", "stereo"]
 
 
 def runs_own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
-    """Return True if a tracker with these needs can run its own detector on the sequence's pictures.
-
-    needs: some of "pixels", "stereo", "boxes", "points". True if "pixels" is among them and the sequence has pictures,
-    or "stereo" and it has right pictures; either suffices.
-    """
+    """Returns True if a tracker with these needs can run its own detector on the sequence's pictures."""
     return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
 
 
 def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: DetectionMode | None) -> DetectionMode:
-    """Return the mode of detections: `requested` if it can work; if it is None, the first of image, file, truth that
-    can.
-
-    needs: what the tracker can work with, any one of "pixels", "stereo", "boxes", "points". Mode "image" works if the
-    tracker can run its own detector on the sequence's pictures. "file" works if it takes boxes or points and the
-    sequence has stored detections, "truth" if it takes these and the sequence has labels.
-
-    Raises InputError, naming the needs and what the sequence has, if the requested mode, or without one every mode,
-    fails. If only the sequence lacks what the requested mode takes, as pictures, the error says that.
-    """
+    """Returns the mode of detections."""
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
     if requested in able or (requested is None and able):
         return requested or able[0]  # type: ignore[return-value]
@@ -62,8 +49,6 @@ def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
 
 
 def _missing(mode: DetectionMode, needs: tuple[str, ...]) -> str:
-    """Returns what a sequence lacks on which a tracker with these needs cannot work in the mode; "" if the tracker
-    itself cannot work in the mode."""
     if mode == "image":
         return "pictures" if "pixels" in needs else "right pictures" if "stereo" in needs else ""
     takes = not {"boxes", "points"}.isdisjoint(needs)
@@ -71,8 +56,6 @@ def _missing(mode: DetectionMode, needs: tuple[str, ...]) -> str:
 
 
 def _contents(sequence: Sequence) -> str:
-    """Returns what the sequence has (images, a right image, detections, truth) in words for an error message; or
-    "nothing"."""
     parts = {
         "images": sequence.has_images,
         "a right image": sequence.has_right,
@@ -83,11 +66,7 @@ def _contents(sequence: Sequence) -> str:
 
 
 def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, frames: Iterable[Frame]) -> InputKind:
-    """Return what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points".
-
-    frames: as the tracker gets them, without pictures; ignored in mode "image". Detections on the ground have points,
-    and boxes beside them if there is a camera. A tracker that does not take points works on the boxes.
-    """
+    """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points"."""
     if mode == "image":
         return "pixels" if "pixels" in needs and sequence.has_images else "stereo"
     in_image = any(f.detections is not None and f.detections.plane == "image" for f in frames)
@@ -97,17 +76,7 @@ def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, 
 def frames_with_detections(
     needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int
 ) -> tuple[Frame, ...] | None:
-    """Return the sequence's frames with the detections of `mode` and without pictures, or None if `mode` is "image".
-
-    needs: of the tracker. sensor: settings of a scenario's [sensor] that degrade the detections of mode "truth", {} for
-    none; seed: of their random numbers, and of the order of the rows in that mode. Both are ignored in mode "file",
-    where a frame's detections may be None. Frames count from 1, frame k at (k - 1) / fps seconds. The arrays of each
-    frame are its own and read-only: none of them leads to the detections of another frame.
-
-    Raises InputError if there are detections, none of them has boxes and the tracker does not take points, if the
-    sensor settings are wrong, or if the stored detections or the truth cannot be read. In mode "truth" raises WorkError
-    if an order of a simulated script was not fulfilled, AssertionError for a sequence without labels.
-    """
+    """Returns the sequence's frames with the detections of `mode` and without pictures, or None if `mode` is "image"."""
     if mode == "image":
         return None
     if mode == "file":
@@ -125,11 +94,7 @@ def frames_with_detections(
 
 
 def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
-    """Raise InputError if a frame's detections cannot be given to a tracker with these needs; else return nothing.
-
-    They cannot if a number is nan or infinite (the error names frame and row, both from 1), or if there are detections
-    without boxes and the tracker does not take points.
-    """
+    """Raise InputError if a frame's detections cannot be given to a tracker with these needs; else return nothing."""
     rows = len(detections.pos)
     arrays = [a for a in (detections.pos, detections.vel, detections.box, detections.score) if a is not None]
     for a in arrays:

@@ -39,11 +39,7 @@ class Source:
 
     @cached_property
     def key(self) -> tuple[object, ...]:
-        """A tuple that is equal for sources of the same sequence. It is computed once.
-
-        For a scenario: name, seed, number of the copy and a hash of the content. For a path: the path resolved, so that
-        two paths are equal if they lead to the same file. For a Sequence in memory: the identity of the object.
-        """
+        """A tuple that is equal for sources of the same sequence. It is computed once."""
         if self.entry is not None:
             content = self.entry.scenario.model_dump_json()
             return self.name, self.seed, self.entry.repeat, hashlib.sha256(content.encode()).hexdigest()
@@ -56,22 +52,12 @@ class Source:
 
     @property
     def fps(self) -> float:
-        """Frames per second: of the scenario's camera if there is one; else the sequence is opened for it, which raises
-        as `open`."""
+        """Frames per second."""
         camera = self.entry.scenario.camera if self.entry is not None else None
         return self.open().fps if camera is None else camera.fps
 
     def open(self, streams: Iterable[str] = ()) -> Sequence:
-        """Return the sequence: simulated, read from its path, or as it is if it is in memory.
-
-        streams: the picture streams to draw if it is simulated ("left", "right", "disparity", "ids", "background"),
-        none by default. Of a stored MOTChallenge folder, the pictures are left out unless "left" is among them; other
-        stored and in-memory sequences ignore it. If several sequences are at the path, the first one.
-
-        Raises InputError if the scenario is impossible, a stream is unknown or needs a baseline that the camera lacks,
-        or the path does not exist, holds no known format or an invalid file. Truth, detections and pictures are read
-        later and may raise then.
-        """
+        """Returns the sequence: simulated, read from its path, or as it is if it is in memory."""
         if self.sequence is not None:
             return self.sequence
         if self.entry is not None:
@@ -84,7 +70,7 @@ class Source:
 
 
 def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
-    """Return the sources that `what` stands for, in order: for each scenario or suite entry all its seeds, then the
+    """Returns the sources that `what` stands for, in order: for each scenario or suite entry all its seeds, then the
     next.
 
     what: a suite's or scenario's name, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a list of
@@ -128,12 +114,6 @@ def _sources_of(
 
 
 def _stored(path: Path) -> list[Source]:
-    """Returns the sources of all sequences in a folder, dataset or recording; pictures are not read.
-
-    In each folder its subfolders come first, then its files, both sorted by name.
-
-    Raises InputError if the path holds no known format or a file is invalid.
-    """
     from sim.io.source import open_source
 
     found = open_source(path, images=False)

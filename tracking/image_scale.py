@@ -44,41 +44,27 @@ def required(px_per_m: float) -> float:
 
 
 def from_boxes(frames: Iterable[Detections | Tracks | None]) -> ImageScale:
-    """Return the image scale by the heights of the boxes of the first frames (sim.scene.boxes); nan without a box.
-
-    frames: detections or tracks of each frame, read to the end. The height is the last of a box's four columns, px.
-    None, and frames without boxes, are skipped; so are heights that are nan.
-    """
+    """Returns the image scale by the heights of the boxes of the first frames (sim.scene.boxes); nan without a box."""
     boxed = [(d.index, d.box[:, 3]) for d in frames if d is not None and d.box is not None]
     index = np.repeat(np.array([k for k, _ in boxed], np.int64), [len(h) for _, h in boxed])
     return ImageScale(*scale_of_first_boxes(index, np.concatenate([np.zeros(0), *(h for _, h in boxed)])))
 
 
 def from_tracks(given: ImageScale, learned: float, tracks: SequenceOf[Tracks]) -> ImageScale:
-    """Return the image scale for deriving groups from tracks; nan if it is unknown.
-
-    The first finite one counts: `given` (the context's), `learned` (that of `learned_by`), then that of the tracks'
-    boxes. Zero and negative values are not refused.
-    """
+    """Returns the image scale for deriving groups from tracks; nan if it is unknown."""
     if np.isfinite(given.px_per_m):
         return given
     return ImageScale(learned) if np.isfinite(learned) else from_boxes(tracks)
 
 
 def learned_by(tracker: object) -> float:
-    """Return the tracker's own attribute `px_per_m` (px per m), a number of Python or numpy; nan if it has none, or it
-    is anything but a finite number. Raises what reading the attribute raises."""
+    """Returns the tracker's own attribute `px_per_m` (px per m), a number of Python or numpy."""
     value = getattr(tracker, "px_per_m", None)
     return float(value) if is_number(value) else float("nan")
 
 
 def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ...] | None) -> ImageScale:
-    """Return the image scale that a tracker is given with a sequence; nan if it is unknown.
-
-    It is the one that is known before the first frame (`before_frames`). If there is none and `mode` is not "image", it
-    is that of the boxes of `frames`, or of the sequence's stored detections if `frames` is None. Raises InputError if
-    these cannot be read.
-    """
+    """Returns the image scale that a tracker is given with a sequence; nan if it is unknown."""
     known = before_frames(sequence)
     if np.isfinite(known.px_per_m) or mode == "image":
         return known
@@ -86,11 +72,7 @@ def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ..
 
 
 def before_frames(sequence: Sequence) -> ImageScale:
-    """Return the image scale that is known before a sequence is read, nan if there is none.
-
-    It is the camera's scale at the image centre, else the one that the sequence states. Its `frames` are above 0 if the
-    sequence took it from the labelled boxes of its first frames, so that labels of all frames tell it better.
-    """
+    """Returns the image scale that is known before a sequence is read, nan if there is none."""
     if sequence.camera is not None:
         from sim.scene.camera import px_per_m_at_centre
 

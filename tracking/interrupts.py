@@ -25,12 +25,7 @@ _recorders: list[Any] = []
 
 @contextmanager
 def recorded_interrupts() -> Iterator[None]:
-    """While the block runs, record SIGINT (Ctrl-C) and raise KeyboardInterrupt for it, as Python does; then forget the
-    record.
-
-    Does nothing outside the main thread, or where SIGINT has another handler than Python's own, which then stays. After
-    the block Python's own handler is set again.
-    """
+    """While the block runs, record SIGINT (Ctrl-C) and raise KeyboardInterrupt for it, as Python does."""
     own = threading.current_thread() is threading.main_thread()
     if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
@@ -58,21 +53,13 @@ def recorded_interrupts() -> Iterator[None]:
 
 
 def raise_if_interrupted() -> None:
-    """Raise KeyboardInterrupt if SIGINT was recorded in the present block of `recorded_interrupts`; else do nothing.
-
-    That happens if Python lost the KeyboardInterrupt of the signal itself. The record is kept, so that a further call
-    raises again.
-    """
+    """Raise KeyboardInterrupt if SIGINT was recorded in the present block of `recorded_interrupts`; else do nothing."""
     if _received.is_set():
         raise KeyboardInterrupt
 
 
 def is_interruption(error: BaseException) -> bool:
-    """Return True if the exception comes from Ctrl-C, False if the code that raised it did so on its own.
-
-    Any exception counts as Ctrl-C after SIGINT was recorded. Without a record a KeyboardInterrupt does, unless it
-    cannot come from Ctrl-C: SIGINT is recorded at present, or it is ignored, as in worker processes.
-    """
+    """Returns True if the exception comes from Ctrl-C, False if the code that raised it did so on its own."""
     if _received.is_set():
         return True
     return isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) not in (*_recorders, signal.SIG_IGN)

@@ -25,21 +25,12 @@ T = TypeVar("T")
 def option(
     help: str, *, low: float | None = None, below: float | None = None, metavar: str | None = None
 ) -> dict[str, Any]:
-    """Returns the metadata of a dataclass field for an option, with the keys help, low, below, metavar.
-
-    help: text for users. low, below: the range of a number, `low` included and `below` excluded; None is no limit, and
-    without `low` nothing is checked. metavar: what stands for the value in the help of a command, None for the default.
-    """
+    """Returns the metadata of a dataclass field for an option, with the keys help, low, below, metavar."""
     return {"help": help, "low": low, "below": below, "metavar": metavar}
 
 
 def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
-    """Returns an instance of the options dataclass `kind` with the given values by name and otherwise its defaults.
-
-    function: name of the function for the error message. Raises InputError if a name is no option, with the most
-    similar option, or if an option without default is missing. Types and ranges are checked only by the dataclass
-    itself.
-    """
+    """Returns an instance of the options dataclass `kind` with the given values by name and otherwise its defaults."""
     known = [f for f in fields(kind) if f.init]  # type: ignore[arg-type]
     names = [f.name for f in known]
     for name in given:
@@ -88,8 +79,7 @@ def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
 
 
 def options_text(kind: type) -> str:
-    """Returns the options of an options dataclass, one a line: "name=default: help text", without "=default" if
-    required."""
+    """Returns the options of an options dataclass, one a line."""
     return "\n".join(f"{f.name}{'' if _required(f) else f'={f.default!r}'}: {f.metadata['help']}" for f in fields(kind))
 
 

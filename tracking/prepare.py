@@ -53,47 +53,29 @@ class PreparedTracker:
     history: ReportHistory = field(default_factory=ReportHistory)
 
     def frames(self) -> Iterator[Frame]:
-        """Return a new iterator over the frames as the tracker gets them, in order. It may be called more than once.
-
-        In mode "image" the detections that are stored with the sequence are removed, and pictures are read while
-        iterating, which raises InputError if one cannot be read.
-        """
+        """Returns a new iterator over the frames as the tracker gets them, in order. It may be called more than once."""
         if self.frames_given is not None:
             return iter(self.frames_given)
         return (replace(f, detections=None) for f in self.sequence)
 
     def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
-        """Return the image scale for deriving groups from these tracks, from the first frame on; nan if unknown.
-
-        It is the first finite one of the context's, the tracker's attribute `px_per_m`, and that of the tracks' boxes
-        in the first frames.
-        """
+        """Returns the image scale for deriving groups from these tracks, from the first frame on; nan if unknown."""
         with self._naming("px_per_m", self.sequence.name):
             learned = image_scale.learned_by(self.tracker)
         return image_scale.from_tracks(ImageScale(self.context.px_per_m, self.scale_frames), learned, tracks)
 
     def px_per_m(self, tracks: SequenceOf[Tracks]) -> float:
-        """Return the image scale of `scale`, px per m; nan if unknown."""
+        """Returns the image scale of `scale`, px per m; nan if unknown."""
         return self.scale(tracks).px_per_m
 
     def reset(self, seed: int) -> None:
-        """Reset the tracker for this sequence and forget what it has reported. seed: of the tracker's random numbers.
-
-        A FlockscopeError of the tracker (InputError, WorkError) passes through, with the recording as its file if it
-        names none. Raises WorkError for any other exception of the tracker.
-        """
+        """Reset the tracker for this sequence and forget what it has reported. seed."""
         self.history.clear()
         with self._naming("reset()", self.sequence.name):
             self.tracker.reset(self.context, seed)
 
     def step(self, frame: Frame) -> Tracks:
-        """Return the tracker's checked tracks of the next frame; frames come in order, from `frames`.
-
-        Raises InputError if the frame's detections cannot be given to the tracker (nan, or points alone to a tracker
-        that needs boxes). Raises WorkError if the tracker raises an exception or returns tracks that
-        tracking.tracks_check refuses. A FlockscopeError of the tracker passes through, with the recording as its file
-        if it names none.
-        """
+        """Returns the tracker's checked tracks of the next frame; frames come in order, from `frames`."""
         detections = frame.detections
         if detections is not None:
             check_detections(detections, self.tracker.needs)
@@ -103,11 +85,6 @@ class PreparedTracker:
 
     @contextmanager
     def _naming(self, part: str, place: str) -> Iterator[None]:
-        """While a part of the tracker runs, give what it raises the names of tracker, sequence and frame.
-
-        part: as "step()". place: sequence and frame, in words. A FlockscopeError that names no file gets the recording
-        as its file; any other exception becomes a WorkError.
-        """
         try:
             with user_code(lambda error: tracker_failed(self.name, part, place, error)):
                 yield
@@ -116,8 +93,6 @@ class PreparedTracker:
 
 
 def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
-    """Returns the same error; if it names no file, a copy with the path (else the name) of the recording as
-    its file."""
     path = sequence.source.get("path", sequence.name)
     return error if error.file else type(error)(**{**error.as_dict(), "file": path})
 
@@ -131,20 +106,7 @@ def prepare(
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
 ) -> PreparedTracker:
-    """Return the tracker ready to be reset for the sequence.
-
-    tracker: a registered name, "file.py:Class", "module:Class", a class, an instance or a TimeLimited. params: a
-    config, values by name, a preset's name or a TOML file; None for the defaults. detections: "image", "file" or
-    "truth"; None for the first of them that can work. sensor: settings that degrade mode "truth", None or {} for
-    none; seed: of their random numbers. Stored detections or labels are read here, and in mode "image" the
-    background pictures.
-
-    Raises InputError if `sequence` is no Sequence, the seed is no whole number of 0 or more in 64 bits, if the tracker,
-    its parameters or the sensor settings are wrong, or if tracker and sequence do not fit. Also if parameters are given
-    to an instance or to a tracker without any, sensor settings with a mode other than "truth", or files of the sequence
-    cannot be read. Raises WorkError if the tracker cannot be created, or in mode "truth" if an order of a simulated
-    script was not fulfilled.
-    """
+    """Returns the tracker ready to be reset for the sequence."""
     if not isinstance(sequence, Sequence):
         remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
         raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
@@ -172,12 +134,7 @@ def prepare(
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:
-    """Returns the tracker's name, an instance and its config (None without parameters).
-
-    A class gets its config from its `config_class`. An instance has the name of its class, keeps its own config (its
-    attribute `config`, None if missing) and takes no `params`. Raises InputError if tracker or params are wrong or do
-    not fit, and WorkError if the tracker cannot be created. A FlockscopeError of its __init__ passes through.
-    """
+    """Returns the tracker's name, an instance and its config (None without parameters)."""
     limited = tracker if isinstance(tracker, TimeLimited) else None
     tracker = tracker.tracker if isinstance(tracker, TimeLimited) else tracker
     if not isinstance(tracker, str | type):
@@ -203,11 +160,7 @@ def _instance(name: str, tracker_class: Any, *arguments: Any) -> Tracker:
 
 
 def config_of(kind: type[Config], params: Params) -> Config:
-    """Return `params` as a config of the class `kind`; the default config if `params` is None.
-
-    params: a config of this class, values by name, the name of a preset, or the path of a TOML file. Raises InputError
-    for unknown names, values out of range or in contradiction, an unreadable file, or a config of another class.
-    """
+    """Returns `params` as a config of the class `kind`; the default config if `params` is None."""
     if params is None:
         return kind()
     if isinstance(params, str | Path):

@@ -43,11 +43,7 @@ class Ranking:
 
 
 def rank(values: Array, upwards: bool = True) -> Ranking:
-    """Returns the ranking of R runs by their scores on S sequences, values (R, S); nan where unknown.
-
-    upwards: a larger score is better. With fewer than 6 sequences (FEWEST) no difference is sure, so all runs share all
-    ranks.
-    """
+    """Returns the ranking of R runs by their scores on S sequences, values (R, S); nan where unknown."""
     known = np.isfinite(values).all(axis=0)
     scores = values[:, known]
     runs, count = scores.shape
@@ -58,11 +54,7 @@ def rank(values: Array, upwards: bool = True) -> Ranking:
 def ordered(
     own: tuple[Array, Array, Array], pairs: tuple[Array, Array, Array], upwards: bool, count: int, sure: bool = True
 ) -> Ranking:
-    """Returns the ranking of R runs by their means and intervals.
-
-    own: mean, low, high (R,). pairs: mean differences (R, R), row minus column, and the ends of their joint intervals.
-    count: number of sequences. sure: False if no difference is to be called sure.
-    """
+    """Returns the ranking of R runs by their means and intervals."""
     mean, own_low, own_high = own
     less, low, high = pairs
     runs = len(mean)
@@ -76,9 +68,6 @@ def ordered(
 
 
 def _joint_intervals(scores: Array) -> tuple[Array, Array, Array]:
-    """Returns the mean differences (R, R) of runs' scores (R, S), row minus column, and the ends of their intervals,
-    which hold all together with the probability LEVEL. The ends are nan for fewer than two sequences.
-    """
     runs, count = scores.shape
     if count < 2:
         unknown = np.full((runs, runs), np.nan)

@@ -53,14 +53,7 @@ class TrackingRun(SequenceOf[Tracks]):
         return len(self.tracks)
 
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
-        """Store the tracks in the folder as `flockscope track` does, and return the folder.
-
-        sequence: what was tracked. run.json gets its truth_hash, so that the tracks are scored with these labels only.
-        pairs: probabilities to store, too, in pairs.parquet; None: none.
-        Files of an earlier run are replaced. Raises InputError if the folder holds files of another program with names
-        of a run's, it cannot be written, or the labels cannot be read; WorkError if the disk is full or an order of a
-        simulated script was not fulfilled.
-        """
+        """Store the tracks in the folder as `flockscope track` does, and return the folder."""
         from sim.io.store.run_seal import tracked_hash
         from sim.io.store.track_files import write_tracks
         from sim.io.store.track_tables import pair_table
@@ -82,7 +75,7 @@ def track(
     grouping: Grouping | str | Path | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> TrackingRun:
-    """Return the tracker's tracks of every frame of the sequence, completed with groups and events.
+    """Returns the tracker's tracks of every frame of the sequence, completed with groups and events.
 
     tracker: a registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
     (tracking.time_limit), which stops a step that hangs. params: a config, values by name, the name of a preset, or a
@@ -145,7 +138,7 @@ def track(
 def group(
     sequence: Sequence, run: TrackingRun | None = None, *, grouping: Grouping | str | Path | None = None
 ) -> TrackingRun:
-    """Return the people of a sequence, whose ids are known, with groups and events that follow from their motion.
+    """Returns the people of a sequence, whose ids are known, with groups and events that follow from their motion.
 
     run: tracks of people; groups and events in them are replaced. None: the labelled people of the sequence, as
     tracking.grouping.known_people gives them; their group labels are not used. grouping: as of
@@ -188,7 +181,7 @@ def group(
 
 
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
-    """Return one tracker's stored tracks of a sequence, one `Tracks` per frame, with groups and events filled in where
+    """Returns one tracker's stored tracks of a sequence, one `Tracks` per frame, with groups and events filled in where
     they are empty.
 
     The scale in px per m is the camera's at the image centre, else the sequence's. It is the truth's, from all labelled

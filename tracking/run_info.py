@@ -41,21 +41,7 @@ def run_info(
     scale: ImageScale,
     speed: Speed,
 ) -> dict[str, Any]:
-    """Return what run.json tells of a run, as a dictionary. Two equal runs differ only in their speeds.
-
-    tracks: of the whole run, one `Tracks` per frame, possibly none. seed: of the run. sensor: settings of mode "truth",
-    empty if none. scale: of the image, by which groups were derived; nan is stored as None.
-
-    Keys: tracker (name); config (values by name, {} without); seed; sequence (name); detections (the mode); input
-    ("points", "boxes", "pixels" or "stereo"); sensor;
-    plane (of the first tracks, None without); boxes ("measured", "projected" or "none"); fps; px_per_m;
-    px_per_m_frames (number of first frames whose boxes gave the scale, 0 for none); background (text on the sample,
-    None without); causal (True if there is a frame from which on no later frame is used); causal_from (the first such
-    frame, from 1, or None); frames (number); frames_per_second (the tracker's steps alone); box_scale
-    (factors of x and y of the boxes, lacking without);
-    whole_frames_per_second (with reading); versions (of packages, by name); diagnostics (what the tracker tells of
-    itself after the last frame, its attribute of this name; lacking if it has none).
-    """
+    """Returns what run.json tells of a run, as a dictionary. Two equal runs differ only in their speeds."""
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
     diagnostics = getattr(prepared.tracker, "diagnostics", None)
@@ -75,11 +61,7 @@ def run_info(
 
 
 def known_people_info(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale) -> dict[str, Any]:
-    """Return what run.json tells of the groups of a sequence's labelled people: the keys of `run_info` without speeds.
-
-    The tracker is "group", without parameters and seed. tracks: of all frames, possibly none. scale: of the image, by
-    which groups were derived.
-    """
+    """Returns what run.json tells of the groups of a sequence's labelled people."""
     given: dict[str, Any] = {
         "tracker": "group",
         "config": {},
@@ -93,10 +75,7 @@ def known_people_info(sequence: Sequence, tracks: SequenceOf[Tracks], scale: Ima
 
 
 def _facts(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, begins: int | None) -> dict[str, Any]:
-    """Returns what run.json tells of tracks, whoever made them: of the sequence, plane, boxes, scale and causality.
-
-    begins: the first frame, from 1, from which on only the scale may depend on later frames; None if there is none.
-    """
+    """Returns what run.json tells of tracks, whoever made them: of the sequence, plane, boxes, scale and causality."""
     from sim.io.store.track_files import box_source
 
     begins = None if begins is None else max(begins, scale.frames)
@@ -116,11 +95,7 @@ def _facts(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, be
 
 
 def causal_from(sequence: Sequence) -> int | None:
-    """Return the first frame (from 1) whose background sample holds no later frame; None if there is no such frame.
-
-    The result is 1 if the sample holds no frame of the recording itself (or there is no sample), N for a sample of the
-    first N frames, and None for a sample spread over the recording.
-    """
+    """Returns the first frame (from 1) whose background sample holds no later frame; None if there is no such frame."""
     from sim.io.pictures.background_sample import BackgroundSample
 
     sample = sequence.load_background
@@ -130,11 +105,7 @@ def causal_from(sequence: Sequence) -> int | None:
 
 
 def input_summary(info: Mapping[str, Any]) -> str:
-    """Return one line on what a tracker was given, from the content of its run.json.
-
-    The line is the detection mode, then in brackets the background sample and the first six sensor settings, with the
-    number of the others. It is "" if `info` has none of the keys detections, background and sensor.
-    """
+    """Returns one line on what a tracker was given, from the content of its run.json."""
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
     more = [f"background: {background}"] if background else []
     more += [f"{key} = {value}" for key, value in list((sensor or {}).items())[:SENSOR_SETTINGS_SHOWN]]
@@ -143,11 +114,7 @@ def input_summary(info: Mapping[str, Any]) -> str:
 
 
 def input_name(info: Mapping[str, Any]) -> str:
-    """Return what a tracker worked on, from the content of its run.json, as "pixels" or "boxes (file)"; "" if unknown.
-
-    Runs of one sequence with the same name got the same input: detections degraded by sensor settings have these and
-    their seed in it.
-    """
+    """Returns what a tracker worked on, from the content of its run.json, as "pixels" or "boxes (file)"."""
     kind, mode, sensor = (info.get(key) for key in ("input", "detections", "sensor"))
     if kind is None:
         return ""
@@ -156,8 +123,7 @@ def input_name(info: Mapping[str, Any]) -> str:
 
 
 def _versions() -> dict[str, str]:
-    """Returns the installed versions of flockscope, numpy and scipy by name; a package that is not installed is left
-    out."""
+    """Returns the installed versions of flockscope, numpy and scipy by name."""
     from importlib.metadata import PackageNotFoundError, version
 
     found = {}

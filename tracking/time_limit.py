@@ -64,21 +64,13 @@ class TimeLimited:
         self._process.join()
 
     def make(self, config: Config | None) -> RemoteTracker:
-        """Return a tracker made in the process, with this config; None for a tracker without parameters.
-
-        It takes the place of the tracker made before. Raises what the tracker's `__init__` raises, and
-        ChildProcessError if the process ends.
-        """
+        """Returns a tracker made in the process, with this config; None for a tracker without parameters."""
         made = RemoteTracker(self, next(self._numbers), config)
         self.call("create", made.made_from, None)
         return made
 
     def call(self, method: str, *arguments: Any) -> Any:
-        """Return what the call returns in the process. method: "create", "reset" or "step"; "create" has no time limit.
-
-        Raises what the tracker raises there; TimeoutError, after ending the process, if it takes longer than the limit;
-        ChildProcessError if the process ends.
-        """
+        """Returns what the call returns in the process. method."""
         pipe = self._process.send(_call, (method, arguments, self.seconds + GRACE))
         if method != "create" and not pipe.poll(self.seconds):
             self.close()
@@ -109,8 +101,7 @@ class RemoteTracker:
         self.px_per_m = self._host.call("reset", self.made_from, (context, seed))
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Return the tracker's tracks of the frame, which holds the detections. Raises what `TimeLimited.call` raises,
-        and RuntimeError if the process was started again since `reset`."""
+        """Returns the tracker's tracks of the frame, which holds the detections."""
         tracks, self.px_per_m = self._host.call("step", self.made_from, frame)
         return tracks  # type: ignore[no-any-return]
 
@@ -120,8 +111,7 @@ _made: dict[int, Tracker] = {}
 
 
 def _call(request: tuple[str, tuple[Any, ...], float]) -> Any:
-    """Runs one call of a tracker in its process. request: method, its arguments, and seconds after which the process
-    ends itself."""
+    """Runs one call of a tracker in its process. request."""
     method, (made_from, given), limit = request
     if method == "create":
         return _create(*made_from)

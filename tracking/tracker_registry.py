@@ -33,16 +33,12 @@ NEEDS = ("pixels", "stereo", "boxes", "points")
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of the registered trackers, in fixed order."""
+    """Returns the names of the registered trackers, in fixed order."""
     return tuple(REGISTRY)
 
 
 def find(spec: str) -> type[Tracker]:
-    """Return the tracker class that `spec` names: a registered name, "file.py:Class" or "module:Class".
-
-    The file or module is imported, which runs its code. Raises InputError if the name is unknown, if the file or module
-    is missing or cannot be imported, if it has no such class, or if the class is no tracker.
-    """
+    """Returns the tracker class that `spec` names: a registered name, "file.py:Class" or "module:Class"."""
     target = REGISTRY.get(spec, spec)
     where, colon, class_name = target.rpartition(":")
     if not colon:
@@ -57,13 +53,7 @@ def find(spec: str) -> type[Tracker]:
 
 
 def _from_file(path: Path) -> Any:
-    """Returns the module of a Python file, imported under a private name that depends on its path and content.
-
-    Files beside it can be imported by their names, as from a script, now and later: the folder becomes the last on
-    Python's path, so that they hide no installed module. The name hides no other module. An unchanged file is imported
-    once, so that a config keeps fitting its tracker; a changed file is imported again. Raises InputError if there is no
-    such file or it cannot be imported.
-    """
+    """Returns the module of a Python file, imported under a private name that depends on its path and content."""
     if not path.is_file():
         raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
     resolved = path.resolve()
@@ -100,20 +90,14 @@ def _import_failed(where: object, error: BaseException) -> InputError:
 
 
 def located(spec: str) -> str:
-    """Return `spec` with an absolute path if it is "file.py:Class", so that a process in another folder finds the file;
+    """Returns `spec` with an absolute path if it is "file.py:Class", so that a process in another folder finds the file;
     any other unchanged."""
     where, colon, name = spec.rpartition(":")
     return f"{Path(where).resolve()}:{name}" if colon and where.endswith(".py") else spec
 
 
 def checked(found: Any, spec: str) -> type[Tracker]:
-    """Return `found` unchanged if it is a tracker class. Raises InputError otherwise, and WorkError if code of the
-    class raises when its attributes are read; `spec` names it in the error.
-
-    A tracker class has `needs` (a tuple or list out of "pixels", "stereo", "boxes", "points", not empty),
-    `reset(context, seed)` and `step(frame, detections)`. It is created with its config if it has a `config_class` (a
-    subclass of Config), else without arguments.
-    """
+    """Returns `found` unchanged if it is a tracker class."""
     with user_code(lambda error: tracker_failed(spec, "class", "before the first frame", error)):
         fault = _class_fault(found)
     if fault:
@@ -123,10 +107,7 @@ def checked(found: Any, spec: str) -> type[Tracker]:
 
 
 def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
-    """Return the class of the tracker's config, its attribute `config_class`.
-
-    Raises InputError, naming the tracker as `spec`, if it has none and so no parameters.
-    """
+    """Returns the class of the tracker's config, its attribute `config_class`."""
     kind = getattr(tracker, "config_class", None)
     if kind is None:
         remedy = "give the class a config_class that declares them (docs/guides/your-own-tracker.md)"
@@ -136,16 +117,12 @@ def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
 
 @cache
 def code_hash(tracker: type[Tracker]) -> str:
-    """Return the first 12 hex digits of the SHA-256 of the file that defines the class; "" if there is no file.
-
-    The file is read at the first call for this class and not again; imported files do not count.
-    """
+    """Returns the first 12 hex digits of the SHA-256 of the file that defines the class; "" if there is no file."""
     file = Path(getattr(sys.modules.get(tracker.__module__), "__file__", None) or "")
     return hashlib.sha256(file.read_bytes()).hexdigest()[:12] if file.is_file() else ""
 
 
 def _class_fault(found: Any) -> str | None:
-    """Returns why `found` is no tracker class, in words for an error message; None if it is one."""
     if not isinstance(found, type):
         return f"a {type(found).__name__}"
     missing = [name for name in ("needs", "reset", "step") if not hasattr(found, name)]
@@ -168,7 +145,6 @@ def _class_fault(found: Any) -> str | None:
 
 
 def _takes(function: Any, count: int) -> bool:
-    """Returns True if the function can be called with `count` positional arguments, or if its signature is unknown."""
     try:
         inspect.signature(function).bind(*range(count))
     except TypeError:

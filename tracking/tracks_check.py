@@ -38,19 +38,7 @@ class ReportHistory:
 
 
 def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory | None = None) -> Tracks:
-    """Return a copy of the tracks of frame `index` with optional fields filled in.
-
-    The tracker may use its arrays again: nothing that it does to them later changes the copy. Raises WorkError if the
-    tracks are wrong; the error names the tracker, the frame and the first fault.
-
-    Checked are type, frame index, shapes, finite numbers (velocities may be nan: unknown), ids (int64, non-negative,
-    unique in the frame), groups and events. Plane, unit and own_events must be those of the first frame in `history`.
-    If own_events names kinds, events of other kinds are wrong. Members of groups and events must be ids that the
-    tracker has reported in this frame or before; with unit "group" there may be none. Any reported id may come back
-    after a gap. Events must be emitted in this frame, start from frame 1 to this one, and not end before they start.
-    Filled in are empty scores (1) and, in events, `emitted` and `end` where they are None (this frame). history: of
-    this sequence; it is updated here, also if a fault is found later. None stands for an empty history.
-    """
+    """Returns a copy of the tracks of frame `index` with optional fields filled in."""
     if isinstance(tracks, Tracks):
         tracks = _filled(tracks)
     history = ReportHistory() if history is None else history
@@ -63,8 +51,6 @@ def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory |
 
 
 def _filled(tracks: Tracks) -> Tracks:
-    """Returns the tracks with empty scores filled in (1), and in events `emitted` and `end` where they are None (this
-    frame)."""
     if not np.size(tracks.score) and np.ndim(tracks.id) == 1:
         tracks = tracks.replace(score=np.ones(len(tracks.id)))
     if isinstance(tracks.events, tuple) and any(map(_has_open_frames, tracks.events)):
@@ -86,11 +72,6 @@ def _with_frames(event: Any, index: int) -> Any:
 
 
 def _fault(tracks: Any, index: int, history: ReportHistory) -> Fault | None:
-    """Returns the first fault of what a tracker returned for frame `index` (from 1), as (got, expected), or None.
-
-    Plane and unit of the first frame, and ids that are right, are added to the history, in place, also if a later check
-    finds a fault.
-    """
     if not isinstance(tracks, Tracks):
         return type(tracks).__name__, "sim.types.Tracks"
     if tracks.index != index:
@@ -118,20 +99,11 @@ def _fault(tracks: Any, index: int, history: ReportHistory) -> Fault | None:
 
 
 def _undeclared(events: Iterable[GroupEvent], own: tuple[str, ...]) -> Fault | None:
-    """Returns the fault, as (got, expected), of an event of a kind that is not declared; None if `own`, the kinds
-    declared, is empty."""
     kind = next((e.kind for e in events if own and e.kind not in own), None)
     return None if kind is None else (f"an event of kind {kind!r}", f"one of own_events, {', '.join(own)}")
 
 
 def _rows_fault(tracks: Tracks) -> Fault | None:
-    """Returns the first fault, as (got, expected), in shape, type or finiteness of the arrays with one row per track,
-    or None.
-
-    For N tracks with D coordinates, 3 in plane "space", else 2: id and group (N,), pos and vel (N, D), cov (N, 2D, 2D),
-    score (N,), box (N, 4) if it is not None. All numbers must be finite, except that
-    velocities may be nan (unknown).
-    """
     if np.ndim(tracks.id) != 1:
         return f"id of shape {np.shape(tracks.id)}", "(N,)"
     n, d = len(tracks.id), 3 if tracks.plane == "space" else 2
@@ -148,12 +120,6 @@ def _rows_fault(tracks: Tracks) -> Fault | None:
 
 
 def _arrays_fault(shapes: dict[str, tuple[Any, tuple[int, ...]]]) -> Fault | None:
-    """Returns the fault, as (got, expected), of the first array with a wrong type or shape or with nan or infinity, or
-    None.
-
-    shapes: by name, the array and the shape that it must have. Only numpy arrays of integers or floats are right. nan
-    in "vel" is right, too.
-    """
     for name, (a, shape) in shapes.items():
         if not isinstance(a, np.ndarray) or a.dtype.kind not in "iuf":
             return f"{name} of type {getattr(a, 'dtype', type(a).__name__)}", "an array of numbers"
@@ -165,16 +131,12 @@ def _arrays_fault(shapes: dict[str, tuple[Any, tuple[int, ...]]]) -> Fault | Non
 
 
 def finite(a: Any) -> bool:
-    """Return True if all numbers of the array are finite; True for an empty array."""
+    """Returns True if all numbers of the array are finite; True for an empty array."""
     # The sum of squares is cheap and finite for ordinary numbers; only if it overflows is each number looked at.
     return isfinite(np.vdot(a, a)) or bool(np.isfinite(a).all())
 
 
 def _id_fault(tracks: Tracks) -> Fault | None:
-    """Returns the first fault, as (got, expected), in the tracks' ids and group ids, or None.
-
-    Both must be int64; group at least -1, and equal to id for unit "group"; ids non-negative and unique.
-    """
     if not isinstance(tracks.id, np.ndarray) or tracks.id.dtype != np.int64 or tracks.group.dtype != np.int64:
         kinds = (getattr(a, "dtype", type(a).__name__) for a in (tracks.id, tracks.group))
         return "ids of type {}, groups of type {}".format(*kinds), "int64"
@@ -186,11 +148,6 @@ def _id_fault(tracks: Tracks) -> Fault | None:
 
 
 def _ids_fault(id: Any, name: str) -> Fault | None:
-    """Returns the fault, as (got, expected), of an array of ids (N,) with a negative one or the same one twice, or
-    None.
-
-    name: what the ids are called in the message.
-    """
     if len(id) and id.min() < 0:
         return f"{name} {id.min()}", f"non-negative {name}s"
     if len(set(id.tolist())) != len(id):
@@ -199,12 +156,6 @@ def _ids_fault(id: Any, name: str) -> Fault | None:
 
 
 def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
-    """Returns the first fault, as (got, expected), in `Tracks.groups`, or None.
-
-    d: columns of pos and vel, 2 or 3; people: ids that may be members. For G groups: id (G,) int64, unique and
-    non-negative, pos (finite) and vel (G, d), extent (G, 2, 2), size (G,). nan is allowed in vel, extent and size,
-    where it means unknown. For G = 0 only the first number of each shape is checked.
-    """
     if not isinstance(groups, Groups):
         return f"groups of type {type(groups).__name__}", "sim.types.Groups or None"
     if not isinstance(groups.id, np.ndarray) or groups.id.ndim != 1 or groups.id.dtype != np.int64:
@@ -220,11 +171,6 @@ def _groups_fault(groups: Any, d: int, people: Iterable[int]) -> Fault | None:
 
 
 def _ragged_fault(groups: Groups, n: int, people: Iterable[int]) -> Fault | None:
-    """Returns the first fault, as (got, expected), in the members and hulls of n groups, or None.
-
-    Each is a tuple with one array per group, or an empty tuple: members (k,) integers that are in `people`, the ids
-    that may be members; hulls (V, 2) finite numbers.
-    """
     for name in ("members", "hull"):
         items = getattr(groups, name)
         if not isinstance(items, tuple) or len(items) not in (0, n):
@@ -244,11 +190,6 @@ def _ragged_fault(groups: Groups, n: int, people: Iterable[int]) -> Fault | None
 
 
 def _members_fault(members: Iterable[Any], people: Iterable[int], name: str) -> Fault | None:
-    """Returns the fault, as (got, expected), of the first member that is no whole number (a bool is none) or not among
-    `people`, or None.
-
-    name: what the members are called in the message.
-    """
     for m in members:
         if not isinstance(m, int | np.integer) or isinstance(m, bool) or m not in people:  # type: ignore[operator]
             return f"{m!r} in {name}", "ids that the tracker has reported"

@@ -28,17 +28,7 @@ _SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
 
 
 def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
-    """Return an iterator over the detections of a labelled sequence, one for each frame in order, from frame 1.
-
-    The rows of a frame are in random order. sensor: settings with the keys of a scenario's [sensor]; those left out
-    have the value of a perfect sensor. Empty: the labels themselves. seed: of the order and of the sensor's random
-    numbers.
-
-    Raises at once, before the first detections: InputError if the truth cannot be read, a key is unknown, a value is
-    wrong, a group that is to be hidden is not in the script, or visible boxes are asked for and cannot be known;
-    WorkError if an order of a simulated script was not fulfilled; AssertionError for a sequence without labels;
-    ValueError for a negative seed.
-    """
+    """Returns an iterator over the detections of a labelled sequence, one for each frame in order, from frame 1."""
     truth = sequence.truth
     assert truth is not None, "the mode was chosen for a source with labels"
     if not sensor:
@@ -47,7 +37,7 @@ def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iter
 
 
 def shuffled(detections: Detections, seed: int) -> Detections:
-    """Return the detections of a frame in an order that depends on the seed and the number of the frame alone."""
+    """Returns the detections of a frame in an order that depends on the seed and the number of the frame alone."""
     d = detections
     order: Ints = rng(seed, "delivery", d.index).permutation(len(d.pos))
     vel, box = (None if a is None else a[order] for a in (d.vel, d.box))
@@ -55,7 +45,7 @@ def shuffled(detections: Detections, seed: int) -> Detections:
 
 
 def perfect(truth: FrameTruth) -> Detections:
-    """Return the labels of a frame as detections with score 1 and no velocities, a row per labelled person, hidden ones
+    """Returns the labels of a frame as detections with score 1 and no velocities, a row per labelled person, hidden ones
     included, in the order of the labels.
 
     They are in the plane "ground" at the labelled positions, m, with the labelled boxes if there are any. Without
@@ -72,13 +62,6 @@ def perfect(truth: FrameTruth) -> Detections:
 
 
 def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
-    """Returns an iterator over the detections, one per frame from frame 1, of a sensor with these settings (keys of a
-    scenario's [sensor]).
-
-    Settings left out have the value of a perfect sensor. Everything is computed before it returns. Raises InputError if
-    a key is unknown, a value is wrong, a group that is to be hidden is not in the script, or visible boxes are asked
-    for and cannot be known.
-    """
     from pydantic import ValidationError
 
     from scenarios.loading.resolve import SensorFile

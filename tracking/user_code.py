@@ -17,12 +17,7 @@ from tracking.interrupts import is_interruption
 def user_code(
     failed: Callable[[BaseException], FlockscopeError], passing: type[Exception] | tuple[()] = FlockscopeError
 ) -> Iterator[None]:
-    """While the block runs, replace any exception, SystemExit and GeneratorExit included, by the error `failed(it)`.
-
-    Exceptions of the class `passing` pass unchanged; () for none. Ctrl-C stays a KeyboardInterrupt, also if the code
-    has made another exception of it. A KeyboardInterrupt that the code raises itself is replaced where the two can be
-    told apart (tracking.interrupts).
-    """
+    """While the block runs, replace any exception, SystemExit and GeneratorExit included, by the error `failed(it)`."""
     try:
         yield
     except BaseException as error:
@@ -34,10 +29,7 @@ def user_code(
 
 
 def what_was_raised(error: BaseException) -> str:
-    """Return the type of an exception and the first line of its message, as "SystemExit: 0".
-
-    The message of an exception whose own `__str__` fails says so.
-    """
+    """Returns the type of an exception and the first line of its message, as "SystemExit: 0"."""
     try:
         text = str(error)
     except BaseException as failed:
@@ -46,10 +38,6 @@ def what_was_raised(error: BaseException) -> str:
 
 
 def tracker_failed(tracker: str, method: str, place: str, error: BaseException) -> WorkError:
-    """Return the WorkError for an exception raised by a tracker's own code, with the first line of its message.
-
-    tracker: its name. method: "reset", "step", "__init__" or another part of the class. place: sequence and frame, in
-    words.
-    """
+    """Returns the WorkError for an exception raised by a tracker's own code, with the first line of its message."""
     remedy = f"correct the tracker's {method}; FLOCKSCOPE_DEBUG=1 shows where"
     return WorkError(file=tracker, place=place, got=what_was_raised(error), expected="no exception", remedy=remedy)

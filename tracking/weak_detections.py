@@ -16,10 +16,7 @@ MOST = 0.5
 
 
 def weak_detections(prepared: PreparedTracker) -> str | None:
-    """Return a warning if over half of the given detections score below the tracker's parameter `score_start`.
-
-    None if they do not, if there are no detections (mode "image"), and for a tracker without such a parameter.
-    """
+    """Returns a warning if over half of the given detections score below the tracker's parameter `score_start`."""
     least = getattr(prepared.config, "score_start", None)
     found = [f.detections.score for f in prepared.frames_given or () if f.detections is not None]
     score = np.concatenate([np.zeros(0), *found])

@@ -61,8 +61,7 @@ def _start(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Takes the options of the command itself: --version prints the version and ends the command line with
-    exit code 0."""
+    """Takes the options of the command itself."""
 
 
 @app.command()
@@ -241,23 +240,14 @@ def webdataset(options: WebdatasetOptions) -> CommandResult:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Runs one command line, prints its result on stdout or its error on stderr, and returns the exit code.
-
-    arguments: the words after `flockscope`; none: the help is printed. Exit codes: 0 done; 1 the work failed or a check
-    found problems; 2 wrong input or usage; 130 Ctrl-C. Errors are not raised. Only if the environment variable
-    FLOCKSCOPE_DEBUG is set, an unexpected exception is raised.
-    """
+    """Runs one command line, prints its result on stdout or its error on stderr, and returns the exit code."""
     from tracking.app.command_runner import run_command
 
     return run_command(app, list(arguments) or ["--help"])
 
 
 def main() -> None:
-    """Runs the command line of this process (sys.argv) and never returns: the process ends with the command's exit
-    code.
-
-    Raises SystemExit for that. After Ctrl-C (code 130) it ends the process at once, without exit handlers.
-    """
+    """Runs the command line of this process (sys.argv) and never returns."""
     _open_streams()
     code = run(sys.argv[1:])
     if code == INTERRUPTED:
@@ -267,12 +257,6 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Opens stdin, stdout and stderr if the caller has closed them, else a file would take their number and get what is
-    printed; and lets both print every character.
-
-    A closed stdout then fails when it is written, a closed stderr swallows all. A character that their encoding lacks
-    is printed as an escape.
-    """
     for number, mode in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
         try:
             os.fstat(number)

@@ -15,10 +15,7 @@ DATASET = ("", "*", "*/*")
 
 
 def refuse_other_things(path: Path, expected: str) -> None:
-    """Raises InputError if the path is a generated sequence or dataset, or a file that cannot hold tracks.
-
-    expected: what the error says that the path should be. Anything else passes, with or without tracks.
-    """
+    """Raises InputError if the path is a generated sequence or dataset, or a file that cannot hold tracks."""
     if path.is_file() and path.suffix.lower() in OTHER_FILES:
         raise InputError(
             file=path, got=f"a {path.suffix.lower()} file, no tracks", expected=expected, remedy="check the path"

@@ -49,17 +49,11 @@ class ProgressMeter:
                 self._bar.stop()
 
     def step(self, item: str = "", amount: int = 1) -> None:
-        """Adds `amount` finished items (1 by default) and shows the count. item: name to show, "" for none.
-
-        Raises KeyboardInterrupt if the user has pressed Ctrl-C and Python lost it; then nothing is added.
-        """
+        """Adds `amount` finished items (1 by default) and shows the count. item: name to show, "" for none."""
         self.update(self.done + amount, self.total, item)
 
     def update(self, done: int, total: int | None, item: str = "") -> None:
-        """Sets the number of finished items, `done`, and of all items, `total` (None if unknown), and shows them.
-
-        item: name to show, "" for none. Raises KeyboardInterrupt if the user has pressed Ctrl-C and Python lost it.
-        """
+        """Sets the number of finished items, `done`, and of all items, `total` (None if unknown), and shows them."""
         raise_if_interrupted()
         self.done, self.total, self.item = done, total, printable(item)
         if self._bar is not None:
@@ -69,8 +63,6 @@ class ProgressMeter:
             print(f"{self.what}: {done}{'' if total is None else f' of {total}'} {self.item}".rstrip(), file=sys.stderr)
 
     def _show(self) -> None:
-        """Shows the bar if stderr is a terminal and the meter has not been left meanwhile. Runs in the
-        timer's thread."""
         if not sys.stderr.isatty():
             return
         from rich.console import Console

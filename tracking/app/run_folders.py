@@ -9,12 +9,7 @@ from sim.types import Sequence
 
 
 def run_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
-    """Returns the folder for each sequence's run: `out` itself if the source is one sequence, else out/<sequence
-    name>, as a file name.
-
-    A dataset that holds a single sequence folder is no single sequence. Raises InputError if two sequences would share
-    a folder.
-    """
+    """Returns the folder for each sequence's run."""
     own = Path(sequences[0].source.get("path", source))
     if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
         return [out]

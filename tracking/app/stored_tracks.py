@@ -48,14 +48,7 @@ class StoredTracks:
             check_run(folder)
 
     def read(self, sequence: Sequence, box_scale: BoxScale | None = None) -> TrackingRun:
-        """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`.
-
-        box_scale: factors of x and y of the boxes of a text of another program; None: 1. It has no effect on a run.
-
-        Whether a run is whole is left to `check`. Raises InputError if run.json states another frame rate or other
-        labels than the sequence's, or there are no tracks. Also if a MOTChallenge text has a frame beyond the
-        sequence's length, or an event's frame is outside the tracks. Warns about a text without rows.
-        """
+        """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`."""
         fps, seal = self.info.get("fps"), (self.path if self.path.is_dir() else self.path.parent) / RUN
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             raise InputError(
@@ -78,13 +71,7 @@ class StoredTracks:
 
 
 def find_tracks(path: Path) -> list[StoredTracks]:
-    """Returns all stored tracks at or below a path, not read yet, in the order of their paths; text files of a folder
-    come last.
-
-    path: a file of a run, a text in MOTChallenge format, a folder with a run or a tracks.txt, or a folder that holds
-    such folders or *.txt files, at most three levels down. Hidden folders are left out. Of a run only run.json is read.
-    Raises InputError if the path does not exist or holds no tracks, or if a run.json is damaged or has no seal.
-    """
+    """Returns all stored tracks at or below a path, not read yet, in the order of their paths."""
     if not path.exists():
         raise InputError(file=path, got="no such file or folder", expected=EXPECTED, remedy="check the path")
     refuse_other_things(path, EXPECTED)
@@ -97,11 +84,6 @@ def find_tracks(path: Path) -> list[StoredTracks]:
 
 
 def _below(folder: Path, depth: int) -> list[StoredTracks]:
-    """Returns the stored tracks in a folder and in `depth` levels of folders below it; none found: an empty list.
-
-    A folder with a run or a tracks.txt counts as one and is not searched further. Hidden folders are left out. Raises
-    InputError if a run.json is damaged or has no seal.
-    """
     if is_run(folder):
         info = read_run(folder) if (folder / RUN).is_file() else {}
         return [StoredTracks(info.get("sequence", folder.name), folder, info)]
@@ -115,15 +97,7 @@ def _below(folder: Path, depth: int) -> list[StoredTracks]:
 
 
 def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[tuple[Sequence, StoredTracks]]:
-    """Returns each sequence with the stored tracks of the same name, in the order of `sequences`; [] without sequences.
-
-    A single file that was given itself matches a single sequence whatever their names; otherwise its name is that
-    of the file without suffix. Tracks of other sequences are ignored. `stored` must not be empty if there is a
-    sequence.
-
-    Raises InputError if a sequence has no tracks, two of `stored` have the same name, a matched run is not whole, or
-    two matched runs have different trackers, parameters or grouping rules.
-    """
+    """Returns each sequence with the stored tracks of the same name, in the order of `sequences`."""
     if len(sequences) == len(stored) == 1 and stored[0].name is None:
         matched = [(sequences[0], stored[0])]
     else:
@@ -150,11 +124,6 @@ def _by_name(stored: list[StoredTracks]) -> dict[str, StoredTracks]:
 
 
 def _named(sequence: Sequence, by_name: dict[str, StoredTracks], stored: list[StoredTracks]) -> StoredTracks:
-    """Returns the tracks of the sequence. Raises InputError if there are none; of an unfinished run among
-    `stored`, which cannot tell what it tracked, that it is unfinished.
-
-    If tracks have the name of the sequence's folder, the error names the seqinfo.ini that calls it otherwise.
-    """
     if sequence.name in by_name:
         return by_name[sequence.name]
     for each in stored:
@@ -172,10 +141,6 @@ def _named(sequence: Sequence, by_name: dict[str, StoredTracks], stored: list[St
 
 
 def _refuse_mixture(stored: Iterable[StoredTracks]) -> None:
-    """Raises InputError if two runs differ in tracker, config or grouping rule.
-
-    Tracks without run.json are left out.
-    """
     runs = [each for each in stored if each.info]
     for each in runs[1:]:
         first = runs[0]
@@ -192,7 +157,6 @@ def _method(stored: StoredTracks) -> list[Any]:
 
 
 def _method_words(stored: StoredTracks, other: StoredTracks) -> str:
-    """Returns the tracker's name and in brackets the first parameters that differ from those of `other`, at most 3."""
     mine, theirs = ({**(s.info.get("config") or {}), **(s.info.get("grouping") or {})} for s in (stored, other))
     tracker = str(stored.info.get("tracker"))
     if tracker != str(other.info.get("tracker")):

@@ -134,8 +134,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return names[self.observation]
 
     def _metadata(self, fps: float) -> dict[str, Any]:
-        """Returns the environment's metadata: "render_modes", and "render_fps" for one picture per action (per frame if
-        an episode is one action), rounded, at least 1. fps: frames per second."""
         return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
 
     def _clear_episode(self) -> None:
@@ -198,8 +196,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         )  # fmt: skip
 
     def _advance(self, upto: int | None) -> bool:
-        """Tracks to frame number `upto`, None: the last. Returns True if the sequence has ended. Raises the tracker's
-        errors."""
         assert self.rollout is not None
         for frame, tracks in self.rollout.advance(upto):
             if self.observation != "none":
@@ -209,9 +205,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return done == self.rollout.length or upto is None or done < upto
 
     def _advance_with(self, config: Config) -> bool:
-        """Tracks `decision_every` frames with this config, or with the last one if the tracker refuses it (InputError).
-        Returns True if the sequence has ended. Sets `config`, and `refused` to the error's text or "". Raises the
-        tracker's other errors, and its InputError if it refuses both."""
         assert self.rollout is not None
         assert self.decision_every is not None
         upto = len(self.rollout.tracks) + self.decision_every
@@ -290,7 +283,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
 
 
 def _check_split(among: Iterable[Source]) -> None:
-    """Raises InputError if the seeds of the simulated sources are of two splits, such as training and test."""
     seeds = sorted({s.seed for s in among if s.simulated})
     found = {split_of(range(seed, seed + 1)) for seed in seeds}
     if len(found) > 1:
@@ -299,9 +291,6 @@ def _check_split(among: Iterable[Source]) -> None:
 
 
 def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: DetectionMode | None) -> DetectionMode:
-    """Returns the input of the tracker, "image", "file" or "truth", the same in all episodes: `wanted` if given. Else
-    the first recording among the sources `among` decides; without recordings "image" or "file", by what the tracker
-    takes. InputError if a recording does not have it or cannot be opened."""
     among = tuple(among)
     for source in among:
         if not source.simulated:
@@ -313,9 +302,6 @@ def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: Det
 
 
 def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:
-    """Returns the parameters that an action sets: tunable ones of the config class `kind` with an effect in this
-    `mode`. every: frames between actions, which leaves only parameters that may change then; None: one action per
-    episode. InputError if there are none, or if `every` is no whole number above 0."""
     if every is not None and (not isinstance(every, int | np.integer) or isinstance(every, bool) or every < 1):
         got, expected = repr(every), "a number of frames, 1 or more, or None"
         raise InputError(place="decision_every", got=got, expected=expected, remedy="correct it")
@@ -328,7 +314,6 @@ def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | Non
 
 
 def _check_choice(place: str, got: object, known: Iterable[object]) -> None:
-    """Raises InputError, with `place` as the option's name, if `got` is not among the known values."""
     known = tuple(known)
     if got not in known:
         remedy = f"did you mean {closest(str(got), map(str, known))}?" if known else "remove it"

@@ -71,10 +71,6 @@ class OpenedSource:
 
 
 def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
-    """Returns a function that calls `compute` at its first call and returns that same result at every call.
-
-    The result is kept where `array_bytes` finds it. If `compute` raises an error, the next call tries again.
-    """
     kept: list[T] = []
 
     def first_result() -> T:
@@ -112,12 +108,7 @@ class SourceCache:
         return sum(self._bytes.values())
 
     def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
-        """Returns the opened source; it is opened now, or was opened earlier with the same `streams` and is still kept.
-
-        streams: the pictures that are drawn if the source is simulated ("left", "right", "background"). Before a source
-        is opened anew, the least recently used ones are dropped while all together exceed the limit. Raises InputError
-        if the source cannot be opened.
-        """
+        """Returns the opened source."""
         key = (*source.key, streams)
         if self._opened and next(reversed(self._opened)) == key:
             return self._opened[key]
@@ -142,11 +133,7 @@ class SourceCache:
 
 
 def array_bytes(root: object) -> int:
-    """Returns the bytes of all numpy arrays that can be reached from the object `root`; each array counts once, a view
-    as its base.
-
-    Containers, functions, methods and objects of the packages sim and tracking are searched; other objects are not.
-    """
+    """Returns the bytes of all numpy arrays that can be reached from the object `root`."""
     arrays: dict[int, int] = {}
     seen: set[int] = set()
     waiting: list[Any] = [root]
@@ -165,10 +152,7 @@ def array_bytes(root: object) -> int:
 
 
 def _parts(one: Any) -> list[Any]:
-    """Returns the objects that `one` holds: items of a tuple or list, values of a dict, the object of a bound method,
-    what a function's closure refers to and the function that it wraps, fields and attributes of an object of sim or
-    tracking. Else [].
-    """
+    """Returns the objects that `one` holds."""
     if isinstance(one, tuple | list):
         return list(one)
     if isinstance(one, dict):

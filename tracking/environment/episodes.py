@@ -209,12 +209,7 @@ class Rollout:
 
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:
-    """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none.
-
-    tracker: name, file.py:Class, module:Class, class or TimeLimited. Pictures are needed if `detections` is "image", or
-    is None and the tracker takes neither boxes nor points. They are "left" and "background", and "right" if the
-    tracker takes stereo. Raises InputError if a tracker given by name cannot be found or imported.
-    """
+    """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none."""
     from tracking.tracker_registry import find
 
     needs = set((find(tracker) if isinstance(tracker, str) else tracker).needs)

@@ -74,11 +74,7 @@ class DetectionRows:
 
 
 def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
-    """Returns the tracks of consecutive frames as rows in m; frame k of the list gets number k, from 0.
-
-    tracks: one `Tracks` per frame. scale: units of their plane per metre (px per m in the image, else 1), not 0. Of
-    positions in space x, y remain. Unknown velocities become 0.
-    """
+    """Returns the tracks of consecutive frames as rows in m; frame k of the list gets number k, from 0."""
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
     id = np.concatenate([np.zeros(0, np.int64), *(t.id for t in tracks)])
     pos, vel = (
@@ -92,11 +88,7 @@ def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
 
 
 def _reach(t: Tracks, scale: float) -> Array:
-    """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame.
-
-    t: the frame's `Tracks`. scale: units of their plane per metre, not 0. The distance is 1 m for a person. For a group
-    (unit "group") 2 standard deviations are added, sqrt(trace of its extent / 2) / scale each, 0 if unknown.
-    """
+    """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame."""
     reach = np.full(len(t.id), REACH)
     if t.unit != "group" or t.groups is None or not len(t.groups.id):
         return reach
@@ -106,12 +98,7 @@ def _reach(t: Tracks, scale: float) -> Array:
 
 
 def detection_rows(detections: Sequence[Detections | None], plane: str, scale: float, first: int) -> DetectionRows:
-    """Returns the detections of consecutive frames as rows in m; entry k of the list gets frame number first + k.
-
-    Frames without detections (None), or with detections in another plane than `plane` ("ground", "space" or "image"),
-    are left out; frames with 0 detections are kept. Of positions in space x, y remain. A detection without score has
-    score 1. scale: units of the plane per metre (px per m in the image, else 1).
-    """
+    """Returns the detections of consecutive frames as rows in m; entry k of the list gets frame number first + k."""
     known = [(first + k, d) for k, d in enumerate(detections) if d is not None and (d.plane == plane or not len(d.pos))]
     frame = np.repeat([f for f, _ in known], [len(d.pos) for _, d in known]).astype(np.int64)
     pos = np.concatenate([np.zeros((0, 2)), *(d.pos[:, :2] for _, d in known)]) / scale
@@ -120,10 +107,7 @@ def detection_rows(detections: Sequence[Detections | None], plane: str, scale: f
 
 
 def consecutive_rows(rows: TrackRows) -> tuple[Ints, Ints]:
-    """Returns the indices of pairs of rows of one track in consecutive frames: earlier rows (K,), later rows (K,).
-
-    Pairs are sorted by id, then frame. Both are empty without pairs.
-    """
+    """Returns the indices of pairs of rows of one track in consecutive frames: earlier rows (K,), later rows (K,)."""
     order = np.lexsort((rows.frame, rows.id))
     a, b = order[:-1], order[1:]
     same: Bools = (rows.id[a] == rows.id[b]) & (rows.frame[a] + 1 == rows.frame[b])
@@ -131,11 +115,7 @@ def consecutive_rows(rows: TrackRows) -> tuple[Ints, Ints]:
 
 
 def nearest_distances(pos: Array, frame: Ints) -> Array:
-    """Returns the distance in m from each of N positions to the nearest other one of the same frame.
-
-    pos (N, 2): x, y in m; frame (N,): number of the frame. Positions that are alone in their frame are left out, so the
-    result may be shorter than N. Empty if N is below 2.
-    """
+    """Returns the distance in m from each of N positions to the nearest other one of the same frame."""
     if len(pos) < 2:
         return np.zeros(0)
     distance = _tree(pos, frame).query(_with_frame(pos, frame), k=2)[0][:, 1]

@@ -74,9 +74,7 @@ class Comparison:
         return f"{self.difference:+.4f}" + (f" [{self.low:+.4f}, {self.high:+.4f}]" if known else " (no interval)")
 
     def line(self) -> str:
-        """Returns one line of text: scenes, key, before → after, difference with its interval, number of sequences,
-        verdict.
-        """
+        """Returns one line of text."""
         change = f"{self.before:.4f} → {self.after:.4f}, {self.difference_words}"
         return f"{self.scenes}: {self.key} {change}, {counted(self.sequences, 'sequence')}: {self.verdict}"
 

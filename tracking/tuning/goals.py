@@ -60,11 +60,7 @@ def finite_mean(values: Iterable[float]) -> float:
 
 
 def goals_of(keys: Iterable[str]) -> tuple[Goal, ...]:
-    """Returns one goal per key, in the order given; the catalogue of scores says which direction is better.
-
-    keys: names of scores, or "frames/s"; a single text counts as the keys of its letters. Raises InputError if there is
-    no key, if a key is unknown or given twice, or if neither direction of its score is better.
-    """
+    """Returns one goal per key, in the order given; the catalogue of scores says which direction is better."""
     from tracking.scoring.catalogue import CATALOGUE
 
     found: list[Goal] = []

@@ -91,12 +91,7 @@ class HeldOutEvaluator:
         return config, value
 
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
-        """Returns the comparisons of the config with the defaults, suite by suite of the tests, and notes (texts).
-
-        Compared are the goals, objective, HOTA, group_F1, pairwise_F1 and event_F1, without scores that no
-        sequence has. A suite on which the config causes an error has a note instead of comparisons. An error of the
-        defaults, errors of the workers, and InputError for a test suite that cannot be read are raised.
-        """
+        """Returns the comparisons of the config with the defaults, suite by suite of the tests, and notes (texts)."""
         found, notes = list[Comparison](), list[str]()
         for name, sources in self.plan.tests.items():
             self.report(f"test on {name}")
@@ -118,13 +113,6 @@ class HeldOutEvaluator:
     def _episodes(
         self, sources: Sequence[Source], config: Config, every_score: bool
     ) -> list[Episode] | FlockscopeError:
-        """Returns the episodes of all sources with this config, or the first FlockscopeError that one of them raises.
-
-        Its cause may be the parameters or a source, as one without labels. The order is that of `sources`. Errors of
-        the workers themselves (one that dies, a lost cluster) are raised.
-
-        every_score: compute the whole catalogue of scores.
-        """
         found = []
         for result in self.play(sources, config.as_dict(), every_score):
             if isinstance(result, FlockscopeError):
@@ -134,13 +122,7 @@ class HeldOutEvaluator:
 
 
 def stored_in_study(study: SearchStudy, play: PlayEpisodes) -> PlayEpisodes:
-    """Returns a function like `play` that stores complete sets of episodes in the study and takes them from there.
-
-    play: play(sources, values, every_score) yields one result per source, the episode or the error of these parameters.
-    A set is known by its sources, parameters and `every_score`. A set with an error, which ends with it, or one that
-    its taker did not read to the end, is not stored. New and stored episodes have only these scores: the goals,
-    objective, HOTA, group_F1, pairwise_F1 and event_F1.
-    """
+    """Returns a function like `play` that stores complete sets of episodes in the study and takes them from there."""
     kept = {*COMPARED_KEYS, *(goal.key for goal in study.plan.goals)}
 
     def stored(

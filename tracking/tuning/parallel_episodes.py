@@ -59,18 +59,7 @@ def episode_player(
     cluster: str | None = None,
     similarity: Similarity | None = None,
 ) -> Iterator[PlayEpisodes]:
-    """Opens the workers for the time of the context and returns the function play(sources, values, every_score).
-
-    That function yields one result per source in order: the episode, or the FlockscopeError that these parameters
-    (values by name) or the source caused. It goes on after an error. Nothing is played before its first result is
-    taken. When its taker stops, no further episode is begun.
-    detections: the tracker's input, "image", "file" or "truth". workers: number of processes, 1 for this process;
-    cluster: address of a dask scheduler, None for no cluster. similarity: how people are compared.
-
-    Raises InputError if a class is to be played by other processes, if `workers` is below 1, or if the address is wrong
-    or dask is missing. Raises WorkError if no scheduler answers. The function raises WorkError if workers are lost or
-    their tracker file differs.
-    """
+    """Opens the workers for the time of the context and returns the function play(sources, values, every_score)."""
     from sim.workers.start import results_in_order, start_workers
 
     if isinstance(tracker.tracker, type) and (workers > 1 or cluster):
@@ -95,11 +84,7 @@ def episode_player(
 
 
 def play_task(task: EpisodeTask) -> EpisodeOrError:
-    """Plays an episode in a worker, which keeps the tracker class and its opened sources for later tasks.
-
-    Returns the episode, or the FlockscopeError that the task's parameters cause. Raises WorkError if the worker's
-    tracker file differs from that of the search, and InputError if the tracker cannot be found there.
-    """
+    """Plays an episode in a worker, which keeps the tracker class and its opened sources for later tasks."""
     return _attempt(task, *_tracker_and_cache(task.tracker, task.code, task.step_timeout))
 
 

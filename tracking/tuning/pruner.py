@@ -31,12 +31,7 @@ class SignedRankPruner(BasePruner):
         self.p = p
 
     def prune(self, study: optuna.Study, trial: FrozenTrial) -> bool:
-        """Returns True if the trial is to be pruned: its p-value is below `p`, and its mean on the common scenes is
-        worse.
-
-        Common scenes are those on which both this trial and the best complete trial have a value. False if no trial is
-        complete, or fewer than two scenes are common. Raises RuntimeError if the study has several goals.
-        """
+        """Returns True if the trial is to be pruned."""
         try:
             best = study.best_trial.intermediate_values
         except ValueError:
@@ -47,12 +42,7 @@ class SignedRankPruner(BasePruner):
 
 
 def signed_rank_p_value(gains: Sequence[float]) -> float:
-    """Returns the one-sided p-value of Wilcoxon's signed-rank test: small if the gains are mostly negative.
-
-    It is the probability, if every sign were random, of a sum of positive ranks no greater than observed. Ranks are
-    those of the absolute values, averaged over equal values. Zeros take part in the ranking and have no sign. 1 without
-    gains.
-    """
+    """Returns the one-sided p-value of Wilcoxon's signed-rank test: small if the gains are mostly negative."""
     d = np.asarray(gains, float)
     _, place, count = np.unique(np.abs(d), return_inverse=True, return_counts=True)
     last = np.cumsum(count)

@@ -64,9 +64,7 @@ class TuningResult:
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:
-        """A dict: parameter name to (default, new value), for every parameter in which the winner differs from the
-        defaults.
-        """
+        """A dict."""
         old, new = self.default.as_dict(), self.config.as_dict()
         return {name: (old[name], new[name]) for name in new if old[name] != new[name]}
 
@@ -90,11 +88,7 @@ class TuningResult:
         return "\n".join(self.lines())
 
     def lines(self, chosen: Candidate | None = None) -> list[str]:
-        """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner.
-
-        chosen: a candidate of the front, whose validation values are shown instead of the winner's, and no comparisons
-        and notes; None for the winner. Training values are never shown, as the search has optimised them.
-        """
+        """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner."""
         plan, seeds = self.plan, self.plan.seeds
         names = ", ".join(goal.key for goal in plan.goals)
         chosen_similarity = plan.options.similarity
@@ -118,11 +112,7 @@ class TuningResult:
         return [*lines, *self.notes, *(f"left out: {scene}" for scene in self.left_out)]
 
     def to_toml(self, chosen: Candidate | None = None) -> str:
-        """Returns a TOML text of all parameters of the winner, or of `chosen`, a candidate of the front.
-
-        `flockscope track --params` reads it. Comments hold the lines of `lines(chosen)`, the versions of the packages,
-        and the default of changed parameters.
-        """
+        """Returns a TOML text of all parameters of the winner, or of `chosen`, a candidate of the front."""
         config = self.config if chosen is None else chosen.config
         old = self.default.as_dict()
         lines = []
@@ -135,12 +125,7 @@ class TuningResult:
         return "\n".join([*(f"# {comment}" for comment in comments), *lines, ""])
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns everything as nested dicts and lists for JSON; an unknown number is nan.
-
-        Keys: settings, counts (trials, episodes, pruned, impossible), params, changed, taken_back, validation,
-        comparisons, candidates, front (empty with one goal), importance, notes, left_out, versions. `changed` (by
-        parameter) and `validation` (by goal) hold dicts of default and tuned value.
-        """
+        """Returns everything as nested dicts and lists for JSON; an unknown number is nan."""
         plan, seeds = self.plan, self.plan.seeds
         return {
             "settings": plan.identity()
@@ -171,13 +156,7 @@ class TuningResult:
         }  # fmt: skip
 
     def write(self, path: str | Path) -> list[Path]:
-        """Writes the parameters to `path` (TOML), and beside it all figures (.json) and the plots (.svg); returns all
-        paths written, `path` first.
-
-        The other names are `path` with another suffix. With several goals each candidate of the front gets a file, too
-        (.front-1.toml …, best first goal first). Existing files are replaced. Raises OSError if a file cannot be
-        written.
-        """
+        """Writes the parameters to `path` (TOML), and beside it all figures (.json) and the plots (.svg)."""
         target = Path(path)
         files = {".json": json.dumps(_without_nan(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
         if len(self.plan.goals) > 1:
@@ -188,10 +167,7 @@ class TuningResult:
         return [target, *(target.with_suffix(suffix) for suffix in files)]
 
     def plots(self) -> dict[str, str]:
-        """Returns the plots as SVG text by file suffix: ".history.svg", ".importance.svg", ".front.svg".
-
-        The second is missing if all shares are 0, the third with one goal.
-        """
+        """Returns the plots as SVG text by file suffix: ".history.svg", ".importance.svg", ".front.svg"."""
         plots = {".history.svg": history_plot(self.plan, self.trials)}
         if any(self.importance.values()):
             plots[".importance.svg"] = importance_plot(self.plan, self.importance, self.config)
@@ -208,9 +184,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Returns a dict of installed versions by package name: flockscope, optuna, numpy, scipy, numba; "unknown" if it is
-    not installed.
-    """
+    """Returns a dict of installed versions by package name."""
     from importlib.metadata import PackageNotFoundError, version
 
     found = {}
@@ -223,10 +197,7 @@ def versions() -> dict[str, str]:
 
 
 def _without_nan(value: Any) -> Any:
-    """Returns a copy of `value`, nested dicts, lists and tuples, with None for nan and infinity, which JSON lacks.
-
-    Tuples become lists; anything else stays as it is.
-    """
+    """Returns a copy of `value`, nested dicts, lists and tuples, with None for nan and infinity, which JSON lacks."""
     if isinstance(value, dict):
         return {key: _without_nan(v) for key, v in value.items()}
     if isinstance(value, list | tuple):
@@ -235,10 +206,6 @@ def _without_nan(value: Any) -> Any:
 
 
 def _short_settings(settings: Sequence[str]) -> Iterator[str]:
-    """Yields settings ("key=value") for the text, cut to 40 characters.
-
-    More than 4 settings that begin with "sensor." are replaced by one text with their number, which comes first.
-    """
     sensor = [setting for setting in settings if setting.startswith("sensor.")]
     profile = len(sensor) > MANY
     if profile:

@@ -83,47 +83,32 @@ class SearchPlan:
 
     @property
     def check_name(self) -> str | None:
-        """The name of the second suite without its folder; with " (--check)" if the first has the same. None without
-        one."""
+        """The name of the second suite without its folder; with " (--check)" if the first has the same."""
         name = None if self.check is None else _without_folder(self.check)
         return f"{name} (--check)" if name == self.suite_name else name
 
     @property
     def defaults(self) -> dict[str, Value]:
-        """The values of the searched parameters in the first trial, a dict by parameter name: those of `base`, the
-        tracker's defaults.
-        """
+        """The values of the searched parameters in the first trial, a dict by parameter name."""
         return {p.name: getattr(self.base, p.name) for p in self.space}
 
     @property
     def needs_every_score(self) -> bool:
-        """True if some goal is other than objective, HOTA, group_F1 and frames/s: all scores must then be
-        computed.
-        """
+        """True if some goal is other than objective, HOTA, group_F1 and frames/s: all scores must then be computed."""
         return any(goal.key not in (*FAST_KEYS, SPEED) for goal in self.goals)
 
     def config(self, values: dict[str, Any]) -> Config:
-        """Returns the base config with these values (by parameter name).
-
-        Raises InputError if a name is unknown or the config refuses the values, alone or together.
-        """
+        """Returns the base config with these values (by parameter name)."""
         return type(self.base).from_dict({**self.base.as_dict(), **values})
 
     @cached_property
     def training(self) -> tuple[Source, ...]:
-        """The sources of the training episodes of each trial: every scene of the suite with every training seed.
-
-        Raises InputError at first use if a scene cannot be read.
-        """
+        """The sources of the training episodes of each trial: every scene of the suite with every training seed."""
         return episode_sources(self.suite, self.seeds.training, self.scene_settings)
 
     @cached_property
     def validation(self) -> tuple[Source, ...]:
-        """The sources of the episodes that choose among the best trials: every scene of the suite with every validation
-        seed.
-
-        Raises InputError at first use if a scene cannot be read.
-        """
+        """The sources of the episodes that choose among the best trials."""
         return episode_sources(self.suite, self.seeds.validation, self.scene_settings)
 
     @cached_property
@@ -141,13 +126,7 @@ class SearchPlan:
         return found
 
     def identity(self) -> dict[str, Any]:
-        """Returns a dict of everything that the value of a trial depends on; a study is resumed only if it is the same.
-
-        Keys: tracker, code, versions, suite, seeds, motions, detections, similarity, objective, searched, ranges,
-        fixed, prune, seed. Long lists are given as hashes. Validation and test seeds, and the number of trials, are not
-        part of it.
-        Raises InputError if a training scene cannot be read.
-        """
+        """Returns a dict of everything that the value of a trial depends on."""
         return {
             "tracker": self.tracker_name,
             "code": self.tracker.code,
@@ -167,13 +146,7 @@ class SearchPlan:
 
 
 def search_plan(options: TuneOptions) -> SearchPlan:
-    """Returns the plan that follows from the options, with defaults for everything that the options leave open.
-
-    Raises InputError if the tracker, a parameter, a suite, a seed or a score is unknown or not allowed, if a file is
-    wrong, if the options contradict each other (such as sensor settings without detections from files), if the second
-    suite shares a scenario with the first, if no parameter is left to search, and if the tracker cannot work with the
-    detections.
-    """
+    """Returns the plan that follows from the options, with defaults for everything that the options leave open."""
     tracker = tuned_tracker(options.tracker, options.step_timeout)
     fixed, scene_settings = _split_settings(options.set)
     suite = suite_names(options.suite)
@@ -206,12 +179,6 @@ def seeds_text(seeds: range) -> str:
 
 
 def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]]:
-    """Returns the "key=value" settings of the tracker (a list), and those of the scenes (a tuple), both in the order
-    given.
-
-    Scenes have keys that begin with "scenario." (removed in the result) or "sensor." (kept); all others are the
-    tracker's, and keep a "tracker." before the key. Nothing is checked.
-    """
     tracker, scenes = [], []
     for setting in settings:
         key, _, value = setting.partition("=")
@@ -223,11 +190,6 @@ def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]
 
 
 def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
-    """Returns the number of scenes of the second suite `check`, 1 if it is None.
-
-    suite: names of what is tuned on. Raises InputError if `check` shares a scenario with them, is unknown or
-    unreadable, or holds no scenes to simulate.
-    """
     if check is None:
         return 1
     count = count_scenes((check,), (), "--check")
@@ -240,13 +202,7 @@ def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
 
 
 def _space(base: Config, settings: Sequence[str], only: tuple[str, ...], mode: DetectionMode) -> tuple[Param, ...]:
-    """Returns the parameters to search: tunable, not fixed, with an effect on this input, and in `only` unless it is
-    empty.
-
-    base: config of the tracker, which declares them. settings: "name=value" texts of fixed parameters. only: names of
-    parameters. mode: the tracker's input; "image" leaves out parameters about points, other modes those about pixels.
-    Raises InputError if a name in `only` is unknown or no such parameter, or if no parameter is left.
-    """
+    """Returns the parameters to search."""
     fixed = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in settings}
     unused = "points" if mode == "image" else "pixels"
     for name in only:

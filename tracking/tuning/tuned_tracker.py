@@ -38,16 +38,12 @@ class TunedTracker:
 
     @property
     def objective(self) -> str:
-        """Key of the score that it is tuned for by default: "pairwise_F1" for the baseline rule of groups, else
-        "objective".
-        """
+        """Key of the score that it is tuned for by default."""
         return "pairwise_F1" if self.name == RULE else "objective"
 
     @property
     def detections(self) -> DetectionMode:
-        """The tracker's input by default: "truth" for the rule of groups, "file" if it takes boxes or points, else
-        "image".
-        """
+        """The tracker's input by default."""
         if self.name == RULE:
             return "truth"
         return "file" if {"boxes", "points"} & {*self.needs} else "image"
@@ -102,13 +98,7 @@ class TunedTracker:
 
 
 def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = None) -> TunedTracker:
-    """Returns what is to be tuned: `grouping` is the baseline rule of groups, else a tracker by name, file.py:Class,
-    module:Class or class.
-
-    step_timeout: seconds that each `reset` and `step` may take, None for no limit. Raises InputError if the tracker is
-    unknown or cannot be imported, is no tracker, or declares no parameters; also if the limit is not above 0 or given
-    for a class or the rule.
-    """
+    """Returns what is to be tuned."""
     from tracking.tracker_registry import checked, code_hash, config_class, find, located
 
     if tracker == RULE:

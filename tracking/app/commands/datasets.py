@@ -12,15 +12,7 @@ from tracking.app.progress import ProgressMeter
 
 
 def generate(options: GenerateOptions) -> CommandResult:
-    """Stores one sequence for every named scenario or suite entry and every seed, all seeds of an entry together.
-
-    The result's data: "sequences", the folders, "folder", their parent, and "left_out", name and reason of each
-    sequence whose script did not come true (at most 5 %). Stored sequences that are intact are kept.
-
-    Raises InputError before anything is simulated for wrong options or scenarios, or a folder with another sequence. If
-    sequences fail, the others are made first; then InputError is raised if all failures are wrong input, else
-    WorkError. A full disk ends the work at once with WorkError.
-    """
+    """Stores one sequence for every named scenario or suite entry and every seed, all seeds of an entry together."""
     from sim.dataset.generate import generate as make
     from sim.workers.start import WorkerOptions
 
@@ -42,13 +34,7 @@ def generate(options: GenerateOptions) -> CommandResult:
 
 
 def validate(folder: Path) -> CommandResult:
-    """Checks a generated sequence or dataset, or stored tracks, at the path `folder`; changes nothing.
-
-    Without problems the result's data are "problems" ([]) and "content_hash" (64 hex digits, None for tracks), else
-    "problems" (a dictionary each: file, place, got, expected, remedy) and "error" (the first of them). Then the exit
-    code is 1 and the text has a line for each problem. Raises InputError if the folder does not exist or holds neither
-    a sequence nor tracks.
-    """
+    """Checks a generated sequence or dataset, or stored tracks, at the path `folder`; changes nothing."""
     from sim.io.store.validate import content_hash, holds_sequences
     from sim.io.store.validate import validate as check
 
@@ -63,12 +49,7 @@ def validate(folder: Path) -> CommandResult:
 
 
 def export_coco(options: CocoOptions) -> CommandResult:
-    """Writes COCO files, one per split, of all sequences with labelled boxes at the path of the options.
-
-    The result's data: "files", their paths, "file", the only path, None if there are several, and "root", the folder
-    from which the names of pictures lead. Existing files are replaced. Raises InputError if the source cannot be
-    opened, no sequence has labelled boxes, or a file cannot be written; WorkError if the disk is full.
-    """
+    """Writes COCO files, one per split, of all sequences with labelled boxes at the path of the options."""
     from sim.io.export.coco import coco
 
     paths = coco(options.folder, options.out, options.min_visibility, person_class=options.person_class)
@@ -78,11 +59,7 @@ def export_coco(options: CocoOptions) -> CommandResult:
 
 
 def export_kitti(source: Path, out: Path) -> CommandResult:
-    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder `out`.
-
-    The result's data: "folders", one per sequence. Files of an earlier export are replaced. Raises InputError if --out
-    is wrong, the source is no intact generated dataset, or a sequence has no pairs; WorkError if the disk is full.
-    """
+    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder `out`."""
     from sim.io.export.kitti import kitti
 
     folders = kitti(source, option_parsing.output_folder(out))
@@ -90,12 +67,7 @@ def export_kitti(source: Path, out: Path) -> CommandResult:
 
 
 def export_webdataset(options: WebdatasetOptions) -> CommandResult:
-    """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json.
-
-    The result's data: "shards", their paths, "bytes", their total, and "content_hash". Complete shards of an earlier
-    run are kept. Raises InputError if --out or --shard-size is wrong, the source is no intact generated dataset, or the
-    folder holds shards of another export; WorkError if the disk is full.
-    """
+    """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json."""
     from sim.io.export.webdataset import size_of, webdataset
 
     out = option_parsing.output_folder(options.out)

@@ -25,15 +25,7 @@ SHOWN = (
 
 
 def fit_sensor(options: FitSensorOptions) -> CommandResult:
-    """Writes the profile of the detector behind the recordings, pooled over all of them, as a TOML file.
-
-    The result's data: "file", "sensor" (the profile's keys), "measured" and "drawn", each a dictionary of statistics by
-    name. "drawn" are means over 8 seeds of detections simulated with the profile; nan where nothing was observed.
-
-    Raises InputError if --out is no .toml file or cannot be written, or if a source is missing or has no labels,
-    detections or boxes of both. Also for fewer than 50 labelled people (rows of all frames), or fewer than 25 of them
-    detected. Raises WorkError if the disk is full.
-    """
+    """Writes the profile of the detector behind the recordings, pooled over all of them, as a TOML file."""
     from scenarios.loading.resolve import dump_sensor
     from sim.io.files.atomic import write_file
     from tracking.fitting.detection_matching import match_sequence
@@ -66,20 +58,12 @@ def _open(sources: Sequence[Path], fps: float | None) -> list[Recording]:
 
 
 def _mean(values: list[float]) -> float:
-    """Returns the mean of the finite values, nan if there is none."""
     known = [v for v in values if np.isfinite(v)]
     return float(np.mean(known)) if known else float("nan")
 
 
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:
-    """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments.
-
-    The result's data: "file", "fitted" and, with --check, "checked", each a dictionary of scores
-    (tracking.fitting.belief_scores).
-
-    Raises InputError if --out is no .toml file or cannot be written, a name, a file or seeds are wrong, or no two
-    people come near each other. Raises WorkError if a script cannot be fulfilled or the disk is full.
-    """
+    """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments."""
     from sim.io.files.atomic import write_file
     from tracking.fitting.belief import fit_belief, sample_of
     from tracking.fitting.belief_scores import belief_scores

@@ -12,15 +12,7 @@ Scores = dict[str, dict[str, float]]
 
 
 def fit_joint(options: FitJointOptions) -> CommandResult:
-    """Writes the fitted parameters as a TOML file, with the command and the scores as comments; the remaining
-    parameters have their defaults.
-
-    The result's data: "file", "params" (the fitted parameters by name), "fitted" and, with --check, "checked", each a
-    dictionary of scores (tracking.fitting.joint_events, tracking.fitting.joint_components).
-
-    Raises InputError if --out is no .toml file or cannot be written, if a name or seeds are wrong, or if the scenes
-    have too few merges or splits, or groups. Raises WorkError if a script cannot be fulfilled or the disk is full.
-    """
+    """Writes the fitted parameters as a TOML file, with the command and the scores as comments."""
     from sim.io.files.atomic import write_file
 
     out = option_parsing.output_file(options.out, ".toml")

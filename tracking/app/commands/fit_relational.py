@@ -8,13 +8,7 @@ from tracking.app.fit_options import FitRelationalOptions
 
 
 def fit_relational(options: FitRelationalOptions) -> CommandResult:
-    """Writes the fitted parameters of `relational` as a TOML file; parameters that are not fitted have their defaults.
-
-    The result's data: "file", and "params", the fitted values by name.
-
-    Raises InputError if --out is no .toml file or cannot be written, if a name or seeds are wrong, or if the scenes
-    have too few people or no groups. Raises WorkError if a script cannot be fulfilled or the disk is full.
-    """
+    """Writes the fitted parameters of `relational` as a TOML file."""
     from scenarios.loading.resolve import resolve
     from sim.io.files.atomic import write_file
     from tracking.fitting.grouping_scenes import simulated

@@ -8,10 +8,7 @@ from tracking.app import option_parsing
 
 
 def fit_and_check_seeds(fitted: str, checked: str | None) -> dict[str, range]:
-    """Returns the seeds of --seeds under "fitted" and, if given, those of --check under "checked".
-
-    Raises InputError if a text is neither "A:B" nor a number.
-    """
+    """Returns the seeds of --seeds under "fitted" and, if given, those of --check under "checked"."""
     asked = {"fitted": ("--seeds", fitted), "checked": ("--check", checked)}
     return {key: option_parsing.seeds(text, option) for key, (option, text) in asked.items() if text is not None}
 

@@ -58,10 +58,7 @@ def group(options: GroupOptions) -> CommandResult:
 
 
 def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | None]]:
-    """Returns the sequences of the source, and for each its run if the source is stored tracks of ours, else None.
-
-    Raises InputError if there are neither sequences nor tracks, one cannot be read, or an option has no effect.
-    """
+    """Returns the sequences of the source, and for each its run if the source is stored tracks of ours, else None."""
     path = options.source
     own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
     if not own and (not path.is_dir() or holds_sequences(path)):
@@ -91,11 +88,6 @@ def _open(path: Path, options: GroupOptions) -> list[Sequence]:
 
 
 def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
-    """Returns a run's sequence without frames: its name, frame rate, length and image scale, and the hash of what was
-    tracked.
-
-    Raises InputError if the run is not whole, or for an option that has no effect on it.
-    """
     tracks.check()
     info, folder = tracks.info, tracks.path if tracks.path.is_dir() else tracks.path.parent
     o = options
@@ -113,7 +105,6 @@ def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
 
 
 def _belief(grouping: Grouping) -> Belief:
-    """Returns the grouping if it is one that has probabilities. Raises InputError for the rule."""
     if isinstance(grouping, Belief):
         return grouping
     raise InputError(
@@ -123,13 +114,10 @@ def _belief(grouping: Grouping) -> Belief:
 
 
 def _scale(run: TrackingRun) -> float:
-    """Returns the image scale of a run, px per m; 1 if it is unknown, as on the ground and without anybody."""
     return run.info["px_per_m"] or 1.0
 
 
 def _refuse(folder: Path, tracks: StoredTracks | None) -> None:
-    """Raises InputError if the folder is that of the tracks to be grouped, or holds files of another program with names
-    of a run; else returns nothing."""
     if tracks is not None and folder.resolve() in (tracks.path.resolve(), tracks.path.resolve().parent):
         raise InputError(
             file=folder, place="--out", got="the folder of the tracks themselves", expected="another folder",

@@ -25,13 +25,7 @@ Row = dict[str, Any]
 
 
 def group_row(run: TrackingRun, folder: Path) -> Row:
-    """Returns what the command tells of one run, as a dictionary.
-
-    Keys: sequence, plane, px_per_m (None if unknown), px_per_m_frames, fps, frames; median_speed (m/s, None if
-    unknown); people (number of ids), people_in_groups (number of those ever in a group); groups, a list in order of
-    first frames of "id", "members" (all ids ever in it), "size" (most people at a time), "start", "end" (frames, from
-    1), "seconds" (from the start of the first to the end of the last frame); events, the number of each kind; folder.
-    """
+    """Returns what the command tells of one run, as a dictionary."""
     count = [len(t.id) for t in run]
     frame = np.repeat(np.array([t.index for t in run], np.int64), count)
     id, group = (np.concatenate([np.zeros(0, np.int64), *(getattr(t, name) for t in run)]) for name in ("id", "group"))
@@ -56,10 +50,7 @@ def group_row(run: TrackingRun, folder: Path) -> Row:
 
 
 def group_tables(rows: Sequence[Row]) -> Any:
-    """Returns something rich can print: a table of groups and one of events, with a line for each run and their sum.
-
-    rows: as `group_row` makes them, at least one. Of a single run the groups that last longest are listed, too.
-    """
+    """Returns something rich can print: a table of groups and one of events, with a line for each run and their sum."""
     from rich.console import Group
 
     counts = _table("groups", rows, _group_counts)
@@ -99,8 +90,6 @@ def _group_counts(rows: Sequence[Row]) -> dict[str, object]:
 
 
 def _longest(row: Row) -> list[Any]:
-    """Returns in a list the table of the groups of a run that last longest, at most 20, in order of their first frames;
-    [] without groups."""
     kept = sorted(row["groups"], key=lambda g: -g["seconds"])[:LISTED]
     table = empty_table()
     for name in ("group", "from, s", "to, s", "most at a time"):
@@ -116,7 +105,6 @@ def _longest(row: Row) -> list[Any]:
 
 
 def _place(row: Row) -> str:
-    """Returns a line that says where the positions of a run are, and of the image its scale and where it comes from."""
     if row["plane"] != "image":
         speed = row["median_speed"]
         return "positions in metres" + (

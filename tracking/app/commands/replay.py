@@ -11,14 +11,7 @@ from tracking.app.progress import ProgressMeter
 
 
 def replay(options: ReplayCommandOptions) -> CommandResult:
-    """Stores one sequence for every recording of the source and every seed, all seeds of a recording together.
-
-    The result's data: "sequences", the folders, and "folder", their parent. Settings of `--set` take precedence over
-    `--sensor`, and both over the file of `--camera`. Stored replays with the same options are kept.
-
-    Raises InputError if --out, --seeds, --duration, a setting or a file is wrong, or if a recording cannot be opened or
-    replayed. Raises WorkError if the disk is full.
-    """
+    """Stores one sequence for every recording of the source and every seed, all seeds of a recording together."""
     from scenarios.loading.resolve import load_observation
     from sim.dataset.generate import ReplayOptions, store_replays
     from sim.dataset.replay import Cut

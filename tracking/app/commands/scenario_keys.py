@@ -14,12 +14,7 @@ Node = dict[str, Any]
 
 
 def list_keys() -> CommandResult:
-    """Returns every key of a scenario file with its type, default and meaning, a line each.
-
-    The result's data: "keys", a list of dictionaries with "key", "type", "default" and "meaning". Keys of inner tables
-    have dots. `[]` after a table's key stands for every element of its array. A word in parentheses names one of the
-    kinds of table that the key can hold.
-    """
+    """Returns every key of a scenario file with its type, default and meaning, a line each."""
     schema = Scenario.model_json_schema(by_alias=True)
     rows = list(_keys(schema, schema["$defs"], ""))
     width = max(len(row["key"]) for row in rows)
@@ -28,12 +23,6 @@ def list_keys() -> CommandResult:
 
 
 def _keys(table: Node, known: Node, prefix: str) -> Iterator[dict[str, str]]:
-    """Yields a dictionary with "key", "type", "default" and "meaning", all texts, of each key of a table and of tables
-    in it.
-
-    table: part of a JSON schema. known: the schema's named tables. prefix: written before each key, "" or with a dot at
-    the end. default: "required" if the key has none. A key that holds tables is replaced by their keys.
-    """
     required = table.get("required", [])
     for name, node in table["properties"].items():
         many = "[]" if any("items" in each for each in (node, *node.get("anyOf", ()))) else ""
@@ -49,11 +38,6 @@ def _keys(table: Node, known: Node, prefix: str) -> Iterator[dict[str, str]]:
 
 
 def _tables(node: Node, known: Node) -> Iterator[Node]:
-    """Yields the tables (parts of a JSON schema) that a key can hold, directly or in an array; none for a plain value.
-
-    node: the key's part of the schema. known: the schema's named tables. A distribution of random numbers counts as a
-    plain value.
-    """
     ref = node.get("$ref", "").rpartition("/")[2]
     if ref and ref != "Distribution":
         yield known[ref]
@@ -63,11 +47,6 @@ def _tables(node: Node, known: Node) -> Iterator[Node]:
 
 
 def _type(node: Node) -> str:
-    """Returns the type of a value in words. node: the value's part of a JSON schema.
-
-    It is the name of a named type in lower case, the choices as JSON ("a" | "b"), the alternatives ("x or y", null left
-    out), the elements ("[x, …]"), or the JSON type; "value" if there is none.
-    """
     if "$ref" in node:
         return str(node["$ref"]).rpartition("/")[2].lower()
     for choices in (node.get("enum"), [node["const"]] if "const" in node else None):
@@ -81,10 +60,6 @@ def _type(node: Node) -> str:
 
 
 def _default(node: Node) -> str:
-    """Returns the default in words, "default" and the value as JSON; "absent" if there is none or it is None.
-
-    node: the value's part of a JSON schema. Keys of a default table that are None are left out.
-    """
     value = node.get("default")
     if isinstance(value, dict):
         value = {key: v for key, v in value.items() if v is not None}

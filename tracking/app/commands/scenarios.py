@@ -18,11 +18,7 @@ if TYPE_CHECKING:
 
 
 def scenarios(options: ScenariosOptions) -> CommandResult:
-    """Explains the named scenario or suite; without a name lists all, or with --schema the keys of a scenario file.
-
-    Raises InputError if NAME, --out or --set is given together with --schema, or --out or --set without NAME; also if
-    the name, a setting or the drawing's file is wrong.
-    """
+    """Explains the named scenario or suite; without a name lists all, or with --schema the keys of a scenario file."""
     if options.name is not None and not options.schema:
         return explain(options.name, options.settings, options.out)
     unused = {"NAME": options.name, "--out": options.out, "--set": options.settings}
@@ -38,11 +34,7 @@ def scenarios(options: ScenariosOptions) -> CommandResult:
 
 
 def catalogue() -> CommandResult:
-    """Returns every scenario and suite of the catalogue with its line of description, sorted by name.
-
-    The result's data: "scenarios" and "suites", each a dictionary from name to description. Raises InputError if a file
-    of the catalogue is wrong.
-    """
+    """Returns every scenario and suite of the catalogue with its line of description, sorted by name."""
     scenarios = {name: load(name).about for name in names()}
     suites = {name: suite.about(suite.find_suite(name)) for name in suite_names()}
     text = ["Scenarios", *_rows(scenarios), "", "Suites", *_rows(suites)]
@@ -70,10 +62,6 @@ def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResu
 
 
 def _is_suite(name: str) -> bool:
-    """Returns True for a suite's TOML file, for "suite:NAME", and for every name that is no scenario in the catalogue.
-
-    Raises InputError if a name ends in .toml and there is no such file, or it is no TOML.
-    """
     if name.endswith(".toml"):
         return not name.startswith("suite:") and "entry" in toml_files.parse(toml_files.find(name))
     return name.startswith("suite:") or name not in names()
@@ -99,9 +87,5 @@ def _list_entries(name: str, entries: list[Entry]) -> CommandResult:
 
 
 def _rows(about: dict[str, str]) -> list[str]:
-    """Returns one indented line for each name with its description, the descriptions aligned; one line "none" for {}.
-
-    about: description by name.
-    """
     width = max(map(len, about), default=0)
     return [f"  {name:<{width}}  {words}".rstrip() for name, words in about.items()] or ["  none"]

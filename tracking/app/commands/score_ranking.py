@@ -69,16 +69,7 @@ class RankedRuns:
 
 
 def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) -> CommandResult:
-    """Scores several runs on all sequences, and ranks them.
-
-    source: how the sequences were opened. The result's data: "by" (the score that ranks), "similarity", "sequences"
-    (names), "ranking" (a dictionary for each oracle, then for each run, best first: "run", "input", "first", "last",
-    "mean", "low", "high", "scores": means of all scores), "differences" (of each pair of runs: "run", "minus", "mean",
-    "low", "high", "sure", and "scores": "mean", "low", "high", "sure" of each score), "settings" (in what the runs
-    differ), "scenarios" (means by scenario and run), "scores" (by run and sequence), "notes".
-
-    Raises InputError as `score`.
-    """
+    """Scores several runs on all sequences, and ranks them."""
     if options.box_scale:
         raise InputError(
             place="--box-scale", got=counted(len(options.tracks), "run"), expected="one text", remedy="leave it out"
@@ -112,9 +103,7 @@ def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) 
 
 
 def short_notes(sequence: Sequence, scores: Scores) -> list[str]:
-    """Returns a list with one note if the recording lasts less than 60 s, so that its intervals are only indicative;
-    else [].
-    """
+    """Returns a list with one note if the recording lasts less than 60 s, so that its intervals are only indicative."""
     seconds = scores.length / sequence.fps
     return [INDICATIVE.format(seconds=seconds)] if seconds < SURE else []
 
@@ -137,9 +126,7 @@ def usual_key(comparison: ComparedRuns) -> str:
 
 
 def _names(texts: list[str]) -> dict[str, str]:
-    """Returns the texts on the command line by a short name: of the class, folder or file; the whole text if two share
-    it. Raises InputError if a text is given twice.
-    """
+    """Returns the texts on the command line by a short name."""
     short = [text.rpartition(":")[2] if is_class(text) else Path(text).name for text in texts]
     if len(set(texts)) < len(texts):
         twice = next(text for text in texts if texts.count(text) > 1)
@@ -157,7 +144,6 @@ def _stored(text: str, sequences: list[Sequence]) -> list[Any]:
 
 
 def _scenario(sequence: Sequence) -> str:
-    """Returns the name of a sequence without its seed: the scenario, or the name of a recording."""
     name, dash, seed = sequence.name.rpartition("-s")
     return name if dash and set(seed) <= set("0123456789-r") else sequence.name
 
@@ -378,7 +364,6 @@ def verdict(comparison: ComparedRuns, key: str) -> list[str]:
 
 
 def _write_csv(path: Path, c: ComparedRuns) -> None:
-    """Writes one row per sequence and run (oracles, too) with every score of the catalogue."""
     from sim.io.files.atomic import write_file
 
     text = io.StringIO()

@@ -61,11 +61,7 @@ class ScoredSequence:
 
 
 def score_sequence(sequence: Sequence, job: ScoringJob) -> ScoredSequence:
-    """Returns the scores of all runs of one sequence, compared alike.
-
-    Warns about tracks that hardly match any label. Raises InputError if a file is wrong, the sequence has no labels, or
-    the tracks cannot be compared as asked; WorkError if a tracker fails.
-    """
+    """Returns the scores of all runs of one sequence, compared alike."""
     runs = [_tracks(source, sequence, job.box_scale) for source in job.sources]
     for run in runs:
         if sequence.truth is not None:

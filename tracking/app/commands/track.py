@@ -51,12 +51,7 @@ class TrackerSetup:
     limited: TimeLimited | None = None
 
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
-        """Tracks the sequence and returns its tracks, with groups and events. Nothing is written.
-
-        progress: called with each frame's number, from 1, when that frame is done; None: not called. Raises InputError
-        if tracker, parameters, settings and sequence do not fit, or a picture or detection cannot be used; WorkError if
-        the tracker fails.
-        """
+        """Tracks the sequence and returns its tracks, with groups and events. Nothing is written."""
         from tracking.run import track
 
         return track(
@@ -137,11 +132,6 @@ def _unpickled_setup(options: bytes) -> TrackerSetup:
 
 
 def _setup(options: TrackOptions) -> TrackerSetup:
-    """Returns the tracker with the parameters, detections, sensor settings and grouping that the options name.
-
-    Raises InputError if the tracker is unknown or a file is wrong, or for a setting that is wrong or belongs to a
-    scenario. Values of the sensor are checked later.
-    """
     found = [
         *option_parsing.settings(option_parsing.sensor_settings(options.sensor), "tracker", ("sensor",)),
         *option_parsing.settings(options.settings, "tracker", ("tracker", "sensor")),
@@ -155,12 +145,6 @@ def _setup(options: TrackOptions) -> TrackerSetup:
 
 
 def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:
-    """Returns the tracker's config with `params` (the name of a preset or a TOML file) and then `settings`
-    ("name=value") applied; None for a tracker without parameters.
-
-    Raises InputError if the tracker is unknown, if the file or a setting is wrong, or if either is given for a tracker
-    without parameters.
-    """
     from tracking.tracker_registry import find
 
     kind: type[Config] | None = getattr(find(tracker), "config_class", None)
@@ -180,12 +164,6 @@ def _config(tracker: str, params: str | None, settings: list[str]) -> Config | N
 def _check_modes(
     setup: TrackerSetup, needs: tuple[str, ...], sequences: list[Sequence], background: str | None
 ) -> None:
-    """Raises InputError if the tracker cannot work on one of the sequences, or if `background` would have no effect;
-    else returns nothing.
-
-    needs: what the tracker can work with. background: the text of --background; it has no effect if no sequence is
-    tracked from its pictures. None: not given.
-    """
     from tracking.detection_mode import choose_mode
 
     modes = [choose_mode(needs, sequence, setup.detections) for sequence in sequences]
@@ -195,8 +173,6 @@ def _check_modes(
 
 
 def _total_frames(sequences: list[Sequence]) -> int | None:
-    """Returns the number of frames of all sequences together, None if one of them does not know its length;
-    0 for none."""
     lengths = [sequence.length for sequence in sequences]
     return None if None in lengths else sum(length or 0 for length in lengths)
 

@@ -19,14 +19,7 @@ def is_close(frame: int, other: int, fps: float) -> bool:
 
 
 def choose_frames(truth: Truth, count: int) -> list[int]:
-    """Returns the numbers, from 1, of `count` frames in ascending order; at least one if there is one, every frame if
-    there are no more.
-
-    First frames of events are taken in order of rank: merge and split, cross and queue, form and dissolve. Those at
-    most a second from a frame taken before are left out. If there are more of one rank than there is room for, they are
-    thinned evenly. The widest gaps are then divided until `count` is reached, with preference for frames with many
-    people. A truth of length 0 has no frames.
-    """
+    """Returns the numbers, from 1, of `count` frames in ascending order."""
     count = min(max(1, count), truth.length)
     chosen: list[int] = []
     events = [event for event in truth.events or () if 1 <= event.start <= truth.length and event.kind in SHOWN_KINDS]
@@ -41,11 +34,6 @@ def choose_frames(truth: Truth, count: int) -> list[int]:
 
 
 def _apart(starts: set[int], chosen: list[int], fps: float) -> list[int]:
-    """Returns, ascending, the starts (frame numbers) that are more than a second from each chosen frame and each
-    earlier start that was kept.
-
-    fps: frames per second. The arguments are not changed.
-    """
     kept: list[int] = []
     for start in sorted(starts):
         if not any(is_close(start, other, fps) for other in (*chosen, *kept)):
@@ -54,19 +42,10 @@ def _apart(starts: set[int], chosen: list[int], fps: float) -> list[int]:
 
 
 def _evenly(n: int, k: int) -> list[int]:
-    """Returns k of the indices 0 to n - 1, evenly spaced, ends included; [0] for k = 1, [] for k = 0. k must not exceed
-    n."""
     return [round(place) for place in np.linspace(0, n - 1, k)] if k > 1 else [0][:k]
 
 
 def _in_widest_gap(chosen: list[int], people: Ints) -> int:
-    """Returns the frame, from 1, with most people in the middle half of the widest gap between chosen frames.
-
-    Of several, the nearest to the gap's middle, then the earliest. people: (T,) counts by frame. Both ends of the
-    sequence count as an eighth of its length further out, so that frames near the ends are chosen, too. A gap without
-    room is passed over for the next widest; if none has room, the first frame that is not chosen. StopIteration if all
-    are.
-    """
     length = len(people)
     marks = np.array([1 - length // 8, *sorted(chosen), length + length // 8])
     for k in np.argsort(-np.diff(marks), kind="stable"):

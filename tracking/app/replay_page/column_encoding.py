@@ -37,10 +37,7 @@ def run_lengths(column: Ints) -> list[int]:
 
 
 def stints(ids: Ints, frame: Ints) -> list[list[int]]:
-    """Returns [id, first frame, number of frames] of each stint: one id in consecutive frames. [] without rows.
-
-    ids, frame: (R,), sorted by id and then by frame; the stints have the same order.
-    """
+    """Returns [id, first frame, number of frames] of each stint: one id in consecutive frames. [] without rows."""
     if not len(ids):
         return []
     first = np.flatnonzero(np.r_[True, (np.diff(ids) != 0) | (np.diff(frame) != 1)])

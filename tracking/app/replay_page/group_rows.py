@@ -37,11 +37,7 @@ class PageGroupRows:
 
 
 def rows_of_groups(tracks: SequenceOf[Tracks]) -> PageGroupRows:
-    """Returns the groups of all rows of `tracks` (one `Tracks` per frame), in their order.
-
-    A row whose id its frame's `groups` lacks has no hull, and nan as extent and size. Speeds are those of the rows'
-    velocities.
-    """
+    """Returns the groups of all rows of `tracks` (one `Tracks` per frame), in their order."""
     rows = [row for t in tracks for row in _rows(t)]
     speed = [np.hypot(t.vel[:, 0], t.vel[:, 1]) for t in tracks]
     extent, size = [row[1] for row in rows], [row[2] for row in rows]
@@ -54,8 +50,7 @@ def rows_of_groups(tracks: SequenceOf[Tracks]) -> PageGroupRows:
 
 
 def _rows(tracks: Tracks) -> list[tuple[Array, Array, float]]:
-    """Returns (hull (V, 2), extent (2, 2), size) of each row of one frame; no vertices and nan where its `groups` lacks
-    the id."""
+    """Returns (hull (V, 2), extent (2, 2), size) of each row of one frame."""
     groups, no_hull = tracks.groups or Groups.none(), np.zeros((0, 2))
     hulls = groups.hull or (no_hull,) * len(groups.id)
     known = dict(zip(groups.id.tolist(), zip(hulls, groups.extent, groups.size, strict=True), strict=True))
@@ -63,14 +58,7 @@ def _rows(tracks: Tracks) -> list[tuple[Array, Array, float]]:
 
 
 def encode_groups(rows: PageGroupRows, order: Ints, plane: str, scale: int) -> dict[str, Any]:
-    """Returns the rows in the order `order` as encoded columns.
-
-    order: (R,) indices of rows. plane: "ground" or "image", KeyError for another. scale: encoded steps per m or px.
-    Keys: size, in tenths. speed: tenths of m/s, or px/s. ellipse: three columns, long and short standard deviation in
-    steps, and direction in degrees. hull: for each row the first corner and the steps to each next corner, as x, y, x,
-    y, …; [] where unknown. Corners that stand out by less than 0.02 m or 1 px are left out. Columns hold their first
-    value, then differences; nan is -99999.
-    """
+    """Returns the rows in the order `order` as encoded columns."""
     axes = ellipses(rows.extent[order])
     hulls = [simplified(rows.hull[k], LEAST_CORNER[plane]) for k in order]
     return {
@@ -82,11 +70,7 @@ def encode_groups(rows: PageGroupRows, order: Ints, plane: str, scale: int) -> d
 
 
 def ellipses(extent: Array) -> Array:
-    """Returns (R, 3) of covariances (R, 2, 2): long and short standard deviation, direction of the long axis in [0, π)
-    rad.
-
-    nan where an entry of the covariance is not finite. A negative eigenvalue counts as 0.
-    """
+    """Returns (R, 3) of covariances (R, 2, 2)."""
     known: Bools = np.asarray(np.isfinite(extent).all(axis=(1, 2)))
     values, vectors = np.linalg.eigh(np.where(known[:, None, None], extent, np.eye(2)))
     sigma = np.sqrt(np.maximum(values, 0.0))
@@ -95,12 +79,7 @@ def ellipses(extent: Array) -> Array:
 
 
 def simplified(hull: Array, least: float) -> Array:
-    """Returns a convex polygon (V, 2) without the corners nearer than `least` to the line through their neighbours.
-
-    Two passes remove every other corner at most, so that no two neighbours go at once; a pass leaves up to three
-    corners as they are. Of a polygon that then still has more than 24 corners every k-th is kept, with the least k that
-    suffices. `hull` is not modified.
-    """
+    """Returns a convex polygon (V, 2) without the corners nearer than `least` to the line through their neighbours."""
     for odd in (1, 0):
         n = len(hull)
         if n > 3:

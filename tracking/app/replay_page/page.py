@@ -32,16 +32,7 @@ def write_page(
     title: str | None = None,
     video: PageVideo | None = None,
 ) -> Path:
-    """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all.
-
-    tracks: one tracker's `Tracks`, one per frame; None for the truth alone. Groups and events that the tracker did not
-    report are derived. scores: by key; nan and infinite ones are not shown, None: none. title: None for the sequence's
-    name. video: the pictures, drawn below the boxes; None: none. An existing file is replaced.
-
-    Raises InputError if the truth or detections cannot be read, groups must be derived in the image and the scale is
-    not above 0, or the file cannot be written; WorkError if the disk is full or an order of a simulated script was not
-    fulfilled.
-    """
+    """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all."""
     shown = page_data(sequence, tracks, scores) | {"video": None if video is None else video.facts()}
     data = json.dumps(shown, separators=(",", ":"), allow_nan=False)
     page = (HERE / "page.html").read_text(encoding="utf-8")

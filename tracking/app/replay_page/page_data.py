@@ -20,19 +20,7 @@ from tracking.run import grouped
 
 
 def page_data(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Mapping[str, float] | None = None) -> Json:
-    """Returns all that the page shows except the video, as a JSON object. An entry is None (a list empty) if it is
-    unknown.
-
-    tracks: one `Tracks` per frame; None for the truth alone. Groups and events that the tracker did not report are
-    derived. scores: by key; nan, infinity and keys outside the catalogue are left out.
-
-    Keys: name; tracker; fps; length (frames); image (width, height, px); bounds (x0, y0, x1, y1 of the plan, m); scene;
-    camera; truth and tracks (encoded rows); detections; unlabelled ([first, last] frames); near ([first, last, id,
-    id]); scores.
-
-    Raises InputError if truth or detections cannot be read, or groups must be derived in the image and the scale is 0
-    or below. Raises WorkError if an order of a simulated script was not fulfilled.
-    """
+    """Returns all that the page shows except the video, as a JSON object."""
     truth = sequence.truth
     complete = None if tracks is None else grouped(tracks, sequence)
     true = None if truth is None else rows_of_truth(truth)
@@ -60,11 +48,7 @@ def page_data(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Map
 
 
 def _scores(scores: Mapping[str, float]) -> list[list[str]]:
-    """Returns [key, value, meaning, family], all texts, of each known (finite) score in the catalogue's order.
-
-    Before these come the same entries of the SHOWN scores, the main ones, with the family "". Keys that are not in the
-    catalogue are ignored.
-    """
+    """Returns [key, value, meaning, family], all texts, of each known (finite) score in the catalogue's order."""
     from tracking.app.commands.score_tables import SHOWN, number
     from tracking.scoring.catalogue import CATALOGUE
 
@@ -79,11 +63,6 @@ def _tracker(tracks: SequenceOf[Tracks] | None) -> str:
 
 
 def _length(sequence: Sequence, both: list[PageRows], detections: Json | None) -> int:
-    """Returns the sequence's number of frames; if unknown, the last frame (from 1) with a person or detection; at least
-    1.
-
-    both: rows of truth and tracks, if any. detections: their encoded object, None if none.
-    """
     if sequence.length is not None:
         return max(sequence.length, 1)
     last = [int(rows.frame.max()) for rows in both if len(rows.frame)]
@@ -92,11 +71,6 @@ def _length(sequence: Sequence, both: list[PageRows], detections: Json | None) -
 
 
 def _image_size(both: list[PageRows]) -> list[int] | None:
-    """Returns the width and height in px, each at least 16, that hold all boxes and all that was tracked in the image.
-
-    Measured from the upper left corner (0, 0) and rounded up. None if there is neither a known box nor a place in the
-    image. both: rows of truth and tracks, if any.
-    """
     corners = [rows.box[:, :2] + rows.box[:, 2:] for rows in both]
     corners += [points for rows in both if rows.plane == "image" for points in _points(rows)]
     known = np.concatenate([np.zeros((0, 2)), *corners])
@@ -108,27 +82,18 @@ def _image_size(both: list[PageRows]) -> list[int] | None:
 
 
 def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
-    """Returns x0, y0, x1, y1 of the plan in m, rounded to 0.01; None without a scene and without people on the ground.
-
-    It is the area of `plan_area` round all positions and hulls, with its margin. both: rows of truth and tracks, if
-    any; those in the image are left out.
-    """
     points = [part for rows in both if rows.plane == "ground" for part in _points(rows)]
     area = plan_area(sequence.scene, np.concatenate([np.zeros((0, 2)), *points]))
     return None if area is None else [round(float(v), 2) for corner in area for v in corner]
 
 
 def _points(rows: PageRows) -> list[Array]:
-    """Returns arrays of points (N, 2), in the rows' unit: the rows' positions, and the corners of their hulls if they
-    are groups."""
+    """Returns arrays of points (N, 2), in the rows' unit."""
     return [rows.pos, *(rows.groups.hull if rows.groups is not None else ())]
 
 
 def _unlabelled(truth: Truth | None) -> list[list[int]]:
-    """Returns [first, last], frames from 1 and both inclusive, of each stretch of frames without group labels.
-
-    [] without truth, if all frames are labelled, or if that is not stated.
-    """
+    """Returns [first, last], frames from 1 and both inclusive, of each stretch of frames without group labels."""
     if truth is None or truth.labelled is None or truth.labelled.all():
         return []
     edge = np.flatnonzero(np.diff(np.r_[True, truth.labelled, True].astype(int)))
@@ -136,10 +101,7 @@ def _unlabelled(truth: Truth | None) -> list[list[int]]:
 
 
 def _near_strangers(truth: Truth | None) -> list[list[int]]:
-    """Returns [first frame, last frame, id, id] of each two strangers who walk as if they were in one group.
-
-    Frames count from 1, both inclusive. [] if none are known.
-    """
+    """Returns [first frame, last frame, id, id] of each two strangers who walk as if they were in one group."""
     if truth is None or truth.near is None:
         return []
     near = truth.near
@@ -148,13 +110,7 @@ def _near_strangers(truth: Truth | None) -> list[list[int]]:
 
 
 def _detections(sequence: Sequence) -> Json | None:
-    """Returns the detections of all frames as encoded columns; None if there is none in any frame.
-
-    Keys: plane (of the first frame with detections), scale (steps per m or px), frames ([frame from 1, count] of each
-    frame with detections), x, y, and box: left, top, width, height in px, [] if a frame has no boxes. Positions are in
-    cm on the ground and half px in the image. Each column holds its first value, then differences. Raises InputError if
-    they cannot be read.
-    """
+    """Returns the detections of all frames as encoded columns; None if there is none in any frame."""
     if not sequence.has_detections:
         return None
     found = [
@@ -179,12 +135,7 @@ def _detections(sequence: Sequence) -> Json | None:
 
 
 def scene_json(scene: Scene | None) -> Json | None:
-    """Returns the scene for the page, in m, as a JSON object; None without a scene.
-
-    Keys: size is x, y. walls and doors are x, y, x, y of their ends. pillars are x, y, radius. service points are x, y.
-    stairs, one flight each, are foot x, y, head x, y, width, rise, number of steps, landing. wallHeight and
-    pillarHeight are heights.
-    """
+    """Returns the scene for the page, in m, as a JSON object; None without a scene."""
     if scene is None:
         return None
     return {
@@ -200,12 +151,7 @@ def scene_json(scene: Scene | None) -> Json | None:
 
 
 def camera_json(camera: Camera | None) -> Json | None:
-    """Returns the camera for the page, which projects ground and walls with it, as a JSON object; None without a
-    camera.
-
-    kind: "pinhole" or "top" (orthographic from above). f: focal lengths x, y, px. c: principal point, px. C: position,
-    m. R: rotation (3, 3), world to camera. scale: px per m, None for a pinhole. k: radial distortion, 0 for none.
-    """
+    """Returns the camera for the page, which projects ground and walls with it, as a JSON object."""
     if camera is None:
         return None
     return {

@@ -49,10 +49,7 @@ class PageRows:
 
 
 def rows_of_truth(truth: Truth) -> PageRows:
-    """Returns the truth's rows: on the ground if places there are labelled, else the centres of the boxes in the image.
-
-    The angle is the labelled heading, else the direction of a velocity above 0.1 m/s. What is not labelled is nan.
-    """
+    """Returns the truth's rows."""
     n = len(truth.frame)
     pos = truth.pos if truth.pos is not None else _centres(truth.box, n)
     angle = truth.heading if truth.heading is not None else _directions(truth.vel, n)
@@ -62,12 +59,7 @@ def rows_of_truth(truth: Truth) -> PageRows:
 
 
 def rows_of_tracks(tracks: SequenceOf[Tracks]) -> PageRows:
-    """Returns a tracker's rows, in the order of `tracks`; in the image if one frame's tracks are, else on the ground.
-
-    tracks: one `Tracks` per frame. Of positions only x, y are kept. The angle is the direction of a velocity above 0.1
-    m/s or px/s, else nan; boxes are nan if the frame has none; the visibility is 1. `groups` is set if one frame's
-    tracks are groups.
-    """
+    """Returns a tracker's rows, in the order of `tracks`."""
     count = np.array([len(t.id) for t in tracks], np.int64)
     box = [t.box if t.box is not None else np.full((len(t.id), 4), np.nan) for t in tracks]
     vel = np.concatenate([np.zeros((0, 2)), *(t.vel[:, :2] for t in tracks)])
@@ -90,10 +82,7 @@ def _centres(box: Array | None, n: int) -> Array:
 
 
 def _directions(vel: Array | None, n: int) -> Array:
-    """Returns the direction (n,) rad of each velocity (n, 2), m/s or px/s; nan where unknown or not faster than 0.1.
-
-    It is atan2(vy, vx), in (-π, π]. vel None: n times nan.
-    """
+    """Returns the direction (n,) rad of each velocity (n, 2), m/s or px/s; nan where unknown or not faster than 0.1."""
     if vel is None:
         return np.full(n, np.nan)
     moving = np.hypot(vel[:, 0], vel[:, 1]) > MOVING
@@ -139,10 +128,6 @@ def _bars(rows: PageRows) -> list[Bar]:
 
 
 def _event(event: GroupEvent) -> list[Any]:
-    """Returns [kind, start, end, emitted, before, after, members, [x, y]] of an event.
-
-    start, end: frames from 1. emitted: frame of the report, None for truth. before, after: group ids. x and y are
-    rounded to 0.01 (m or px), None where unknown.
-    """
+    """Returns [kind, start, end, emitted, before, after, members, [x, y]] of an event."""
     pos = [round(v, 2) if math.isfinite(v) else None for v in event.pos]
     return [event.kind, event.start, event.end, event.emitted, event.before, event.after, event.members, pos]
