@@ -76,7 +76,7 @@ def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, 
 def frames_with_detections(
     needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int
 ) -> tuple[Frame, ...] | None:
-    """Returns the sequence's frames with the detections of `mode` and without pictures, or None if `mode` is "image"."""
+    """Returns the frames with the detections of `mode` and without pictures, or None if `mode` is "image"."""
     if mode == "image":
         return None
     if mode == "file":

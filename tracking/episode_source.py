@@ -23,16 +23,13 @@ SourceSpec = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """One sequence to play on: a scenario entry with its seed, or a path, or a Sequence in memory.
+    """One sequence to play on: a scenario entry with its seed, a path, or a Sequence in memory (exactly one of these).
 
-    name: of the scenario or sequence. seed: of the simulation, or stated by the recording (0 if it states none). entry:
-    a scenario with its name and copy number, None if it is not simulated; path: of a stored sequence, "" if none;
-    sequence: in memory, else None. Exactly one of these three is to be set, which is not checked. A source with a
-    Sequence in memory cannot be pickled.
+    A source with a Sequence in memory cannot be pickled.
     """
 
-    name: str
-    seed: int = 0
+    name: str  # of the scenario or sequence
+    seed: int = 0  # of the simulation, or stated by the recording, else 0
     entry: Entry | None = field(default=None, repr=False)
     path: str = ""
     sequence: Sequence | None = field(default=None, repr=False)
@@ -70,15 +67,19 @@ class Source:
 
 
 def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
-    """Returns the sources that `what` stands for, in order: for each scenario or suite entry all its seeds, then the
-    next.
+    """Returns the sources that `what` stands for: for each scenario or suite entry all its seeds, then the next.
 
-    what: a suite's or scenario's name, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a list of
-    these. A scenario gives one source for each of the `seeds` (by default 0 to 9); the others ignore seeds. A name in
-    the catalogue counts before a folder of that name. set: "key=value" settings for the scenarios.
+    A name in the catalogue counts before a folder of that name.
 
-    Raises InputError if a name is unknown, a file or setting is wrong, `seeds` is no iterable, `set` is a single
-    string, there is no source at all, or there are settings but no scenario.
+    Args:
+        what: A suite's or scenario's name, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a
+            list.
+        seeds: Of scenarios; the others ignore them.
+        set: "key=value" settings for the scenarios.
+
+    Raises:
+        InputError: A name is unknown, a file or setting is wrong, there is no source, or there are settings but no
+            scenario.
     """
     if isinstance(what, str | Path | Sequence | Source):
         what = (what,)

@@ -21,14 +21,10 @@ from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
 
 @dataclass(frozen=True)
 class ImageScale:
-    """An image scale and what it was taken from.
+    """An image scale and what it was taken from."""
 
-    px_per_m: nan if unknown. frames: the scale was taken from boxes of this many first frames; 0 if it was not taken
-    from boxes of the sequence.
-    """
-
-    px_per_m: float
-    frames: int = 0
+    px_per_m: float  # nan if unknown
+    frames: int = 0  # the scale is that of the boxes of this many first frames; 0 if it has another source
 
 
 def required(px_per_m: float) -> float:

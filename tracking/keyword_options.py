@@ -44,12 +44,7 @@ def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
 
 
 def check_ranges(options: Any) -> None:
-    """Raises InputError at the first number, in order of the fields, of an options dataclass that lies outside its
-    declared range; else returns nothing.
-
-    The message names the option with two hyphens, for example `--trials`. nan lies outside every range. Options without
-    a lower limit are not checked. Of an option with one, anything but a number (None, a text) raises TypeError.
-    """
+    """Raises InputError at the first number of an options dataclass that lies outside its declared range."""
     for f in fields(options):
         low, below, value = f.metadata.get("low"), f.metadata.get("below"), getattr(options, f.name)
         if low is None or (value >= low and (below is None or value < below)):
@@ -59,12 +54,9 @@ def check_ranges(options: Any) -> None:
 
 
 def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
-    """Returns a decorator that gives a function the signature and, in its docstring, the list of options of a
-    dataclass.
+    """Returns a decorator that gives a function the signature and the list of options of a dataclass.
 
-    kind: the options dataclass. positional: so many of the first options may be given without their name. A first
-    parameter `self` is kept. The decorator returns the same function with `__signature__` and `__doc__` replaced; it
-    still takes what it was written to take.
+    The first `positional` options may be given without their name. A first parameter `self` is kept.
     """
 
     def decorate(function: F) -> F:

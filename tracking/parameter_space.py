@@ -31,12 +31,7 @@ HALVINGS = 6
 
 
 def space_of(kind: type[Config], mode: DetectionMode | None = None, *, online: bool = False) -> Space:
-    """Returns the tunable parameters of a config class that have an effect in this detection mode, in order of the
-    fields.
-
-    Mode "image" leaves out parameters for points, "file" and "truth" those for pixels, None leaves out none. online:
-    only parameters that may change between two frames.
-    """
+    """Returns the tunable parameters of a config class that have an effect in this detection mode."""
     without_effect = {"image": "points", None: None}.get(mode, "pixels")
     return tuple(p for p in kind.space(online=online) if p.sees == "" or p.sees != without_effect)
 

@@ -33,27 +33,21 @@ Params = Config | Mapping[str, Any] | str | Path | None
 
 @dataclass(frozen=True, eq=False)
 class PreparedTracker:
-    """A tracker instance and everything that it is given for one sequence. Call `reset` before the first `step`.
+    """A tracker instance and everything that it is given for one sequence. Call `reset` before the first `step`."""
 
-    name: as the user gave it, or of the class. tracker: the instance. config: None if the tracker has no parameters.
-    context: what the tracker knows before the first frame. mode: of the detections, "image", "file" or "truth".
-    sequence: the one to track. frames_given: frames with detections and without pictures; None if the sequence's own
-    frames are used (mode "image"). scale_frames: the context's image scale was taken from boxes of this many first
-    frames; 0 if not from boxes. history: what the tracker has reported since `reset`.
-    """
-
-    name: str
+    name: str  # as the user gave it, or of the class
     tracker: Tracker
-    config: Config | None
+    config: Config | None  # None if the tracker has no parameters
     context: Context
     mode: DetectionMode
     sequence: Sequence
+    # with detections and without pictures; None: the sequence's own frames (mode "image")
     frames_given: tuple[Frame, ...] | None
-    scale_frames: int = 0
-    history: ReportHistory = field(default_factory=ReportHistory)
+    scale_frames: int = 0  # as of ImageScale
+    history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
 
     def frames(self) -> Iterator[Frame]:
-        """Returns a new iterator over the frames as the tracker gets them, in order. It may be called more than once."""
+        """Returns a new iterator over the frames as the tracker gets them, in order; may be called again."""
         if self.frames_given is not None:
             return iter(self.frames_given)
         return (replace(f, detections=None) for f in self.sequence)

@@ -19,27 +19,19 @@ from tracking.stats import FEWEST, joint_level, mean_interval, student
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """R runs in order of their means, best first; runs of equal mean in the order given. A mean is over sequences, or
-    the score of a single recording.
+    """R runs in order of their means over sequences, best first; runs of equal mean in the order given."""
 
-    - order (R,): index of each run as given. mean, low, high (R,): the mean and its own 95 % interval.
-    - first, last (R,): the range of ranks, from 1.
-    - less, less_low, less_high (R, R): mean of run i minus run j over the same sequences, with the joint interval.
-    - better (R, R): run i is surely better than run j.
-    - sequences: number of sequences in which all scores are known; only these count. 1 for a single recording.
-    """
-
-    order: Ints
-    mean: Array
+    order: Ints  # (R,) index of each run as given
+    mean: Array  # (R,), with its own 95 % interval
     low: Array
     high: Array
-    first: Ints
+    first: Ints  # (R,) range of ranks, from 1
     last: Ints
-    less: Array
+    less: Array  # (R, R) mean of run i minus run j over the same sequences, with the joint interval
     less_low: Array
     less_high: Array
-    better: Bools
-    sequences: int
+    better: Bools  # (R, R) run i is surely better than run j
+    sequences: int  # where all scores are known; only these count. 1 for a single recording
 
 
 def rank(values: Array, upwards: bool = True) -> Ranking:

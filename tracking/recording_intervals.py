@@ -43,11 +43,7 @@ def recording_intervals(
 def recording_differences(
     truth: Truth, first: Callable[[Array], Array], second: Callable[[Array], Array], draws: int = DRAWS
 ) -> tuple[Array, Array, Array]:
-    """Returns the differences (K,) of the scores of two runs of one recording, first minus second, and the low and the
-    high ends (K,) of their 95 % intervals.
-
-    first, second: as `score` in `recording_intervals`. Both get the same weights in each draw.
-    """
+    """Returns the differences (K,) of two runs of one recording, first - second, and their 95 % intervals."""
 
     def difference(weights: Array) -> Array:
         return first(weights) - second(weights)

@@ -33,10 +33,11 @@ OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "frames"
 
 @dataclass(frozen=True, eq=False)
 class TrackingRun(SequenceOf[Tracks]):
-    """The tracks of one run; as a sequence, one `Tracks` per frame in order: item 0 is frame 1, a slice gives a tuple.
+    """The tracks of one run; as a sequence, one `Tracks` per frame in order: item 0 is frame 1.
 
-    tracks: the `Tracks` of every frame. info: what run.json tells of the run (tracker, config, seed, detections,
-    speed), {} by default. `write` adds what it tells of the labels and files.
+    Attributes:
+        tracks: The `Tracks` of every frame.
+        info: What run.json tells of the run (tracker, config, seed, detections, speed); `write` adds labels and files.
     """
 
     tracks: tuple[Tracks, ...]
@@ -75,23 +76,28 @@ def track(
     grouping: Grouping | str | Path | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> TrackingRun:
-    """Returns the tracker's tracks of every frame of the sequence, completed with groups and events.
+    """Tracks every frame of a sequence, and derives groups and events if the tracker names none.
 
-    tracker: a registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
-    (tracking.time_limit), which stops a step that hangs. params: a config, values by name, the name of a preset, or a
-    TOML file; None for the tracker's defaults. detections: "image", "file" or "truth"; None for the first of them that
-    can work. sensor: settings as in a scenario's [sensor] that degrade "truth" (misses, clutter, noise, hiding); None:
-    perfect. seed: for the tracker's and the sensor's random numbers. grouping: "belief", "rule", a TOML file of
-    either, or the grouping itself, for a tracker that names no groups; None: the belief. If the tracker names groups,
-    it has no effect, with a UserWarning. Another one says that the tracker's velocities are too far from its motion to
-    derive groups, or that most detections score too low to start a track. If the tracker's first answer with people
-    names no groups, later ones are replaced by derived ones, with a UserWarning. progress: called with each frame's
-    number, from 1, when the frame is done.
+    A UserWarning says that `grouping` has no effect, that the tracker's velocities are too far from its motion to
+    derive groups, that most detections score too low to start a track, or that groups which the tracker began to name
+    only later were replaced by derived ones.
 
-    Raises InputError before the first frame if the arguments are wrong or tracker and sequence do not fit; later for a
-    frame whose detections are not finite or whose picture cannot be read; after the last frame if tracks in the image
-    have a scale of 0 or below. Raises WorkError if the tracker raises an exception or returns wrong tracks, or in mode
-    "truth" if an order of a simulated script was not fulfilled.
+    Args:
+        tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
+            (tracking.time_limit), which stops a step that hangs.
+        sequence: As `sim.simulate` or `sim.io.source.open_sequence` return it.
+        params: A config, values by name, the name of a preset, or a TOML file; None for the tracker's defaults.
+        detections: "image", "file" or "truth"; None for the first of them that can work.
+        sensor: Settings as in a scenario's [sensor] that degrade "truth"; None: perfect.
+        seed: Of the tracker's and the sensor's random numbers.
+        grouping: "belief", "rule", a TOML file of either, or the grouping itself; None: the belief.
+        progress: Called with each frame's number, from 1, when the frame is done.
+
+    Raises:
+        InputError: The arguments are wrong, tracker and sequence do not fit, a picture cannot be read, detections are
+            not finite, or tracks in the image have a scale of 0 or below.
+        WorkError: The tracker raises an exception or returns wrong tracks, or an order of a simulated script was not
+            fulfilled (mode "truth").
     """
     from tracking.grouping.foot_points import can_stand, completed
     from tracking.grouping.grouped_tracks import late_groups, names_groups
@@ -138,17 +144,17 @@ def track(
 def group(
     sequence: Sequence, run: TrackingRun | None = None, *, grouping: Grouping | str | Path | None = None
 ) -> TrackingRun:
-    """Returns the people of a sequence, whose ids are known, with groups and events that follow from their motion.
+    """Finds the groups and events of people whose ids are known, from their motion.
 
-    run: tracks of people; groups and events in them are replaced. None: the labelled people of the sequence, as
-    tracking.grouping.known_people gives them; their group labels are not used. grouping: as of
-    `track`. `info` of the result is what run.json tells: that of the run with the new grouping, or of a
-    tracker "group".
+    Args:
+        sequence: Labelled people, if `run` is None; their group labels are not used.
+        run: Tracks of people; groups and events in them are replaced.
+        grouping: As of `track`.
 
-    Raises InputError if there are no people with ids, the tracks are of whole groups, people lie in the image and its
-    scale is unknown or not above 0, or labels or the file of the grouping cannot be read. Raises WorkError if an order
-    of a simulated script was not fulfilled. Warns if frame numbers or speeds are hardly right
-    (tracking.grouping.plausibility), or velocities are too far from the motion to derive groups.
+    Raises:
+        InputError: There are no people with ids, the tracks are of whole groups, people lie in the image and its scale
+            is unknown or not above 0, or labels or the file of the grouping cannot be read.
+        WorkError: An order of a simulated script was not fulfilled.
     """
     from tracking.grouping.foot_points import can_stand, completed
     from tracking.grouping.grouped_tracks import without_groups
@@ -181,16 +187,7 @@ def group(
 
 
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
-    """Returns one tracker's stored tracks of a sequence, one `Tracks` per frame, with groups and events filled in where
-    they are empty.
-
-    The scale in px per m is the camera's at the image centre, else the sequence's. It is the truth's, from all labelled
-    boxes, if the sequence states none or took it from the boxes of the first frames; without any, tracks in the image
-    are returned unchanged, as are tracks marked as derived, or of groups. Boxes of a calibrated sequence, not from
-    pixels, are grouped where they stand on the ground (tracking.grouping.foot_points). Raises InputError if the truth
-    cannot be read or tracks in the image have a scale of 0 or below; WorkError if an order of a simulated script was
-    not fulfilled.
-    """
+    """Returns stored tracks of a sequence with groups and events filled in where they are empty."""
     from tracking.grouping.foot_points import completed
 
     known = image_scale.before_frames(sequence)

@@ -23,14 +23,10 @@ SENSOR_SETTINGS_SHOWN = 6
 
 @dataclass(frozen=True)
 class Speed:
-    """Speed of a run in frames per second, 0 if nothing was run.
+    """Speed of a run in frames per second, 0 if nothing was run."""
 
-    tracker: speed of the tracker's steps alone, with their checks. whole: with the reading and decoding of frames, too;
-    without the derivation of groups.
-    """
-
-    tracker: float = 0.0
-    whole: float = 0.0
+    tracker: float = 0.0  # of the tracker's steps alone, with their checks
+    whole: float = 0.0  # with the reading of frames, without the derivation of groups
 
 
 def run_info(

@@ -49,9 +49,7 @@ def mean_interval(values: Array) -> tuple[Array, Array, Array]:
 
 
 def student(degrees: Array | float, level: Array | float = LEVEL) -> Array:
-    """Returns the t with which Student's t, of so many degrees of freedom (above 0), lies within +- t with probability
-    `level`; of the shape that both have together.
-    """
+    """Returns the t with which Student's t, of so many degrees of freedom, lies within +- t at probability `level`."""
     from scipy.special import stdtrit
 
     return np.asarray(stdtrit(degrees, (1 + np.asarray(level)) / 2))
@@ -68,11 +66,9 @@ def paired(first: Array, second: Array) -> tuple[Array, Array, Array]:
 
 
 def wilson(hits: int, count: int) -> tuple[float, float, float]:
-    """Returns the share of `hits` out of `count`, and the low and high end of its 95 % interval, within 0 to 1 (Wilson
-    1927).
+    """Returns the share of `hits` out of `count` and its 95 % interval (Wilson 1927): nan, 0 and 1 if count is 0.
 
-    hits: 0 to count. The interval holds all p with (share - p)^2 <= z^2 p (1 - p) / count, where z = 1.96 is the normal
-    quantile. If count is 0: nan, 0 and 1.
+    The interval holds all p with (share - p)² <= z² p (1 - p) / count, where z = 1.96 is the normal quantile.
     """
     if count == 0:
         return float("nan"), 0.0, 1.0

@@ -28,12 +28,17 @@ LONGEST = 1_000_000
 
 
 class TimeLimited:
-    """A tracker whose every `reset` and `step` must end within `seconds`. `tracking.track` takes it as its tracker.
+    """A tracker whose every `reset` and `step` must end within `seconds`, for `tracking.track`. A context manager.
 
-    tracker: a registered name, "file.py:Class" or "module:Class". State: the process, started with the first tracker
-    that is made, and again after its end. It runs one tracker at a time. A context manager; leaving it, or `close`,
-    ends the process. Raises InputError if the tracker is not given by name, or if the limit is not
-    above 0 or is above 1,000,000 s.
+    State: the process, which runs one tracker at a time; started with the first tracker that is made, and again after
+    its end.
+
+    Args:
+        tracker: A registered name, "file.py:Class" or "module:Class".
+        seconds: Up to 1,000,000.
+
+    Raises:
+        InputError: The tracker is not given by name, or the limit is out of range.
     """
 
     def __init__(self, tracker: str, seconds: float) -> None:
@@ -84,11 +89,7 @@ class TimeLimited:
 
 
 class RemoteTracker:
-    """A tracker that works in the process of a TimeLimited; a `Tracker` like any other.
-
-    needs, config, px_per_m: as those attributes of the tracker itself; px_per_m is nan if it has none. made_from: what
-    the process makes the tracker from.
-    """
+    """A tracker that works in the process of a TimeLimited, with the attributes of the tracker itself."""
 
     def __init__(self, host: TimeLimited, number: int, config: Config | None) -> None:
         self.needs, self.config = host.needs, config

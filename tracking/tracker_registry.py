@@ -90,8 +90,7 @@ def _import_failed(where: object, error: BaseException) -> InputError:
 
 
 def located(spec: str) -> str:
-    """Returns `spec` with an absolute path if it is "file.py:Class", so that a process in another folder finds the file;
-    any other unchanged."""
+    """Returns `spec` with an absolute path if it is "file.py:Class", for a process in another folder."""
     where, colon, name = spec.rpartition(":")
     return f"{Path(where).resolve()}:{name}" if colon and where.endswith(".py") else spec
 

@@ -21,15 +21,11 @@ Fault = tuple[str, str]
 
 @dataclass
 class ReportHistory:
-    """What a tracker has reported in a sequence so far.
+    """What a tracker has reported in a sequence so far."""
 
-    plane_and_unit: (plane, unit) of its first tracks, None before. own_events: of its first tracks. ids: all track ids
-    so far, of people or of groups. It starts empty.
-    """
-
-    plane_and_unit: tuple[str, str] | None = None
-    own_events: tuple[str, ...] = ()
-    ids: set[int] = field(default_factory=set)
+    plane_and_unit: tuple[str, str] | None = None  # of its first tracks
+    own_events: tuple[str, ...] = ()  # of its first tracks
+    ids: set[int] = field(default_factory=set)  # all track ids, of people or of groups
 
     def clear(self) -> None:
         """Forget everything, in place, for the start of another sequence."""

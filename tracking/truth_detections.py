@@ -45,13 +45,10 @@ def shuffled(detections: Detections, seed: int) -> Detections:
 
 
 def perfect(truth: FrameTruth) -> Detections:
-    """Returns the labels of a frame as detections with score 1 and no velocities, a row per labelled person, hidden ones
-    included, in the order of the labels.
+    """Returns the labels of a frame as detections with score 1, a row per labelled person, hidden ones included.
 
-    They are in the plane "ground" at the labelled positions, m, with the labelled boxes if there are any. Without
-    positions they are in the plane "image", at the centres of the boxes, px. Boxes are left, top, width, height in px,
-    amodal: as if nothing hid the person. A person whose box is unknown, as of people behind the camera, has no row.
-    Labels without both are an AssertionError.
+    They lie on the ground if positions are labelled, else at the centres of the boxes. Without a box, as behind the
+    camera, people in the image have no row.
     """
     seen = np.ones(len(truth.id), bool) if truth.box is None else np.isfinite(truth.box).all(axis=1)
     box, score = None if truth.box is None else truth.box[seen], np.ones(int(seen.sum()))

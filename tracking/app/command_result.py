@@ -29,16 +29,11 @@ WIDTH = 160
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What a command returns.
+    """What a command returns."""
 
-    data: the content of the JSON object that --json prints, without its "status". text: what people see without --json,
-    a string or anything that the library rich can print; "" by default. It is printed letter by letter, markup of rich
-    and control characters included. code: the exit code, 0 (default), or 1 if a check found problems.
-    """
-
-    data: dict[str, Any]
-    text: Any = ""
-    code: int = 0
+    data: dict[str, Any]  # content of the JSON object that --json prints, without its "status"
+    text: Any = ""  # printed without --json: a string, letter by letter, or what rich can print
+    code: int = 0  # exit code: 0, or 1 if a check found problems
 
 
 def print_result(result: CommandResult, as_json: bool) -> int:

@@ -13,11 +13,7 @@ from tracking.app.shared_options import Fps
 
 @dataclass(frozen=True, kw_only=True)
 class FitSensorOptions:
-    """Options of the command `fit sensor`, which measures a detector's errors.
-
-    sources: recordings with true boxes and detections, pooled. out: the TOML file to write. fps: frames per second;
-    None: the recordings' own.
-    """
+    """Options of `fit sensor`."""
 
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Recordings with gt and det, pooled.")]
     out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")]
@@ -26,10 +22,7 @@ class FitSensorOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FitRelationalOptions:
-    """Options of the command `fit relational`, which learns the motion of people and of pairs from simulated truth.
-
-    names: scenarios, *.toml files or suites. seeds: "A:B" (A to B - 1) or one number. out: the TOML file to write.
-    """
+    """Options of `fit relational`."""
 
     names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
     out: Annotated[
@@ -42,12 +35,7 @@ class FitRelationalOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FitJointOptions:
-    """Options of the command `fit joint`, which learns how groups of people behave from simulated truth.
-
-    names: scenarios, *.toml files or suites. learn: the weights of the event classifier, or the components of the
-    Dirichlet process mixture. seeds: those fitted to; check: others that the fit is scored with, None:
-    none; each "A:B" (A to B - 1) or one number. out: the TOML file to write.
-    """
+    """Options of `fit joint`."""
 
     names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
     out: Annotated[
@@ -65,11 +53,7 @@ class FitJointOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class FitGroupingOptions:
-    """Options of the command `fit grouping`, which fits the belief of who belongs together to simulated scenes.
-
-    names: scenarios, *.toml files or suites. seeds: those fitted to; check: others that the fit is scored with, None:
-    none; each "A:B" (A to B - 1) or one number. out: the TOML file to write.
-    """
+    """Options of `fit grouping`."""
 
     names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
     out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write, for --grouping.")]

@@ -24,9 +24,7 @@ PAUSE = 10.0
 class ProgressMeter:
     """Counts finished items of a long work and shows them on stderr. A context manager; leaving it removes the bar.
 
-    On a terminal a bar appears 2 s after entering, from a thread; elsewhere `update` prints a line, at most every 10 s
-    and not in the first 2 s. what: name of the work. total: number of all items, None if unknown. done: items finished,
-    0 at first. item: name of the current item, "" for none. An instance can be entered once.
+    On a terminal a bar appears 2 s after entering, from a thread. Elsewhere `update` prints a line, at most every 10 s.
     """
 
     def __init__(self, what: str, total: int | None = None) -> None:

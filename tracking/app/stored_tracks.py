@@ -30,16 +30,11 @@ SHOWN = 3
 
 @dataclass(frozen=True)
 class StoredTracks:
-    """The stored tracks of one sequence, not read yet.
+    """The stored tracks of one sequence, not read yet."""
 
-    name: the sequence's name: from run.json, or else the name of the folder or, without suffix, of the text; None for a
-    file that the user gave itself. path: the folder with the tracks, or the file. info: the content of run.json as a
-    dictionary, empty for tracks of another program and for a run that was not finished.
-    """
-
-    name: str | None
-    path: Path
-    info: dict[str, Any]
+    name: str | None  # from run.json, else of the folder or text; None for a file that the user gave itself
+    path: Path  # the folder with the tracks, or the file
+    info: dict[str, Any]  # content of run.json; {} for tracks of another program and for a run that was not finished
 
     def check(self) -> None:
         """Raises InputError if these are tracks of a run of ours that is unfinished, damaged or mixed with another."""

@@ -4,8 +4,8 @@ An episode tracks one whole sequence. An action sets the parameters to search, e
 tracking.parameter_space). With decision_every=None one action before the first frame sets them all, and the episode is
 one step long. Else an action sets those that may change between frames, every `decision_every` frames. Observations are
 statistics of the run. A step's reward is S(frames so far) - S(frames before it), S being the objective of
-`tracking.evaluate` (mean of HOTA and group_F1), 0 for no frames; the rewards sum to it. `import tracking`
-registers it."""
+`tracking.evaluate` (mean of HOTA and group_F1), 0 for no frames; the rewards sum to it. `import tracking` registers it.
+"""
 
 from __future__ import annotations
 
@@ -44,12 +44,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, kw_only=True)
 class TuningEnvOptions:
-    """The keyword arguments of the environment. tracker; suite: what is played; seeds (0 to 99), set: seeds and
-    "key=value" settings of scenarios; detections: the tracker's input, None chooses it; similarity: "ground",
-    "image" or "boxes", None by the data; params: to begin with, as for `tracking.track`; decision_every: frames between
-    actions, None: one action per episode; observation: "statistics", "parameters" (both) or "none"; cache: bytes of
-    sequences kept; tracker_seed: the same in all episodes; render_mode: "rgb_array" or None. InputError if one with
-    fixed values is unknown; others are checked when used."""
+    """The keyword arguments of the environment; the metadata of each field hold its meaning."""
 
     tracker: AnyTracker = field(metadata=option('Registered name, "file.py:Class", "module:Class" or a class.'))
     suite: SourceSpec | Source = field(
@@ -88,19 +83,23 @@ class TuningEnvOptions:
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
-    """An episode is one run of a tracker; an action, float32 (P,) in [-1, 1], sets its parameters; the reward is the
-    gain in score. Observations: float32 (K,), statistics in [0, 1] and parameters in [-1, 1]. Arguments: the fields of
-    TuningEnvOptions. State: sources, cache; config, rollout (the run, None before it) and score of the episode. Raises
-    InputError if an argument is wrong, there is no parameter to search, a source lacks the detections, or simulated
-    sources have seeds of two splits."""
+    """One episode is one run of a tracker: an action sets its parameters, the reward is the gain in score.
+
+    An action is float32 (P,) in [-1, 1], an observation float32 (K,): statistics in [0, 1] and parameters in [-1, 1].
+
+    State: sources, cache; config, rollout (the run, None before it) and score of the episode.
+    """
 
     metadata = METADATA
 
     @documented(TuningEnvOptions, positional=2)
     def __init__(self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", **options: Any) -> None:
-        """Makes the environment; the first episode begins with `reset`. tracker: a name, "file.py:Class",
-        "module:Class" or class. suite: what is played. options: other fields of TuningEnvOptions. Raises InputError if
-        an argument is unknown or wrong, no parameter can be searched, or a source is unreadable or lacks detections."""
+        """Makes the environment; the first episode begins with `reset`.
+
+        Raises:
+            InputError: An argument is unknown or wrong, no parameter can be searched, a source is unreadable or lacks
+                the detections, or simulated sources have seeds of two splits.
+        """
         given = from_keywords(TuningEnvOptions, "TuningEnv", {"tracker": tracker, "suite": suite, **options})
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
         self.tracker_seed, self.decision_every = given.tracker_seed, given.decision_every
@@ -142,13 +141,24 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.config, self.score, self.scores, self.refused = self.base, 0.0, dict[str, float](), ""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begins an episode on a source that the env's generator draws; returns observation (float32) and info dict.
-        seed: reseeds the generator, None goes on with it. options: "scenario" and "seed" restrict the draw to sources
-        of this name and seed; "params" are the parameters to begin with. Info keys: scenario, seed, frame (number of
-        frames tracked), objective (0 while unknown), scores (by key, {} at first), names (of the action's parameters),
-        params (all, by name), refused ("" if none). InputError if an option is unknown, no source fits, the source
-        cannot be opened or has no labels, the parameters are wrong, or, with `decision_every`, the tracker refuses them
-        or keeps no `config`; then also WorkError if its `reset` fails. The running episode goes on after an error."""
+        """Begins an episode on a source that the environment's generator draws.
+
+        The running episode goes on after an error.
+
+        Args:
+            seed: Reseeds the generator; None goes on with it.
+            options: "scenario" and "seed" restrict the draw to sources of this name and seed; "params" are the
+                parameters to begin with.
+
+        Returns:
+            The observation, and a dict: scenario, seed, frame (number of frames tracked), objective (0 while unknown),
+            scores (by key), names (of the action's parameters), params (all, by name), refused ("" if nothing).
+
+        Raises:
+            InputError: An option is unknown, no source fits, the source cannot be opened or has no labels, or the
+                parameters are refused.
+            WorkError: The tracker's own `reset` fails.
+        """
         super().reset(seed=seed)
         options = options or {}
         for name in options:
@@ -168,12 +178,21 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Sets the parameters and tracks on, to the end or for `decision_every` frames.
 
-        Returns observation, reward (gain of the objective, which is 0 while unknown), True at the end of the sequence,
-        False (never truncated), info dict as of `reset`. action: (P,) numbers, clipped to [-1, 1]. Refused parameters
-        are moved towards those that the episode began with. If the tracker refuses a config between frames it keeps the
-        one before, and `info["refused"]` holds the error. After the end: the sequence is tracked anew with one action
-        per episode, else reward 0. Raises InputError before `reset`, or for an action of another shape or not finite;
-        IncomparableError if the tracks cannot be compared with the truth; and the tracker's errors."""
+        Refused parameters are moved towards those that the episode began with. If the tracker refuses a config between
+        frames it keeps the one before. After the end the sequence is tracked anew with one action per episode; else the
+        reward is 0.
+
+        Args:
+            action: (P,), clipped to [-1, 1].
+
+        Returns:
+            Observation, gain of the objective, whether the sequence has ended, False, and the dict of `reset`.
+
+        Raises:
+            InputError: Before `reset`, for an action of another shape or not finite, or from the tracker.
+            IncomparableError: The tracks cannot be compared with the truth.
+            WorkError: The tracker fails.
+        """
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
@@ -221,8 +240,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             return self._advance(upto)
 
     def render(self) -> Image | None:
-        """Returns the last frame with detections and tracks, uint8 (H, W, 3) RGB; None without a render_mode. Before
-        the first frame only the scene or an empty picture is drawn. InputError if the source has no labels."""
+        """Returns the last frame with detections and tracks, uint8 (H, W, 3) RGB; None without a render_mode."""
         if self.render_mode is None:
             return None
         from tracking.environment.picture import episode_picture

@@ -30,13 +30,9 @@ TIMES_COUNTED = 2
 
 
 class OpenedSource:
-    """A source whose sequence is open. Its detections, truth and background are kept once used.
+    """A source whose sequence is open; its detections, truth and background are kept once used.
 
-    - source: what is opened. streams: the pictures that are drawn if the source is simulated ("left", "right",
-      "background"); () draws none.
-    - sequence: the opened Sequence; it keeps its frames without pictures, and its background.
-
-    Raises InputError if the source cannot be opened.
+    `streams` are the pictures that are drawn if the source is simulated: "left", "right", "background".
     """
 
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
@@ -84,9 +80,8 @@ def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
 class SourceCache:
     """Opened sources for reuse; the least recently used one is dropped first. len() gives their number.
 
-    limit: bytes of arrays that all opened sources may hold together (256 MiB by default); the source in use is kept
-    whatever its size. The bytes of a source are counted when the next source is opened, and again after its second use.
-    Raises InputError if `limit` is negative. State: the opened sources and their bytes.
+    limit: bytes of arrays that all of them may hold together. The source in use is kept whatever its size. The bytes
+    of a source are counted when the next one is opened, and again after its second use.
     """
 
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:

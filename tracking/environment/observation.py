@@ -34,14 +34,11 @@ TWO_PEOPLE = 1.5
 
 @dataclass(frozen=True)
 class Statistic:
-    """One number of the observation: its name and its meaning in words.
-
-    half: the value that 0.5 stands for, in `unit`; None for a share, which stands for itself. unit: such as "s" or
-    "m/s", "" for plain numbers, "share" for shares."""
+    """One number of the observation."""
 
     name: str
-    half: float | None
-    unit: str
+    half: float | None  # the value that 0.5 stands for, in `unit`; None for a share, which stands for itself
+    unit: str  # such as "m/s", "" for plain numbers, "share" for shares
     meaning: str
 
 
@@ -85,10 +82,11 @@ NAMES = tuple(s.name for s in STATISTICS)
 
 
 class Observer:
-    """Collects frames and tracks between two decisions, for the statistics of the observation. fps: frames per second.
+    """Collects frames and tracks between two decisions, for the statistics of the observation.
 
     State: frames and tracks since the last decision, the tracks of the frame before them, the first frame of each id,
-    the brightness of the pictures, from 0 (black) to 1."""
+    the brightness of the pictures, from 0 (black) to 1.
+    """
 
     def __init__(self, fps: float) -> None:
         self.fps = fps
@@ -108,11 +106,10 @@ class Observer:
             self._brightness.append(float(frame.image[::PIXEL_STEP, ::PIXEL_STEP].mean()) / 255)
 
     def statistics(self, px_per_m: float) -> NDArray[np.float32]:
-        """Returns the statistics (K,) float32 in [0, 1] of the frames since the last call, in the order of STATISTICS.
+        """Returns the statistics (K,) of the frames since the last call, in the order of STATISTICS, and forgets them.
 
-        px_per_m: scale of tracks in the image; nan or 0 if unknown, then all statistics of lengths, speeds and of
-        tracks against detections are 0. A statistic that is not known is 0; all are 0 if no frame was added. Frames so
-        far are forgotten, apart from the last tracks, the last brightness and the first frame of each id."""
+        Unknown ones are 0. Without a scale (px_per_m nan or 0) all lengths and speeds of tracks in the image are.
+        """
         values = self._values(px_per_m) if self._tracks else {}
         self._before, self._tracks, self._frames = self._tracks[-1:] or self._before, [], []
         self._brightness = self._brightness[-1:]

@@ -23,21 +23,14 @@ EXTENT_SIGMAS = 2.0
 
 @dataclass(frozen=True, eq=False)
 class TrackRows:
-    """R reported tracks in frames, frame by frame; len() gives R.
+    """R reported tracks in frames, frame by frame."""
 
-    - frame (R,): counted from 0 at the first frame given.
-    - id (R,): of the track.
-    - pos (R, 2): x, y in m; vel (R, 2): in m/s, 0 if unknown.
-    - cov (R, 2, 2): covariance of the position, m².
-    - reach (R,): distance within which detections belong to the track, m.
-    """
-
-    frame: Ints
-    id: Ints
-    pos: Array
-    vel: Array
-    cov: Array
-    reach: Array
+    frame: Ints  # (R,) from 0 at the first frame given
+    id: Ints  # (R,)
+    pos: Array  # (R, 2) x, y in m
+    vel: Array  # (R, 2) m/s, 0 if unknown
+    cov: Array  # (R, 2, 2) covariance of the position, m²
+    reach: Array  # (R,) distance within which detections belong to the track, m
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -45,28 +38,19 @@ class TrackRows:
 
 @dataclass(frozen=True, eq=False)
 class DetectionRows:
-    """D detections, frame by frame; len() gives D.
+    """D detections, frame by frame."""
 
-    - frame (D,): counted like the frames of the TrackRows, from 0.
-    - pos (D, 2): x, y in m.
-    - score (D,): the detector's, in [0, 1]; 1 if unknown.
-    - frames: numbers of the frames whose detections are known, frames without a detection included.
-    - first: number of the first frame of the window.
-    """
-
-    frame: Ints
-    pos: Array
-    score: Array
-    frames: tuple[int, ...]
-    first: int
+    frame: Ints  # (D,) counted like the frames of the TrackRows
+    pos: Array  # (D, 2) x, y in m
+    score: Array  # (D,) in [0, 1]; 1 if unknown
+    frames: tuple[int, ...]  # whose detections are known, frames without a detection included
+    first: int  # frame of the window
 
     def __len__(self) -> int:
         return len(self.frame)
 
     def neighbours(self, reach: float) -> float:
-        """Returns the mean number of other detections of the same frame within `reach` (m) of a detection, 0 without
-        detections.
-        """
+        """Returns the mean number of other detections of the same frame within `reach` (m) of a detection."""
         if not len(self):
             return 0.0
         tree = _tree(self.pos, self.frame)
@@ -123,12 +107,7 @@ def nearest_distances(pos: Array, frame: Ints) -> Array:
 
 
 def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: DetectionRows) -> Ints:
-    """Returns for each of D detections the index of the nearest expected position of its frame, (D,), -1 if there is
-    none within that position's reach.
-
-    expected (N, 2): x, y in m; frame (N,): number of their frame; reach (N,): greatest distance in m at which a
-    detection belongs to the position. A position farther away is never taken, even if its reach is greater.
-    """
+    """Returns for each of D detections the nearest expected position of its frame within reach; -1 for none."""
     if not len(expected) or not len(detections):
         return np.full(len(detections), -1)
     distance, nearest = _tree(expected, frame).query(_with_frame(detections.pos, detections.frame))

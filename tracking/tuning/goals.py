@@ -21,28 +21,19 @@ FAST_KEYS = ("objective", "HOTA", "group_F1")
 
 @dataclass(frozen=True)
 class Goal:
-    """One score to improve.
+    """One score to improve."""
 
-    key: its name in the catalogue of scores, or "frames/s" for the tracker's speed. higher: True if greater values are
-    better.
-    """
-
-    key: str
-    higher: bool = True
+    key: str  # in the catalogue of scores, or "frames/s" for the tracker's speed
+    higher: bool = True  # True if greater values are better
 
     def of(self, episode: Episode) -> float:
-        """Returns the score of one episode, nan if the episode does not have it.
-
-        For the key "frames/s" it is frames / seconds in the tracker, nan if that is 0 s.
-        """
+        """Returns the score of one episode, nan if the episode does not have it."""
         if self.key == SPEED:
             return episode.frames / episode.seconds_tracking if episode.seconds_tracking else float("nan")
         return episode.scores.get(self.key, float("nan"))
 
     def mean(self, episodes: Sequence[Episode]) -> float:
-        """Returns the mean over the episodes that have the score, nan if none has. For the key "frames/s" it is all
-        frames / all seconds in the tracker, nan for 0 s.
-        """
+        """Returns the mean over the episodes that have the score, nan if none has."""
         if self.key == SPEED:
             seconds = sum(e.seconds_tracking for e in episodes)
             return sum(e.frames for e in episodes) / seconds if seconds else float("nan")

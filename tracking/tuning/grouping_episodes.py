@@ -23,19 +23,12 @@ from tracking.grouping.link_rule import LinkRule
 
 @dataclass(frozen=True)
 class LabelErrors:
-    """How the labelled positions of people err.
+    """How the labelled positions of people err."""
 
-    - sd: standard deviation of a position in each coordinate, m; for boxes it is multiplied by the true image scale.
-    - time: correlation time of the errors, s: after it their correlation is 1/e.
-    - filmed: True for boxes in the image without velocities, False for positions on the ground.
-    - scale: the image scale (px per m) is multiplied by a random factor between 1 / scale and scale, whose logarithm
-      is uniform; 1 leaves it.
-    """
-
-    sd: float
-    time: float
-    filmed: bool
-    scale: float = 1.0
+    sd: float  # standard deviation of each coordinate, m; of boxes it is multiplied by the true image scale
+    time: float  # correlation time, s
+    filmed: bool  # boxes in the image without velocities; False: positions on the ground
+    scale: float = 1.0  # the image scale is multiplied by a log-uniform factor from 1 / scale to scale
 
 
 SURVEYED, FILMED = LabelErrors(0.02, 0.1, filmed=False), LabelErrors(0.06, 0.1, filmed=True, scale=1.5)

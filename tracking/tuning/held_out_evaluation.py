@@ -33,11 +33,7 @@ STORED = "judged "
 
 @dataclass(frozen=True)
 class HeldOutEvaluator:
-    """Plays configs on the validation and test scenes, which the search did not use.
-
-    plan: the search. play: function play(sources, values, every_score) that yields episodes. report: called with a text
-    before each set of scenes, does nothing by default.
-    """
+    """Plays configs on the validation and test scenes, which the search did not use."""
 
     plan: SearchPlan
     play: PlayEpisodes

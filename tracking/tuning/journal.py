@@ -31,9 +31,7 @@ HEAD = b'{"op_code":'
 class TrialLocks:
     """Locks on single bytes of the file `path`, shared by the processes of a search; the file is created if missing.
 
-    Byte 0: a trial is chosen; 1: lines are written; 2 + n: trial n is played. State: the open file; closing it, or the
-    end of the process, releases every lock. Needs a system with fcntl. Raises OSError if the file cannot be opened for
-    writing.
+    State: the open file; closing it, or the end of the process, releases every lock.
     """
 
     def __init__(self, path: Path) -> None:
@@ -85,11 +83,7 @@ class TrialLocks:
 
 
 class LockedJournal(JournalFileBackend):
-    """Optuna's journal file at `path`, created if missing, and written under `locks`. An incomplete last line is
-    removed when the journal is opened, and before each writing.
-
-    Raises ValueError if the file is not a journal of Optuna, and OSError if it cannot be opened.
-    """
+    """Optuna's journal file at `path`, written under `locks`, without incomplete last lines."""
 
     def __init__(self, path: Path, locks: TrialLocks) -> None:
         self._path, self._locks = path, locks

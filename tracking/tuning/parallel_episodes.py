@@ -24,25 +24,15 @@ CACHE_BYTES = 512 * 2**20
 
 @dataclass(frozen=True)
 class EpisodeTask:
-    """One episode to play by a worker.
-
-    - tracker: a name, file.py:Class, module:Class or class.
-    - source: the scene with its seed.
-    - values: the tracker's parameters by name; others have their defaults.
-    - detections: the tracker's input, "image", "file" or "truth".
-    - every_score: True to compute the whole catalogue of scores.
-    - code: hash of the tracker's file where the search runs, "" if there is no file.
-    - step_timeout: seconds that each `reset` and `step` may take, None for no limit.
-    - similarity: how people are compared, None by the data.
-    """
+    """One episode to play by a worker."""
 
     tracker: str | type[Tracker]
     source: Source
-    values: dict[str, Any]
+    values: dict[str, Any]  # the tracker's parameters by name; others have their defaults
     detections: DetectionMode
     every_score: bool
-    code: str
-    step_timeout: float | None = None
+    code: str  # hash of the tracker's file where the search runs, "" if there is no file
+    step_timeout: float | None = None  # seconds that each `reset` and `step` may take
     similarity: Similarity | None = None
 
 

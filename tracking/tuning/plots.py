@@ -28,10 +28,7 @@ BLUE, ORANGE, RED = "#0b6bcb", "#d4600a", "#b42318"
 
 @dataclass(frozen=True)
 class Axes:
-    """Axes of a plot on a page of 760 × 400 px: 70 px from its left, 20 from its right, 78 from its top, 48 from its
-    bottom. x, y: each the range (low, high) of the data that fills the plot, in the data's unit, low below high (not
-    checked).
-    """
+    """Axes of a plot; x and y are the ranges (low, high) of the data that fill it."""
 
     x: tuple[float, float]
     y: tuple[float, float]

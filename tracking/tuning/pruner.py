@@ -20,11 +20,10 @@ LEAST_SCENES = 2
 
 
 class SignedRankPruner(BasePruner):
-    """Prunes a trial if its values on the scenes played so far are surely worse than those of the best trial on the
-    same scenes.
+    """Prunes a trial whose values on the scenes so far are surely worse than the best trial's on the same scenes.
 
-    p: a trial is pruned if the one-sided p-value of Wilcoxon's signed-rank test is below this; 0 never prunes. Values
-    must be reported with the number of the scene as step. For studies with one goal.
+    A trial is pruned if the one-sided p-value of Wilcoxon's signed-rank test is below p; 0 never prunes. Values must be
+    reported with the number of the scene as step. For studies with one goal.
     """
 
     def __init__(self, p: float) -> None:

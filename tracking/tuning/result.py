@@ -31,17 +31,19 @@ MANY = 4
 class TuningResult:
     """The result of `tracking.tune`.
 
-    - plan: the search.
-    - config: the winner, all its parameters.
-    - front: with several goals the candidates that no other dominates, best first goal first; else ().
-    - candidates: the defaults first, then the best trials, with their values on the validation scenes.
-    - trials: all finished ones in the order of the search, pruned and impossible ones included.
-    - importance: share (0 to 1) of each parameter, by name, in the first goal's training values.
-    - comparisons: winner and defaults on the test scenes; () if the defaults won.
-    - taken_back: names of parameters that the best trial changed and the winner does not.
-    - validation: two tuples, values by goal of the defaults and of the winner on the validation scenes.
-    - notes: remarks for the reader; study: name of the study. left_out: a line for each scene whose script did not
-      come true.
+    Attributes:
+        plan: The search.
+        config: The winner, all its parameters.
+        front: With several goals the candidates that no other dominates, best first goal first; else ().
+        candidates: The defaults, then the best trials, with their values on the validation scenes.
+        trials: All finished ones in the order of the search, pruned and impossible ones included.
+        importance: Share (0 to 1) of each parameter, by name, in the first goal's training values.
+        comparisons: Of winner and defaults on the test scenes; () if the defaults won.
+        taken_back: Names of parameters that the best trial changed and the winner does not.
+        validation: Values by goal of the defaults and of the winner on the validation scenes.
+        notes: Remarks for the reader.
+        study: Name of the study.
+        left_out: A line for each scene whose script did not come true.
     """
 
     plan: SearchPlan = field(repr=False)

@@ -57,11 +57,9 @@ def place_in_search(trials: Sequence[FrozenTrial], trial: FrozenTrial) -> int:
 
 
 class HillClimbingSampler(BaseSampler):
-    """Optuna sampler that moves a few parameters of a good finished trial (one of the best three, or of the Pareto
-    front); every fourth trial is drawn by TPE (a density model of all trials), once ten are complete.
+    """Optuna sampler that moves a few parameters of one of the best trials; every fourth trial is drawn by TPE.
 
-    plan: the search. The parameters of a trial depend only on the seed of the search, its place in it and the trials
-    finished before. State: of the current trial its random generator, its TPE sampler, and whether TPE is used.
+    State: of the current trial its random generator, its TPE sampler, and whether TPE is used.
     """
 
     def __init__(self, plan: SearchPlan) -> None:
@@ -92,9 +90,7 @@ class HillClimbingSampler(BaseSampler):
     def sample_independent(
         self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
     ) -> Any:
-        """Returns the value that TPE draws for the parameter `param_name` alone, from its distribution, given the
-        study.
-        """
+        """Returns the value that TPE draws for the parameter `param_name` alone."""
         return self._tpe.sample_independent(study, trial, param_name, param_distribution)
 
     def _moved(self, study: optuna.Study) -> dict[str, Any]:

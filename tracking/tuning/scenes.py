@@ -74,11 +74,7 @@ def episode_sources(names: Sequence[str], seeds: range, settings: Sequence[str])
 
 
 def default_check_suite(names: Sequence[str]) -> str | None:
-    """Returns the first of friends-meet and crossing that shares no scenario with the suites `names`, None if there is
-    none.
-
-    Raises InputError if a name is unknown or a file unreadable.
-    """
+    """Returns the first of friends-meet and crossing that shares no scenario with `names`, None if there is none."""
     return next((suite for suite in CHECK_SUITES if not shared_scenarios(names, (suite,))), None)
 
 

@@ -47,16 +47,22 @@ RESULT_MARKS: Rules = {"settings": TABLE, "counts": TABLE, "taken_back": list_of
 
 @documented(TuneOptions, positional=3)
 def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.trials, **options: Any) -> TuningResult:
-    """Returns the parameters that a search found on simulated scenes, and what they gain on other scenes.
+    """Searches parameters on simulated scenes, and measures their gain on other scenes.
 
-    tracker: a name, file.py:Class, module:Class or class, or "grouping". suite: names or TOML files of what to tune on.
-    trials: sets of parameters to play, the defaults included. The tracker plays whole episodes. The same call resumes a
-    search that was interrupted, if `out` or `storage` is given. With `out` the result is written to files. A class as
-    tracker needs workers=1.
+    The same call resumes a search that was interrupted, if `out` or `storage` is given.
 
-    Raises InputError before anything is played if an option is unknown or wrong, if options contradict each other, if a
-    study in the storage is about another search, and if Optuna is not installed. Errors that the tracker raises with
-    the default parameters are raised, WorkError if workers are lost, and OSError if a file cannot be written.
+    Args:
+        tracker: A name, file.py:Class, module:Class, a class (then workers must be 1), or "grouping".
+        suite: Names of suites or scenarios, or TOML files, to tune on.
+        trials: Number of sets of parameters to play, the defaults included.
+
+    Returns:
+        The winner and its comparison with the defaults on the test scenes; with `out` written to files, too.
+
+    Raises:
+        InputError: An option is unknown or wrong, options contradict each other, the study in the storage is about
+            another search, or Optuna is not installed.
+        WorkError: Workers are lost, or the tracker fails with its defaults.
     """
     given = {"tracker": tracker, "suite": suite, "trials": trials, **options}
     return _search(from_keywords(TuneOptions, "tracking.tune", given))
@@ -103,8 +109,8 @@ def _unfulfilled(source: Source) -> str:
 class PlayedScenes:
     """Plays episodes and keeps a record of the scenes that are left out, because their script did not come true.
 
-    play: what plays them. State: scenes, all that were counted, by key of their source; left_out, a line for
-    each that was left out."""
+    State: scenes, all that were counted, by key of their source; left_out, a line for each that was left out.
+    """
 
     def __init__(self, play: PlayEpisodes) -> None:
         self.play = play

@@ -34,42 +34,28 @@ from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
 @dataclass(frozen=True)
 class SearchSeeds:
-    """The seeds that every scene is played with, as ranges with the end excluded.
-
-    training, validation, test: of the suite that is tuned on. check: test seeds of the second suite, unused without
-    one.
-    """
+    """The seeds that every scene is played with."""
 
     training: range
     validation: range
     test: range
-    check: range
+    check: range  # test seeds of the second suite
 
 
 @dataclass(frozen=True)
 class SearchPlan:
-    """A search whose options fit together.
-
-    - options: as given.
-    - tracker: what is tuned; base: its config with the values that the option `set` fixed; space: the parameters to
-      search.
-    - suite: names of what is tuned on; check: a second suite to test on, or None.
-    - seeds: of training, validation and tests.
-    - goals: scores to improve, at least one; the first decides.
-    - detections: the tracker's input, "image", "file" or "truth".
-    - scene_settings: "key=value" overrides of the scenes.
-    """
+    """A search whose options fit together."""
 
     options: TuneOptions
     tracker: TunedTracker
-    base: Config
-    space: tuple[Param, ...]
-    suite: tuple[str, ...]
-    check: str | None
+    base: Config  # its config with the values that the option `set` fixed
+    space: tuple[Param, ...]  # the parameters to search
+    suite: tuple[str, ...]  # names of what is tuned on
+    check: str | None  # second suite to test on
     seeds: SearchSeeds
-    goals: tuple[Goal, ...]
+    goals: tuple[Goal, ...]  # at least one; the first decides
     detections: DetectionMode
-    scene_settings: tuple[str, ...]
+    scene_settings: tuple[str, ...]  # "key=value" overrides of the scenes
 
     @property
     def tracker_name(self) -> str:
@@ -113,12 +99,7 @@ class SearchPlan:
 
     @cached_property
     def tests(self) -> dict[str, tuple[Source, ...]]:
-        """The sources (scene and seed) of the episodes that measure the gain, a dict by `suite_name` and `check_name`.
-
-        It has the suite that is tuned on and, if there is one, the second suite. The second suite keeps its own scenes;
-        only settings that begin with "sensor." apply to it. Raises InputError if a setting does not fit the second
-        suite, or a scene cannot be read.
-        """
+        """The sources of the test episodes, by `suite_name` and `check_name`."""
         found = {self.suite_name: episode_sources(self.suite, self.seeds.test, self.scene_settings)}
         if self.check is not None and self.check_name is not None:
             sensor = [setting for setting in self.scene_settings if setting.startswith("sensor.")]

@@ -33,9 +33,7 @@ FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 class SearchStudy:
     """An open study of a search (Optuna's record of its trials), which several processes can share.
 
-    A new study gets the defaults as its first trial. plan: the search; study (kept as `optuna`): Optuna's study; locks:
-    locks by which processes share its journal file, None without them; storage: names it in errors. Raises InputError
-    if the study is about another search.
+    A new study gets the defaults as its first trial. Without a journal file, `locks` is None.
     """
 
     def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
@@ -96,22 +94,12 @@ class SearchStudy:
         return TrialRecord(place, tuple(t.values or ()), dict(t.params), episodes, PRUNED in t.user_attrs)
 
     def best(self) -> set[int]:
-        """Returns the places in the search of the best trial, or, with several goals, of the trials of the Pareto
-        front.
-
-        Estimates of pruned trials take part. Of one goal, all trials with the best value are returned. Empty if no
-        trial is complete.
-        """
+        """Returns the places in the search of the best trials, or of the Pareto front, pruned ones included."""
         trials = self.trials()
         return {place_in_search(trials, t) for t in self.optuna.best_trials}
 
     def importance(self) -> dict[str, float]:
-        """Returns the share (0 to 1) of each parameter in the first goal's training values (PED-ANOVA), a dict by name,
-        greatest first.
-
-        Estimates of pruned trials take part. All shares are 0 if fewer than two trials have values, or all values are
-        equal.
-        """
+        """Returns the share (0 to 1) of each parameter in the first goal's training values (PED-ANOVA)."""
         from optuna.importance import get_param_importances
 
         names = [p.name for p in self.plan.space]

@@ -33,13 +33,7 @@ Progress = Callable[[int, int, str], None]
 
 
 def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> None:
-    """Plays trials until the study has as many finished ones as planned, by this process or by others, for which it
-    waits.
-
-    play: plays episodes. progress: called before each trial, and while waiting, as progress(finished, planned, text).
-    Raises the error of the defaults if they cannot be played, InputError if no training scene has a score for a goal
-    with them, and every error of the workers.
-    """
+    """Plays trials until the study has as many finished ones as planned, by this process or by others."""
     retry_unfinished, planned = False, study.plan.options.trials
     while True:
         progress(len(study.finished()), planned, _best_so_far(study))

@@ -18,22 +18,14 @@ RULE = LinkRule.tracker
 
 @dataclass(frozen=True)
 class TunedTracker:
-    """A tracker with parameters, or the baseline rule of groups, as a search tunes it.
+    """A tracker with parameters, or the baseline rule of groups, as a search tunes it."""
 
-    - tracker: as `tracking.track` takes it: name, file.py:Class, module:Class or class; "grouping" for the rule.
-    - name: for messages and files.
-    - config_class: declares its parameters.
-    - needs: inputs of which it can use any one: "pixels", "stereo", "boxes", "points".
-    - code: hash of the file that defines the tracker, "" if there is none.
-    - limited: the tracker in a process of its own, with a limit of time for each step; None without a limit, and always
-      for a class and the rule.
-    """
-
-    tracker: str | type[Tracker]
+    tracker: str | type[Tracker]  # as `tracking.track` takes it, or "grouping" for the rule
     name: str
     config_class: type[Config]
     needs: tuple[str, ...]
-    code: str = ""
+    code: str = ""  # hash of the file that defines the tracker, "" if there is none
+    # in a process of its own, with a limit of time for each step; never for a class and the rule
     limited: TimeLimited | None = None
 
     @property
@@ -49,12 +41,7 @@ class TunedTracker:
         return "file" if {"boxes", "points"} & {*self.needs} else "image"
 
     def check_input(self, source: Source, detections: DetectionMode, similarity: Similarity | None) -> None:
-        """Raises InputError if the tracker cannot work on this source with these detections, if there is no such
-        similarity, or if the source cannot be opened.
-
-        detections: "image", "file" or "truth". The baseline rule of groups works with "truth" and without a chosen
-        similarity only; its source is not opened. Otherwise returns None.
-        """
+        """Raises InputError if the tracker cannot work on this source with these detections and this similarity."""
         from tracking.detection_mode import choose_mode
 
         known = get_args(Similarity)
@@ -79,14 +66,7 @@ class TunedTracker:
         every_score: bool,
         similarity: Similarity | None = None,
     ) -> Episode:
-        """Returns one episode with the parameters `values` (by name, defaults for others), from the first frame to the
-        last.
-
-        The tracker's own seed is the seed of the source. detections: the tracker's input. cache: keeps the opened
-        source. every_score: compute the whole catalogue of scores. similarity: how people are compared. The baseline
-        rule ignores these three. Raises InputError if the parameters are refused, tracker and source do not fit, the
-        source has no labels, or the tracks lack the boxes or positions to compare; WorkError if the tracker fails.
-        """
+        """Returns one whole episode with these parameters; the tracker's seed is that of the source."""
         if self.name == RULE:
             from tracking.tuning.grouping_episodes import play_rule
 

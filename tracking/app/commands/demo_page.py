@@ -51,16 +51,12 @@ WITHOUT_PEOPLE = "<p>This tracker reports groups without people, so people canno
 
 @dataclass(frozen=True)
 class ResultSection:
-    """The scores under one heading; three lists of equal length that `add` extends.
-
-    title: the heading. rows: the scores of one sequence each. pages: the replay page of each row. names: the text that
-    links to it.
-    """
+    """The scores under one heading; three lists of equal length that `add` extends."""
 
     title: str
-    rows: list[SequenceScores] = field(default_factory=list)
-    pages: list[Path] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
+    rows: list[SequenceScores] = field(default_factory=list)  # of one sequence each
+    pages: list[Path] = field(default_factory=list)  # the replay page of each row
+    names: list[str] = field(default_factory=list)  # texts that link to the pages
 
     def add(self, row: SequenceScores, page: Path, name: str) -> None:
         """Appends one row of scores with its page and name."""
@@ -71,16 +67,12 @@ class ResultSection:
 
 @dataclass(frozen=True)
 class PixelScene:
-    """The scene that was tracked from its pictures.
+    """The scene that was tracked from its pictures."""
 
-    section: its scores, one row for each tracker and input; its `names` begin with the tracker's name. videos: path of
-    the overlay video by the tracker's name. frames: number of frames. seconds: duration of the scene.
-    """
-
-    section: ResultSection
-    videos: dict[str, Path]
+    section: ResultSection  # one row for each tracker and input; its names begin with the tracker's name
+    videos: dict[str, Path]  # overlay videos by the tracker's name
     frames: int
-    seconds: float
+    seconds: float  # duration of the scene
 
 
 @dataclass(frozen=True)

@@ -28,16 +28,7 @@ TEXT = "mot text"
 
 
 def group(options: GroupOptions) -> CommandResult:
-    """Groups the people of every sequence, or of every stored run, and stores each as a run; returns tables of groups
-    and events.
-
-    The run of a single sequence goes to --out, those of several to --out/<sequence name>. The result's data: "runs", a
-    dictionary for each (tracking.app.commands.group_tables.group_row) and "pairs", the number of stored pairs or None.
-
-    Raises InputError if an option is wrong or has no effect, the source or the tracks cannot be read, there are no
-    people with ids, people lie in the image and its scale is unknown, or a folder is the source itself or holds files
-    of another program with names of a run. Raises WorkError if the disk is full. Runs stored before an error stay.
-    """
+    """Groups the people of every sequence or stored run, stores each as a run, and returns tables of groups."""
     option_parsing.output_folder(options.out)
     grouping = None if options.grouping is None else grouping_of(options.grouping)
     belief = _belief(grouping or default_grouping()) if options.probabilities else None

@@ -42,15 +42,7 @@ def catalogue() -> CommandResult:
 
 
 def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResult:
-    """Returns a scenario in words with a text drawing of its plan, or the entries of a suite with their descriptions.
-
-    settings: texts "key=value". drawing: the SVG file to write, None for none. Data of a scenario: "name", "about"
-    (description), "text", "toml", and "drawing" if written. Data of a suite: "name" and "entries", a dictionary from
-    name to description.
-
-    Raises InputError for a name or setting that is wrong, for a drawing of a suite, and for a `drawing` that does not
-    end in .svg or cannot be written; WorkError if the disk is full.
-    """
+    """Returns a scenario in words with its plan, which it writes to `drawing` (SVG), or a suite's entries."""
     entries = resolve(name, scenario_settings(settings))
     if not _is_suite(name):
         return _explain_scenario(entries[0].scenario, drawing)

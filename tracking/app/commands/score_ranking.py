@@ -51,20 +51,15 @@ LONGEST_INPUT = 40
 
 @dataclass(frozen=True)
 class RankedRuns:
-    """A comparison of runs by one score, and what is shown of it, each computed once.
-
-    key: the score. ranking: by it. table: rows of `ComparedRuns.to_arrow`, the oracles first. pairs: the difference of
-    each pair of runs, the better one first. scenarios: for each name of a scenario the indices of its sequences.
-    settings: in what the runs differ. notes: further lines.
-    """
+    """A comparison of runs by one score, and what is shown of it."""
 
     comparison: ComparedRuns
-    key: str
+    key: str  # the score
     ranking: Ranking
-    table: list[dict[str, Any]]
-    pairs: list[dict[str, Any]]
-    scenarios: Mapping[str, list[int]]
-    settings: list[dict[str, Any]]
+    table: list[dict[str, Any]]  # rows of `ComparedRuns.to_arrow`, the oracles first
+    pairs: list[dict[str, Any]]  # the difference of each pair of runs, the better one first
+    scenarios: Mapping[str, list[int]]  # indices of its sequences by scenario
+    settings: list[dict[str, Any]]  # in what the runs differ
     notes: list[str]
 
 

@@ -52,12 +52,11 @@ Means = dict[str, dict[str, float]]
 
 @dataclass(frozen=True)
 class SequenceScores:
-    """The scores of one sequence. sequence: its name. scores: by key, nan where unknown. given: what detections the
-    tracker got, in words; "" if there is no run.json."""
+    """The scores of one sequence."""
 
     sequence: str
-    scores: Scores
-    given: str = ""
+    scores: Scores  # by key, nan where unknown
+    given: str = ""  # what detections the tracker got, in words; "" without run.json
 
 
 def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> Any:
@@ -110,8 +109,7 @@ def empty_table() -> Any:
 
 
 def with_title(title: str, table: Any, foot: str = "") -> Any:
-    """Returns, for rich to print, the title above the table, not wrapped to the table's width, and below it the foot,
-    if any, and an empty line."""
+    """Returns, for rich to print, the title, not wrapped to the table's width, the table and the foot."""
     from rich.console import Group
     from rich.text import Text
 

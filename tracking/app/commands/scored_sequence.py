@@ -25,29 +25,23 @@ SURFACE_WORDS = {"ground": "on the ground, boxes by their foot points", "image":
 
 @dataclass(frozen=True)
 class ScoringJob:
-    """What to score on a sequence, and how.
+    """What to score on a sequence, and how; similarity, group_match and blocks as of `compare`."""
 
-    sources: of each run, its stored tracks or the text that names a tracker class. similarity, group_match, blocks: as
-    of `compare`. oracles: score those, too. box_scale: factors of x and y of the boxes of texts; None: 1.
-    """
-
-    sources: tuple[StoredTracks | str, ...]
+    sources: tuple[StoredTracks | str, ...]  # of each run, its stored tracks or the text that names a tracker class
     similarity: Similarity | None = None
     group_match: GroupMatch = "hull"
     blocks: int = 0
-    oracles: bool = False
-    box_scale: BoxScale | None = None
+    oracles: bool = False  # score those, too
+    box_scale: BoxScale | None = None  # factors of x and y of the boxes of texts
 
 
 @dataclass(frozen=True)
 class ScoredSequence:
-    """The scores of runs of one sequence. infos: the content of run.json of each, {} without. note: what was done to
-    compare them, "" if nothing.
-    """
+    """The scores of runs of one sequence."""
 
     compared: ComparedSequence
-    infos: list[Mapping[str, Any]]
-    note: str = ""
+    infos: list[Mapping[str, Any]]  # content of run.json of each run, {} without
+    note: str = ""  # what was done to compare them
 
     @property
     def scores(self) -> list[Scores]:

@@ -34,13 +34,7 @@ ROW_KEYS = (
 
 @dataclass(frozen=True)
 class TrackerSetup:
-    """A tracker with its parameters and inputs, as `tracking.track` takes them.
-
-    tracker: name, "file.py:Class" or "module:Class". config: its parameters; None for its own defaults. detections:
-    "image", "file" or "truth"; None for the first of these that works. sensor: settings that degrade detections of mode
-    "truth", {} for none. seed: of the tracker's and the sensor's random numbers. grouping: for trackers that
-    report no groups; None for the default. limited: the tracker with a limit of time for each step; None without.
-    """
+    """A tracker with its parameters and inputs, as `tracking.track` takes them."""
 
     tracker: str
     config: Config | None = None
@@ -48,7 +42,7 @@ class TrackerSetup:
     sensor: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
     grouping: Grouping | None = None
-    limited: TimeLimited | None = None
+    limited: TimeLimited | None = None  # the tracker with a limit of time for each step
 
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
         """Tracks the sequence and returns its tracks, with groups and events. Nothing is written."""
@@ -61,19 +55,7 @@ class TrackerSetup:
 
 
 def track(options: TrackOptions) -> CommandResult:
-    """Tracks every sequence of the source and stores the tracks; returns a line for each run. The tracks are the same
-    for any number of workers.
-
-    The tracks of a source that is one sequence go to --out, those of a dataset's sequences to --out/<sequence name>.
-    The result's data: "tracker", and "runs", a dictionary for each with keys of its run.json, "tracks" (number of ids)
-    and "folder".
-
-    Raises InputError before the first frame if an option is wrong, the source cannot be opened, the tracker cannot work
-    on one of the sequences, two sequences would share a folder, a folder is a stored sequence or holds files of another
-    program with names of ours, or another run writes to --out; later if a picture, a detection or labels cannot be read
-    or a folder cannot be written. Raises WorkError if the tracker fails or the disk is full. Tracks stored before an
-    error stay.
-    """
+    """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
     from sim.io.files.atomic import lock_folder
     from sim.io.store.run_seal import reject_foreign
     from tracking.tracker_registry import find

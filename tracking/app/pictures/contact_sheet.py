@@ -56,14 +56,10 @@ def empty_truth(sequence: Sequence) -> Truth:
 
 @dataclass(frozen=True)
 class PanelLayout:
-    """What a panel of a contact sheet has below its title.
-
-    picture, small, plan: heights in px of the large picture, the row of small pictures and the plan; 0 for what is
-    absent.
-    """
+    """Heights in px of what a panel has below its title; 0 for what is absent."""
 
     picture: int
-    small: int
+    small: int  # row of small pictures
     plan: int
 
     @property

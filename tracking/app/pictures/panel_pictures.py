@@ -24,13 +24,7 @@ QUANTILE = 0.99
 
 
 class PanelPictures:
-    """Draws the pictures of chosen frames for a contact sheet's panels. They are read at construction (InputError if
-    one cannot be).
-
-    size: (width, height) of the sequence's pictures, px, or None. fps: frames per second. frames: the chosen frames by
-    number from 1; {} without pictures or size. pixels: the truth of their pixels by number, {} if unknown. layer: the
-    truth to draw over them, empty without frames.
-    """
+    """Draws the pictures of chosen frames for a contact sheet's panels; they are read at construction."""
 
     def __init__(self, sequence: Sequence, truth: Truth, chosen: Iterable[int]) -> None:
         self.size, self.fps = sequence.image_size, truth.fps
@@ -51,8 +45,7 @@ class PanelPictures:
         return ("left", *kinds) if len(kinds) == 1 else kinds
 
     def heights(self, width: int) -> tuple[int, int]:
-        """Returns the heights in px of the large picture and of the row of small pictures, at this panel width in px; 0
-        if absent."""
+        """Returns the heights in px of the large picture and of the row of small ones at this width; 0 if absent."""
         if self.size is None or not self.frames:
             return 0, 0
         aspect = self.size[1] / self.size[0]

@@ -17,11 +17,7 @@ Json = dict[str, Any]
 
 
 def deltas(column: NDArray[np.float64]) -> list[int]:
-    """Returns the column (N,) rounded to whole numbers, as its first value and the difference of each value from the
-    one before.
-
-    nan and infinity count as -99999. A cumulative sum restores the rounded column. [] for an empty column.
-    """
+    """Returns the rounded column (N,) as its first value and the steps; nan and infinity are -99999."""
     whole = np.where(np.isfinite(column), np.rint(column), NIL).astype(np.int64)
     listed: list[int] = np.diff(whole, prepend=0).tolist()
     return listed

@@ -24,16 +24,12 @@ SPEED_SCALE = {"ground": 10, "image": 1}
 
 @dataclass(frozen=True, eq=False)
 class PageGroupRows:
-    """What a tracker of whole groups says of R groups, one per row, in m or px; nan where unknown.
+    """What a tracker of whole groups says of R groups, one per row, in m or px; nan where unknown."""
 
-    hull: R polygons (V, 2) x, y, without vertices where unknown. extent: (R, 2, 2), the covariance of where the group's
-    people are, m² or px². size: (R,), estimated number of people. speed: (R,), m/s or px/s.
-    """
-
-    hull: tuple[Array, ...]
-    extent: Array
-    size: Array
-    speed: Array
+    hull: tuple[Array, ...]  # R polygons (V, 2) x, y, without vertices where unknown
+    extent: Array  # (R, 2, 2) covariance of where the group's people are, m² or px²
+    size: Array  # (R,) estimated number of people
+    speed: Array  # (R,) m/s or px/s
 
 
 def rows_of_groups(tracks: SequenceOf[Tracks]) -> PageGroupRows:

@@ -12,27 +12,20 @@ from sim.types import Array, GroupEvent, Ints
 
 @dataclass(frozen=True)
 class Bar:
-    """One unbroken life of a group id, a bar of the timeline.
-
-    start, end: frames from 1, both inclusive. lane: line of the timeline, from 0. size: most people in it in one of its
-    frames, rounded.
-    """
+    """One unbroken life of a group id, a bar of the timeline."""
 
     id: int
-    start: int
-    end: int
-    lane: int
-    size: int
+    start: int  # frame, from 1
+    end: int  # frame, inclusive
+    lane: int  # line of the timeline, from 0
+    size: int  # most people in one of its frames, rounded
 
 
 @dataclass(frozen=True)
 class Link:
-    """Group `a` becomes or joins group `b`, a link between their bars; both are ids.
+    """Group `a` becomes or joins group `b`, a link between their bars; both are ids."""
 
-    frame: from 1, when a tracker reported it; for truth the event's first frame.
-    """
-
-    frame: int
+    frame: int  # when a tracker reported it; of truth the event's first frame
     a: int
     b: int
 

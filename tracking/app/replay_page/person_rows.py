@@ -29,23 +29,17 @@ MOVING = 0.1
 
 @dataclass(frozen=True, eq=False)
 class PageRows:
-    """Truth or one tracker's tracks as R rows in any order, one per person or group and frame; nan where unknown.
+    """Truth or one tracker's tracks as R rows in any order, one per person or group and frame; nan where unknown."""
 
-    plane: "ground" (m) or "image" (px). frame: from 1, (R,). id: (R,). group: (R,) id of the group, -1 for alone. pos:
-    (R, 2) x, y. angle: (R,) rad, direction of view or of movement, from +x towards +y, which in the image is
-    downwards. box: (R, 4) left, top, width, height, px.
-    visibility: (R,), 0 to 1. groups: what is known of rows that are groups, None if the rows are people.
-    """
-
-    plane: str
-    frame: Ints
+    plane: str  # "ground" (m) or "image" (px)
+    frame: Ints  # (R,) from 1
     id: Ints
-    group: Ints
-    pos: Array
-    angle: Array
-    box: Array
-    visibility: Array
-    groups: PageGroupRows | None = None
+    group: Ints  # (R,) id of the group, -1 for alone
+    pos: Array  # (R, 2) x, y
+    angle: Array  # (R,) rad, direction of view or movement, from +x towards +y, which in the image is downwards
+    box: Array  # (R, 4) left, top, width, height, px
+    visibility: Array  # (R,) 0 to 1
+    groups: PageGroupRows | None = None  # of rows that are groups
 
 
 def rows_of_truth(truth: Truth) -> PageRows:
@@ -90,15 +84,7 @@ def _directions(vel: Array | None, n: int) -> Array:
 
 
 def encode_rows(rows: PageRows, events: Iterable[GroupEvent]) -> Json:
-    """Returns the rows as encoded columns, with events, and with the bars and links of the group timeline, as a JSON
-    object.
-
-    Rows are sorted by id and frame. Keys: plane; scale (steps per m or px); stints ([id, first frame, frames] of
-    consecutive frames); x and y; a (angle, degrees); box (four columns in half px, [] if all unknown); group and vis
-    (visibility in tenths, unknown as 10), as value, count, …; wholes (columns of groups, None for people); events
-    (those that start in frame 1 or later); bars ([id, start, end, lane, size], of groups of two or more people, or of
-    all rows that are groups); links ([frame, a, b]). Other columns hold their first value, then differences.
-    """
+    """Returns the rows as encoded columns, sorted by id and frame, with events and the group timeline."""
     events = list(events)
     order = np.lexsort((rows.frame, rows.id))
     frame, ids, group = rows.frame[order], rows.id[order], rows.group[order]

@@ -29,16 +29,12 @@ GREY = 128
 
 @dataclass(frozen=True)
 class PageVideo:
-    """A video with one picture per frame.
+    """A video with one picture per frame."""
 
-    address: relative to the page, "" if the video is inside it. content: the video's bytes in base64 if it is inside
-    the page, else "". fps: frames per second. lost: frames (from 1) without a picture, which show the picture before.
-    """
-
-    address: str
-    content: str
+    address: str  # relative to the page, "" if the video is inside it
+    content: str  # the bytes in base64 if inside, else ""
     fps: float
-    lost: tuple[int, ...] = ()
+    lost: tuple[int, ...] = ()  # frames (from 1) without a picture, which show the picture before
 
     def facts(self) -> dict[str, Any]:
         """Returns the video's entry in the page's data."""
