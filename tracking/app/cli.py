@@ -13,8 +13,14 @@ import typer
 
 from tracking.app.command_options import (
     CocoOptions,
+    FitGroupingOptions,
+    FitJointOptions,
+    FitRelationalOptions,
+    FitSensorOptions,
     GenerateOptions,
     GroupOptions,
+    Json,
+    Out,
     OverlayOptions,
     ReplayCommandOptions,
     ScenariosOptions,
@@ -26,9 +32,7 @@ from tracking.app.command_options import (
 )
 from tracking.app.command_result import INTERRUPTED, CommandResult
 from tracking.app.commands.tune import tune
-from tracking.app.fit_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.options_from_dataclass import options_from
-from tracking.app.shared_options import Json, Out
 from tracking.app.strict_command import StrictTyper
 
 app = StrictTyper(
@@ -130,7 +134,7 @@ app.command()(tune)
 @options_from(ReplayCommandOptions)
 def replay(options: ReplayCommandOptions) -> CommandResult:
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
-    from tracking.app.commands.replay import replay
+    from tracking.app.commands.datasets import replay
 
     return replay(options)
 
@@ -157,7 +161,7 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
 @options_from(FitJointOptions)
 def fit_joint(options: FitJointOptions) -> CommandResult:
     """Learn the groups of the tracker joint from simulated truth: their merges and splits, or their components."""
-    from tracking.app.commands.fit_joint import fit_joint
+    from tracking.app.commands.fit import fit_joint
 
     return fit_joint(options)
 
@@ -166,7 +170,7 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
 @options_from(FitRelationalOptions)
 def fit_relational(options: FitRelationalOptions) -> CommandResult:
     """Learn the speed table and the relations of the tracker relational from simulated truth."""
-    from tracking.app.commands.fit_relational import fit_relational
+    from tracking.app.commands.fit import fit_relational
 
     return fit_relational(options)
 

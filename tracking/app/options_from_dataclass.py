@@ -21,8 +21,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar, get_type_hints
 
+from tracking.app.command_options import Json
 from tracking.app.command_result import CommandResult
-from tracking.app.shared_options import Json
 
 T = TypeVar("T")
 

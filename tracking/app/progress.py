@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -14,11 +15,19 @@ from tracking.interrupts import raise_if_interrupted
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+    from sim.types import Sequence
+
 PATIENCE = 2.0
 """s before anything is shown."""
 
 PAUSE = 10.0
 """s between lines if stderr is no terminal."""
+
+
+def total_frames(sequences: Iterable[Sequence]) -> int | None:
+    """Returns the number of frames of all sequences, None if one of them does not know its length."""
+    lengths = [sequence.length for sequence in sequences]
+    return None if None in lengths else sum(length or 0 for length in lengths)
 
 
 class ProgressMeter:

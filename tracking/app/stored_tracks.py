@@ -1,4 +1,4 @@
-"""Finds stored tracks below a path, and matches them with sequences by name."""
+"""Finds stored tracks below a path, matches them with sequences by name, and chooses the folders of new ones."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from sim.io.files.output_paths import output_paths
 from sim.io.files.own_files import is_hidden
 from sim.io.formats.box_columns import BoxScale
+from sim.io.store.manifest import is_sequence
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
-from tracking.app.not_tracks import refuse_other_things
 from tracking.run import TrackingRun
 
 DEPTH = 3
@@ -26,6 +27,13 @@ METHOD = ("tracker", "config", "grouping")
 
 SHOWN = 3
 """Most parameters that the error on two configs names."""
+
+
+OTHER_FILES = (".toml", ".py", ".json", ".ini", ".html", ".svg", ".jpg", ".png", ".mp4", ".xml")
+"""Endings of files that hold no tracks."""
+
+DATASET = ("", "*", "*/*")
+"""Where a stored sequence lies below a sequence folder, a split of a dataset, or a dataset."""
 
 
 @dataclass(frozen=True)
@@ -158,3 +166,25 @@ def _method_words(stored: StoredTracks, other: StoredTracks) -> str:
         return tracker
     changed = [f"{key} = {value}" for key, value in mine.items() if theirs.get(key) != value][:SHOWN]
     return f"{tracker} ({', '.join(changed)})" if changed else tracker
+
+
+def refuse_other_things(path: Path, expected: str) -> None:
+    """Raises InputError if the path is a generated sequence or dataset, or a file that cannot hold tracks."""
+    if path.is_file() and path.suffix.lower() in OTHER_FILES:
+        raise InputError(
+            file=path, got=f"a {path.suffix.lower()} file, no tracks", expected=expected, remedy="check the path"
+        )
+    folders = (folder for pattern in DATASET for folder in ([path] if not pattern else path.glob(pattern)))
+    if path.is_dir() and any(is_sequence(folder) for folder in folders):
+        raise InputError(
+            file=path, got="a generated dataset, no tracks", expected=expected,
+            remedy="give the --out of `flockscope track`",
+        )  # fmt: skip
+
+
+def run_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
+    """Returns the folder for each sequence's run."""
+    own = Path(sequences[0].source.get("path", source))
+    if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
+        return [out]
+    return output_paths(out, [sequence.name for sequence in sequences], source=source)

@@ -19,7 +19,7 @@ from sim.io.store.sequence_folder import sequence_files
 from sim.io.store.track_files import tracks_files
 from tracking import track, tracker_registry
 from tracking.app.cli import app, run
-from tracking.app.commands.scenario_keys import list_keys
+from tracking.app.commands.scenarios import list_keys
 
 pytestmark = pytest.mark.slow
 

@@ -1,12 +1,13 @@
-"""`flockscope generate`, `validate` and `export`: make, check and convert datasets."""
+"""`flockscope generate`, `replay`, `validate` and `export`: make, check and convert datasets."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from scenarios.errors import InputError
 from scenarios.printable import counted
 from tracking.app import option_parsing
-from tracking.app.command_options import CocoOptions, GenerateOptions, WebdatasetOptions
+from tracking.app.command_options import CocoOptions, GenerateOptions, ReplayCommandOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 
@@ -80,3 +81,25 @@ def export_webdataset(options: WebdatasetOptions) -> CommandResult:
     text = f"{packed}, {total / 1e6:.1f} MB; content {index['content_hash'][:16]}"
     files = [out / s["name"] for s in shards]
     return CommandResult({"shards": files, "bytes": total, "content_hash": index["content_hash"]}, text)
+
+
+def replay(options: ReplayCommandOptions) -> CommandResult:
+    """Stores one sequence for every recording of the source and every seed, all seeds of a recording together."""
+    from scenarios.loading.resolve import load_observation
+    from sim.dataset.generate import ReplayOptions, store_replays
+    from sim.dataset.replay import Cut
+    from sim.io.source import open_source
+
+    option_parsing.output_folder(options.out)
+    seeds = option_parsing.seeds(options.seeds)
+    streams, images = option_parsing.pictures(options.streams, options.images)
+    if options.duration is not None and options.duration <= 0:
+        raise InputError(place="--duration", got=options.duration, expected="seconds above 0", remedy="correct it")
+    settings = option_parsing.scenario_settings(options.settings)
+    view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *settings])
+    recordings = open_source(options.source, fps=options.fps, images=False)
+    replays = ReplayOptions(view, Cut(options.start, options.duration), options.calibration, streams, images)
+    with ProgressMeter("replay") as meter:
+        folders = store_replays(recordings, replays, seeds, options.out, meter.update)
+    text = f"{counted(len(folders), 'sequence')} in {folders[0].parent}"
+    return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)

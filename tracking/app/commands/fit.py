@@ -1,18 +1,20 @@
-"""`flockscope fit`: measures the errors of a detector on recordings, or fits the belief of who belongs together."""
+"""`flockscope fit`: the errors of a detector, from recordings; and from simulated truth the belief of who belongs
+together, the groups of `joint`, and the speed table and relations of `relational`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from scenarios.printable import printable
 from sim.types import Sequence as Recording
+from sim.types import Truth
 from tracking.app import option_parsing
+from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.fitted_scores import fit_and_check_seeds, score_lines
-from tracking.app.fit_options import FitGroupingOptions, FitSensorOptions
 
 CHECK_SEEDS = range(30_000, 30_008)
 """Seeds of the simulated detections whose statistics are shown beside the measured ones."""
@@ -22,6 +24,9 @@ SHOWN = (
     "overlap, 10% quantile", "overlap, 50% quantile", "overlap, 90% quantile", "error correlation after 0.2 s",
 )  # fmt: skip
 """The statistics that the text shows; --json has all of them."""
+
+
+Scores = dict[str, dict[str, float]]
 
 
 def fit_sensor(options: FitSensorOptions) -> CommandResult:
@@ -70,12 +75,96 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     from tracking.fitting.grouping_scenes import pair_scenes
 
     out = option_parsing.output_file(options.out, ".toml")
-    seeds = fit_and_check_seeds(options.seeds, options.check)
+    seeds = _fit_and_check_seeds(options.seeds, options.check)
     samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
     belief = fit_belief(samples["fitted"])
     scores = {key: belief_scores(sample, belief.log_odds(sample.values)) for key, sample in samples.items()}
     words = " ".join(["flockscope fit grouping", *options.names, f"--seeds {options.seeds}"])
-    lines = score_lines(seeds, scores)
+    lines = _score_lines(seeds, scores)
     write_file(out, belief.toml_text("\n".join([words, *lines])).encode())
     text = "\n".join([*lines, f"→ {out}: use it as --grouping {out}"])
     return CommandResult({"file": out, **scores}, text)
+
+
+def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]]:
+    """Yields seed and truth of every scene of these names with every seed."""
+    from scenarios.loading.resolve import resolve
+    from tracking.fitting.grouping_scenes import simulated
+
+    entries = [entry for name in names for entry in resolve(name)]
+    return ((seed, simulated(entry, seed)) for entry in entries for seed in seeds)
+
+
+def _fit_and_check_seeds(fitted: str, checked: str | None) -> dict[str, range]:
+    """Returns the seeds of --seeds under "fitted" and, if given, those of --check under "checked"."""
+    asked = {"fitted": ("--seeds", fitted), "checked": ("--check", checked)}
+    return {key: option_parsing.seeds(text, option) for key, (option, text) in asked.items() if text is not None}
+
+
+def _score_lines(seeds: Mapping[str, range], scores: Mapping[str, Mapping[str, float]]) -> list[str]:
+    return [
+        f"{key}, seeds {numbers.start}:{numbers.stop}: "
+        + ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
+        for key, numbers in seeds.items()
+    ]
+
+
+def fit_joint(options: FitJointOptions) -> CommandResult:
+    """Writes the fitted parameters as a TOML file, with the command and the scores as comments."""
+    from sim.io.files.atomic import write_file
+
+    out = option_parsing.output_file(options.out, ".toml")
+    seeds = _fit_and_check_seeds(options.seeds, options.check)
+    params, scores = {"events": _events, "components": _components}[options.learn](options, seeds)
+    own = [] if options.learn == "events" else [f"--learn {options.learn}"]
+    words = " ".join(["flockscope fit joint", *options.names, *own, f"--seeds {options.seeds}"])
+    lines = _score_lines(seeds, scores)
+    body = [f"{name} = {value}" for name, value in params.items()]
+    text = "\n".join([*(f"# {line}" for line in (words, *lines)), 'tracker = "joint"', "", "[params]", *body, ""])
+    write_file(out, text.encode())
+    shown = [f"{name:<22}  {value:9.4f}" for name, value in params.items()]
+    result = "\n".join([*lines, "", *shown, "", f"→ {out}: use it as --params {out}"])
+    return CommandResult({"file": out, "params": params, **scores}, result)
+
+
+def _events(options: FitJointOptions, seeds: dict[str, range]) -> tuple[dict[str, float], Scores]:
+    """Returns the weights of the event classifier, and the scores on the seeds fitted to and checked."""
+    from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
+    from tracking.papers.joint.config import JointConfig
+
+    lag = JointConfig().lag
+    rows = {
+        key: EventRows.joined(event_rows(truth, lag, seed) for seed, truth in _simulated(options.names, numbers))
+        for key, numbers in seeds.items()
+    }
+    weights = fit_events(rows["fitted"])
+    return weights, {key: event_scores(part, weights) for key, part in rows.items()}
+
+
+def _components(options: FitJointOptions, seeds: dict[str, range]) -> tuple[dict[str, float], Scores]:
+    """Returns the parameters of the Dirichlet process mixture, and the scores on the seeds fitted to and checked."""
+    from tracking.fitting.joint_components import component_scores, fit_components, true_partitions
+
+    parts = {
+        key: [part for seed, truth in _simulated(options.names, numbers) for part in true_partitions(truth, seed)]
+        for key, numbers in seeds.items()
+    }
+    params = fit_components(parts["fitted"])
+    return params, {key: component_scores(part, params) for key, part in parts.items()}
+
+
+def fit_relational(options: FitRelationalOptions) -> CommandResult:
+    """Writes the fitted parameters of `relational` as a TOML file."""
+    from sim.io.files.atomic import write_file
+    from tracking.fitting.relational import fit_relational as fit
+    from tracking.papers.relational.config import RelationalConfig
+
+    out = option_parsing.output_file(options.out, ".toml")
+    scenes = _simulated(options.names, option_parsing.seeds(options.seeds))
+    params = fit((truth for _, truth in scenes), RelationalConfig().speed_ends)
+    config = RelationalConfig.from_dict(dict(params), out)
+    write_file(out, config.to_toml().encode())
+    width = max(map(len, params))
+    lines = [f"{name:<{width}}  {value:9.4f}  {RelationalConfig.known(name).unit}" for name, value in params.items()]
+    lines += ["", f"→ {out}: use it as --params {out}"]
+    return CommandResult({"file": out, "params": params}, "\n".join(lines))

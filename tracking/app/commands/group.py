@@ -16,8 +16,7 @@ from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.group_tables import group_row, group_tables
 from tracking.app.progress import ProgressMeter
-from tracking.app.run_folders import run_folders
-from tracking.app.stored_tracks import StoredTracks, find_tracks
+from tracking.app.stored_tracks import StoredTracks, find_tracks, run_folders
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.grouping.pair_probabilities import pair_probabilities

@@ -14,9 +14,8 @@ from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_ranking import is_class, ranking, short_notes, sparse_notes
 from tracking.app.commands.score_tables import Means, SequenceScores, tables
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
-from tracking.app.progress import ProgressMeter
-from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequences
+from tracking.app.sequence_workers import OpenedAs
 from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.comparison import check_blocks
 from tracking.scoring.catalogue import ALL, CATALOGUE
@@ -53,12 +52,7 @@ def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence
         )  # fmt: skip
     how = (options.similarity, options.group_match, options.blocks)
     jobs = [ScoringJob((stored,), *how, box_scale=box_scale) for _, stored in matched]
-    found: list[ScoredSequence] = []
-    with ProgressMeter("score", len(sequences)) as meter:
-        for one in over_sequences(score_sequence, sequences, jobs, source, options.workers):
-            meter.step(sequences[len(found)].name)
-            found.append(one)
-    return found
+    return score_sequences(sequences, jobs, source, options.workers)
 
 
 def _block_means(scored: ScoredSequence) -> Means:

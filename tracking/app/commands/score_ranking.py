@@ -31,9 +31,8 @@ from tracking.app.commands.score_tables import (
     number,
     with_title,
 )
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
-from tracking.app.progress import ProgressMeter
-from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.commands.scored_sequence import ScoringJob, score_sequences
+from tracking.app.sequence_workers import OpenedAs
 from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.comparison import ComparedRuns, joined
 from tracking.ranking import Ranking, rank
@@ -78,11 +77,7 @@ def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) 
     runs = [[text] * len(sequences) if is_class(text) else _stored(text, sequences) for text in names.values()]
     how = (options.similarity, options.group_match, options.blocks)
     jobs = [ScoringJob(sources, *how, oracles=True) for sources in zip(*runs, strict=True)]
-    found: list[ScoredSequence] = []
-    with ProgressMeter("score", len(sequences)) as meter:
-        for one in over_sequences(score_sequence, sequences, jobs, source, options.workers):
-            meter.step(sequences[len(found)].name)
-            found.append(one)
+    found = score_sequences(sequences, jobs, source, options.workers)
     comparison = joined(list(names), [s.name for s in sequences], [one.compared for one in found])
     notes = [*sparse_notes([one.scores[0] for one in found]), *dict.fromkeys(one.note for one in found if one.note)]
     if options.blocks:

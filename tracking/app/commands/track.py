@@ -16,9 +16,9 @@ from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.progress import ProgressMeter
-from tracking.app.run_folders import run_folders
+from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.run import TrackingRun
@@ -75,7 +75,7 @@ def track(options: TrackOptions) -> CommandResult:
         for folder in folders:
             reject_foreign(folder)
         _check_modes(setup, needs, sequences, options.background)
-        with setup.limited or nullcontext(), ProgressMeter("track", _total_frames(sequences)) as meter:
+        with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
             if min(options.workers, len(sequences)) == 1:
                 for sequence, folder in zip(sequences, folders, strict=True):
                     step = partial(_step, meter, sequence.name)
@@ -152,11 +152,6 @@ def _check_modes(
     if background is not None and "image" not in modes:
         got, expected = f"--detections {modes[0]}", "a tracker that works on pictures"
         raise InputError(place="--background", got=got, expected=expected, remedy="leave --background out")
-
-
-def _total_frames(sequences: list[Sequence]) -> int | None:
-    lengths = [sequence.length for sequence in sequences]
-    return None if None in lengths else sum(length or 0 for length in lengths)
 
 
 def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:

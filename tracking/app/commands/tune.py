@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 import typer
 
 from tracking.app import option_parsing
+from tracking.app.command_options import Cluster, Detector, Set, StepTimeout, Workers
 from tracking.app.command_result import CommandResult
 from tracking.app.options_from_dataclass import options_from
 from tracking.app.progress import ProgressMeter
-from tracking.app.shared_options import Cluster, Detector, Set, StepTimeout, Workers
 from tracking.tuning.options import TuneOptions
 
 SHARED = {"set": Set, "workers": Workers, "cluster": Cluster, "step_timeout": StepTimeout}

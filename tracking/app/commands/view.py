@@ -13,7 +13,7 @@ from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.progress import ProgressMeter
+from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.run import TrackingRun
 
@@ -81,8 +81,7 @@ def _tracks_reader(sequences: list[Sequence], tracks: Path | None) -> Callable[[
 
 
 def _picture_count(sequences: list[Sequence]) -> int | None:
-    lengths = [sequence.length for sequence in sequences if sequence.has_images]
-    return None if None in lengths else sum(length or 0 for length in lengths)
+    return total_frames(sequence for sequence in sequences if sequence.has_images)
 
 
 def _write_each(

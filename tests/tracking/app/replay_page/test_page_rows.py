@@ -13,10 +13,9 @@ from sim.geometry.footprints import footprint_hull, footprint_hulls
 from sim.geometry.polygons import area, convex_hull
 from sim.types import Groups, Sequence, Tracks
 from tests.groups_as_wholes import wholes
-from tracking.app.replay_page import group_rows
-from tracking.app.replay_page.column_encoding import NIL
-from tracking.app.replay_page.page import write_page
-from tracking.app.replay_page.page_data import page_data
+from tracking.app.replay_page import page_rows
+from tracking.app.replay_page.page import page_data, write_page
+from tracking.app.replay_page.page_rows import NIL
 
 
 def column(values: list[int]) -> np.ndarray:
@@ -111,8 +110,8 @@ def test_the_page_shows_all_of_their_hulls(sequence: Sequence) -> None:
 def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) -> None:
     """Never outside, no more than two steps of tolerance inside, in their order."""
     hull = footprint_hull(np.array(places))
-    less = group_rows.simplified(hull, 0.02)
-    assert len(less) <= group_rows.MAX_CORNERS
+    less = page_rows.simplified(hull, 0.02)
+    assert len(less) <= page_rows.MAX_CORNERS
     assert {tuple(p) for p in less} <= {tuple(p) for p in hull}
     np.testing.assert_allclose(area(less), area(convex_hull(less)), rtol=1e-9)
     edge = np.roll(less, -1, axis=0) - less
@@ -124,7 +123,7 @@ def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) ->
 def test_a_hull_of_few_corners_stays() -> None:
     for n in range(4):
         corners = np.array([[0, 0], [1e-4, 0], [0, 1e-4]])[:n]
-        np.testing.assert_array_equal(group_rows.simplified(corners, 1.0), corners)
+        np.testing.assert_array_equal(page_rows.simplified(corners, 1.0), corners)
 
 
 def test_a_long_recording_of_groups_stays_small(tmp_path) -> None:
