@@ -27,7 +27,7 @@ def runs_own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
 
 
 def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: DetectionMode | None) -> DetectionMode:
-    """Returns the mode of detections."""
+    """Returns the requested mode if it can work; without one the first of image, file, truth that can."""
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
     if requested in able or (requested is None and able):
         return requested or able[0]  # type: ignore[return-value]

@@ -28,7 +28,7 @@ class ImageScale:
 
 
 def required(px_per_m: float) -> float:
-    """Return px_per_m (image scale, px per m) unchanged. Raises InputError if it is nan, zero or negative."""
+    """Returns px_per_m (image scale, px per m) unchanged. Raises InputError if it is nan, zero or negative."""
     if px_per_m > 0:
         return px_per_m
     raise InputError(

@@ -25,7 +25,7 @@ _recorders: list[Any] = []
 
 @contextmanager
 def recorded_interrupts() -> Iterator[None]:
-    """While the block runs, record SIGINT (Ctrl-C) and raise KeyboardInterrupt for it, as Python does."""
+    """While the block runs, records SIGINT (Ctrl-C) and raises KeyboardInterrupt for it, as Python does."""
     own = threading.current_thread() is threading.main_thread()
     if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
@@ -53,7 +53,7 @@ def recorded_interrupts() -> Iterator[None]:
 
 
 def raise_if_interrupted() -> None:
-    """Raise KeyboardInterrupt if SIGINT was recorded in the present block of `recorded_interrupts`; else do nothing."""
+    """Raises KeyboardInterrupt if SIGINT was recorded in the present block of `recorded_interrupts`."""
     if _received.is_set():
         raise KeyboardInterrupt
 

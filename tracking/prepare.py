@@ -63,7 +63,7 @@ class PreparedTracker:
         return self.scale(tracks).px_per_m
 
     def reset(self, seed: int) -> None:
-        """Reset the tracker for this sequence and forget what it has reported. seed."""
+        """Resets the tracker for this sequence and forgets what it has reported."""
         self.history.clear()
         with self._naming("reset()", self.sequence.name):
             self.tracker.reset(self.context, seed)

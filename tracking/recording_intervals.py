@@ -21,7 +21,7 @@ from tracking.stats import DRAWS, LEVEL, Scale, block_intervals, joint_level
 
 
 def scale_of(score: Score) -> Scale:
-    """Returns the scale of a score of the catalogue."""
+    """Returns on which scale the error of a score is nearly symmetric."""
     if score.unit == "count":
         return "count"
     if score.unit == "1":

@@ -124,14 +124,14 @@ def _ends(x: float, half: float, scale: Scale) -> tuple[float, float]:
 
 
 def block_length(frames: int, fps: float, likeness: float = 1.0) -> int:
-    """Returns the length of a block in frames."""
+    """Returns frames of a block: twice `likeness`, within a twentieth and a fifth of the recording."""
     few, many = BLOCKS
     wanted = min(max(ceil(2 * likeness), ceil(frames / many)), ceil(frames / few))
     return min(frames, max(1, ceil(SHORTEST_BLOCK * fps), wanted))
 
 
 def block_weights(frames: int, block: int, draws: int, r: np.random.Generator) -> Array:
-    """Return weights (draws, frames)."""
+    """Returns weights (draws, frames): how often each frame is drawn, in blocks of `block` consecutive frames."""
     count = -(-frames // block)
     starts = r.integers(0, frames, (draws, count))
     length = np.full(count, block)

@@ -64,7 +64,7 @@ class TimeLimited:
         return tuple(tracker_registry.find(self.tracker).needs)
 
     def close(self) -> None:
-        """End the process; does nothing without one. A tracker that is made later starts another."""
+        """Ends the process; a tracker that is made later starts another."""
         self._process.terminate()
         self._process.join()
 
@@ -75,7 +75,7 @@ class TimeLimited:
         return made
 
     def call(self, method: str, *arguments: Any) -> Any:
-        """Returns what the call returns in the process. method."""
+        """Returns what the call ("create", "reset" or "step") returns in the process; "create" has no time limit."""
         pipe = self._process.send(_call, (method, arguments, self.seconds + GRACE))
         if method != "create" and not pipe.poll(self.seconds):
             self.close()
@@ -98,7 +98,7 @@ class RemoteTracker:
         self._host = host
 
     def reset(self, context: Context, seed: int) -> None:
-        """Reset the tracker. Raises what `TimeLimited.call` raises. A tracker whose process has ended is made again."""
+        """Resets the tracker; one whose process has ended is made again."""
         self.px_per_m = self._host.call("reset", self.made_from, (context, seed))
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
@@ -112,7 +112,6 @@ _made: dict[int, Tracker] = {}
 
 
 def _call(request: tuple[str, tuple[Any, ...], float]) -> Any:
-    """Runs one call of a tracker in its process. request."""
     method, (made_from, given), limit = request
     if method == "create":
         return _create(*made_from)

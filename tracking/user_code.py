@@ -17,7 +17,7 @@ from tracking.interrupts import is_interruption
 def user_code(
     failed: Callable[[BaseException], FlockscopeError], passing: type[Exception] | tuple[()] = FlockscopeError
 ) -> Iterator[None]:
-    """While the block runs, replace any exception, SystemExit and GeneratorExit included, by the error `failed(it)`."""
+    """While the block runs, replaces any exception, SystemExit included, by the error `failed(it)`."""
     try:
         yield
     except BaseException as error:

@@ -101,7 +101,7 @@ def toml_values(texts: Iterable[str]) -> dict[str, Any]:
 
 
 def output_file(out: Path, suffix: str) -> Path:
-    """Returns `out` unchanged. Nothing is created."""
+    """Returns `out` if it is a file name with this suffix; else raises InputError."""
     is_folder = out.is_dir()
     if is_folder or out.suffix.lower() != suffix:
         got, better = (f"{out}, a folder", out / "page") if is_folder else (str(out), out.with_suffix(""))
@@ -111,7 +111,7 @@ def output_file(out: Path, suffix: str) -> Path:
 
 
 def output_folder(out: Path) -> Path:
-    """Returns `out` unchanged. Nothing is created; it need not exist."""
+    """Returns `out` if it is, or can become, a folder; else raises InputError."""
     existing = next(p for p in (out, *out.parents) if p.exists())
     if not existing.is_dir():
         raise InputError(

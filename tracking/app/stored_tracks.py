@@ -183,7 +183,7 @@ def refuse_other_things(path: Path, expected: str) -> None:
 
 
 def run_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
-    """Returns the folder for each sequence's run."""
+    """Returns the folder for each sequence's run: `out` itself if the source is one sequence, else one below it."""
     own = Path(sequences[0].source.get("path", source))
     if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
         return [out]

@@ -103,7 +103,7 @@ class SourceCache:
         return sum(self._bytes.values())
 
     def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
-        """Returns the opened source."""
+        """Returns the opened source; one that was opened with the same `streams` and is still kept is used again."""
         key = (*source.key, streams)
         if self._opened and next(reversed(self._opened)) == key:
             return self._opened[key]

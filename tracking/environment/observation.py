@@ -142,7 +142,7 @@ class Observer:
         }
 
     def _movement(self, rows: TrackRows, found: DetectionRows) -> dict[str, float]:
-        """Returns a dict of medians."""
+        """Returns medians over the window, m and s; d' C^-1 d / 2 for the names in "sigma"."""
         now = rows.frame >= len(self._before)
         before, after = consecutive_rows(rows)
         expected = rows.pos + rows.vel / self.fps
@@ -163,7 +163,7 @@ class Observer:
 
 
 def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict[str, float]:
-    """Returns a dict."""
+    """Returns shares and medians of detections against expected positions (R, 2) of the rows one frame later, m."""
     looked = np.isin(rows.frame + 1, found.frames)
     here = np.flatnonzero(looked)
     owner = nearest_expected(expected[here], rows.frame[here] + 1, rows.reach[here], found)
@@ -188,7 +188,6 @@ def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict
 
 
 def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
-    """Returns a dict."""
     kinds = [e.kind for t in tracks for e in t.events]
     merges, splits = (sum(kind in pair for kind in kinds) for pair in (("merge", "form"), ("split", "dissolve")))
     values = {"merges": 60 * merges / seconds, "splits": 60 * splits / seconds}

@@ -38,7 +38,7 @@ class TrackRows:
 
 @dataclass(frozen=True, eq=False)
 class DetectionRows:
-    """D detections, frame by frame."""
+    """D detections of a window, frame by frame."""
 
     frame: Ints  # (D,) counted like the frames of the TrackRows
     pos: Array  # (D, 2) x, y in m

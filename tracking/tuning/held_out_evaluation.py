@@ -40,13 +40,7 @@ class HeldOutEvaluator:
     report: Callable[[str], None] = field(default=lambda text: None)
 
     def validated(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Returns the candidates in order, with their values on the validation scenes and their gain over the first
-        one.
-
-        The first candidate must be the defaults; a FlockscopeError of theirs is raised. Another candidate with an error
-        on a validation scene is left out. `gain` compares the first goal, of the first candidate with itself; it is
-        None if no scene has its score. Errors of the workers are raised.
-        """
+        """Returns the candidates that can be played, with validation values and gain over the first, the defaults."""
         found = list[Candidate]()
         defaults: Sequence[Episode] = ()
         for k, candidate in enumerate(candidates):
@@ -63,13 +57,7 @@ class HeldOutEvaluator:
         return found
 
     def simplified(self, config: Config, value: float, order: Sequence[str]) -> tuple[Config, float]:
-        """Returns the config with needless changes reset to the defaults, and its value by the first goal on the
-        validation scenes.
-
-        value: that of `config` on these scenes. order: names of searched parameters (others raise KeyError or
-        AttributeError), tried one after the other; unchanged ones are skipped. A parameter is reset if that does not
-        make the value worse or unknown, and causes no error. Errors of the workers are raised.
-        """
+        """Returns the config without changes that bring nothing in validation, tried in `order`, and its value."""
         goal = self.plan.goals[0]
         changed = [name for name in order if getattr(config, name) != self.plan.defaults[name]]
         for k, name in enumerate(changed):

@@ -87,7 +87,7 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
 
 
 def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: Config) -> str:
-    """Returns an SVG text."""
+    """Returns as SVG a bar for the importance of each parameter."""
     ranked = sorted(importance.items(), key=lambda pair: -pair[1])
     most, body = max(importance.values()), []
     left, wide = 190, WIDTH - 190 - 250
@@ -106,7 +106,7 @@ def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: C
 
 
 def pareto_plot(plan: SearchPlan, candidates: Sequence[Candidate], front: Sequence[Candidate]) -> str:
-    """Returns an SVG text."""
+    """Returns as SVG the candidates by the first two goals."""
     one, two = plan.goals[:2]
     points = [c.validation[:2] for c in candidates]
     axes = Axes(_range([p[0] for p in points], 0.08), _range([p[1] for p in points], 0.08))

@@ -66,7 +66,7 @@ class TuningResult:
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:
-        """A dict."""
+        """Default and new value of each parameter that the winner changed, by name."""
         old, new = self.default.as_dict(), self.config.as_dict()
         return {name: (old[name], new[name]) for name in new if old[name] != new[name]}
 

@@ -183,7 +183,6 @@ def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
 
 
 def _space(base: Config, settings: Sequence[str], only: tuple[str, ...], mode: DetectionMode) -> tuple[Param, ...]:
-    """Returns the parameters to search."""
     fixed = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in settings}
     unused = "points" if mode == "image" else "pixels"
     for name in only:

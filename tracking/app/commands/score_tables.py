@@ -60,7 +60,7 @@ class SequenceScores:
 
 
 def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> Any:
-    """Returns something rich can print."""
+    """Returns, for rich to print, a table for each family of scores with a known mean, and how all was compared."""
     from rich.console import Group
 
     detections = f"detections {printable(rows[0].given) or 'unknown (no run.json)'}"
@@ -137,7 +137,7 @@ def chance(count: int, what: str) -> str:
 
 
 def number(key: str, value: float, *, mean: bool = False) -> str:
-    """Returns a score as text."""
+    """Returns a score as text: three decimals, none for a count; a dash if it is unknown."""
     if not math.isfinite(value):
         return "–"
     return f"{value:.3f}" if CATALOGUE[key].unit != "count" else f"{value:.{int(mean)}f}"

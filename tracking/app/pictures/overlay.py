@@ -121,7 +121,7 @@ def _draw_panel(picture: Image | None, sequence: Sequence, index: int, panel: Pa
 
 
 def banner_words(sequence: Sequence, frame: Frame, panels: list[Panel]) -> str:
-    """Returns the banner's text."""
+    """Returns the banner's text: sequence, frame, time in s, and how many people or groups each layer has."""
     of = "" if sequence.length is None else f" of {sequence.length}"
     marks = {layer.name: layer.at(frame.index) for panel in panels for layer, _ in panel}
     count = "".join(f"   {name} {len(m.id)}{' groups' * m.whole_groups}" for name, m in marks.items())

@@ -100,7 +100,7 @@ def _fill(area: Image, picture: Image | None, interpolation: int = cv2.INTER_ARE
 
 
 def coloured_ids(ids: Ints) -> Image:
-    """Returns an (H, W, 3) BGR picture of ids (H, W)."""
+    """Returns a BGR picture of ids (H, W): people above 0, walls and pillars below 0 dark, ground 0 light."""
     out = np.full((*ids.shape, 3), FLOOR, np.uint8)
     out[ids < 0] = OBJECTS
     for identity in np.unique(ids[ids > 0]).tolist():

@@ -67,7 +67,7 @@ class PageRows:
 
 
 def rows_of_truth(truth: Truth) -> PageRows:
-    """Returns the truth's rows."""
+    """Returns the truth's rows: on the ground if positions are labelled, else centres of boxes in the image."""
     n = len(truth.frame)
     pos = truth.pos if truth.pos is not None else _centres(truth.box, n)
     angle = truth.heading if truth.heading is not None else _directions(truth.vel, n)
@@ -177,7 +177,7 @@ def encode_groups(rows: PageGroupRows, order: Ints, plane: str, scale: int) -> d
 
 
 def ellipses(extent: Array) -> Array:
-    """Returns (R, 3) of covariances (R, 2, 2)."""
+    """Returns (R, 3) of covariances (R, 2, 2): long and short standard deviation, direction of the long axis, rad."""
     known: Bools = np.asarray(np.isfinite(extent).all(axis=(1, 2)))
     values, vectors = np.linalg.eigh(np.where(known[:, None, None], extent, np.eye(2)))
     sigma = np.sqrt(np.maximum(values, 0.0))
