@@ -17,21 +17,21 @@ from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 
 import tracking
 from benchmarks.support.in_memory import people_in_view
 from benchmarks.support.options import PETS, add_data, add_seeds, new_parser
+from benchmarks.support.replaced_code import replaced_code
 from benchmarks.support.tables import head, row, signed
 from scenarios import load
 from sim import simulate
 from sim.io.pictures.background_sample import parse_choice
 from sim.io.source import open_source
 from sim.types import Array, Bools, Frame, Sequence
+from tracking.detect import foreground as pipeline_module
 from tracking.detect.background import Background
-from tracking.detect.background_settings import NEVER, BackgroundSettings
 from tracking.detect.foreground import Foreground, Segmented
 from tracking.run import track
 from tracking.stats import paired
@@ -40,7 +40,7 @@ FPS, SECONDS = 7, 30
 VIEW = ("tilt_deg=20", "image=[480,360]", "focal_px=600", "crop=true", "baseline=0")
 SIDE, STREETS = ("party", "queue", "mixed"), ("stop", "signal", "square")
 SAMPLES = "spread:50", "first:50", "first:100"
-TIMES = NEVER, BackgroundSettings().ghost_time
+SEARCHES = False, True
 RATES = 0.999, 0.9993, 0.9995, 0.9997, 0.9998
 WORKERS = 2
 
@@ -57,7 +57,7 @@ def main() -> None:
 
 def rows_of(title: str, jobs: Iterable[tuple[object, ...]], of: Callable[..., Array]) -> None:
     """Prints a row for each of SAMPLES; of(*job) returns HOTA, MOTA, pixels mended, and those of people, for each
-    sample and time (S, 2, 4)."""
+    sample, without and with the search (S, 2, 4)."""
     with ProcessPoolExecutor(WORKERS, get_context("spawn")) as pool:
         found = np.stack(list(pool.map(of, *zip(*jobs, strict=True))))
     head([title, "HOTA without", "HOTA", "added", "MOTA without", "MOTA", "added", "mended, px", "of people, px"])
@@ -80,7 +80,9 @@ def of_video(name: str, seed: int) -> Array:
     images = [frame.image for frame in video.frames()]
     samples = [np.stack([images[n - 1] for n in parse_choice(text).indices(len(images))]) for text in SAMPLES]
     people = partial(people_pixels, whole)
-    return np.array([[measure(with_sample(video, sample), {}, time, people) for time in TIMES] for sample in samples])
+    return np.array(
+        [[measure(with_sample(video, sample), {}, search, people) for search in SEARCHES] for sample in samples]
+    )
 
 
 def with_sample(video: Sequence, sample: Array) -> Sequence:
@@ -97,7 +99,7 @@ def of_pets(folder: Path, rate: float) -> Array:
     for sample in SAMPLES:
         sequence = open_source(folder, images=True, background=sample)[0]
         people = partial(labelled_pixels, sequence)
-        found.append([measure(sequence, {"detection_rate": rate}, time, people) for time in TIMES])
+        found.append([measure(sequence, {"detection_rate": rate}, search, people) for search in SEARCHES])
     return np.array(found)
 
 
@@ -110,9 +112,7 @@ def labelled_pixels(sequence: Sequence, index: int) -> Bools:
     return inside
 
 
-def measure(
-    video: Sequence, params: dict[str, object], ghost_time: float, people: Callable[[int], Bools]
-) -> list[float]:
+def measure(video: Sequence, params: dict[str, object], search: bool, people: Callable[[int], Bools]) -> list[float]:
     """Returns HOTA, MOTA, pixels mended, and pixels mended that were foreground and show a person.
 
     people(index): the pixels of people in frame `index`.
@@ -138,9 +138,9 @@ def measure(
             shown = frame.index
             yield frame
 
-    with mock.patch.object(Background, "mend", counted), mock.patch.object(Foreground, "adapt", watched):
-        given = {**params, "ghost_time": ghost_time}
-        run = track("blob", replace(video, frames=frames), params=given, detections="image")
+    changes = [(Background, "mend", counted), (Foreground, "adapt", watched)]
+    with replaced_code(changes if search else [*changes, (pipeline_module, "Ghosts", lambda *_: None)]):
+        run = track("blob", replace(video, frames=frames), params=params, detections="image")
     assert video.truth is not None
     scores = tracking.evaluate(video.truth, run, similarity="boxes")
     return [float(scores["HOTA"]), float(scores["MOTA"]), mended, of_people]

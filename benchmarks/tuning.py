@@ -8,7 +8,7 @@ search: on the suites of benchmarks/tuning_suites (or --suite), training seeds. 
 on test seeds, and on friends-meet or crossing, which share no scenario with the suites. An interrupted search continues
 when it is started again. --sensor: detections err as this profile says (`flockscope fit sensor`), with --half in every
 second scene; for trackers of boxes.
-real: first defaults (tracking/frozen), present defaults and the parameters that `search` found, on recordings: `blob`
+real: present defaults and the parameters that `search` found, on recordings: `blob`
 on PETS09-S2L1 (200 frames) and TUD-Campus from their det/det.txt; `group-pda` and the baseline grouping rule on
 seq_hotel and CAVIAR Meet_WalkTogether1 from labelled people. With several objectives the whole front is compared.
 Intervals are by moving blocks, of the differences from the present defaults.
@@ -138,12 +138,12 @@ def real(given: argparse.Namespace) -> None:
 
 
 def compared_configs(name: str, folder: Path) -> dict[str, Config]:
-    """Returns first defaults, present defaults and what the search found; of several objectives the whole front."""
+    """Returns present defaults and what the search found; of several objectives the whole front."""
     kind = LinkRule if name == "grouping" else find(name).config_class
     files = sorted(folder.glob(f"{name}.front-*.toml"), key=lambda path: (len(path.name), path))
     files = files or [folder / f"{name}.toml"]
     found = {path.stem.rpartition(".")[2] if len(files) > 1 else "tuned": kind.from_toml(path) for path in files}
-    return {"first": kind.frozen(), "present": kind(), **found}
+    return {"present": kind(), **found}
 
 
 def print_comparison(name: str, sequence: Sequence, mode: str, chosen: dict[str, Config]) -> None:

@@ -2,40 +2,38 @@
 
 A field is declared as `gate: float = param(0.99, (0.9, 0.9999), "probability", "share of ...")`. Parameters are
 seconds, metres and rates, never frame counts. The search space of `tune`, the action space of the environment and the
-table in the docs are read from the declarations. Sets of values with a name (first defaults, presets) are TOML files:
+table in the docs are read from the declarations. Presets are TOML files:
 tracking.parameter_files.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
+from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack, cast
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import closest
 from sim.io.files.numeric_text import read_number
-from tracking.parameter_files import file_of, first_defaults, preset_file, presets, read, toml_text
+from tracking.parameter_files import file_of, preset_file, presets, read, toml_text
 from tracking.user_code import tracker_failed, user_code
 
-Scale = Literal["linear", "log", "int", "categorical"]
-Value = float | int | str | bool
+Scale = Literal["linear", "log", "int", "categorical", "vector"]
+Value = float | int | str | bool | tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Param:
     """One declared parameter of a tracker.
 
-    name; default; unit and meaning: texts for the docs. scale: "linear", "log", "int" or "categorical". low, high:
-    range, both ends allowed; -inf and inf if scale is "categorical". choices: the allowed values if scale is
-    "categorical", else empty. online: it may change between two frames. tunable: searches may change it. before: its
-    value in the frozen first defaults if their file lacks it; None: not declared. sees: "pixels" or "points" if it has
-    an effect only with these, else "".
+    name; default; unit and meaning: texts for the docs. scale: "linear", "log", "int", "categorical", or "vector" for
+    as many numbers as the default has. low, high: range, both ends allowed; -inf and inf if scale is "categorical".
+    choices: the allowed values if scale is "categorical", else empty. online: it may change between two frames.
+    tunable: searches may change it. sees: "pixels" or "points" if it has an effect only with these, else "".
     """
 
     name: str
@@ -48,7 +46,6 @@ class Param:
     choices: tuple[Value, ...] = ()
     online: bool = True
     tunable: bool = True
-    before: Value | None = None
     sees: str = ""
 
     @property
@@ -63,10 +60,12 @@ class Param:
         if self.scale == "categorical":
             return "one of " + ", ".join(str(c) for c in self.choices)
         kind = "an integer" if self.scale == "int" else "a number"
+        kind = f"{len(self.default)} numbers" if isinstance(self.default, tuple) else kind
         return f"{kind} from {self.low:g} to {self.high:g}"
 
     def check(self, value: object, file: object = "") -> Value:
-        """Return the value as float, or as int if scale is "int" (3.0 is allowed); a choice is returned as it is.
+        """Return the value as float, as int if scale is "int" (3.0 is allowed), or as a tuple of floats if it is
+        "vector"; a choice is returned as it is.
 
         file: only for the error message, "" for none. Raises InputError if the value has a wrong type (a bool is no
         number), is out of range (both ends are inside), is nan, or is no choice of the same type.
@@ -74,6 +73,10 @@ class Param:
         if self.scale == "categorical":
             if any(type(value) is type(c) and value == c for c in self.choices):
                 return value  # type: ignore[return-value]
+        elif isinstance(self.default, tuple):
+            good = isinstance(value, tuple | list) and len(value) == len(self.default)
+            if good and all(is_number(v, self.low, self.high) for v in cast("tuple[float]", value)):
+                return tuple(map(float, cast("tuple[float]", value)))
         elif is_number(value, self.low, self.high):
             if self.scale != "int":
                 return float(value)
@@ -83,7 +86,8 @@ class Param:
         raise InputError(file=file, place=self.name, got=repr(value), expected=self.expected, remedy=remedy)
 
     def parse(self, text: str) -> Value:
-        """Return the value that `text` stands for: a choice, else a number, as int if scale is "int", else as float.
+        """Return the value that `text` stands for: a choice, else a number, as int if scale is "int", else as float;
+        if scale is "vector" numbers, separated by commas.
 
         True and False may be in lower case. Raises InputError if the text stands for no allowed value.
         """
@@ -91,6 +95,8 @@ class Param:
             if text == str(choice) or (isinstance(choice, bool) and text.lower() == str(choice).lower()):
                 return choice
         try:
+            if self.scale == "vector":
+                return self.check([read_number(part) for part in text.strip("[] ").split(",")])
             return self.check(read_number(text))
         except ValueError:
             return self.check(text)
@@ -100,14 +106,12 @@ class ParamUse(TypedDict, total=False):
     """Optional keywords of `param`: where and when the parameter is used.
 
     online: True (default) if it may change between two frames. tunable: True (default) if searches may change it.
-    before: for a parameter that is missing in the frozen first defaults, the value with which the tracker behaves as it
-    did then; None (default): not declared. sees: "pixels" or "points" if it has an effect only with these, and searches
-    over others leave it out; "" (default): it has an effect with both.
+    sees: "pixels" or "points" if it has an effect only with these, and searches over others leave it out; "" (default):
+    it has an effect with both.
     """
 
     online: bool
     tunable: bool
-    before: Value | None
     sees: Literal["", "pixels", "points"]
 
 
@@ -122,11 +126,13 @@ def param(
     """Return a dataclass field that declares a parameter with its default.
 
     values: (low, high), both allowed, or the choices if scale is "categorical". unit, meaning: texts for the docs.
-    scale: how a search moves: "linear" or "log" for numbers, "int" for whole numbers, "categorical" for choices. use:
-    keywords online, tunable, before, sees, described at ParamUse. The default itself is checked only when a config is
-    created. Raises ValueError if the `values` of a number are not two.
+    scale: how a search moves: "linear" or "log" for numbers, "int" for whole numbers, "categorical" for choices,
+    "vector" for a tuple of numbers, which no search moves. use: keywords online, tunable, sees, described at ParamUse.
+    The default itself is checked only when a config is created. Raises ValueError if a number has not two `values`.
     """
     categorical = scale == "categorical"
+    if scale == "vector":
+        use["tunable"] = False
     low, high = (float("-inf"), float("inf")) if categorical else values
     declared = Param("", default, unit, meaning, scale, low, high, values if categorical else (), **use)
     return dataclasses.field(default=default, metadata={"param": declared})
@@ -198,21 +204,6 @@ class Config:
         that are not allowed or contradict each other.
         """
         return cls.from_dict(read(path, cls.tracker), path)
-
-    @classmethod
-    def frozen(cls) -> Self:
-        """Return the first defaults of the tracker, from tracking/frozen/NAME.toml, against which tuning is judged.
-
-        NAME is the class's `tracker`. A parameter that the file lacks has its `before` if the class itself declares it,
-        and its default if it is inherited. Raises AssertionError if a lacking parameter that the class declares has no
-        `before`. Raises InputError if the file is missing or wrong.
-        """
-        path = first_defaults(cls.tracker)
-        first = read(path, cls.tracker)
-        own = inspect.get_annotations(cls)
-        later = {n: p.before if n in own else p.default for n, p in cls.params().items() if n not in first}
-        assert None not in later.values(), f"a parameter that {path.name} lacks declares what it was before: {later}"
-        return cls.from_dict(first | later, path)
 
     @classmethod
     def preset(cls, name: str) -> Self:

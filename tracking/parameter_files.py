@@ -1,7 +1,7 @@
 """Files of parameters: TOML with an optional `tracker = "name"` and a table [params], and the folders of named ones.
 
-tracking/frozen/TRACKER.toml has the first defaults of a tracker; tracking/presets/NAME/TRACKER.toml its preset NAME.
-This module reads and writes values as they stand; tracking.config checks them.
+tracking/presets/NAME/TRACKER.toml is the preset NAME of a tracker. This module reads and writes values as they stand;
+tracking.config checks them.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from pathlib import Path
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import parse, toml_value
 
-FROZEN = Path(__file__).parent / "frozen"
-"""Folder of the first defaults of each tracker, TRACKER.toml."""
 PRESETS = Path(__file__).parent / "presets"
 """Folder with a folder for each preset, which holds TRACKER.toml."""
 
@@ -41,11 +39,6 @@ def toml_text(tracker: str, values: Mapping[str, object]) -> str:
     """Return the text of a TOML file that `read` reads: the tracker's name and all values, in their order."""
     lines = [f"{name} = {toml_value(value)}" for name, value in values.items()]
     return "\n".join([f"tracker = {toml_value(tracker)}", "", "[params]", *lines, ""])
-
-
-def first_defaults(tracker: str) -> Path:
-    """Return the path of the file of a tracker's first defaults; it may be missing."""
-    return FROZEN / f"{tracker}.toml"
 
 
 def presets(tracker: str) -> tuple[str, ...]:

@@ -6,8 +6,7 @@ after a warm-up, its input read before; the best round counts.
 train, test: scenes with occlusion (synthetic.walk), of the seeds on which defaults were chosen and of others on which
 nothing was. generated: the catalogue with its own sensor, test seeds; `blob` gets the camera. Printed: means over all
 scenes of HOTA, DetA, AssA, MOTA, IDSW, FP, FN, IDF1, and blob's HOTA minus that of each tracker, paired over scenes,
-with 95 % intervals. `blob, paper` is the preset `paper`, `blob, frozen` has the first
-defaults.
+with 95 % intervals. `blob, paper` is the preset `paper`.
 real: PETS09-S2L1-first200 and TUD-Campus with their det/det.txt; the intervals are by moving blocks of frames.
 """
 
@@ -44,7 +43,6 @@ VARIANTS = {
     "blob": {},
     "blob, nearest": {"association": "nearest"},
     "blob, paper": BlobConfig.preset("paper").as_dict(),
-    "blob, frozen": BlobConfig.frozen().as_dict(),
 }
 Answer = list[tuple[np.ndarray, np.ndarray]]
 """Per frame ids (N,) and boxes (N, 4) left, top, width, height, px."""
@@ -125,7 +123,7 @@ def track_peer(python: str, name: str, det: Path, frames: int) -> tuple[Answer, 
 
 
 def all_answers(python: str, folder: Path, sequence: Recording) -> dict[str, Answer]:
-    """Returns the answers of blob (defaults, the paper's association, its preset, first defaults) and of the peers."""
+    """Returns the answers of blob (defaults, the paper's association, its preset) and of the peers."""
     det = folder / "det.txt"
     write_mot(sequence, det)
     answers = {name: track_blob(sequence, params)[0] for name, params in VARIANTS.items()}

@@ -46,7 +46,6 @@ def options(count: int) -> None:
         print(f"{title}: defaults " + "  ".join(f"{k} {v.mean():.3f}" for k, v in base.items()))
         tried = {str(change): change for change in CHANGES} | {
             "preset paper": BlobConfig.preset("paper").as_dict(),
-            "frozen": BlobConfig.frozen().as_dict(),
         }
         for name, change in tried.items():
             cells = []

@@ -31,7 +31,6 @@ ABLATIONS: dict[str, dict[str, object]] = {
     "blob": {},
     "no splitting, no person size": {"split": False},
     "nearest": {"association": "nearest"},
-    "axes hardly expected (5 m)": {"person_noise": 5.0},
     "preset `paper`": dict(BlobConfig.preset("paper").as_dict()),
 }
 SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))

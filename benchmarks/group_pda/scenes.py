@@ -25,12 +25,8 @@ SCENES = ("merge", "split", "cross", "queue", "side-by-side")
 ABLATED = ("merge", "split", "cross", "cross-same-speed", "pass-by", "queue", "party")
 SUITES = ("standard", "friends-meet")
 WITHOUT: Mapping[str, Mapping[str, object]] = {
-    "freeze": {"freeze": False},
-    "miss": {"miss": False},
-    "gate_correction": {"gate_correction": False},
-    'centroid_noise "people"': {"centroid_noise": "redrawn"},
-    "inherit_velocity": {"inherit_velocity": False},
-    "recapture": {"recapture": False},
+    "corrections": {"corrections": False},
+    "recapture": {"recapture_time": 0.0},
     "association by masses: the most probable group": {"association": "nearest"},
     "association by masses: all points": {"association": "all"},
     "association and group constraint": {"association": "none"},

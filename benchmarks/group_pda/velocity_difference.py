@@ -134,7 +134,7 @@ def difference(given: argparse.Namespace) -> Any:
     variants = (
         Variant("defaults", ours),
         Variant("preset paper", ours, GroupPdaConfig.preset("paper").as_dict()),
-        Variant("freeze=false", ours, {"freeze": False}),
+        Variant("corrections=false", ours, {"corrections": False}),
         Variant('association="none"', ours, {"association": "none"}),
     )
     inputs: dict[str, tuple[DetectionMode, range]] = {

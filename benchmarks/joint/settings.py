@@ -1,4 +1,4 @@
-"""Scores on friends-meet with other parameters: departures, the Dirichlet process, numbers of particles."""
+"""Scores on friends-meet with other parameters: departures, numbers of particles."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.joint.runs import (
     OTHERS,
     SHARES,
+    Row,
     Variant,
     difference,
     mean_row,
@@ -27,9 +28,9 @@ from tracking.papers.joint.people import People
 COUNTS = (10, 25, 50, 100)
 DEPARTURES = (
     "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
-    "size_std=1.5", "size_std=50", "lag=0.1", "normaliser=sampled",
-    "weights=joint", "proposal=detection", "alpha=0", "alpha=0.5", "size_prior=all size_std=1.5",
-    "estimate=histogram", "validity=bayesian", "validity=bayesian evidence_rate=20", "partition_dynamics=dirichlet",
+    "size_std=1.5", "size_std=50", "lag=0.1",
+    "algorithm=paper", "alpha=0", "alpha=0.5", "algorithm=paper size_std=1.5",
+    "estimate=histogram",
 )  # fmt: skip
 """Settings of the mode ablation."""
 
@@ -54,7 +55,8 @@ RULES: Mapping[str, tuple[object, str, object]] = {
 def ablation(given: argparse.Namespace) -> None:
     """Prints a table: rows are settings and `RULES` switched off, columns scores pooled over frames and paired
     differences to the defaults."""
-    made, base = list(sequences(given.seeds, given.suite or "friends-meet")), []
+    made = list(sequences(given.seeds, given.suite or "friends-meet"))
+    base: list[Row] = []
     deltas = {"GDSR": "group_GDSR", "MOTA": "group_MOTA", "event F1": "event_F1", "false events": "false"}
     shown = "event F1", "of the least person"
     tables.head(["setting", *(f"{name}, %" for name in SHARES), *shown, *(f"Δ {name}" for name in deltas)])

@@ -21,10 +21,10 @@ from tracking.papers.relational import sensor_kernels, transition_kernels
 
 DEPARTURES = (
     "relation_evidence=state", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0",
-    "relation_bias=40 newcomer_share=0", "newcomer_share=0", "weights=joint", "NO_FACTORS",
-    "PAIR_BY_PAIR", "kernel_width=0", "body_radius=0", "outlier_share=0", "body_radius=0 outlier_share=0",
-    "hidden_time=0.3", "noise_scale=1", "resample_share=1", "resampling=systematic", "least_existence=0",
-    "birth_doubt=0.9", "clutter_density=0.02",
+    "relation_bias=40", "weights=joint", "NO_FACTORS",
+    "PAIR_BY_PAIR", "outlier_share=0",
+    "hidden_time=0.3", "noise_scale=1", "least_existence=0",
+    "clutter_density=0.02",
 )  # fmt: skip
 """Settings of the ablation beside the defaults. With relation_bias 40 partners count fully. Capitals: of SWITCHES."""
 

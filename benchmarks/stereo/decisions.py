@@ -21,7 +21,7 @@ from benchmarks.support.tables import signed, table
 from sim.scene.stereo import back_project, project_pair
 from sim.types import Array
 from tracking.detect.features import SpacePoints
-from tracking.papers.stereo import measurement, merging, space_group, tracker
+from tracking.papers.stereo import measurement, merging, picture_points, space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.measurement import PairMeasurement
 from tracking.stats import mean_interval
@@ -31,14 +31,12 @@ ABLATIONS: Mapping[str, Mapping[str, object]] = {
     "density_width": {"density_width": 20.0},
     "point_covariance": {"point_covariance": False},
     "velocity_weight": {"velocity_weight": 0.0},
-    "back_check": {"back_check": 5.0},
     "spread_weight": {"spread_weight": 0.1},
     "split": {"split": False},
     "split_time": {"split_time": 0.0},
     "confirm_time": {"confirm_time": 0.0},
     "centroid_noise": {"centroid_noise": 0.005},
     "coast_time": {"coast_time": 10.0, "report_coast": 5.0},
-    "person or not": {"least_height": 0.0, "least_width": 0.0, "most_height": 10.0},
 }
 
 
@@ -55,10 +53,7 @@ def _measured_places(offset: Array, cov: Array, spread: Array) -> Array:
     return offset
 
 
-LIGHT: Mapping[str, Mapping[str, object]] = {
-    "gain": {"gain": "none"},
-    "gain and most_foreground": {"gain": "none", "most_foreground": 1.0},
-}
+LIGHT: Mapping[str, Mapping[str, object]] = {"adaptive background": {"background": "trained"}}
 
 
 def _largest_part(n: Array, P: Array) -> Array:
@@ -71,6 +66,7 @@ RULES: Mapping[str, tuple[object, str, object]] = {
     "settled": (merging, "SETTLED", 0.0),
     "P of a mean": (merging, "covariance_of_mean", _largest_part),
     "least density": (measurement, "LEAST_DENSITY", 0.0),
+    "person or not": (picture_points, "PERSON", (0.0, 10.0, 0.0)),
     "half a footprint": (tracker, "FEATURE_OUTLINE", 1.0),
 }
 """Owner, name and replacement by the name of the row."""

@@ -21,11 +21,10 @@ from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.picture_points import PicturePoints, moved_away, stereo_camera
 
 TRACKING = frozenset({
-    "gate", "position_weight", "velocity_weight", "point_covariance",
-    "person_spread", "velocity_spread", "spread_weight", "spread_time", "accel_noise", "centroid_noise",
-    "density_width", "radius", "point_radius", "point_noise", "least_group",
-    "least_features", "merge_gate", "split", "split_time", "confirm_time", "coast_time",
-    "report_coast", "surface_offset",
+    "gate", "velocity_weight", "point_covariance",
+    "person_spread", "spread_weight", "spread_time", "accel_noise", "centroid_noise",
+    "density_width", "radius", "point_radius", "point_noise", "merge_gate", "split", "split_time", "confirm_time",
+    "coast_time", "report_coast", "surface_offset",
 })  # fmt: skip
 """Parameters that change no points, or move finished points."""
 

@@ -1,4 +1,4 @@
-"""Configs: declared once, parsed strictly, derived everywhere; the frozen first defaults still load."""
+"""Configs: declared once, parsed strictly, derived everywhere."""
 
 from __future__ import annotations
 
@@ -94,28 +94,6 @@ def test_table_has_every_parameter():
     assert all(p.meaning and p.default == getattr(BlobConfig(), p.name) for p in BlobConfig.params().values())
 
 
-def test_frozen_first_defaults_still_load():
-    frozen = BlobConfig.frozen()
-    assert frozen.association == "nearest"
-    assert (frozen.gate, frozen.coast_time, frozen.report_coast) == (0.99, 1.0, 0.3)
-    assert (frozen.report_hidden, frozen.report_credit) == (0.0, 1.0)
-    frozen.dynamics(25.0)
-
-
-def test_a_parameter_younger_than_the_frozen_file_says_what_was_before(tmp_path, monkeypatch):
-    monkeypatch.setattr("tracking.parameter_files.FROZEN", tmp_path)
-    (tmp_path / "small.toml").write_text('[params]\ncount = 5\nkind = "b"\non = false\n')
-
-    @dataclasses.dataclass(frozen=True)
-    class Later(Small):
-        rate: float = param(1.0, (0.1, 10.0), "1/s", "a rate", "log", before=0.2)
-
-    assert Later.frozen() == Later(0.2, 5, "b", False)
-    assert Later.from_toml(tmp_path / "small.toml").rate == 1.0
-    with pytest.raises(AssertionError, match="rate"):
-        Small.frozen()
-
-
 WITH_PRESETS = [find(name).config_class for name in names()]
 
 
@@ -160,3 +138,18 @@ def test_the_table_shows_what_a_preset_changes():
     cells = {row[1].strip(): row[3].strip() for row in rows[2:]}
     assert (cells["`association`"], cells["`gate`"]) == ("nearest", "")
     assert Small.table().startswith("| parameter | default | range |")
+
+
+def test_a_vector_has_as_many_numbers_as_its_default():
+    @dataclasses.dataclass(frozen=True)
+    class Rows(Config):
+        rows: tuple[float, ...] = param((0.1, 0.5), (0.0, 1.0), "", "by row", "vector")
+
+    assert Rows.from_dict({"rows": [1, 0.25]}).rows == (1.0, 0.25)
+    assert Rows().with_set("rows=[0.2, 0.3]") == Rows().with_set("rows=0.2,0.3") == Rows((0.2, 0.3))
+    assert not Rows.space()
+    for wrong in ([0.1], [0.1, 0.2, 0.3], [0.1, 1.5], [0.1, "a"], 0.1, "ab"):
+        with pytest.raises(InputError, match=r"2 numbers from 0 to 1"):
+            Rows.from_dict({"rows": wrong})
+    with pytest.raises(InputError, match=r"2 numbers from 0 to 1"):
+        Rows().with_set("rows=0.2")

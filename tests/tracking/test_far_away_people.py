@@ -19,7 +19,6 @@ FPS, FRAMES = 10.0, 45
 CAMERA = Camera("pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([0.0, -10.0, 3.0]), np.eye(3))
 TRACKERS = {
     "particle": lambda: Particle(ParticleConfig(particles=150)),
-    "systematic": lambda: Particle(ParticleConfig(particles=150, resampling="systematic", resample_share=1.0)),
     "relational": lambda: Relational(RelationalConfig(particles=150)),
     "state": lambda: Relational(RelationalConfig(particles=150, relation_evidence="state")),
     "stereo": lambda: Stereo(),

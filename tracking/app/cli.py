@@ -160,7 +160,7 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
 @fit.command("joint")
 @options_from(FitJointOptions)
 def fit_joint(options: FitJointOptions) -> CommandResult:
-    """Learn the groups of the tracker joint from simulated truth: their merges and splits, or their components."""
+    """Learn the merges and splits of the tracker joint from simulated truth."""
     from tracking.app.commands.fit import fit_joint
 
     return fit_joint(options)

@@ -364,10 +364,6 @@ class FitJointOptions:
     out: Annotated[
         Path, typer.Option("--out", metavar="FILE.toml", help="File to write: parameters of joint, for --params.")
     ]
-    learn: Annotated[
-        Literal["events", "components"],
-        typer.Option(help="events: the classifier of merges and splits; components: the Dirichlet process mixture."),
-    ] = "events"
     seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds of the scenes to fit to.")] = "30000:30002"
     check: Annotated[str | None, typer.Option("--check", metavar="A:B", help="Other seeds, to score the fit with.")] = (
         None

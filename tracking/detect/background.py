@@ -8,13 +8,13 @@ Both are divided by their RMS over the training sample, so that one threshold se
 Classes, tested in the order of Gonzalez et al., sec. 3.2:
     1. CD / b above its threshold: foreground
     2. (alpha - 1) / a below the lower threshold and alpha below `dark`: dark foreground
-    3. (alpha - 1) / a above the upper threshold: highlight; foreground if alpha is above `bright` (ours)
+    3. (alpha - 1) / a above the upper threshold: highlight; foreground if alpha is above BRIGHT (ours)
     4. (alpha - 1) / a below the lower threshold: shadow
     5. otherwise: background
 Eqs 5, 6, 9, 10 are in background_kernels, eqs 3, 4, 7, 8 in background_training_kernels.
 
 Departures (ours; all of them: docs/reference/foreground.md). `dark` is a limit of alpha instead of a normalised
-threshold, and a pixel within the noise is never dark foreground. `bright` is a limit of alpha, too. The model adapts,
+threshold, and a pixel within the noise is never dark foreground. BRIGHT is a limit of alpha, too. The model adapts,
 and follows the gain of each frame. If all frames of the sample are grey (R = G = B), chromaticity is not available:
 every pixel beyond the brightness thresholds is foreground, dark foreground if it is darker.
 """
@@ -35,7 +35,7 @@ from tracking.detect.background_kernels import FOREGROUND as FOREGROUND
 from tracking.detect.background_kernels import HIGHLIGHT as HIGHLIGHT
 from tracking.detect.background_kernels import SHADOW as SHADOW
 from tracking.detect.background_kernels import Floats
-from tracking.detect.background_settings import BackgroundSettings
+from tracking.detect.background_settings import BRIGHT, FOREGROUND_SLOWER, BackgroundSettings
 from tracking.detect.background_training import FLOOR, check_frame, thresholds, train
 
 INTERLEAVE = 4
@@ -69,7 +69,7 @@ class Background:
         """
         self.settings = settings or BackgroundSettings()
         self.fps = fps
-        trained = train(sample, self.settings.detection_rate, self.settings.gain == "global")
+        trained = train(sample, self.settings.detection_rate, self.settings.adaptive)
         self.mean: Floats = np.ascontiguousarray(np.moveaxis(trained.mean, -1, 0))
         self.var: Floats = np.ascontiguousarray(np.moveaxis(np.square(trained.sigma), -1, 0))
         self.valid = trained.valid
@@ -85,24 +85,21 @@ class Background:
     def follow(self, settings: BackgroundSettings) -> None:
         """Replace the settings: thresholds and limits of brightness are computed anew, mean, variance and gain stay as
         learned.
-
-        A new `gain` setting holds for the frames to come; it does not change how the model was trained.
         """
         self.settings = settings
         self.thresholds = thresholds(self._counts, settings.detection_rate)
-        self.bounds = (1.0, 1.0) if self._grey else (settings.dark, settings.bright)
+        self.bounds = (1.0, 1.0) if self._grey else (settings.dark, BRIGHT if settings.adaptive else math.inf)
 
     def classify(self, image: Image) -> Image:
         """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8.
 
         The classes: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. A pixel whose `valid`
-        is False is always BACKGROUND. With the setting gain = "global" the model's `gain` is first estimated from this
-        frame and kept; else it stays as it was, 1 at first. Mean and variance do not change.
+        is False is always BACKGROUND. An adaptive model estimates its `gain` first; mean and variance do not change.
 
         Raises InputError if the frame's size or dtype is not the sample's.
         """
         check_frame(image, self.valid.shape)
-        if self.settings.gain == "global":
+        if self.settings.adaptive:
             self.gain = self._estimate_gain(image)
         limits = np.array([*self.thresholds, *self.bounds], np.float32)
         classes = np.empty(self.valid.shape, np.uint8)
@@ -116,19 +113,19 @@ class Background:
         """Change the model's mean and variance in place towards a frame (H, W, 3) BGR uint8.
 
         classes (H, W): the result of the last `classify`, which must have been of this frame, as it set the gain.
-        BACKGROUND pixels move with the time constant background_time (s), all others with foreground_time (s; mean
-        only). The mean stays at 1 or above, the variance at 4 squared grey levels or above. A colour channel at 255
-        does not count where the model expects 255 or more. Pixels where `protected` (H, W) is True do not change; None
-        protects no pixel. Each call changes every fourth row only; four calls change all rows.
+        BACKGROUND pixels move with the time constant background_time (s), the mean of all others FOREGROUND_SLOWER
+        times as slowly. The mean stays at 1 or above, the variance at 4 squared grey levels or above. A colour channel
+        at 255 does not count where the model expects 255 or more. Pixels where `protected` (H, W) is True do not
+        change. Each call changes every fourth row only. A model that is not adaptive does not change.
 
         Raises InputError if the frame's size or dtype is not the sample's.
         """
         check_frame(image, self.valid.shape)
         keep = np.zeros(self.valid.shape, bool) if protected is None else protected
-        fast, slow = (
-            1 - math.exp(-INTERLEAVE / (self.fps * time))
-            for time in (self.settings.background_time, self.settings.foreground_time)
-        )
+        if not self.settings.adaptive:
+            return
+        time = self.settings.background_time
+        fast, slow = (1 - math.exp(-INTERLEAVE / (self.fps * t)) for t in (time, FOREGROUND_SLOWER * time))
         first, self._first_row = self._first_row, (self._first_row + 1) % INTERLEAVE
         kernels.adapt(image, classes, keep, self.mean, self.var, self.gain, first, INTERLEAVE, fast, slow, FLOOR**2)
 
@@ -148,13 +145,6 @@ class Background:
         self.valid[where] = True
 
     def _estimate_gain(self, image: Image) -> Floats:
-        """Returns the brightness factor (3,) of a frame (H, W, 3) uint8 relative to the model's mean, one per colour
-        channel.
-
-        It is estimated on a grid of pixels that were not foreground in the last classified frame. If no channel has 50
-        usable ones (neither near black nor clipped), all valid pixels of the grid are tried. If no channel has 50 of
-        these, the last gain is returned. The model does not change.
-        """
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
         mean = self.mean[:, *self._grid]
         found = brightness_gain.gain(seen, mean, self._grid_background)
@@ -164,9 +154,6 @@ class Background:
 
 
 def fused_foreground(classes: Image) -> Bools:
-    """Returns True where the class is FOREGROUND or DARK (dark foreground), False for the others (Gonzalez et al.,
-    sec. 3.3).
-
-    classes: pixel classes from `classify`, any shape; the result has the same shape.
-    """
+    """Returns True where the class is FOREGROUND or DARK (dark foreground), False for the others (Gonzalez et al., sec.
+    3.3)."""
     return np.asarray((classes == FOREGROUND) | (classes == DARK))

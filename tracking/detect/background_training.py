@@ -72,15 +72,7 @@ class Trained:
 
 
 def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
-    """Returns the background model of a sample of frames (K, H, W, 3) BGR uint8.
-
-    rate: the detection rate, the share of background pixels that each threshold leaves background, between 0 and 1; 0
-    or 1 raises statistics.StatisticsError. follow_gain: if True, each frame is first divided by its brightness factor
-    relative to the median frame.
-
-    Raises InputError if the sample has a wrong shape or dtype, has fewer than LEAST_FRAMES = 10 frames, or if fewer
-    than half of its pixels show a background.
-    """
+    """Returns the background model of a sample of frames (K, H, W, 3) BGR uint8."""
     check(sample)
     gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3), np.float32)
     size = sample.shape[1:3]
@@ -116,10 +108,7 @@ def check(sample: Image) -> None:
 
 
 def check_frame(image: Image, size: tuple[int, ...]) -> None:
-    """Raises InputError unless a frame is a uint8 array of shape (H, W, 3).
-
-    size: (H, W), px, of the background sample, which the frame must have.
-    """
+    """Raises InputError unless a frame is a uint8 array of shape (H, W, 3)."""
     if image.dtype != np.uint8 or image.shape != (*size, 3):
         raise InputError(
             place="frame",
@@ -131,17 +120,7 @@ def check_frame(image: Image, size: tuple[int, ...]) -> None:
 
 def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:
     """Returns 3 thresholds at a detection rate: of CD / b, lower of (alpha - 1) / a (below 0), upper of (alpha - 1) /
-    a.
-
-    CD / b: normalised chromaticity distortion; (alpha - 1) / a: normalised brightness, 0 where as bright as the model.
-    counts (2, BINS = 4000): histograms over [-SPAN, SPAN], SPAN = 20, of brightness (row 0) and chromaticity distortion
-    (row 1). rate: share of the histogram, between 0 and 1, that each threshold leaves background; 0 or 1 raises
-    statistics.StatisticsError.
-
-    No threshold is nearer to the background than that of Gaussian noise with unit RMS, as a still sample has no tails.
-    An empty histogram gives just these Gaussian thresholds. The brightness of such noise is normal, and its CD has P(CD
-    > t) = exp(-t^2) (chi2 of 2 degrees over its mean 2).
-    """
+    a."""
     edges = np.linspace(-SPAN, SPAN, BINS + 1)
     shares = [np.concatenate([[0], np.cumsum(c)]) / max(c.sum(), 1) for c in counts]
     low, high, most = (

@@ -52,11 +52,8 @@ class Blobs(Frozen):
         return len(self.area)
 
     def contour(self, row: int) -> Array:
-        """Returns the outer contour of blob `row` (from 0), (V, 2) x, y in px, through the centres of its edge pixels.
-
-        Points on straight runs are left out; a blob of one pixel has V = 1. Raises IndexError if `row` is the number of
-        blobs or more.
-        """
+        """Returns the outer contour of blob `row` (from 0), (V, 2) x, y in px, through the centres of its edge
+        pixels."""
         left, top, wide, high = self.box[row].astype(int)
         part = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
         outlines, _ = cv2.findContours(part, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
@@ -65,11 +62,7 @@ class Blobs(Frozen):
 
     def hull(self, row: int) -> Array:
         """Returns the convex hull of the contour of blob `row` (from 0), (V, 2) x, y in px, counter-clockwise where y
-        is up.
-
-        It goes through pixel centres, so a blob of one pixel has V = 1. Raises IndexError if `row` is the number of
-        blobs or more.
-        """
+        is up."""
         return np.asarray(cv2.convexHull(self.contour(row).astype(np.float32), clockwise=False), float).reshape(-1, 2)
 
     def cut(self) -> Bools:
@@ -82,13 +75,7 @@ class Blobs(Frozen):
 
 def clean(foreground: Bools, px_per_m: float) -> Bools:
     """Returns a foreground mask (H, W) bool after majority, opening and closing, in this order; the argument is not
-    changed (sec. 3.3).
-
-    Majority: a pixel is foreground if more than half of a square window round it is. Opening removes narrow parts,
-    closing fills narrow gaps. px_per_m: scale of the image, px per m. The windows are 0.08, 0.05 and 0.15 m wide,
-    rounded to an odd number of px, at least 3, 1 and 3. So up to 40 px per m there is no opening. Raises ValueError if
-    the scale is nan.
-    """
+    changed (sec. 3.3)."""
     mask: NDArray[Any] = foreground.astype(np.uint8)
     size = odd(MAJORITY_M * px_per_m, 3)
     mask = (cv2.boxFilter(mask, cv2.CV_16U, (size, size), normalize=False) > size * size // 2).astype(np.uint8)
@@ -98,31 +85,20 @@ def clean(foreground: Bools, px_per_m: float) -> Bools:
 
 
 def odd(size: float, least: int) -> int:
-    """Returns the odd whole number nearest to `size` (px), but at least `least` (an odd number of px).
-
-    Of two equally near ones it is the one that is 1 above a multiple of 4: 4 gives 5, 6 gives 5. Raises ValueError if
-    `size` is nan.
-    """
+    """Returns the odd whole number nearest to `size` (px), but at least `least` (an odd number of px)."""
     return max(least, 2 * round((size - 1) / 2) + 1)
 
 
 @cache
 def disc(size: int) -> Image:
-    """Returns a disc of diameter `size` px (odd) as an array (size, size) uint8: 1 inside, 0 outside.
-
-    It is a structuring element; OpenCV's own ellipse is not symmetric. The array is cached, so do not change it.
-    """
+    """Returns a disc of diameter `size` px (odd) as an array (size, size) uint8: 1 inside, 0 outside."""
     v, u = np.mgrid[:size, :size] - (size - 1) / 2
     return np.asarray(np.hypot(u, v) <= size / 2, np.uint8)
 
 
 def find(mask: Bools, min_area: float) -> Blobs:
     """Returns the connected regions (8 neighbours) of a foreground mask (H, W) bool that have at least `min_area`
-    pixels.
-
-    The result is a `Blobs` with a row per region, the largest first; regions of equal size are in raster order of their
-    first pixels. A min_area below 1 counts as 1. Without such a region the result has 0 rows.
-    """
+    pixels."""
     runs = kernels.runs(mask)
     region, count = kernels.connect(runs)
     area, corners = kernels.extents(runs, region, count)
@@ -140,23 +116,13 @@ def find(mask: Bools, min_area: float) -> Blobs:
 
 
 def _moments(centre: Array, spread: Array) -> tuple[Array, Array]:
-    """Returns centres (M, 2) x, y in px, and covariances (M, 2, 2) in px^2, of M regions made of unit-square pixels.
-
-    centre (M, 2): mean column and row index. spread (M, 3): variance of the column indices, covariance, variance of the
-    row indices. A pixel's centre is its index + 0.5; 1/12 is added to both variances.
-    """
     xx, xy, yy = spread.T
     return centre + 0.5, np.stack([xx + 1 / 12, xy, xy, yy + 1 / 12], axis=-1).reshape(-1, 2, 2)
 
 
 def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:
     """Returns the ellipses (M, 5) of M regions: centre x, y, full axes h >= w (px), theta (rad); and theta's variance
-    (M,).
-
-    n (M,): number of pixels; centre (M, 2): x, y, px; cov (M, 2, 2): covariance of the pixels, px^2 (sec. 3.3). theta
-    is the direction of h from the abscissa, v down, from -pi/2 to pi/2. Its variance, rad^2, is inf where both axes are
-    equal.
-    """
+    (M,)."""
     half, differ = (cov[:, 0, 0] + cov[:, 1, 1]) / 2, (cov[:, 0, 0] - cov[:, 1, 1]) / 2
     root = np.hypot(differ, cov[:, 0, 1])
     major, minor = half + root, np.maximum(half - root, 0.0)

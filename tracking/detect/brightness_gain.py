@@ -20,24 +20,15 @@ FEWEST = 50
 
 
 def grid(high: int, wide: int) -> tuple[slice, slice]:
-    """Returns two slices, of rows and of columns, that select a regular grid of pixels from an image of high x wide px.
-
-    In a large image the grid has about POINTS = 6000 pixels or somewhat more. An image of fewer than 24,000 pixels is
-    taken whole.
-    """
+    """Returns two slices, of rows and of columns, that select a regular grid of pixels from an image of high x wide
+    px."""
     step = max(1, int(np.sqrt(high * wide / POINTS)))
     return slice(step // 2, None, step), slice(step // 2, None, step)
 
 
 def gain(image: Floats, mean: Floats, where: Bools) -> Floats | None:
     """Returns a frame's brightness factor in each colour channel, (3,) float32, or None if no channel has enough
-    pixels.
-
-    image, mean (3, h, w): grey levels of the frame and of the background model on a grid. where (h, w) bool: the pixels
-    to use. A factor is the median of image / mean over usable pixels: mean above 16, and expected grey level (factor
-    times mean) between 16 and 235. A channel with fewer than FEWEST = 50 usable pixels, as blue under sodium lamps,
-    gets the mean factor of the other channels.
-    """
+    pixels."""
     found = [_one_channel(i[where], e[where]) for i, e in zip(image, mean, strict=True)]
     known = [factor for factor in found if factor is not None]
     if not known:
@@ -46,13 +37,6 @@ def gain(image: Floats, mean: Floats, where: Bools) -> Floats | None:
 
 
 def _one_channel(seen: Floats, mean: Floats) -> float | None:
-    """Returns the median of seen / mean over the usable pixels, None if these are fewer than FEWEST = 50.
-
-    seen, mean (N,): grey levels of one channel in the frame and in the background model. A pixel is usable if its mean
-    is above DARKEST = 16 and its expected grey level, factor * mean, lies between DARKEST and BRIGHTEST = 235. A first
-    pass, which chooses by the seen grey level, guesses the factor; alone it would be biased, as noise decides which
-    pixels pass.
-    """
     usable = (mean > DARKEST) & (seen > DARKEST) & (seen < BRIGHTEST)
     for _ in range(2):
         if np.count_nonzero(usable) < FEWEST:
@@ -63,7 +47,6 @@ def _one_channel(seen: Floats, mean: Floats) -> float | None:
 
 
 def _median(values: Floats) -> float:
-    """Returns the median of values (N,), equal to numpy's but four times as fast; N must be at least 1, without nan."""
     half = len(values) // 2
     middle = np.partition(values, half)
     above = middle[half]
@@ -72,12 +55,7 @@ def _median(values: Floats) -> float:
 
 def frame_gains(sample: Image) -> Floats:
     """Returns the gain of each frame of a sample (K, H, W, 3) uint8, (K, 3) float32: a brightness factor per colour
-    channel.
-
-    It is relative to the median frame, the median over time of each pixel. A channel with fewer than 50 usable pixels
-    (neither near black nor clipped) gets the mean factor of the other channels. If no channel has enough, all three
-    factors are 1.
-    """
+    channel."""
     rows, columns = grid(*sample.shape[1:3])
     values = np.moveaxis(sample[:, rows, columns], -1, 1).astype(np.float32)
     middle = np.median(values, axis=0)

@@ -29,11 +29,7 @@ ROUNDS = 5
 
 
 def divided(found: Blobs, people: Array, size: PersonSize) -> Array:
-    """Return the boxes (N, 4), left, top, width, height, px, of the people in the blobs of a frame.
-
-    people (K, 4): boxes of the tracked people, px; size: of a person at each place of the image. A blob where it is
-    unknown is one person.
-    """
+    """Return the boxes (N, 4), left, top, width, height, px, of the people in the blobs of a frame."""
     boxes = [np.zeros((0, 4))]
     centre = people[:, :2] + people[:, 2:] / 2
     foot = found.box[:, :2] + found.box[:, 2:] * np.array([0.5, 1.0])
@@ -51,10 +47,6 @@ def divided(found: Blobs, people: Array, size: PersonSize) -> Array:
 
 
 def _pieces(found: Blobs, row: int, known: Array, count: int, person: Array) -> Array:
-    """Returns the boxes (count or fewer, 4) of the pieces of a blob.
-
-    known (K, 2): centres of tracked people in it, px; person (2,): width and height of a person, px.
-    """
     left, top, width, height = found.box[row].astype(int).tolist()
     v, u = np.nonzero(found.label[top : top + height, left : left + width] == row + 1)
     pixels = (np.stack([u + left, v + top], axis=1) + 0.5) / person
@@ -77,6 +69,5 @@ def _pieces(found: Blobs, row: int, known: Array, count: int, person: Array) -> 
 
 
 def _nearest(points: Array, centres: Array) -> tuple[Array, Array]:
-    """Returns for each point (N, 2) the row of the nearest of the centres (K, 2), (N,), and the squared distance."""
     squared = np.square(points[:, None] - centres).sum(axis=2)
     return squared.argmin(axis=1), squared.min(axis=1)

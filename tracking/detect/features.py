@@ -105,11 +105,7 @@ class Features:
         self.uv, self.world, self.age = np.zeros((0, 2), np.float32), np.zeros((0, 2, 3)), np.zeros(0, np.int64)
 
     def step(self, grey: Image, mask: Bools, disparity: Disparities, rules: FeatureRules) -> SpacePoints:
-        """Follow the features into the next picture, find new ones, and return those that lived through the window.
-
-        grey (H, W) uint8: left picture. mask (H, W): where features may be, the foreground of people. disparity (H, W):
-        px, nan where unknown. A feature without disparity in this frame, or in half of the window, is not returned.
-        """
+        """Follow the features into the next picture, find new ones, and return those that lived through the window."""
         self._resize(max(round(rules.window_time * self.fps), 1) + 1)
         if self.grey is not None and len(self.uv):
             self._follow(self.grey, grey, mask, rules)
@@ -128,7 +124,6 @@ class Features:
         self._keep(np.zeros(len(self.uv), bool))
 
     def _resize(self, frames: int) -> None:
-        """Makes room for the points of `frames` frames: drops the oldest, or adds frames without points before them."""
         have = self.world.shape[1]
         if have > frames:
             self.world = self.world[:, have - frames :]
@@ -141,7 +136,6 @@ class Features:
         self.world, self.age = self.world[kept], self.age[kept]
 
     def _follow(self, before: Image, now: Image, mask: Bools, rules: FeatureRules) -> None:
-        """Moves the features from one picture to the next; drops those that are lost, or not in the mask any more."""
         start: Any = (self.uv - CENTRE)[:, None]
         follow: Any = partial(cv2.calcOpticalFlowPyrLK, winSize=WINDOW, maxLevel=LEVELS)
         found, there, _ = follow(before, now, start, None)
@@ -155,7 +149,6 @@ class Features:
         self._keep(good & mask[cell[:, 1], cell[:, 0]])
 
     def _thin(self, spacing: float) -> None:
-        """Keeps the oldest feature in each square cell of half the spacing (px) in width."""
         cell = np.floor(self.uv / max(spacing / 2, 1.0)).astype(np.int64)
         order = np.argsort(-self.age, kind="stable")
         _, first = np.unique(cell[order], axis=0, return_index=True)
@@ -164,7 +157,6 @@ class Features:
         self._keep(kept)
 
     def _find(self, grey: Image, mask: Bools, rules: FeatureRules) -> None:
-        """Adds corners in the mask that keep the spacing from the features."""
         room = rules.most - len(self.uv)
         if room <= 0:
             return
@@ -186,8 +178,6 @@ class Features:
         self.age = np.concatenate([self.age, np.zeros(len(new), np.int64)])
 
     def _measured(self, rules: FeatureRules) -> SpacePoints:
-        """Returns the points of the features that have lived through the time window, and have a disparity now and in
-        more than half of it."""
         frames = self.world.shape[1]
         known = np.isfinite(self.world[..., 0])
         old = (self.age >= frames) & known[:, -1] & (known.sum(1) > frames / 2)
@@ -200,11 +190,7 @@ class Features:
 
 def slopes(points: Array, known: Bools, times: Array) -> tuple[Array, Array, Array]:
     """Return the velocities (M, 3) of least squares of M points over K frames, sum (t - mean t)^2 (M,), s^2, and the
-    last time less mean t (M,), s.
-
-    points (M, K, 3): nan where not `known` (M, K); times (K,): s. The covariance of a slope is that of one point over
-    the sum. Each row needs two known points at least.
-    """
+    last time less mean t (M,), s."""
     mean = known @ times / np.maximum(known.sum(1), 1)
     t = np.where(known, times - mean[:, None], 0.0)
     spread = np.square(t).sum(1)

@@ -19,7 +19,7 @@ import numpy as np
 from sim.types import Array, Bools, Context, Image
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
-from tracking.detect.background_settings import NEVER, BackgroundSettings
+from tracking.detect.background_settings import GHOST_TIME, MOST_FOREGROUND, BackgroundSettings
 from tracking.detect.ghosts import Ghosts
 from tracking.detect.person_size import PersonSize
 
@@ -37,8 +37,7 @@ class Segmented:
 
     image (H, W, 3): the picture, BGR uint8. classes (H, W) uint8: class of each pixel: 0 BACKGROUND, 1 FOREGROUND, 2
     DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. mask (H, W) bool: the foreground (1 and 2) after cleaning. plausible:
-    False if a larger share of the mask is foreground than the limit most_foreground: then a light was switched or the
-    camera moved.
+    False if more of the mask is foreground than MOST_FOREGROUND: then a light was switched or the camera moved.
     """
 
     image: Image
@@ -50,28 +49,23 @@ class Segmented:
 class Foreground:
     """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
 
-    State: model, the background model; px_per_m, the scale of the image, nan or 0 while it is
-    unknown (first the context's; the tracker may set it later); most_foreground, the largest plausible share of
-    foreground, 0 to 1. The constructor raises InputError for an unusable background sample, AssertionError for none.
+    State: model, the background model; px_per_m, the scale of the image, nan or 0 while it is unknown (first the
+    context's; the tracker may set it later). Raises InputError for an unusable background sample, AssertionError for
+    none.
     """
 
-    def __init__(self, context: Context, settings: BackgroundSettings, most_foreground: float) -> None:
+    def __init__(self, context: Context, settings: BackgroundSettings) -> None:
         """Train the background model on the context's background sample, which must not be None (AssertionError).
-
-        settings: of the model. most_foreground: largest plausible share of foreground, 0 to 1.
 
         Raises InputError if the sample has a wrong shape or dtype, fewer than 10 frames or shows too little background.
         """
         assert context.background is not None
         self.px_per_m = context.px_per_m
-        self.most_foreground = most_foreground
         self.model = Background(context.background, context.fps, settings)
-        self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.ghost_time < NEVER else None
+        self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.adaptive else None
 
-    def follow(self, settings: BackgroundSettings, most_foreground: float) -> None:
-        """Replace the settings of the background model and most_foreground (share, 0 to 1); what the model learned
-        stays."""
-        self.most_foreground = most_foreground
+    def follow(self, settings: BackgroundSettings) -> None:
+        """Replace the settings of the background model; what the model learned stays."""
         self.model.follow(settings)
 
     @property
@@ -93,13 +87,12 @@ class Foreground:
         """Returns the pixel classes and the cleaned foreground mask of a picture (H, W, 3) BGR uint8 (secs. 3.2, 3.3).
 
         The background model does not learn from the picture; only its estimate of the picture's brightness changes.
-        `plausible` of the result is False if the share of foreground is above most_foreground.
-
         Raises InputError if the picture's size or dtype is not that of the background sample.
         """
         classes = self.model.classify(image)
         mask = blobs.clean(fused_foreground(classes), self.scale)
-        return Segmented(image, classes, mask, not np.count_nonzero(mask) / mask.size > self.most_foreground)
+        flooded = self.model.settings.adaptive and np.count_nonzero(mask) / mask.size > MOST_FOREGROUND
+        return Segmented(image, classes, mask, not flooded)
 
     def adapt(self, seen: Segmented, protected: Bools) -> None:
         """Let the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
@@ -112,7 +105,7 @@ class Foreground:
         if seen.plausible and self.ghosts is not None:
             model = self.model
             found = self.ghosts.find(
-                seen.image, model.gain, seen.mask, model.mean, model.settings.ghost_time, self.scale, self.least_area
+                seen.image, model.gain, seen.mask, model.mean, GHOST_TIME, self.scale, self.least_area
             )
             if found is not None:
                 model.mend(found, self.ghosts.colour)
@@ -139,11 +132,7 @@ class Foreground:
 
 
 def convex_areas(shape: tuple[int, ...], outlines: list[Array]) -> Bools:
-    """Returns an (H, W) bool mask, True inside and on the convex hull of each outline.
-
-    shape: (H, W). outlines: arrays (V, 2) x, y in px, V at least 1, no nan; coordinates are rounded to whole px, and
-    parts outside the image are cut off. No outlines: False everywhere.
-    """
+    """Returns an (H, W) bool mask, True inside and on the convex hull of each outline."""
     inside = np.zeros(shape, np.uint8)
     for outline in outlines:
         cv2.fillConvexPoly(inside, cv2.convexHull(np.rint(outline).astype(np.int32)), 1)

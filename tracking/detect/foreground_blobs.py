@@ -27,14 +27,11 @@ class ForegroundBlobs:
     learned, if it is zero or negative, or if the sample cannot be used.
     """
 
-    def __init__(
-        self, settings: BackgroundSettings, most_foreground: float, context: Context, divide: bool = False
-    ) -> None:
-        """Train the background model; most_foreground: largest plausible share of foreground, 0 to 1; divide: blobs of
-        several people are divided (tracking.detect.divided_blobs)."""
+    def __init__(self, settings: BackgroundSettings, context: Context, divide: bool = False) -> None:
+        """Train the background model; divide: blobs of several people are divided (tracking.detect.divided_blobs)."""
         assert context.background is not None
         self.settings = settings
-        self.foreground = Foreground(context, settings, most_foreground)
+        self.foreground = Foreground(context, settings)
         self.size: PersonSize | None = None
         if divide or np.isnan(context.px_per_m):
             size = PersonSize(context)
@@ -44,19 +41,14 @@ class ForegroundBlobs:
                 self.foreground.px_per_m = size.px_per_m
         self.scale = self.foreground.px_per_m = required(self.foreground.px_per_m)
 
-    def follow(self, settings: BackgroundSettings, most_foreground: float) -> None:
+    def follow(self, settings: BackgroundSettings) -> None:
         """Replace the settings of the background model; what the model learned and the scale stay."""
         self.settings = settings
-        self.foreground.follow(settings, most_foreground)
+        self.foreground.follow(settings)
 
     def detections(self, frame: Frame, people: Array) -> Detections | None:
-        """Return the blobs of the frame's picture as detections; None without a picture, or if more of it is foreground
-        than `most_foreground`.
-
-        people (N, 4): boxes of the tracked people, left, top, width, height, px. The background model learns from the
-        picture except inside them, so that people who stand still do not become background. Raises InputError if the
-        picture's size or dtype is not the background sample's.
-        """
+        """Return the blobs of the frame's picture as detections; None without a picture, or if too much of it is
+        foreground."""
         if frame.image is None:
             return None
         seen = self.foreground.segment(frame.image)

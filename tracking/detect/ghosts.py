@@ -60,11 +60,7 @@ class Ghosts:
     def find(
         self, image: Image, gain: Floats, mask: Bools, model: Floats, ghost_time: float, px_per_m: float, least: float
     ) -> Bools | None:
-        """Returns the pixels (H, W) of ghosts and of a band round them that are still, None if there is no ghost.
-
-        image (H, W, 3) uint8 and its gain (3,); mask (H, W): its foreground; model (3, H, W): the background model's
-        colours at gain 1. ghost_time: s. px_per_m: scale of the image. least: fewest pixels of a region.
-        """
+        """Returns the pixels (H, W) of ghosts and of a band round them that are still, None if there is no ghost."""
         self._frames += 1
         if self._frames % self._every:
             return None
@@ -86,11 +82,7 @@ class Ghosts:
 
 
 def has_left(region: Bools, mask: Bools, model: Floats, colour: Floats, band: int) -> bool:
-    """True if the model, and not the picture, has steps in colour at the edge of a region.
-
-    region, mask (H, W): the region, and all foreground; model, colour (3, H, W): colours of the model and of the
-    picture, grey levels at gain 1; band: px on both sides of the edge.
-    """
+    """True if the model, and not the picture, has steps in colour at the edge of a region."""
     edge = cv2.dilate(region.astype(np.uint8), blobs.disc(3)).astype(bool) & ~region
     border = edge & ~mask
     if np.count_nonzero(border) <= OPEN * np.count_nonzero(edge):
@@ -100,11 +92,7 @@ def has_left(region: Bools, mask: Bools, model: Floats, colour: Floats, band: in
 
 
 def steps(inside: Bools, outside: Bools, planes: Floats, band: int) -> Floats:
-    """Returns the difference (H, W) of mean colours inside and outside, in the channel where it is largest.
-
-    planes (3, H, W): colours. The means are over the window of 2 band + 1 px round each pixel; without pixels on one
-    side its mean is 0.
-    """
+    """Returns the difference (H, W) of mean colours inside and outside, in the channel where it is largest."""
     means = [_means(planes, where.astype(np.float32), band) for where in (inside, outside)]
     return np.asarray(np.max(np.abs(means[0] - means[1]), axis=0), np.float32)
 

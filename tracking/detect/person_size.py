@@ -90,35 +90,21 @@ class PersonSize:
 
     def at(self, foot: Array) -> Array:
         """Returns height and width (N, 2), px, of the box of a person who stands at image points `foot` (N, 2) u, v,
-        px.
-
-        nan where the size is unknown (without a camera before the first fit; where a pinhole camera sees no ground) or
-        its height is below 12 px (longer axis below 6 px from above). From above it is the box of a person turned by 45
-        degrees. Beyond the camera's table the size is that at its edge."""
+        px."""
         size = self._expected(foot)
         return np.sqrt(np.square(size).mean(1, keepdims=True) * np.ones(2)) if self.above else size
 
     def axes(self, foot: Array) -> Array:
-        """Returns height and width (N, 2), px, of the ellipse of a person who stands at `foot` (N, 2) u, v, px.
-
-        From above: the axes of the ellipse, the longer first. nan where the size is unknown (no camera and no fit yet,
-        or no ground there) or the height (from above the longer axis) of the box is below 12 px (6 px)."""
+        """Returns height and width (N, 2), px, of the ellipse of a person who stands at `foot` (N, 2) u, v, px."""
         return self._expected(foot) if self.above else self._expected(foot) / self.box_over_ellipse
 
     def _expected(self, foot: Array) -> Array:
-        """Returns the expected size (N, 2), px, of people at `foot` (N, 2) u, v: height, width (from above the longer
-        and shorter axis), with the learned factors. nan where it is unknown (no camera and no fit yet, or no ground
-        there) or smaller than 12 px high (6 px from above)."""
         size = self._unscaled(foot) * self.factor
         return np.where(size[:, :1] >= (SMALLEST_FROM_ABOVE if self.above else SMALLEST), size, np.nan)
 
     def one_person(self, box: Array, ellipse: Array) -> Bools:
         """Returns True for each blob (M,) that has the size of one person; False where a person's size is unknown or
-        too small (nan).
-
-        box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, full axes h, w (px), theta (rad). The box's
-        sides, from above the ellipse's axes, may be 0.8 (from above 0.6) to 1.25 times the expected height and 0.5 to
-        1.6 times the width."""
+        too small (nan)."""
         size = ellipse[:, 2:4] if self.above else box[:, :1:-1]
         with np.errstate(invalid="ignore"):
             tall, wide = (size / self._expected(_feet(box))).T
@@ -126,8 +112,6 @@ class PersonSize:
             return np.asarray((tall >= short) & (tall <= TALL) & (wide >= THIN) & (wide <= WIDE))
 
     def _unscaled(self, foot: Array) -> Array:
-        """Returns height and width (N, 2), px, from above the axes, of people at `foot` (N, 2) u, v by the camera or
-        the line, without the learned factors; nan before a fit, or where no ground is seen."""
         if self.axes_above is not None:
             return np.tile(self.axes_above, (len(foot), 1))
         if self.table is not None:
@@ -138,19 +122,11 @@ class PersonSize:
     @property
     def px_per_m(self) -> float:
         """Scale of the image, px per m: the median height of the remembered lone blobs (each may be one person) over
-        1.7 m.
-
-        nan without lone blobs. Heights include 1.3 px that cleaning cuts off. From above their longer axis is taken."""
+        1.7 m."""
         return float(np.median(self.lone[:, 2])) / PERSON_HEIGHT if len(self.lone) else float("nan")
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
-        """Change the size in place by the blobs of a picture that may be one person; the others are ignored.
-
-        box (M, 4): left, top, width, height, px; ellipse (M, 5): x, y, full axes h, w (px), theta (rad); whole (M,):
-        False for a blob that must not be used. A blob may be one person if it is at least 12 px high (from above 6 px
-        long) and its width over height is within a factor 2 of a person's; with a camera its height must be within a
-        factor 1.4 of the expected one, too. The last 400 are kept, with 1.3 px added to the height (not from above), as
-        cleaning cuts them off. Line and factors change only when 5 % of the kept ones are new."""
+        """Change the size in place by the blobs of a picture that may be one person; the others are ignored."""
         foot, size = _feet(box), ellipse[:, 2:4] if self.above else box[:, :1:-1]
         expected = np.divide(*self._unscaled(foot).T[::-1]) if self.from_camera else SLIM
         with np.errstate(invalid="ignore"):
@@ -173,10 +149,6 @@ class PersonSize:
             self._fit()
 
     def _plausible_height(self, foot: Array, size: Array) -> Bools:
-        """Returns True for each blob (M,) whose height is within the factor HEIGHT_FACTOR = 1.4 of the camera's; all
-        without a camera.
-
-        foot (M, 2): u, v, px; size (M, 2): height, width, px. False where the camera gives nan."""
         if not self.from_camera:
             return np.ones(len(size), bool)
         with np.errstate(invalid="ignore"):
@@ -184,10 +156,6 @@ class PersonSize:
         return np.asarray(off <= np.log(HEIGHT_FACTOR))
 
     def _fit(self) -> None:
-        """Compute line (without a camera), factors and `agreed` from the remembered lone blobs, at least one; in place.
-
-        A blob weighs more the higher it is, and less the more lone blobs were seen at its place. Factors are limited to
-        0.9 … 1.1 (height) and 0.6 … 1.25 (width)."""
         foot, height = self.lone[:, :2], self.lone[:, 2]
         typical = float(np.median(height))
         weight = height / typical / _crowding(foot / typical)
@@ -203,10 +171,7 @@ class PersonSize:
 
 
 def upright(place: Array, angle: Array) -> Array:
-    """Returns the bounding boxes (N, 4) of ellipses: centre x, y, height, width, in the unit of `place`.
-
-    place (N, 4): centre x, y and two full axes; angle (N,): direction of the first axis, rad, from the abscissa.
-    """
+    """Returns the bounding boxes (N, 4) of ellipses: centre x, y, height, width, in the unit of `place`."""
     box, c, s = place.copy(), np.square(np.cos(angle)), np.square(np.sin(angle))
     first, second = np.square(place[:, 2]), np.square(place[:, 3])
     box[:, 2], box[:, 3] = np.sqrt(first * s + second * c), np.sqrt(first * c + second * s)
@@ -214,17 +179,10 @@ def upright(place: Array, angle: Array) -> Array:
 
 
 def _feet(box: Array) -> Array:
-    """Returns the middle of the lower edge (M, 2) u, v, px, of boxes (M, 4): left, top, width, height, px."""
     return np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)
 
 
 def _densest(value: Array, weight: Array, least: float = 1.0) -> tuple[float, Bools]:
-    """Returns the weighted mean of the values that agree with the most popular one, and flags (N,) of these values.
-
-    value, weight (N,): ratios and their votes. Two values agree if they differ by at most AGREEMENT = 12 %. The most
-    popular value has the most votes near it. The value 1 has the weight PRIOR_COUNT = 2 in advance and counts in the
-    mean, but has no flag. least < 1: instead of the most popular value the smallest one with at least this share of its
-    votes (one person is narrower than two). N = 0 gives 1."""
     value, weight = np.append(value, 1.0), np.append(weight, PRIOR_COUNT)
     near = np.abs(value / np.maximum(value[:, None], 1e-9) - 1) <= AGREEMENT
     votes = near @ weight
@@ -234,11 +192,6 @@ def _densest(value: Array, weight: Array, least: float = 1.0) -> tuple[float, Bo
 
 
 def _line(v: Array, h: Array, weight: Array) -> tuple[float, float]:
-    """Returns a (px) and b of the line h = a + b v on which most heights agree; N must be at least 1.
-
-    v, h, weight (N,): rows of the feet, px, heights, px, and weights. The best of LEVELS x SLOPES lines is refined
-    three times by least squares of relative errors among the heights that agree with it (differ by at most 12 %); a
-    weak prior holds its slope. Raises LinAlgError if no height agrees."""
     middle, typical = max(float(np.median(v)), 1.0), float(np.median(h))
     at = v / middle - 1
     level, slope = (a.ravel() for a in np.meshgrid(LEVELS, SLOPES))
@@ -257,23 +210,12 @@ def _line(v: Array, h: Array, weight: Array) -> tuple[float, float]:
 
 
 def _crowding(place: Array) -> Array:
-    """Returns how many of the places lie in the same cell as each place, (N,), itself included; so at least 1.
-
-    place (N, 2): x, y in person heights (px over the median height); a cell is a quarter of a height wide. With the
-    weight 1 / crowding a person who stands still counts about once.
-    """
     cell = np.floor(4 * place).astype(np.int64)
     _, which, count = np.unique(cell[:, 0] * 100_003 + cell[:, 1], return_inverse=True, return_counts=True)
     return np.asarray(count[which], float)
 
 
 def _table(camera: Camera, low: Array) -> Array:
-    """Returns height and width (2, V, U), px, of a person's box whose foot is at each node of a grid; nan where nobody
-    stands.
-
-    The person is the typical one (tracking.detect.typical_person), on z = 0. low (2,): u, v of the first node, px;
-    nodes are STEP = 8 px apart and reach MARGIN = 0.25 image sizes beyond the image. The ground point is not at the
-    box's lower edge unless seen from the side, so it is corrected twice."""
     from sim.scene.camera import to_ground
 
     size = (np.array(camera.image) * (1 + 2 * MARGIN) / STEP).astype(int) + 2

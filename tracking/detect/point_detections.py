@@ -15,11 +15,7 @@ BOX_TIME = 0.5
 
 
 def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array | None]:
-    """Return places (M, 2), m, and sizes of boxes (M, 2): width, height, px, None on the ground or without boxes.
-
-    They are in order of x, then y, so that the order of detections has no effect. unit: length of a metre in the unit
-    of the detections' positions.
-    """
+    """Return places (M, 2), m, and sizes of boxes (M, 2): width, height, px, None on the ground or without boxes."""
     order = np.lexsort(detections.pos[:, 1::-1].T)
     sizes = None
     if detections.plane == "image" and detections.box is not None:
@@ -28,16 +24,10 @@ def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array | 
 
 
 def followed_sizes(old: Array, new: Array, dt: Array | float) -> Array:
-    """Return the sizes of boxes (N, 2), px, after boxes of sizes `new` (N, 2) were measured.
-
-    old (N, 2): sizes before, nan if none was measured. dt: s since then, a number or (N, 1).
-    """
+    """Return the sizes of boxes (N, 2), px, after boxes of sizes `new` (N, 2) were measured."""
     return np.asarray(np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt / BOX_TIME)))
 
 
 def boxes_at(pos: Array, size: Array) -> Array | None:
-    """Return boxes (N, 4) left, top, width, height in px with the centres pos (N, 2) px; None if a size is unknown.
-
-    size (N, 2): width, height, px, nan if unknown.
-    """
+    """Return boxes (N, 4) left, top, width, height in px with the centres pos (N, 2) px; None if a size is unknown."""
     return np.concatenate([pos - size / 2, size], axis=1) if np.isfinite(size).all() else None

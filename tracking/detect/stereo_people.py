@@ -40,10 +40,7 @@ class PersonLimits:
 
 
 def person_mask(blobs: Blobs, disparity: Disparities, camera: Camera, limits: PersonLimits) -> Bools:
-    """Return the foreground (H, W) bool of the regions that may be people.
-
-    blobs: of the frame; disparity (H, W): px, nan where unknown. A region of fewer than 5 known points is no person.
-    """
+    """Return the foreground (H, W) bool of the regions that may be people."""
     height, width, error = sizes(blobs, disparity, camera, limits.deviations)
     small = (height < limits.least_height) | (width < limits.least_width)
     keep = np.isfinite(height) & (height**2 - error**2 <= limits.most_height**2) & (~small | blobs.cut())
@@ -53,11 +50,7 @@ def person_mask(blobs: Blobs, disparity: Disparities, camera: Camera, limits: Pe
 def sizes(
     blobs: Blobs, disparity: Disparities, camera: Camera, deviations: tuple[float, float, float]
 ) -> tuple[Array, Array, Array]:
-    """Return height, width and the height that errors alone would give, (M,) each, m, of M foreground regions.
-
-    They are nan for a region of fewer than 5 known points. deviations (3,): standard deviations of a point's u, v and
-    disparity, px.
-    """
+    """Return height, width and the height that errors alone would give, (M,) each, m, of M foreground regions."""
     found = np.full((3, len(blobs)), np.nan)
     row, column = np.nonzero((blobs.label > 0) & ~np.isnan(disparity))
     blob = blobs.label[row, column] - 1

@@ -63,11 +63,7 @@ class SubtractionStereo:
         self.block = max(block, LEAST_BLOCK)
 
     def match(self, left: Image, right: Image, mask: Bools) -> Matched:
-        """Returns the disparities inside `mask` (H, W), the foreground of the left picture.
-
-        left, right (H, W): grey values, uint8, of a rectified pair. An empty mask gives nan everywhere. Pixels whose
-        block, or a match of it, would lie beyond the edge of a picture have none.
-        """
+        """Returns the disparities inside `mask` (H, W), the foreground of the left picture."""
         half, D = self.block // 2, self.disparities
         found = np.full(mask.shape, np.nan, np.float32)
         high, wide = mask.shape
@@ -85,10 +81,7 @@ class SubtractionStereo:
         return Matched(found, D * int((needed[:, 2] - needed[:, 1]).sum()))
 
     def dense(self, left: Image, right: Image) -> Disparities:
-        """Returns the disparities of the whole pictures (H, W), px, nan where there is none, by OpenCV's matcher.
-
-        They are those of `match` with a mask that is True everywhere.
-        """
+        """Returns the disparities of the whole pictures (H, W), px, nan where there is none, by OpenCV's matcher."""
         matcher = cv2.StereoBM.create(self.disparities, self.block)
         matcher.setUniquenessRatio(LEAST_UNIQUE)
         matcher.setTextureThreshold(0)
@@ -98,11 +91,7 @@ class SubtractionStereo:
 
 
 def sampled(disparity: Disparities, uv: Array | Disparities, half: int) -> Array:
-    """Return the median disparity (N,), px, of the known pixels in a square of 2 half + 1 px round each point.
-
-    disparity (H, W): nan where unknown. uv (N, 2): points in the picture, px. A point without a known disparity in its
-    square gets nan.
-    """
+    """Return the median disparity (N,), px, of the known pixels in a square of 2 half + 1 px round each point."""
     high, wide = disparity.shape
     step = np.arange(-half, half + 1)
     column = np.clip(np.floor(uv[:, 0]).astype(int)[:, None] + step, 0, wide - 1)

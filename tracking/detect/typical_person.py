@@ -18,11 +18,7 @@ SHOULDERS, DEPTH = 0.459, 0.272  # m, from straight above, where shoulders hide 
 
 
 def boxes(camera: Camera, ground: Array) -> Array:
-    """Returns the boxes (N, 4), left, top, width, height, px, of upright typical people in a pinhole camera's image.
-
-    ground (N, 2): where they stand, x, y in m, at z = 0. Each is WIDTH wide from any side. A row is nan if the person
-    is not wholly in front of the camera.
-    """
+    """Returns the boxes (N, 4), left, top, width, height, px, of upright typical people in a pinhole camera's image."""
     n = len(ground)
     tall, wide = np.full(n, PERSON_HEIGHT), np.full(n, WIDTH)
     return person_boxes(camera, np.column_stack([ground, np.zeros(n)]), np.zeros(n), tall, wide, wide)

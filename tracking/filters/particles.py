@@ -34,16 +34,6 @@ def residual_resample(weights: Array, uniforms: Array) -> Ints:
     return np.repeat(np.arange(count), copies)[:count]
 
 
-def systematic_resample(weights: Array, uniform: float) -> Ints:
-    """Return the indices (P,) of the particles that replace the old ones, ascending: systematic sampling.
-
-    weights (P,): sum 1. uniform: in [0, 1). Particle i is taken once for each of the P positions (k + uniform) / P that
-    lie in its part of the cumulated weights.
-    """
-    count = len(weights)
-    return np.searchsorted(_cumulative(weights), (np.arange(count) + uniform) / count, side="right")
-
-
 def systematic_resample_rows(weights: Array, uniforms: Array) -> Ints:
     """Return the indices (R, P) that replace the old particles of R sets, ascending in each row: systematic sampling.
 
@@ -52,7 +42,8 @@ def systematic_resample_rows(weights: Array, uniforms: Array) -> Ints:
     rows, count = weights.shape
     total = np.cumsum(weights, axis=1)
     total /= total[:, -1:]
-    reached = np.ceil(count * total - uniforms[:, None]).astype(np.int64)
+    below_one = np.minimum(uniforms, 1 - 1e-9)  # count less the largest number below 1 is rounded to count - 1
+    reached = np.ceil(count * total - below_one[:, None]).astype(np.int64)
     copies = np.diff(reached, axis=1, prepend=0)
     return np.repeat(np.tile(np.arange(count), rows), copies.ravel()).reshape(rows, count)
 

@@ -145,7 +145,7 @@ def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
     start = at_birth(dynamics)
     if start <= confirm_ratio:
         got = f"{confirm_ratio:g}, while new tracks start at {start:.3g} times the asymptote"
-        remedy = "raise speed_prior or size_rate_prior, or lower confirm_ratio or the acceleration noises"
+        remedy = "raise speed_prior, or lower confirm_ratio or the acceleration noises"
         raise InputError(place="confirm_ratio", got=got, expected="new tracks that start above it", remedy=remedy)
 
 

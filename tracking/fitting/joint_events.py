@@ -10,7 +10,7 @@ velocities have errors as large as those of a particle.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,6 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.rng import rng
 from sim.types import Array, Bools, Ints, Truth
-from tracking.papers.joint.config import TERMS
 from tracking.papers.joint.group_events_kernels import FEATURES, partition_features
 from tracking.papers.joint.partition_kernels import canonical
 
@@ -136,8 +135,8 @@ def rows_of(early: Array, late: Array, before: Ints, after: Ints) -> EventRows:
     return EventRows(features[:count], event, possible, 0.0)
 
 
-def fit_events(rows: EventRows) -> dict[str, float]:
-    """Return the weights of Merge and Split by the names of the config: merge_distance_early, ..., split_bias.
+def fit_events(rows: EventRows) -> dict[str, list[float]]:
+    """Return the weights of Merge and Split by the names of the config, merge_weights and split_weights.
 
     Raises InputError with fewer than LEAST merges or splits.
     """
@@ -167,13 +166,12 @@ def fit_events(rows: EventRows) -> dict[str, float]:
     weights = found.x.reshape(2, FEATURES + 1)
     weights[:, :FEATURES] /= spread
     weights[:, FEATURES] -= weights[:, :FEATURES] @ mean
-    names = [f"{event}_{term}" for event in CLASSES[:NONE] for term in TERMS]
-    return {name: round(float(value), 4) for name, value in zip(names, weights.ravel(), strict=True)}
+    return {f"{CLASSES[event]}_weights": weights[event].round(4).tolist() for event in (MERGE, SPLIT)}
 
 
-def log_probabilities(rows: EventRows, weights: dict[str, float]) -> Array:
+def log_probabilities(rows: EventRows, weights: Mapping[str, Sequence[float]]) -> Array:
     """Return log pi of Merge, Split and None, (R, 3); -inf for an event that is not possible."""
-    table = np.array([[weights[f"{event}_{term}"] for term in TERMS] for event in CLASSES[:NONE]])
+    table = np.array([weights[f"{CLASSES[event]}_weights"] for event in (MERGE, SPLIT)])
     design = np.concatenate([rows.features, np.ones((len(rows.event), 1))], axis=1)
     return _log_probabilities(design, table, rows.possible)
 
@@ -185,7 +183,7 @@ def _log_probabilities(design: Array, weights: Array, possible: Bools) -> Array:
     return np.asarray(log_softmax(np.where(possible, scores, -np.inf), axis=1))
 
 
-def event_scores(rows: EventRows, weights: dict[str, float]) -> dict[str, float]:
+def event_scores(rows: EventRows, weights: Mapping[str, Sequence[float]]) -> dict[str, float]:
     """Return scores of a classifier on rows: rows, merges and splits (numbers); log_loss and prior_log_loss, of a model
     that knows the frequencies alone, per row; and of merge and split the mean probability of the rows with and without
     the event, and the expected number of events over the true one."""

@@ -11,7 +11,7 @@ log loss.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,11 +48,11 @@ class TruePairs:
     dt: float
 
 
-def fit_relational(truths: Iterable[Truth], ends: Array) -> dict[str, float]:
-    """Return fitted parameters of `relational` by name: drift_k, diffusion_k, relation_rate, _bias, _distance,
+def fit_relational(truths: Iterable[Truth], ends: Sequence[float]) -> dict[str, float | list[float]]:
+    """Return fitted parameters of `relational` by name: drift, diffusion, relation_rate, _bias, _distance,
     _velocity.
 
-    truths: of simulated sequences with positions, velocities and groups; ends (4,): upper ends of the rows of the speed
+    truths: of simulated sequences with positions, velocities and groups; ends: upper ends of the rows of the speed
     table, m/s. Raises InputError with fewer than 500 changes of velocity, or without pairs of both kinds.
     """
     changes, pairs = [], []
@@ -67,19 +67,25 @@ def fit_relational(truths: Iterable[Truth], ends: Array) -> dict[str, float]:
             expected=f"{LEAST} changes, and pairs in and out of groups", remedy="give more seeds or scenarios",
         )  # fmt: skip
     row = np.searchsorted(ends, speed)
-    out: dict[str, float] = {}
+    drifts, diffusions = [], []
     for k in range(len(ends) + 1):
         inside = row == k
         if not inside.any():
             inside = np.ones(len(row), bool)
         drift = 0.0 if k == 0 else max(-float(np.mean(along[inside] / lag[inside])), 0.0)
         spread = np.mean((along[inside] + drift * lag[inside]) ** 2 / lag[inside] + across[inside] ** 2 / lag[inside])
-        out |= {f"drift_{k + 1}": drift, f"diffusion_{k + 1}": float(np.sqrt(spread / 2))}
+        drifts.append(drift)
+        diffusions.append(float(np.sqrt(spread / 2)))
     weights = logistic(np.concatenate([p.design for p in pairs]), same)
     losses = [_log_loss(pairs, weights, rate) for rate in RATES]
     rate = RATES[int(np.argmin(losses))]
     names = ("relation_bias", "relation_distance", "relation_velocity")
-    return out | {"relation_rate": rate} | dict(zip(names, weights.tolist(), strict=True))
+    return {
+        "drift": drifts,
+        "diffusion": diffusions,
+        "relation_rate": rate,
+        **dict(zip(names, weights.tolist(), strict=True)),
+    }
 
 
 def velocity_changes(truth: Truth) -> tuple[Array, Array, Array, Array]:

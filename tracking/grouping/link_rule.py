@@ -46,48 +46,26 @@ class LinkRule(Config):
 
     tracker: ClassVar[str] = "grouping"
 
+    # fmt: off
     near: float = param(MERGE_DISTANCE, (0.5, 3.0), "m", "a pair nearer than this is near")
     alike: float = param(MERGE_VELOCITY, (0.1, 2.0), "m/s", "a pair whose velocities differ by less moves alike")
-    share: float = param(
-        0.8,
-        (0.3, 1.0),
-        "share",
-        "a pair is linked if it was near and moved alike in this share of the frames of `window` with both seen",
-    )
+    share: float = param(0.8, (0.3, 1.0), "share",
+        "a pair is linked if it was near and moved alike in this share of the frames of `window` with both seen")
     window: float = param(HOLD_TIME, (0.2, 6.0), "s", "time over which the share is counted")
-    acquaintance: float = param(
-        1.0,
-        (0.0, 6.0),
-        "s",
-        "least time within the window in which both must have been seen before they can be linked",
-    )
+    acquaintance: float = param(1.0, (0.0, 6.0), "s",
+        "least time within the window in which both must have been seen before they can be linked")
     apart: float = param(SPLIT_DISTANCE, (0.5, 5.0), "m", "a pair farther than this is apart")
     patience: float = param(HOLD_TIME, (0.1, 6.0), "s", "time apart after which a link breaks")
-    idle: float = param(
-        0.0,
-        (0.0, 1.0),
-        "m/s",
-        "two people who are both slower than this are not near; 0: standing people can be linked",
-        before=0.0,
-    )
-    diverge: float = param(
-        NEVER,
-        (0.2, NEVER),
-        "m/s",
-        "a pair farther than `near` whose velocities differ by more than this is apart, too; 10: never",
-        "log",
-        before=NEVER,
-    )
-    smooth: float = param(
-        0.0,
-        (0.0, 3.0),
-        "s",
-        "time over which velocities are taken as chords of positions; 0: the tracker's own velocities",
-    )
+    idle: float = param(0.0, (0.0, 1.0), "m/s",
+        "two people who are both slower than this are not near; 0: standing people can be linked")
+    diverge: float = param(NEVER, (0.2, NEVER), "m/s",
+        "a pair farther than `near` whose velocities differ by more than this is apart, too; 10: never", "log")
+    smooth: float = param(0.0, (0.0, 3.0), "s",
+        "time over which velocities are taken as chords of positions; 0: the tracker's own velocities")
     memory: float = param(1.0, (0.0, 5.0), "s", "time for which a member that is missed stays in the group")
-    arrival: float = param(
-        ARRIVAL, (0.0, 5.0), "s", "a link that began within this time of a track's first frame is no merge"
-    )
+    arrival: float = param(ARRIVAL, (0.0, 5.0), "s",
+        "a link that began within this time of a track's first frame is no merge")
+    # fmt: on
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ is resumed therefore finds what it would have found.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import optuna
@@ -44,7 +44,7 @@ TPE_FROM = 10
 def distribution(p: Param) -> BaseDistribution:
     """Returns Optuna's distribution of the declared parameter p, in the unit of the parameter."""
     if p.scale == "categorical":
-        return CategoricalDistribution(p.choices)
+        return CategoricalDistribution(cast(Any, p.choices))
     if p.scale == "int":
         return IntDistribution(int(np.ceil(p.low)), int(np.floor(p.high)))
     return FloatDistribution(p.low, p.high, log=p.scale == "log")

@@ -97,7 +97,7 @@ def test_two_trackers_in_one_folder(made, tracks, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("option", "words"),
     [
-        (["--set", "confirm_gate=0.9"], "blob (confirm_gate = "),
+        (["--set", "orphan_gate=0.8"], "blob (orphan_gate = "),
         (["--grouping", "{folder}/rule.toml"], "blob (near = 0.7"),
     ],
 )

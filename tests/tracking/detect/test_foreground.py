@@ -22,8 +22,8 @@ def context(scale=SCALE, people=()):
     return Context(painted.FPS, scale, image_size=(painted.WIDE, painted.HIGH), background=sample)
 
 
-def made(scale=SCALE, *, most=0.6, people=(), **settings):
-    return Foreground(context(scale, people), BackgroundSettings(**settings), most)
+def made(scale=SCALE, *, people=(), **settings):
+    return Foreground(context(scale, people), BackgroundSettings(**settings))
 
 
 def picture(*people, seed=1):
@@ -46,19 +46,22 @@ def test_a_person_is_one_blob_and_settings_are_followed():
     found = pipeline.person_blobs(pipeline.segment(picture(PERSON)).mask)
     assert len(found) == 1
     assert found.ellipse[0, :2] == pytest.approx([160, 180 - TALL / 2], abs=4)
-    pipeline.follow(BackgroundSettings(dark=0.2, background_time=9.0), 0.01)
+    pipeline.follow(BackgroundSettings(dark=0.2, background_time=9.0))
     assert pipeline.model.settings.background_time == 9.0
-    assert not pipeline.segment(picture(PERSON)).plausible
 
 
-def test_a_picture_with_more_foreground_than_people_can_cover_is_implausible():
+def test_a_picture_with_more_foreground_than_people_can_cover_is_implausible(monkeypatch):
     share = np.mean(made().segment(picture(PERSON)).mask)
-    assert made(most=share).segment(picture(PERSON)).plausible
-    assert not made(most=share * 0.99).segment(picture(PERSON)).plausible
+    monkeypatch.setattr("tracking.detect.foreground.MOST_FOREGROUND", share)
+    assert made().segment(picture(PERSON)).plausible
+    monkeypatch.setattr("tracking.detect.foreground.MOST_FOREGROUND", share * 0.99)
+    assert not made().segment(picture(PERSON)).plausible
+    assert made(background="trained").segment(picture(PERSON)).plausible
 
 
-def test_protected_places_are_not_learned():
-    quick = {"background_time": 1.0, "foreground_time": 1.0}
+def test_protected_places_are_not_learned(monkeypatch):
+    monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)
+    quick = {"background_time": 1.0}
     kept, learned = made(**quick), made(**quick)
     everywhere, nowhere = np.ones(kept.shape, bool), np.zeros(kept.shape, bool)
     for k in range(60):
@@ -77,7 +80,7 @@ def test_an_unknown_scale_is_guessed_from_the_images_height(unknown):
 def test_the_sample_shows_how_large_people_are():
     shown = context(np.nan, painted.spread())
     size = PersonSize(shown)
-    Foreground(shown, BackgroundSettings(), 0.6).learn_person_size(size, shown.background)
+    Foreground(shown, BackgroundSettings()).learn_person_size(size, shown.background)
     assert size.px_per_m == pytest.approx(SCALE, rel=0.06)
 
 

@@ -10,7 +10,7 @@ from tests import painted
 from tests import reference_background as reference
 from tests.painted import TALL
 from tracking.detect import ghosts_kernels
-from tracking.detect.background_settings import NEVER, BackgroundSettings
+from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.foreground import Foreground
 from tracking.detect.ghosts import has_left
 
@@ -28,7 +28,6 @@ def made(people, look="colour", fps=10.0, **settings):
     return Foreground(
         Context(fps, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample),
         BackgroundSettings(**settings),
-        0.6,
     )
 
 
@@ -43,7 +42,7 @@ def watch(pipeline, people, seconds, look="colour", protected=None):
 @pytest.mark.parametrize("look", LOOKS)
 @pytest.mark.parametrize("fps", [2.5, 7.0, 30.0])
 def test_who_stood_in_the_whole_sample_leaves_no_ghost(fps, look):
-    assert len(watch(made([PERSON], look, fps, ghost_time=NEVER), [], 3.0, look)) == 1
+    assert len(watch(made([PERSON], look, fps, background="trained"), [], 3.0, look)) == 1
     pipeline = made([PERSON], look, fps)
     assert len(watch(pipeline, [], 0.5, look)) == 1
     assert not len(watch(pipeline, [], 2.5, look))
@@ -57,7 +56,8 @@ def test_who_stood_in_the_whole_sample_leaves_no_ghost(fps, look):
 @pytest.mark.parametrize("look", LOOKS)
 @pytest.mark.parametrize("fps", [2.5, 7.0, 30.0])
 def test_who_comes_and_stands_is_not_absorbed(fps, look):
-    pipeline, never = made([], look, fps), made([], look, fps, ghost_time=NEVER)
+    pipeline, never = made([], look, fps), made([], look, fps)
+    never.ghosts = None
     for each in (pipeline, never):
         assert len(watch(each, [PERSON], 10.0, look)) == 1
     assert np.array_equal(pipeline.model.mean, never.model.mean)

@@ -106,7 +106,7 @@ def test_a_seed_repeats_everything(tracker, every):
 def test_a_refused_reset_leaves_the_episode_as_it_was():
     env = make(decision_every=5)
     env.reset(seed=0, options={"scenario": "cross"})
-    by_tracker = {"confirm_ratio": 2.0, "speed_prior": 0.1, "size_rate_prior": 0.01}
+    by_tracker = {"confirm_ratio": 2.0, "speed_prior": 0.1, "accel_noise": 10.0}
     for wrong in (
         {"scenario": "pass-by", "params": {"gate": 7}},
         {"scenario": "pass-by", "params": by_tracker},
@@ -262,7 +262,7 @@ def test_which_parameters_an_action_sets():
     assert set(often.parameter_names) < set(make(detections="image").unwrapped.parameter_names) | set(
         once.parameter_names
     )
-    assert "angle_noise" not in once.parameter_names
+    assert "dark" not in once.parameter_names
     assert all(p.online for p in often.space)
     params = make("group-pda").unwrapped
     assert params.observation_names[0] == "time"
@@ -283,7 +283,7 @@ def test_parameters_that_the_tracker_refuses_are_left_as_they_were():
     """At any frame rate newborn tracks of blob must start above confirm_ratio."""
     env = make(decision_every=5).unwrapped
     env.reset(seed=1)
-    wrong = dataclasses.replace(env.defaults, confirm_ratio=2.0, speed_prior=0.1, size_rate_prior=0.01)
+    wrong = dataclasses.replace(env.defaults, confirm_ratio=2.0, speed_prior=0.1, accel_noise=10.0)
     _, _, _, _, info = env.step(encode(env.space, wrong).astype(np.float32))
     assert "confirm_ratio" in info["refused"]
     assert info["params"] == env.defaults.as_dict()

@@ -49,7 +49,7 @@ def test_the_objective_of_a_beginning(name, cache):
 
 def test_parameters_reach_the_tracker(cache):
     plain = play("blob", CROSS, cache=cache)
-    late = play("blob", CROSS, {"report_delay": 4.0, "confirm_gate": 0.1}, cache=cache)
+    late = play("blob", CROSS, {"report_delay": 4.0, "report_coast": 0.0}, cache=cache)
     assert late.objective < plain.objective
     assert late.seconds_tracking > 0
     assert late.seconds_scoring > 0

@@ -45,5 +45,5 @@ def test_the_command_writes_parameters(tmp_path, capsys):
     assert run(["fit", "relational", str(scene), "--seeds", "30000:30006", "--out", str(out)]) == 0
     fitted = RelationalConfig.from_toml(out)
     assert fitted.relation_distance > 0
-    assert 0 < fitted.diffusion_5 < 1
+    assert 0 < fitted.diffusion[4] < 1
     assert "--params" in capsys.readouterr().out

@@ -126,11 +126,6 @@ def test_the_rule_is_tuned_like_a_tracker(tmp_path):
     assert LinkRule.from_toml(tmp_path / "rule.toml") == found.config
 
 
-def test_first_rule_is_frozen():
-    first = LinkRule.frozen()
-    assert (first.near, first.acquaintance, first.idle, first.diverge) == (1.5, 2.0, 0.0, 10.0)
-
-
 def test_a_rule_of_ones_own_groups_what_is_tracked(source, tmp_path):
     """From Python, from a file; run.json says which; who says nothing gets the usual one."""
     rule = LinkRule(near=0.5)

@@ -1,5 +1,5 @@
 """`flockscope fit`: the errors of a detector, from recordings; and from simulated truth the belief of who belongs
-together, the groups of `joint`, and the speed table and relations of `relational`.
+together, the events of `joint`, and the speed table and relations of `relational`.
 """
 
 from __future__ import annotations
@@ -24,9 +24,6 @@ SHOWN = (
     "overlap, 10% quantile", "overlap, 50% quantile", "overlap, 90% quantile", "error correlation after 0.2 s",
 )  # fmt: skip
 """The statistics that the text shows; --json has all of them."""
-
-
-Scores = dict[str, dict[str, float]]
 
 
 def fit_sensor(options: FitSensorOptions) -> CommandResult:
@@ -110,47 +107,26 @@ def _score_lines(seeds: Mapping[str, range], scores: Mapping[str, Mapping[str, f
 
 
 def fit_joint(options: FitJointOptions) -> CommandResult:
-    """Writes the fitted parameters as a TOML file, with the command and the scores as comments."""
+    """Writes the fitted weights of the event classifier as a TOML file, with command and scores as comments."""
     from sim.io.files.atomic import write_file
-
-    out = option_parsing.output_file(options.out, ".toml")
-    seeds = _fit_and_check_seeds(options.seeds, options.check)
-    params, scores = {"events": _events, "components": _components}[options.learn](options, seeds)
-    own = [] if options.learn == "events" else [f"--learn {options.learn}"]
-    words = " ".join(["flockscope fit joint", *options.names, *own, f"--seeds {options.seeds}"])
-    lines = _score_lines(seeds, scores)
-    body = [f"{name} = {value}" for name, value in params.items()]
-    text = "\n".join([*(f"# {line}" for line in (words, *lines)), 'tracker = "joint"', "", "[params]", *body, ""])
-    write_file(out, text.encode())
-    shown = [f"{name:<22}  {value:9.4f}" for name, value in params.items()]
-    result = "\n".join([*lines, "", *shown, "", f"→ {out}: use it as --params {out}"])
-    return CommandResult({"file": out, "params": params, **scores}, result)
-
-
-def _events(options: FitJointOptions, seeds: dict[str, range]) -> tuple[dict[str, float], Scores]:
-    """Returns the weights of the event classifier, and the scores on the seeds fitted to and checked."""
     from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
     from tracking.papers.joint.config import JointConfig
 
-    lag = JointConfig().lag
+    out = option_parsing.output_file(options.out, ".toml")
+    seeds, lag = _fit_and_check_seeds(options.seeds, options.check), JointConfig().lag
     rows = {
         key: EventRows.joined(event_rows(truth, lag, seed) for seed, truth in _simulated(options.names, numbers))
         for key, numbers in seeds.items()
     }
-    weights = fit_events(rows["fitted"])
-    return weights, {key: event_scores(part, weights) for key, part in rows.items()}
-
-
-def _components(options: FitJointOptions, seeds: dict[str, range]) -> tuple[dict[str, float], Scores]:
-    """Returns the parameters of the Dirichlet process mixture, and the scores on the seeds fitted to and checked."""
-    from tracking.fitting.joint_components import component_scores, fit_components, true_partitions
-
-    parts = {
-        key: [part for seed, truth in _simulated(options.names, numbers) for part in true_partitions(truth, seed)]
-        for key, numbers in seeds.items()
-    }
-    params = fit_components(parts["fitted"])
-    return params, {key: component_scores(part, params) for key, part in parts.items()}
+    params = fit_events(rows["fitted"])
+    scores = {key: event_scores(part, params) for key, part in rows.items()}
+    words = " ".join(["flockscope fit joint", *options.names, f"--seeds {options.seeds}"])
+    lines = _score_lines(seeds, scores)
+    body = [f"{name} = {value}" for name, value in params.items()]
+    text = "\n".join([*(f"# {line}" for line in (words, *lines)), 'tracker = "joint"', "", "[params]", *body, ""])
+    write_file(out, text.encode())
+    result = "\n".join([*lines, "", *body, "", f"→ {out}: use it as --params {out}"])
+    return CommandResult({"file": out, "params": params, **scores}, result)
 
 
 def fit_relational(options: FitRelationalOptions) -> CommandResult:
@@ -164,7 +140,9 @@ def fit_relational(options: FitRelationalOptions) -> CommandResult:
     params = fit((truth for _, truth in scenes), RelationalConfig().speed_ends)
     config = RelationalConfig.from_dict(dict(params), out)
     write_file(out, config.to_toml().encode())
-    width = max(map(len, params))
-    lines = [f"{name:<{width}}  {value:9.4f}  {RelationalConfig.known(name).unit}" for name, value in params.items()]
+    width, body = max(map(len, params)), config.as_dict()
+    lines = [
+        f"{name:<{width}}  {np.round(np.array(body[name]), 4)}  {RelationalConfig.known(name).unit}" for name in params
+    ]
     lines += ["", f"→ {out}: use it as --params {out}"]
     return CommandResult({"file": out, "params": params}, "\n".join(lines))

@@ -16,12 +16,7 @@ from tracking.papers.blob import box_geometry
 
 
 def owners(centre: Array, predicted: Array, d2: Array, free: Bools) -> Ints:
-    """Returns the row (M,) of the track of which each blob may be a piece, -1 for none.
-
-    It is the nearest track, by d^2, whose predicted box holds the blob's centre. centre (M, 2 or more): columns x, y,
-    px. predicted (N, 4): boxes of the tracks: centre x, y, height, width, px. d2 (N, M): squared Mahalanobis distances;
-    no gate is applied. free (M,): False for a blob that is no candidate. Without tracks all are -1.
-    """
+    """Returns the row (M,) of the track of which each blob may be a piece, -1 for none."""
     found = np.full(len(centre), -1)
     if not len(predicted):
         return found
@@ -38,11 +33,7 @@ def hull(box: Array) -> Array:
 
 
 def union(area: Array, ellipse: Array) -> tuple[Array, float]:
-    """Returns the ellipse (5,) of all pixels of several blobs, and the variance of its direction, rad^2.
-
-    area (K,): numbers of pixels; ellipse (K, 5): centre x, y, full axes h >= w (px), theta (rad), of each blob, from
-    their moments. The moments of the union are sums, so the result is that of one blob of the same pixels.
-    """
+    """Returns the ellipse (5,) of all pixels of several blobs, and the variance of its direction, rad^2."""
     share, c, s = area / area.sum(), np.cos(ellipse[:, 4]), np.sin(ellipse[:, 4])
     axes = np.square(ellipse[:, 2:4] / 4)
     turn = np.stack([np.stack([c, -s], 1), np.stack([s, c], 1)], 1)

@@ -21,10 +21,7 @@ def centred_from_ltwh(box: Array) -> Array:
 
 def ltwh_from_centred(place: Array) -> Array:
     """Returns boxes (N, 4) left, top, width, height, px, of centred boxes `place` (N, 4): centre x, y, height, width,
-    px.
-
-    Sides are at least 1 px; a smaller box grows about its centre.
-    """
+    px."""
     box = np.empty_like(place)
     np.maximum(place[:, :1:-1], 1.0, out=box[:, 2:])
     np.multiply(box[:, 2:], -0.5, out=box[:, :2])
@@ -33,21 +30,14 @@ def ltwh_from_centred(place: Array) -> Array:
 
 
 def inscribed_ellipses(box: Array) -> Array:
-    """Returns the ellipses (N, 5) inscribed in centred boxes (N, 4): centre x, y, height, width, px.
-
-    Columns: centre x, y, h, w (px), theta (rad). h is the longer full axis, w the shorter; theta is pi / 2 if h is
-    vertical (also for a square), else 0.
-    """
+    """Returns the ellipses (N, 5) inscribed in centred boxes (N, 4): centre x, y, height, width, px."""
     tall = box[:, 2] >= box[:, 3]
     axes = np.where(tall[:, None], box[:, 2:], box[:, :1:-1])
     return np.column_stack([box[:, :2], axes, np.where(tall, np.pi / 2, 0.0)])
 
 
 def standing(box: Array) -> Array:
-    """Returns boxes (N, 4): x, foot, height, width, px, of centred boxes (N, 4): centre x, y, height, width, px.
-
-    foot is the row of the lower edge. The argument is not changed.
-    """
+    """Returns boxes (N, 4): x, foot, height, width, px, of centred boxes (N, 4): centre x, y, height, width, px."""
     out = box.copy()
     out[:, 1] += box[:, 2] / 2
     return out
@@ -55,7 +45,7 @@ def standing(box: Array) -> Array:
 
 def centred(standing_box: Array) -> Array:
     """Returns centred boxes (N, 4): centre x, y, height, width, px, of boxes (N, 4): x, foot (row of the lower edge),
-    height, width, px. The argument is not changed."""
+    height, width, px."""
     out = standing_box.copy()
     out[:, 1] -= standing_box[:, 2] / 2
     return out
@@ -63,12 +53,7 @@ def centred(standing_box: Array) -> Array:
 
 def fuse_pieces(pieces: Array) -> Array:
     """Returns one centred box (4,) with the area-weighted mean and variance of several filled boxes, pieces (K, 4), K
-    >= 1.
-
-    Centred boxes are centre x, y, height, width, px; at least one piece must have an area, else the result is nan. A
-    filled box of side L has variance L^2 / 12 along it, and the spread of the centres is added. So two halves of a box
-    give the box itself.
-    """
+    >= 1."""
     centre, side = pieces[:, :2], pieces[:, :1:-1]
     w = np.prod(side, 1)
     w = w / w.sum()
@@ -78,11 +63,7 @@ def fuse_pieces(pieces: Array) -> Array:
 
 
 def covered_share(place: Array, others: Array) -> Array:
-    """Returns the share (N, M), 0 to 1, of each box of `place` (N, 4) that lies in each box of `others` (M, 4).
-
-    All are centred boxes: centre x, y, height, width, px. The share is of the area of the box of `place`; 0 for a box
-    without area.
-    """
+    """Returns the share (N, M), 0 to 1, of each box of `place` (N, 4) that lies in each box of `others` (M, 4)."""
     shared = np.ones((len(place), len(others)))
     for centre, side in ((0, 3), (1, 2)):
         half, other_half = place[:, side, None] / 2, others[:, side] / 2
@@ -93,20 +74,14 @@ def covered_share(place: Array, others: Array) -> Array:
 
 
 def points_inside(points: Array, boxes: Array) -> Bools:
-    """Returns flags (N, M): True where point n lies in box m or on its edge.
-
-    points (N, 2 or more): columns x, y, px, others ignored; boxes (M, 4): centre x, y, height, width, px.
-    """
+    """Returns flags (N, M): True where point n lies in box m or on its edge."""
     away = np.abs(points[:, None, :2] - boxes[:, :2]) <= boxes[:, :1:-1] / 2
     return np.asarray(away[..., 0] & away[..., 1])
 
 
 def hull_iou(places: Array, box: Array) -> float:
     """Returns the IoU, 0 to 1, of the bounding box of several boxes `places` (K, 4), K at least 1, with another `box`
-    (4,).
-
-    All are centred boxes: centre x, y, height, width, px. Raises ZeroDivisionError if both have no area.
-    """
+    (4,)."""
     low = (places[:, :2] - places[:, :1:-1] / 2).min(0)
     high = (places[:, :2] + places[:, :1:-1] / 2).max(0)
     whole = np.concatenate([(low + high) / 2, (high - low)[::-1]])[None]

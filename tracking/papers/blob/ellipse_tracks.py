@@ -20,6 +20,7 @@ from tracking.filters import kalman, track_uncertainty
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.track_management import LARGEST_SCALE, TrackedPeople
 
+ANGLE_RATE = 15.0  # deg/s^0.5, random walk of the direction: its standard deviation after one second
 RELAXATION = 0.5  # s, time constant with which axes return to the expected ones
 HEADING = 6.0  # seen from straight above, the direction turns with the heading: so many times faster than a body leans
 
@@ -43,7 +44,7 @@ class TrackedEllipses(TrackedPeople):
         they are."""
         super().follow(config, dynamics)
         self.largest_log_det += 2 * dynamics.noise.size * np.log(LARGEST_SCALE)
-        rate = config.angle_rate * (HEADING if self.top else 1.0)
+        rate = ANGLE_RATE * (HEADING if self.top else 1.0)
         self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
 
     def predict(self) -> None:
@@ -69,41 +70,21 @@ class TrackedEllipses(TrackedPeople):
 
     def start_tracks(self, z: Array, score: Array, t: float) -> None:
         """Append a tentative track at rest for each ellipse z (K, 5): centre x, y, full axes h, w (px), direction theta
-        (rad).
-
-        score (K,): 0 to 1; t: time of the frame, s. No ellipse changes nothing. The tracks get fresh ids, in order, and
-        count as measured. The variance of the direction starts at (30 degrees)^2, so that the next measured direction
-        counts for more.
-        """
+        (rad)."""
         super().start_tracks(z[:, :4], score, t)
         new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
         self.angle = np.concatenate([self.angle, new], 1)
         self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
 
     def direction_distances(self, z: Array, angle_var: Array) -> Array:
-        """Returns the direction's part y^2 / S of the squared distance d^2 (eq. 9) of N tracks and M ellipses, (N, M).
-
-        y: measured less predicted direction, modulo pi; S: the sum of both variances. z (M,): measured directions, rad;
-        angle_var (M,): their variances, rad^2. The part is 0 for an ellipse whose variance is (30 degrees)^2 or more,
-        as its direction carries no information.
-        """
+        """Returns the direction's part y^2 / S of the squared distance d^2 (eq. 9) of N tracks and M ellipses, (N,
+        M)."""
         s = self.angle[kalman.DIRECTION_VAR][:, None] + angle_var
         turn = kalman.angle_innovation(z, self.angle[kalman.DIRECTION][:, None])
         return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
 
     def innovations(self, z: Array, angle_var: Array) -> tuple[Array, Array]:
-        """Returns d^2 (eq. 9) and ln |S| but for a constant, (N, M) each, of N tracks and M ellipses.
-
-        z (M, 5): centre x, y, full axes h, w (px), theta (rad). angle_var (M,): variance of theta, rad^2; from (30
-        degrees)^2 on an ellipse has no direction.
-
-        The likelihood of an ellipse z given its track is N(z; prediction, S), so -2 ln of it is d^2 + ln |2 pi S|, S in
-        px and rad: the variances of bank and nominal noise times the squared scale, and that of the direction. An
-        ellipse without a direction has the density 1 / pi of a uniform direction under every track, -2 ln of which is 2
-        ln pi. No direction is known less than that, so ln (2 pi S) of a direction is at most 2 ln pi. The constant left
-        out is that of a track in the steady state, at the sequence's scale, without a direction. rho cannot stand for
-        |S| here: it is computed from the nominal covariance, without direction and scale (ours).
-        """
+        """Returns d^2 (eq. 9) and ln |S| but for a constant, (N, M) each, of N tracks and M ellipses."""
         d2 = kalman.distances(self.bank, z[:, :4], self.noise, self.scale) + self.direction_distances(
             z[:, 4], angle_var
         )
@@ -114,12 +95,7 @@ class TrackedEllipses(TrackedPeople):
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
         """Update the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3
-        to 7).
-
-        z: centre x, y, axes h, w (px), theta (rad). noise (K, 4): variances of x, y, h, w, m^2; angle_var (K,):
-        variances of theta, rad^2. Returns d^2 (K,), the squared Mahalanobis distance before the update, direction
-        included.
-        """
+        to 7)."""
         terms = kalman.update(self.bank, rows, z[:, :4], noise)
         turn = self.direction_distances(z[:, 4], angle_var)[rows, np.arange(len(rows))]
         kalman.update(self.nominal, rows, z[:, :4], self.noise)
@@ -127,12 +103,7 @@ class TrackedEllipses(TrackedPeople):
         return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]) + turn)
 
     def relax_axes(self, rows: Ints, axes: Array, var: float) -> None:
-        """Move the axes h, w of the tracks at positions `rows` (K,) towards expected axes (K, 2), px, in place (ours).
-
-        var: variance of people's axes about the expected ones, m^2. An Ornstein-Uhlenbeck step: s = exp(-dt / 0.5 s),
-        dt the frame's s; axes x = s x + (1 - s) expected; their variance P = s^2 P + (1 - s^2) var; their covariance
-        with the rate times s. It is no measurement, as the expectation is the same in every frame. rho does not change.
-        """
+        """Move the axes of the tracks at positions `rows` (K,) towards expected axes (K, 2), px, in place (ours)."""
         stay = np.exp(-self.dynamics.dt / RELAXATION)
         bank = self.bank[:, rows, 2:]
         bank[kalman.PLACE] += (1 - stay) * (axes - bank[kalman.PLACE])

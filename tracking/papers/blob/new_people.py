@@ -25,13 +25,7 @@ EVIDENCE = 1000.0  # log-likelihood of full support: so large that the first gue
 
 def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float) -> Array:
     """Returns the templates (K, 4) x, foot (row of the lower edge), h, w, px, of new people, and paints them into
-    `scene`.
-
-    A template is an upright ellipse that stands for a person. Searched are the regions of foreground that no template
-    covers and no blob explains, from 0.3 of a person's area on. size: a person's size at each place. support: least
-    support of each template: the pixels that it alone covers, foreground 1, background -1/2, over its area. A region
-    where a person's size is unknown has no new people; at most 6 are found in a region. K = 0 if there are none.
-    """
+    `scene`."""
     found = blobs.find(scene.unexplained(), LEAST * SMALLEST**2 * SLIM * ELLIPSE)
     box = found.box
     h, w = size.at(np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)).T
@@ -45,13 +39,6 @@ def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float
 
 
 def _in_region(scene: ExplainedForeground, guesses: Array, person: float, support: float) -> Array:
-    """Returns the templates (K, 4) x, foot, h, w, px, of the number of people that explains a region best, and paints
-    them into `scene`.
-
-    guesses (1 + 2 + …, 4): first places for 1, 2, … people, one number after the other; those from the first with an
-    unknown size (nan) on are left out. person: area of a person, px^2. support: least support of each template: the
-    pixels that it alone covers, foreground 1, background -1/2, over its area. K may be 0.
-    """
     known = np.asarray(np.isfinite(guesses).all(1))
     sure = len(known) if known.all() else int(known.argmin())
     most = int((np.sqrt(8 * sure + 1) - 1) / 2)  # 1 + 2 + ... + most <= sure
@@ -61,12 +48,6 @@ def _in_region(scene: ExplainedForeground, guesses: Array, person: float, suppor
 
 
 def _guesses(found: blobs.Blobs, rows: Ints, most: Ints, size: PersonSize) -> list[Array]:
-    """Returns a list with the first places (1 + 2 + … + most[k], 4) x, foot, h, w, px, for each region rows[k].
-
-    They are places for 1, 2, … most[k] people, one number after the other; the people of one number share the region's
-    pixels evenly. rows, most (R,): row of the region in `found`, from 0, and most people in it. size: a person's size
-    at each place; h, w are nan where it is unknown.
-    """
     if size.above:
         return [_from_above(found, row, n, size) for row, n in zip(rows.tolist(), most.tolist(), strict=True)]
     box = found.box.astype(int)
@@ -76,13 +57,6 @@ def _guesses(found: blobs.Blobs, rows: Ints, most: Ints, size: PersonSize) -> li
 
 
 def _from_above(found: blobs.Blobs, row: int, most: int, size: PersonSize) -> Array:
-    """Returns first places (1 + 2 + … + most, 4) x, foot, h, w, px, of 1, 2, … `most` people in one region, seen from
-    above.
-
-    They stand in a row along the region's longer axis; each template is centred on its share of the pixels. row: of the
-    region in `found`, which has at least two pixels. size: a person's size at each place; h, w are nan where it is
-    unknown.
-    """
     left, top, wide, high = found.box[row].astype(int)
     at = np.argwhere(found.label[top : top + high, left : left + wide] == row + 1)[:, ::-1] + (left, top) + 0.5
     axis = np.linalg.eigh(np.cov(at.T))[1][:, -1]

@@ -36,10 +36,7 @@ class ExplainedForeground:
         self.cover: kernels.Cover = np.zeros(foreground.shape, np.int16)
 
     def mark_explained(self, label: Labels, rows: Ints) -> None:
-        """Mark the pixels of blobs as explained: templates get no support from them. Changes `cover`.
-
-        label (H, W): row + 1 of the blob of each pixel, 0 for none. rows (K,): rows, from 0, of the blobs to mark.
-        """
+        """Mark the pixels of blobs as explained: templates get no support from them."""
         which = np.zeros(int(rows.max(initial=-1)) + 2, bool)
         which[rows + 1] = True
         kernels.mark_explained(self.cover, label, which)
@@ -49,52 +46,28 @@ class ExplainedForeground:
         return np.asarray(self.foreground & (self.cover == 0))
 
     def fit_places(self, templates: Array, spread: Array, evidence: float) -> Array:
-        """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most together; paints them.
-
-        templates (K, 4): at their expected places, not painted, not changed. Sizes stay. Each in turn moves to the
-        largest evidence * support - d^2 / 2, those with low feet (near people) first. d: distance from its expected
-        place in standard deviations; support: at most 1, the foreground that it alone covers, less half the background,
-        over its area. spread (K, 2): standard deviation, px, of the expected x and foot. evidence: log-likelihood of a
-        template with full support.
-        """
+        """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most together; paints
+        them."""
         return search.fit_places(self.foreground, self.cover, templates, spread, evidence)
 
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
         """Returns the rows, ascending, of painted templates (K, 4) x, foot, h, w, px, that have enough support; erases
-        the others, weakest first.
-
-        The support of a template: the pixels that it alone covers, 1 for foreground, -1/2 for background, over its
-        area. That of the remaining ones is computed anew after each removal. least: the support needed. pieces: compare
-        instead the share of foreground among the pixels that the template alone covers, so that a visible piece of a
-        person is enough; 0 if these are less than kernels.BARE = 0.1 of the template. Of two templates on one person
-        either share is low, and one template is erased.
-        """
+        the others, weakest first."""
         return np.flatnonzero(kernels.prune(self.foreground, self.cover, templates, least, pieces))
 
     def support(self, templates: Array) -> Array:
-        """Returns the support (K,) of painted templates (K, 4) x, foot, h, w, px: at most 1, may be negative.
-
-        It is the sum over the pixels that only this template covers (1 for foreground, -1/2 for background), divided by
-        its area.
-        """
+        """Returns the support (K,) of painted templates (K, 4) x, foot, h, w, px: at most 1, may be negative."""
         return kernels.supports(self.foreground, self.cover, templates, 1)
 
     def visible_share(self, templates: Array) -> Array:
         """Returns the share (K,), 0 to 1, of each template (K, 4) that no template with a lower foot and no explained
-        blob covers.
-
-        A template's columns are x, foot (row of the lower edge), h, w, px. Of equal feet the earlier template hides the
-        later. The share is of the area inside the image, but at least of 0.3 of the ellipse.
-        """
+        blob covers."""
         return kernels.visible_share(self.cover, templates)
 
 
 def template_mask(shape: tuple[int, ...], templates: Array) -> Bools:
     """Returns an (H, W) bool mask, True where an ellipse of the templates (K, 4) x, foot, h, w, px, covers a pixel's
-    centre.
-
-    shape: (H, W). Without templates it is False everywhere.
-    """
+    centre."""
     cover = np.zeros(shape, np.int16)
     kernels.paint_all(cover, templates, 1)
     return cover > 0

@@ -65,11 +65,7 @@ class TrackedPeople:
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
         """Replace the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
-        they are.
-
-        The limits of rho (uncertainty: sqrt|S|, S the innovation covariance, over its asymptote) for deletion and
-        reporting are computed anew.
-        """
+        they are."""
         self.config, self.dynamics = config, dynamics
         self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
         self.birth_rho = track_uncertainty.at_birth(dynamics)
@@ -90,18 +86,11 @@ class TrackedPeople:
         self._bind(self.numbers, self.flags)
 
     def _bind(self, numbers: Array, flags: Bools) -> None:
-        """Use `numbers` (6, N) and `flags` (3, N) as the tables, and bind their rows as views to attributes: scale,
-        rho, born, score, hits, misses; confirmed, measured, miss_explained."""
         self.numbers, self.flags = numbers, flags
         self.scale, self.rho, self.born, self.score, self.hits, self.misses = numbers
         self.confirmed, self.measured, self.miss_explained = flags
 
     def _rho_after(self, seconds: float) -> float:
-        """Returns rho (sqrt|S|, S the innovation covariance, over its asymptote) in the frame that ends `seconds`
-        without measurement, from the steady state.
-
-        Seconds are rounded up to whole frames.
-        """
         frames = int(np.ceil(seconds * self.context.fps - 1e-6))
         return track_uncertainty.after_misses(self.dynamics, frames - 1)
 
@@ -116,20 +105,13 @@ class TrackedPeople:
         return track_uncertainty.rho(self.bank, self.noise, self.asymptote)
 
     def upright_boxes(self) -> Array:
-        """Returns the boxes (N, 4) of all tracks: centre x, y, height, width, px; predicted or updated, as the bank is.
-
-        The array is a view of the bank: do not change it.
-        """
+        """Returns the boxes (N, 4) of all tracks: centre x, y, height, width, px; predicted or updated, as the bank
+        is."""
         return np.asarray(self.bank[kalman.PLACE])
 
     def record_measured(self, rows: Ints, near: Bools, score: Array) -> None:
         """Record that the tracks at positions `rows` (K,) were measured in this frame and all others missed; confirm
-        tracks.
-
-        A measured track is confirmed if its uncertainty rho is at most confirm_ratio and `near` (K,) is True: the
-        squared Mahalanobis distance of its measurement is inside confirm_gate. score (K,): scores of the measurements,
-        0 to 1. Counts, flags and scales are changed in place; a measured track's miss_explained becomes False.
-        """
+        tracks."""
         self.measured[:] = False
         self.measured[rows] = True
         self.hits += self.measured
@@ -141,11 +123,6 @@ class TrackedPeople:
         self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
 
     def _scale_of(self, place: Array) -> Array:
-        """Returns px per m (N,) at people in centred boxes `place` (N, 4): centre x, y, height, width, px.
-
-        It is the longer side / 1.7 m, limited to half to twice the sequence's scale. Seen from straight above it is the
-        sequence's scale. nan if that is unknown.
-        """
         whole = self.context.px_per_m
         if self.top:
             return np.full(len(place), whole)
@@ -153,14 +130,7 @@ class TrackedPeople:
         return np.asarray(np.clip(size, whole / LARGEST_SCALE, whole * LARGEST_SCALE))
 
     def associate(self, d2: Array, log_det: Array, gate: float) -> tuple[Ints, Ints]:
-        """Returns rows and columns (K,) of associated tracks and measurements, one to one.
-
-        d2 (N, M): squared Mahalanobis distance d^2 of track and measurement inside the gates, inf outside. log_det (N,
-        1) or (N, M): ln |S| of the pair but for a constant. gate: the widest gate, a d^2. association = "nearest"
-        (sec. 4.4): each measurement chooses its nearest track, and each track keeps the nearest of these. "optimal"
-        (ours): least total d^2 + ln |S|, which is -2 ln of the likelihood N(z; prediction, S) but for a constant; a
-        lone pair inside a gate is always associated. K may be 0.
-        """
+        """Returns rows and columns (K,) of associated tracks and measurements, one to one."""
         if self.config.association == "nearest":
             return assignment.cheapest_per_track(*assignment.nearest(d2), d2)
         return assignment.optimal(d2 + np.minimum(log_det, self.largest_log_det), gate + self.largest_log_det)
@@ -171,7 +141,7 @@ class TrackedPeople:
 
     def explain_misses(self) -> None:
         """Set miss_explained of each missed confirmed track that is hidden: one measured track with a lower foot covers
-        at least the share HIDDEN = 0.4 of its box. From straight above nothing is hidden."""
+        at least the share HIDDEN = 0.4 of its box."""
         lost = (self.confirmed & ~self.measured & ~self.miss_explained).nonzero()[0]
         if not len(lost) or self.top:
             return
@@ -185,13 +155,7 @@ class TrackedPeople:
 
     def cover_several(self, z: Array, unseen: Bools) -> Bools:
         """Returns flags (M,): True for each box z (M, 4) that covers several confirmed tracks, at least one of them
-        unseen.
-
-        z: centre x, y, height, width, px. unseen (N,): flags of tracks without a measurement. Tracks have the boxes
-        that the bank holds now. A box covers several tracks if it holds their centres and fits the hull of their boxes:
-        with an IoU of at least SAME = 0.5, and not below that with the best single box. Also sets miss_explained of the
-        unseen tracks in such a box. With merged_time = 0 no box is taken for several people.
-        """
+        unseen."""
         found = np.zeros(len(z), bool)
         if not self.config.merged_time or not len(z) or not unseen.any():
             return found
@@ -209,14 +173,7 @@ class TrackedPeople:
         return found
 
     def delete_tracks(self, t: float) -> None:
-        """Delete tracks from the table at time t, s (sec. 5, and ours).
-
-        rho is a track's uncertainty, which grows with misses. A measured confirmed track stays. Deleted are: missed
-        confirmed tracks whose rho reached the value after coast_time (the longer of it and merged_time if the miss is
-        explained); missed tentative tracks whose rho reached its value at birth; tentative tracks older than
-        tentative_time, or than a confirmation takes if that is longer; missed tracks whose centre is outside the image,
-        if the image's size is known.
-        """
+        """Delete tracks from the table at time t, s (sec. 5, and ours)."""
         lost = (~(self.measured & self.confirmed)).nonzero()[0]
         if not len(lost):
             return
@@ -236,21 +193,12 @@ class TrackedPeople:
         self._bind(self.numbers.take(rows, 1), self.flags.take(rows, 1))
 
     def _outside(self, place: Array) -> Bools:
-        """Returns flags (N,): True where a box's centre is outside the image; all False if the image's size is unknown.
-
-        place (N, 4): centre x, y, height, width, px.
-        """
         if self.context.image_size is None:
             return np.zeros(len(place), bool)
         return np.asarray(((place[:, :2] < 0) | (place[:, :2] > self.context.image_size)).any(1))
 
     def start_tracks(self, z: Array, score: Array, t: float) -> None:
-        """Append a tentative track at rest for each box z (K, 4): centre x, y, height, width, px. No box changes
-        nothing.
-
-        score (K,): 0 to 1; t: time of the frame, s. The tracks get fresh ids, in order, and count as measured in this
-        frame.
-        """
+        """Append a tentative track at rest for each box z (K, 4): centre x, y, height, width, px."""
         n = len(z)
         if not n:
             return
@@ -264,15 +212,7 @@ class TrackedPeople:
         self.bank = np.concatenate([self.bank, kalman.born(z, self.noise, self.dynamics.birth_rate_var)], 1)
 
     def rows_to_report(self, t: float) -> Ints:
-        """Returns the table positions (K,), ascending, of the tracks to report at time t, s (ours).
-
-        Reported are measured tracks that are confirmed, or whose first measurement is report_delay or more ago. A
-        missed confirmed track is reported while all of this holds:
-        - its uncertainty rho is at most the value after report_coast (the longer of it and report_hidden if the miss is
-          explained);
-        - its misses since the last measurement are at most report_credit times the frames in which it was measured;
-        - it does not leave the field of view.
-        """
+        """Returns the table positions (K,), ascending, of the tracks to report at time t, s (ours)."""
         reported = self.measured & (self.confirmed | (t - self.born >= self.config.report_delay - 1e-6))
         lost = (self.confirmed & ~self.measured).nonzero()[0]
         if len(lost):
@@ -282,10 +222,7 @@ class TrackedPeople:
         return np.asarray(reported.nonzero()[0])
 
     def widen_view(self, z: Array) -> None:
-        """Set the field of view to the image, or, if its size is unknown, widen it to hold the boxes z (M, 4).
-
-        z: centre x, y, height, width, px; ignored if the image's size is known.
-        """
+        """Set the field of view to the image, or, if its size is unknown, widen it to hold the boxes z (M, 4)."""
         if self.context.image_size is not None:
             self.view_low, self.view_high = np.zeros(2), np.array(self.context.image_size, float)
         elif len(z):
@@ -293,8 +230,6 @@ class TrackedPeople:
             self.view_high = np.maximum(self.view_high, (z[:, :2] + z[:, :1:-1] / 2).max(0))
 
     def _leaving(self, rows: Ints) -> Bools:
-        """Returns flags (K,): True for each track at positions `rows` (K,) whose box crosses an edge of the field of
-        view and whose centre moves outwards there."""
         place, rate = self.upright_boxes()[rows], self.bank[kalman.RATE, rows, :2]
         centre, half = place[:, :2], place[:, :1:-1] / 2
         out = ((centre - half < self.view_low) & (rate < 0)) | ((centre + half > self.view_high) & (rate > 0))

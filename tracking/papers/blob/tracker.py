@@ -120,11 +120,6 @@ class Blob:
         return self._report(frame)
 
     def _report(self, frame: Frame) -> Tracks:
-        """Returns the Tracks to report in this frame, each `group` -1: in the image (px), or with a camera on the
-        ground (m).
-
-        With a camera a track above the horizon has no ground position and is left out.
-        """
         people = self.people
         rows = people.rows_to_report(frame.t)
         state, scale = people.bank.take(rows, 1), people.scale[rows]
@@ -143,11 +138,7 @@ class Blob:
 
 
 def image_covariance(state: Array, scale: Array) -> Array:
-    """Returns covariances (N, 4, 4) of x, y, vx, vy in px and px/s.
-
-    state (5, N, D): a bank of filters (rows place, rate, variance of the place, covariance, variance of the rate) whose
-    first coordinates are x, y, with covariances in m^2 and s; scale (N,): px per m.
-    """
+    """Returns covariances (N, 4, 4) of x, y, vx, vy in px and px/s."""
     cov = np.zeros((state.shape[1], 16))  # entry (i, j) at 4 i + j: the strides below walk along diagonals
     var, cross, rate = state[kalman.VAR :, :, :2] * (scale * scale)[:, None]
     cov[:, 0:6:5], cov[:, 10:16:5] = var, rate
@@ -157,14 +148,7 @@ def image_covariance(state: Array, scale: Array) -> Array:
 
 def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:
     """Returns ground positions (K, 2) m, velocities (K, 2) m/s, covariances (K, 4, 4), and flags (N,) of tracks that
-    have one.
-
-    state (5, N, 4): a bank of filters of x, y, h, w (rows place, rate, variance of the place, covariance, variance of
-    the rate); scale (N,): px per m. A track above the horizon has no ground position and is in no result but the flags.
-    The projected point is the bottom centre of the box for a pinhole, its centre from straight above. Covariances are
-    of x, y, vx, vy. With the Jacobian J of sim.scene.camera.to_ground: v = J (u', v'), and P = J P_uv J' block by
-    block.
-    """
+    have one."""
     from sim.scene.camera import ground_jacobian, to_ground
 
     foot, rate, cov = _foot(camera, state, scale)
@@ -180,14 +164,6 @@ def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array,
 
 
 def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array]:
-    """Returns place (N, 2) px, velocity (N, 2) px/s and covariance (N, 4, 4) of the image point projected to the
-    ground.
-
-    state (5, N, 4): a bank of x, y, h, w; rows: place (px), rate (px/s), variance of the place (m²), covariance (m²/s),
-    variance of the rate (m²/s²). scale (N,): px per m, which turns m² into px². For a pinhole the point is (x, y + h /
-    2), else (x, y). Covariances are of u, v and their velocities, px and s. The place of `state` is the reported box;
-    its variances of h are those of the bank, taken for the box's height.
-    """
     place, rate = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
     cov = image_covariance(state, scale)
     if camera.kind == "pinhole":

@@ -14,7 +14,7 @@ from sim.types import Array, Bools, Detections, Frame, Ints
 from tracking import image_scale
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
-from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.track_management import TrackedPeople
 
 INSIDE = 0.8  # share of a box that must lie in a larger predicted box to be a piece of that track's person
@@ -38,16 +38,11 @@ class BoxUpdater:
 
         self.config = config
         self.noise, self.asymptote = self.people.noise, self.people.asymptote
-        shares = 1 - np.array([config.gate, config.orphan_gate, config.confirm_gate])
+        shares = 1 - np.array([config.gate, config.orphan_gate, CONFIRM_GATE])
         self.gate, self.orphan_gate, self.confirm_gate = chdtri(4, shares)  # largest d^2 at these shares (eq. 10)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Update the tracks with a frame's detections: predict, associate, update, confirm, delete, start.
-
-        detections: boxes and scores; None, detections without boxes and no detection are a frame without measurement.
-        Boxes without area or below score_continue are ignored. Raises InputError if there are usable boxes and the
-        scale (px per m) is unknown, zero or negative; then nothing is changed.
-        """
+        """Update the tracks with a frame's detections: predict, associate, update, confirm, delete, start."""
         z, score = self._measurements(detections)
         people = self.people
         if len(z):
@@ -70,12 +65,6 @@ class BoxUpdater:
         return self.people.upright_boxes()[rows]
 
     def _measurements(self, detections: Detections | None) -> tuple[Array, Array]:
-        """Returns centred boxes z (M, 4): centre x, y, height, width, px, and scores (M,) of the usable detections, in
-        order.
-
-        Usable are boxes with a positive size and a score of at least score_continue. Without scores all are 1. None or
-        no boxes give empty arrays.
-        """
         if detections is None or detections.box is None or not len(detections.box):
             return np.zeros((0, 4)), np.zeros(0)
         box, score = detections.box, detections.score
@@ -86,14 +75,6 @@ class BoxUpdater:
         return box_geometry.centred_from_ltwh(box), score
 
     def _associate(self, z: Array, score: Array) -> tuple[Ints, Ints, Bools, Array]:
-        """Returns rows and columns (K,) of associated tracks and measurements, flags (M,) of free measurements, and d^2
-        (N, M).
-
-        z (M, 4): centred boxes: centre x, y, height, width, px; score (M,), 0 to 1. Pairs are one to one; free are
-        measurements in no pair. d^2: squared Mahalanobis distance of each of N tracks and M measurements, eq. 9; gates:
-        eq. 10. Measurements below score_start choose after all others (ours). Without tracks or measurements K = 0, all
-        are free and d^2 is 0.
-        """
         people, free = self.people, np.ones(len(z), bool)
         if not len(z) or not len(people.id):
             return np.zeros(0, np.int64), np.zeros(0, np.int64), free, np.zeros((len(people.id), len(z)))
@@ -110,13 +91,6 @@ class BoxUpdater:
         return rows, columns, free, d2
 
     def _weak_pairs(self, cost: Array, taken: Ints) -> tuple[Ints, Ints]:
-        """Returns rows and columns (K,) of pairs of tracks that are not `taken` and weak measurements (below
-        score_start).
-
-        cost (N, M): d^2 (squared Mahalanobis distance) inside the gates, inf outside and for strong measurements; it
-        may be changed. taken: positions of tracks that have a measurement. With "nearest" a measurement whose nearest
-        track is taken has no pair.
-        """
         if self.config.association == "optimal":
             cost[taken] = np.inf
             return self.people.associate(cost, self.people.rho_log_det(), self.gate)
@@ -125,13 +99,6 @@ class BoxUpdater:
         return rows[open_rows], columns[open_rows]
 
     def _without_merged_boxes(self, rows: Ints, columns: Ints, z: Array) -> tuple[Ints, Ints]:
-        """Returns the pairs rows, columns (K,) of tracks and boxes z (M, 4) without those whose box covers several
-        people (ours): such a box updates nobody.
-
-        z: centre x, y, height, width, px. The wide gate of a long-missed track would let such a box in. Only boxes
-        whose size is outside the gate of a track that is measured in every frame are examined; if all tracks are
-        associated, none is. Missed tracks in such a box get miss_explained: they survive longer.
-        """
         people = self.people
         if len(rows) == len(people.id):
             return rows, columns
@@ -147,15 +114,6 @@ class BoxUpdater:
     def _with_pieces(
         self, rows: Ints, columns: Ints, free: Bools, z: Array, score: Array, d2: Array
     ) -> tuple[Ints, Array, Array, Bools]:
-        """Returns positions (K,), scores (K,) and measurements (K, 4) of the tracks with pieces fused, and free flags
-        (M,).
-
-        rows, columns: associated tracks and measurements z (M, 4): centre x, y, height, width, px; score (M,); free
-        (M,) bool, changed in place; d2 (N, M): squared Mahalanobis distances. Free measurements that are pieces of a
-        track's person (`_owners`) are fused into one box, with the track's own measurement if it has one. The fused box
-        updates the track if it is nearer than the own measurement, or, without one, inside the gate. A piece is no
-        longer free in any case. The score is that of the own measurement, else the best of the pieces.
-        """
         people, measured, best = self.people, z[columns], score[columns]
         left = free.nonzero()[0]
         if not len(left) or not len(people.id):
@@ -180,15 +138,6 @@ class BoxUpdater:
         return rows, best, measured, free
 
     def _owners(self, rows: Ints, pieces: Array, d2: Array) -> Ints:
-        """Returns the position (K,) of the track of which each free measurement is a piece, -1 if it is a piece of none
-        (ours).
-
-        rows: positions of the measured tracks. pieces (K, 4): centre x, y, height, width, px. d2 (N, K): squared
-        Mahalanobis distances of N tracks. A piece belongs to the nearest measured track if it lies in that track's
-        orphan_gate, by the variance S of a track measured in every frame. Otherwise it belongs to the confirmed track
-        that covers most of it, if its area is smaller than the predicted box's, its centre lies inside and INSIDE = 0.8
-        of it is covered.
-        """
         people = self.people
         place, owner = people.bank[kalman.PLACE], np.full(len(pieces), -1)
         possible = box_geometry.points_inside(pieces, place) & people.confirmed
@@ -205,32 +154,16 @@ class BoxUpdater:
         return np.asarray(owner)
 
     def _away(self, rows: Ints, measured: Array) -> Array:
-        """Returns d^2 (K,), squared Mahalanobis distance (eq. 9), of the tracks at positions `rows` (K,) and their
-        measurements.
-
-        measured (K, 4): centre x, y, height, width, px.
-        """
         people = self.people
         y = (measured - people.bank[kalman.PLACE, rows]) / people.scale[rows, None]
         return np.asarray((y * y / (people.bank[kalman.VAR, rows] + self.noise)).sum(1))
 
     def _update(self, rows: Ints, measured: Array) -> Array:
-        """Update the tracks at positions `rows` (K,) with measurements (K, 4), in place (eqs 3 to 7); returns d^2 (K,)
-        (eq. 9).
-
-        measured: centre x, y, height, width, px. d^2 is the squared Mahalanobis distance before the update.
-        """
         people = self.people
         terms = kalman.update(people.bank, rows, measured, self.noise)
         return np.asarray(np.add.reduce(terms, 1) / np.square(people.scale[rows]))
 
     def _orphans(self, z: Array, score: Array, free: Bools) -> Ints:
-        """Returns the columns (K,), ascending, of the measurements that start tracks.
-
-        They are free, have at least score_start and do not cover several people. z (M, 4): centre x, y, height, width,
-        px; score, free (M,): score and whether no track has it. Missed confirmed tracks in a box that covers several
-        get miss_explained.
-        """
         left, people = (free & (score >= self.config.score_start)).nonzero()[0], self.people
         if not len(left):
             return left

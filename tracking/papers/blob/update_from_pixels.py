@@ -18,6 +18,8 @@ gate starts a track nor pieces of a person whose union is inside (blob_pieces; t
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Ints
@@ -27,11 +29,15 @@ from tracking.detect.foreground import Foreground
 from tracking.detect.person_size import PersonSize
 from tracking.filters import kalman
 from tracking.papers.blob import blob_pieces, box_geometry, new_people
-from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
-from tracking.papers.blob.measured_ellipses import Measured
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 
+EVIDENCE = 10.0  # nats, log-likelihood of a template with full support; d^2 / 2 of its place is subtracted
+TRACK_SUPPORT = 0.3  # least foreground share in the part of a confirmed track's template that no other covers
+ENTRY_SUPPORT = 0.5  # least support of the template of a new person or of a tentative track
+PERSON_NOISE = 0.15  # m, standard deviation of people's sizes about the size expected at their place
+ANGLE_NOISE = np.radians(8.0) ** 2  # rad^2, variance of a measured direction beside that of the blob's moments
 SHARED = 0.35  # share of a predicted box that a blob's box must cover for the track to be expected in the blob
 UPRIGHT = 25.0  # deg, standard deviation of the direction of a person measured by an upright template
 EXTENT = 0.75, 1.3  # least and largest height and width of a template relative to the expected person
@@ -39,68 +45,69 @@ BLIND = 25.0  # a template's variance of height and width relative to a lone blo
 LEAST_SHOWN = 0.2  # a person of whom a smaller share is visible is measured as if this share were
 
 
+class Measured(NamedTuple):
+    """Measurements of K tracks, one row each; tracks without a measurement have no row.
+
+    rows (K,): table positions of the tracks, from 0, each once, in any order. z (K, 5): ellipse: centre x, y, full axes
+    h, w (px), direction theta of h (rad). noise (K, 4): variances of x, y, h, w, m^2. angle_var (K,): variance of
+    theta, rad^2, inf if it is not measured. support (K,), 0 to 1: foreground less half the background, of the pixels
+    that the template alone covers, over its area; 1 for a blob.
+    """
+
+    rows: Ints
+    z: Array
+    noise: Array
+    angle_var: Array
+    support: Array
+
+    def joined(self, more: Measured) -> Measured:
+        """Returns new Measured with the rows of these measurements followed by those of `more`."""
+        return Measured(*(np.concatenate(pair) for pair in zip(self, more, strict=True)))
+
+
 class PixelUpdater:
     """Updates the tracks of `people` from the picture of each frame.
 
     State: foreground, the pipeline with its background model; size, the size of a person at each place; people, the
     table of tracks; config; context, of the sequence; gates, confirm_gates (2,): largest squared Mahalanobis distance
-    d^2, without and with direction, of an association and of a measurement that may confirm a track; angle_noise:
-    variance of a measured direction, rad^2; upright_var: that of an upright template, inf from straight above.
+    d^2, without and with direction, of an association and of a measurement that may confirm a track; upright_var:
+    variance of the direction of an upright template, rad^2, inf from straight above.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:
         """Learn background and person size from the context's background sample, which must not be None
-        (AssertionError).
-
-        If the context has no scale (px_per_m is nan), it is learned from people who stand alone in the sample; without
-        any it stays unknown, and an image is taken to be 18 m high. Raises InputError if the scale is zero or negative,
-        or if the sample has a wrong shape or dtype, too few frames or shows no background.
-        """
+        (AssertionError)."""
         assert context.background is not None
         if not np.isnan(context.px_per_m):
             image_scale.required(context.px_per_m)
         self.people, self.context = people, context
         self.size = PersonSize(context)
-        self.foreground = Foreground(context, config, config.most_foreground)
+        self.foreground = Foreground(context, config)
         self.foreground.learn_person_size(self.size, context.background)
         self._take_scale()
         self.upright_var = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
         self._set(config)
 
     def follow(self, config: BlobConfig) -> None:
-        """Replace the config, which `people` must follow already; background and person size stay as learned. Gates are
-        computed anew."""
-        self.foreground.follow(config, config.most_foreground)
+        """Replace the config, which `people` must follow already; background and person size stay as learned."""
+        self.foreground.follow(config)
         self._set(config)
 
     def _set(self, config: BlobConfig) -> None:
-        """Keep the config and compute from it the gates (largest d^2, squared Mahalanobis distance, without and with
-        direction) and angle_noise, the variance of a measured direction, rad^2."""
         from scipy.special import chdtri
 
         self.config = config
         # largest d^2 at these shares, for 4 degrees of freedom (no direction) and 5 (eq. 10)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
-        self.confirm_gates = chdtri(np.array([4, 5]), 1 - config.confirm_gate)
-        self.angle_noise = np.radians(config.angle_noise) ** 2
+        self.confirm_gates = chdtri(np.array([4, 5]), 1 - CONFIRM_GATE)
 
     def _take_scale(self) -> None:
-        """If the context has no scale (nan), use the learned one, px per m, for foreground and tracks; the context
-        stays nan.
-
-        While none is learned, the tracks get that of an image 18 m high.
-        """
         if np.isnan(self.context.px_per_m):
             self.foreground.px_per_m = self.size.px_per_m
             self.people.context = self.context.replace(px_per_m=self.foreground.scale)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Update the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used.
-
-        If the picture is missing or implausible (more than most_foreground of it is foreground), no track is measured.
-        An implausible picture still adapts the background. Raises InputError if the picture's size or dtype is not that
-        of the background sample; the tracks are then already predicted.
-        """
+        """Update the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used."""
         people = self.people
         people.predict()
         people.widen_view(np.zeros((0, 4)))
@@ -124,15 +131,11 @@ class PixelUpdater:
         return None
 
     def _measure_nobody(self, t: float) -> None:
-        """Record a miss of all tracks at time t, s, and delete those missed for too long or outside the image; the
-        others keep the prediction (sec. 4.4)."""
         people = self.people
         people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
         people.delete_tracks(t)
 
     def _protected(self) -> Bools:
-        """Returns a mask (H, W), True in ellipses at the places of confirmed tracks: there the background must not
-        adapt."""
         boxes = self._person_boxes(self.people.upright_boxes()[self.people.confirmed])
         return template_mask(self.foreground.shape, box_geometry.standing(boxes))
 
@@ -142,18 +145,12 @@ class PixelUpdater:
         return self._person_boxes(self.people.upright_boxes()[rows])
 
     def _measure(self, t: float, mask: Bools, found: Blobs) -> None:
-        """Update, confirm, delete and start tracks with the foreground of a frame at time t, s.
-
-        mask (H, W) bool: the cleaned foreground; found: its blobs, connected regions. Blobs of one person are
-        associated; with `split`, and once the size of people is reliable, other foreground is divided among the tracks
-        by templates (upright ellipses). Else all blobs are associated. Foreground that no track explains starts tracks.
-        """
-        people, c = self.people, self.config
+        people = self.people
         expected = people.upright_boxes()
-        split = c.split and self.size.reliable
+        split = self.config.split and self.size.reliable
         lone = self._lone_people(found, expected) if split else np.ones(len(found), bool)
         columns = lone.nonzero()[0]
-        z, angle_var = found.ellipse[columns], found.angle_var[columns] + self.angle_noise
+        z, angle_var = found.ellipse[columns], found.angle_var[columns] + ANGLE_NOISE
         made, taken, d2 = self._associate(z, angle_var)
         unexplained = np.delete(z, taken, 0)
         if not split:
@@ -165,7 +162,7 @@ class PixelUpdater:
             scene.mark_explained(found.label, columns)
             for confirmed in (True, False):
                 made = made.joined(self._measure_by_templates(scene, expected, made.rows, confirmed))
-            entered = box_geometry.centred(new_people.find_new_people(scene, self.size, c.entry_support))
+            entered = box_geometry.centred(new_people.find_new_people(scene, self.size, ENTRY_SUPPORT))
             unexplained = np.concatenate([unexplained, self._person_ellipses(entered)])
         away = people.update(made.rows, made.z, made.noise, made.angle_var)
         if split:
@@ -177,88 +174,47 @@ class PixelUpdater:
         people.start_tracks(unexplained, np.ones(len(unexplained)), t)
 
     def _relax_sizes(self) -> None:
-        """Move the axes of all tracks, in place, a step towards those of a person at their places.
-
-        Axes do not change where a person's size is unknown. `person_noise` (m) is the spread of people about it.
-        """
         at = box_geometry.standing(self.people.upright_boxes())
         axes = self.size.axes(at[:, :2])
         rows = np.flatnonzero(np.isfinite(axes).all(1))
-        self.people.relax_axes(rows, -np.sort(-axes[rows]), self.config.person_noise**2)
+        self.people.relax_axes(rows, -np.sort(-axes[rows]), PERSON_NOISE**2)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
-        """Returns flags (M,): True for each blob of `found` that is taken for one person.
-
-        It has one person's size (so False where that is unknown), the image's edge does not cut it, and at most one
-        confirmed track is expected in it. expected (N, 4): boxes of all tracks: centre x, y, height, width, px.
-        """
         one = self.size.one_person(found.box, found.ellipse)
         return np.asarray(one & ~found.cut() & ~self._several_expected(found.box, expected))
 
     def _person_boxes(self, upright: Array) -> Array:
-        """Returns the boxes (N, 4) of people whose ellipses have the bounding boxes `upright` (N, 4).
-
-        Both are centre x, y, height, width, px. Height and width are multiplied by learned factors, the median ratios
-        of a person's box to its ellipse's; the centre stays.
-        """
         return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.box_over_ellipse], 1)
 
     def _person_ellipses(self, box: Array) -> Array:
-        """Returns the ellipses (N, 5) centre x, y, full axes h, w (px, the longer first), theta (rad), of upright
-        people in the boxes `box` (N, 4).
-
-        Boxes are centre x, y, height, width, px; their sides are divided by the learned factors of a person's box over
-        its ellipse. theta, the direction of h, is pi / 2 if h is vertical, else 0.
-        """
         return box_geometry.inscribed_ellipses(np.concatenate([box[:, :2], box[:, 2:] / self.size.box_over_ellipse], 1))
 
     def _several_expected(self, box: Array, expected: Array) -> Bools:
-        """Returns flags (M,): True for each blob in which two or more confirmed tracks are expected.
-
-        box (M, 4): left, top, width, height, px, of the blobs; expected (N, 4): centre x, y, height, width, px, of all
-        tracks. A track is expected in a blob that covers at least SHARED = 0.35 of its box.
-        """
         sure = expected[self.people.confirmed]
         blobs = box_geometry.centred_from_ltwh(box)
         return np.asarray((box_geometry.covered_share(sure, blobs) >= SHARED).sum(0) > 1)
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Measured, Ints, Array]:
-        """Returns the measurements of the associated tracks, one to one, the rows (K,) of z that they use, and d^2 (N,
-        M) of all N tracks and M ellipses, inf outside the gates.
-
-        z (M, 5): centre x, y, axes h, w (px), theta (rad); angle_var (M,): variance of theta, rad^2. The gate, a limit
-        of the squared Mahalanobis distance, has 5 degrees of freedom if the ellipse has a direction, else 4 (eqs 9,
-        10). Seen from straight above it always has 4, as people turn on the spot. Without ellipses or tracks K = 0.
-        """
         d2, log_det = self.people.innovations(z, self._gated_direction(angle_var))
         rows, taken = self.people.associate(self._gated(d2, angle_var), log_det, self.gates[1])
         noise = np.tile(self.people.noise, (len(rows), 1))
         return Measured(rows, z[taken], noise, angle_var[taken], np.ones(len(rows))), taken, d2
 
     def _gated_direction(self, angle_var: Array) -> Array:
-        """Returns variances (M,) of directions for the gate, rad^2: inf (none) from straight above."""
         return np.full(len(angle_var), np.inf) if self.size.above else angle_var
 
     def _gated(self, d2: Array, angle_var: Array) -> Array:
-        """Returns d^2 (N, M) with inf outside the gates of eq. 10; angle_var (M,): variances of directions, rad^2."""
         directed = kalman.directed(self._gated_direction(angle_var)).astype(int)
         return np.where(d2 <= self.gates[directed], d2, np.inf)
 
     def _with_pieces(self, made: Measured, taken: Ints, found: Blobs, d2: Array) -> tuple[Measured, Bools]:
-        """Returns the measurements with the pieces of a person united (blob_pieces), and flags (M,) of the blobs used.
-
-        made, taken: measurements of associated tracks and the blobs that they use; d2 (N, M): squared distances of all
-        tracks and blobs. A blob in no pair may be a piece of the nearest track whose predicted box holds its centre.
-        All pieces of a track and its own blob, if it has one, are replaced by their union. They are so if the union is
-        nearer than the own blob or, without one, inside the gate, and one person where a person's size is reliable.
-        """
         used = np.isin(np.arange(len(found)), taken)
         owner = blob_pieces.owners(found.ellipse, self.people.upright_boxes(), d2, ~used)
         own = dict(zip(made.rows.tolist(), taken.tolist(), strict=True))
         for row in np.unique(owner[owner >= 0]).tolist():
             mine = (owner == row) | (np.arange(len(found)) == own.get(row, -1))
             whole, var = blob_pieces.union(found.area[mine], found.ellipse[mine])
-            z, angle_var = whole[None], np.array([var + self.angle_noise])
+            z, angle_var = whole[None], np.array([var + ANGLE_NOISE])
             if self.size.reliable and not self.size.one_person(blob_pieces.hull(found.box[mine]), z)[0]:
                 continue
             away = self._gated(self.people.innovations(z, self._gated_direction(angle_var))[0], angle_var)[row, 0]
@@ -272,16 +228,7 @@ class PixelUpdater:
     def _measure_by_templates(
         self, scene: ExplainedForeground, expected: Array, rows: Ints, confirmed: bool
     ) -> Measured:
-        """Returns template measurements of the confirmed (or, if `confirmed` is False, of the tentative) tracks not in
-        `rows`.
-
-        A template is an upright ellipse; it keeps the track's size, within 0.75 to 1.3 of a person's, and moves to
-        where it explains most foreground. scene: the frame's foreground; the templates are painted into it. expected
-        (N, 4): boxes of all tracks: centre x, y, height, width, px. rows: positions of tracks measured already. A track
-        whose template has too little support (foreground of its own) is left out. The variances grow with the inverse
-        square of the visible share; those of h and w are BLIND = 25 times larger still.
-        """
-        people, c = self.people, self.config
+        people = self.people
         open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == confirmed), rows)
         at = box_geometry.standing(self._person_boxes(expected[open_rows]))
         size = self.size.at(at[:, :2])
@@ -289,8 +236,8 @@ class PixelUpdater:
         at[:, 2:] = np.clip(at[:, 2:], EXTENT[0] * size, EXTENT[1] * size)
         var = (people.bank[kalman.VAR, open_rows] + people.noise)[:, :2]
         spread = np.sqrt(var) * people.scale[open_rows, None]
-        at = scene.fit_places(at, spread, c.evidence)
-        keep = scene.prune(at, c.track_support if confirmed else c.entry_support, pieces=confirmed)
+        at = scene.fit_places(at, spread, EVIDENCE)
+        keep = scene.prune(at, TRACK_SUPPORT if confirmed else ENTRY_SUPPORT, pieces=confirmed)
         at = at[keep]
         support, visible = scene.support(at), scene.visible_share(at)
         noise = people.noise / np.maximum(visible, LEAST_SHOWN)[:, None] ** 2

@@ -16,7 +16,7 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.components import linked
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.group_bank import GroupBank
-from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 FASTEST = 2.0
 """m/s: nobody walks faster than this relative to a group (walking distance)."""
@@ -54,23 +54,14 @@ class Associated:
 
 
 def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:
-    """Return the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2).
-
-    Departure: the paper's is Sigma alone. H P H' is the part of P for the centroid, r the standard deviation of a
-    point, I the unit matrix. w grows at `split_speed` while a group has no feasible association. bank: of the G
-    groups. In the squared unit of the points.
-    """
-    wider = np.square(scaled.scale * scaled.config.split_speed * bank.null_time)
+    """Return the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2)."""
+    wider = np.square(scaled.scale * (SPLIT_SPEED if scaled.config.corrections else 0.0) * bank.null_time)
     return np.asarray(bank.extent + bank.P[:, :2, :2] + (scaled.point_sd**2 + wider)[:, None, None] * np.eye(2))
 
 
 def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: ScaledParameters, t: float) -> Array:
     """Return squared Mahalanobis distances (G, M) of the points (M, 2) from the groups, inf outside a search region
-    (eq. 2.2).
-
-    bank: of the G groups, predicted; region (G, 2, 2): from `search_regions`; t: time of the frame, s. Lost groups (not
-    measured for `coast_time`) have no region. Tentative groups have no points that lie in a confirmed group's region.
-    """
+    (eq. 2.2)."""
     config = scaled.config
     lost = bank.confirmed & (t - bank.last_seen > max(config.coast_time, scaled.dt) + 1e-9)
     d2 = kernels.search(points, bank.x, region, config.gate)
@@ -83,14 +74,7 @@ def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: Scale
 
 
 def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters) -> Ints:
-    """Return for each point (M,) the row of the group that it is attached to, or -1 (ours).
-
-    points (M, 2); d2 (G, M): inf outside the search regions. A point in a region gets -1. A point in no region is
-    attached to a group if it is linked to a point in the group's region, directly or through others. Linked points are
-    at most 2 r apart (r: the config's radius). Of several groups it gets the one whose point is nearest. From points, a
-    confirmed group takes only points within walking distance (2 m/s for a frame, and 3 standard deviations) of its
-    members. The others are newcomers or false alarms.
-    """
+    """Return for each point (M,) the row of the group that it is attached to, or -1 (ours)."""
     link, owner = scaled.constraint.link, np.full(len(points), -1)
     taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)
     if taken.all() or not taken.any():
@@ -115,21 +99,12 @@ def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters
 
 
 def walking_reach(scaled: ScaledParameters, elapsed: Array) -> Array:
-    """Return how far (K,), in the unit of the points, a member may be from its predicted place.
-
-    elapsed (K,) or a number: s after its last measurement; times shorter than a frame count as one frame. The reach is
-    2 m/s times that, plus 3 standard deviations of a measured position.
-    """
+    """Return how far (K,), in the unit of the points, a member may be from its predicted place."""
     return np.asarray(scaled.scale * FASTEST * np.maximum(elapsed, scaled.dt) + 3 * scaled.point_sd)
 
 
 def claimed(points: Array, weights: Array, d2: Array, owner: Ints, t: float) -> PointClaims:
-    """Return the claims on the points (M, 2) of the frame at time t, s: who may have each point.
-
-    weights (M,): people that each point stands for; d2 (G, M): squared Mahalanobis distances from G groups, inf outside
-    the search regions; owner (M,): row of the group that a point in no region is attached to, or -1. All points are
-    measured at t. An owned point has one claimant, any other as many as regions it lies in.
-    """
+    """Return the claims on the points (M, 2) of the frame at time t, s: who may have each point."""
     claimants = np.where(owner >= 0, 1, np.isfinite(d2).sum(0))
     return PointClaims(points, weights, np.full(len(points), t), d2, owner, claimants)
 
@@ -138,14 +113,7 @@ def associate(
     bank: GroupBank, claims: PointClaims, region: Array, log_ratio: Array, scaled: ScaledParameters, t: float
 ) -> Associated:
     """Update the groups of the bank in place by their associations (sec. 4.1 to 4.3) and return the points that they
-    have.
-
-    claims: which points each group may have; region (G, 2, 2): from `search_regions`. log_ratio (G, M): log p(colour |
-    group) - log p(colour | other groups) of each point, or (G, 0) without colours. t: time of the frame, s. A group
-    counts as measured if its association has a point of this frame. `null_time` grows by a frame for a group without
-    feasible associations (points that form one group), and shrinks by a frame, down to 0, for a measured one.
-    last_seen, measured_time and own_people are updated, too.
-    """
+    have."""
     weighted = scaled.config.appearance * log_ratio
     log_density = point_log_density(bank.size, region, claims, weighted)
     state, chosen, report = kernels.associate(
@@ -172,11 +140,7 @@ def associate(
 
 def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio: Array) -> Array:
     """Return the log of N_g N(y; xi_g, S_g) times the colour ratio (G, M) of each point y and group g, without its
-    constant; -inf where a group may not have the point.
-
-    size (G,): N; region (G, 2, 2): S; log_ratio (G, M) of the points' colours, or (G, 0). 0 for a point that its owner
-    alone may have.
-    """
+    constant; -inf where a group may not have the point."""
     log_weight = np.log(np.maximum(size, 1e-300)) - np.log(np.linalg.det(region)) / 2
     found = log_weight[:, None] - claims.d2 / 2 + (log_ratio if log_ratio.shape[1] else 0.0)
     owned = np.flatnonzero(claims.owner >= 0)
@@ -186,11 +150,7 @@ def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio
 
 def shares(log_density: Array, may: Bools) -> Array:
     """Return the probability (G, M) that each point is each group's: proportional to the density, among the groups that
-    `may` have it.
-
-    log_density (G, M): log of N_g N(y; xi_g, S_g), with colours that of their product; may (G, M): True where a group
-    may have the point and the density is above 0. A point that no group may have has probability 0 for all.
-    """
+    `may` have it."""
     share, shared = may.astype(float), np.flatnonzero(may.sum(0) > 1)
     log = np.where(may[:, shared], log_density[:, shared], -np.inf)
     density = np.exp(log - log.max(0, initial=-np.inf))

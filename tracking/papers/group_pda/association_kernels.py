@@ -156,13 +156,6 @@ def associate(
 def _ordered_points(
     d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, share: Array, g: int, association: float
 ) -> tuple[Ints, int]:
-    """Returns the indices of the points of group g, and the number of unshared ones, which come first (sec. 4.1).
-
-    The shared points, which other groups may have, too, follow by distance less twice the colour evidence; with
-    `association` NEAREST only those that are most probably of g. d2, log_ratio (M,): of this group, d2
-    inf outside its region (log_ratio may be empty); owner (M,): group that alone may have a point in no region, -1
-    none; claimants (M,): number of groups that may have the point; share (G, M): probability that it is a group's.
-    """
     inside = np.flatnonzero((d2 < np.inf) | (owner == g))
     if association == NEAREST:
         kept = np.empty(len(inside), np.bool_)
@@ -180,19 +173,6 @@ def _estimate(
     points: Array, weights: Array, age: Array, colour: Array, start: int, feasible: Bools, region: Array,
     x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array, report: Array,
 ) -> int:  # fmt: skip
-    """Update one group (x, P, extent, size, report) in place by its associations: the first start, start + 1, … of its
-    points.
-
-    points (M, 2), weights (people each stands for), age (s since it was measured), colour (what each adds to the log
-    mass) (M,): ordered; the first `start` are unshared. feasible (J,): which associations satisfy the group constraint
-    (m_g, eq. 4.1), at least one. region (2, 2): covariance of the search region. x (4,), P (4, 4), extent (2, 2), size
-    (1,), report (6,). rest: extent and size must not change. Returns the number of shared points in the likeliest
-    association, or -1 if the miss has at least the mass of all associations together.
-
-    A place carried for a seconds is a measurement of a seconds ago, moved with the estimated velocity. So the centroid
-    of points whose mean age is a measures xi - a v (ours): H = [I, -a I] and S = H P H' + R. An association of missed
-    members alone says that all points here are others'; it has its mass and leaves the prediction.
-    """
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     seen, mean_age = running_ages(weights, age, start)
     S = np.empty((len(people), 3))
@@ -225,12 +205,6 @@ def _estimate(
 
 @njit(cache=True)
 def _mix(beta: Array, mean: Array, age: Array, S: Array, x: Array, P: Array) -> None:
-    """Mix the conditional estimates (sec. 4.3) into x (4,) and P (4, 4), in place: means over the J associations.
-
-    x = sum beta_j x_j, P = sum beta_j (P_j + spread of x_j). beta (J,): normalised masses; what they lack of 1 leaves
-    the prediction. mean (J, 2): innovations; age (J,): a of H = [I, -a I], s; S (J, 3): covariances xx, xy, yy of the
-    innovations. Each association has its own gain P H' / S.
-    """
     shift, spread, less = np.zeros(4), np.zeros((4, 4)), np.zeros((4, 4))
     step, PH, gain = np.empty(4), np.empty((4, 2)), np.empty((4, 2))
     for j in range(len(beta)):
@@ -258,14 +232,6 @@ def _mix(beta: Array, mean: Array, age: Array, S: Array, x: Array, P: Array) -> 
 
 @njit(cache=True)
 def _adapt(beta: Array, people: Array, cov: Array, extent: Array, size: Array, rules: Array) -> None:
-    """Update extent (2, 2) and size (1,) in place by eq. 2.4, as means over J associations; the miss leaves them as
-    they are.
-
-    Each becomes keep · old + (1 - keep) · new, with the decay per frame KEEP_EXTENT or KEEP_SIZE of `rules`. beta (J,):
-    normalised masses; people (J,), cov (J, 3): number and covariance xx, xy, yy of each association's people.
-    Departures: covariances of few people are shrunk to the prior, and divided by GATE_FACTOR to restore what the edge
-    of the search region cuts off.
-    """
     target, count = np.zeros(3), 0.0
     total = beta.sum()
     for j in range(len(beta)):

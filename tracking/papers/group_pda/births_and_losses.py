@@ -18,7 +18,7 @@ from tracking.filters.components import partition
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association import walking_reach
 from tracking.papers.group_pda.group_bank import GroupBank, alike_velocities, newborn
-from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 RECAPTURE_GATE = 13.28
 """Squared Mahalanobis radius of a recapture: 99 % quantile of chi-square with 4 degrees of freedom."""
@@ -38,11 +38,7 @@ class ExpectedMembers:
 
 
 def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> ExpectedMembers:
-    """Return the expected members, at time t (s), of the confirmed groups that were measured lately.
-
-    That is within the last `carry_time` s, or within one frame if that is longer. Without such a group the result has K
-    = 0.
-    """
+    """Return the expected members, at time t (s), of the confirmed groups that were measured lately."""
     recent = t - bank.last_seen <= max(scaled.config.carry_time, scaled.dt) + 1e-9
     rows = np.flatnonzero(bank.confirmed & recent).tolist()
     places = [bank.positions(r) for r in rows]
@@ -55,13 +51,8 @@ def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> Exp
 def add_newborns(
     bank: GroupBank, points: Array, weights: Array, expected: ExpectedMembers, scaled: ScaledParameters, t: float
 ) -> None:
-    """Append to the bank the tentative groups that the unclaimed points form under the group constraint G_y (sec. 3.3).
-
-    G_y: linked points are one group, and such components whose regions overlap. points (M, 2), weights (M,): people
-    each stands for; t: s. expected: the members before the groups were updated. A newborn group with a point within
-    their reach is the child of the nearest member's group (ours). Components with too few people (noise) form no group.
-    No points change nothing.
-    """
+    """Append to the bank the tentative groups that the unclaimed points form under the group constraint G_y (sec.
+    3.3)."""
     if not len(points):
         return
     group = partition(points, weights, scaled.constraint)
@@ -76,30 +67,19 @@ def add_newborns(
 
 
 def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
-    """Make group k of the bank `born` a child of the group in `row` of `bank`; changes `born` in place.
-
-    Its origin is the common centroid of both, weighted by their people. With `inherit_velocity` it starts with the
-    parent's velocity, with `split_speed` as further standard deviation.
-    """
     share = bank.size[row] / (bank.size[row] + born.size[k])
     born.parent[k] = bank.id[row]
     born.origin[k] = share * bank.x[row, :2] + (1 - share) * born.x[k, :2]
-    if scaled.config.inherit_velocity:
+    if scaled.config.corrections:
         born.x[k, 2:] = bank.x[row, 2:]
-        born.P[k, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * scaled.config.split_speed) ** 2 * np.eye(2)
+        born.P[k, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
 
 
 def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[WholeGroupEvent]:
-    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield their events. t: s.
-
-    A group that fits a confirmed group not measured in this frame takes over its id and age, without an event, if
-    `recapture` is on; the old row becomes tentative and is dropped later. Any other group gets a fresh id from `ids`,
-    with a split event if its parent (the group it has left) still exists, else an enter event. Onset: its first
-    measurement. It is a generator: the bank changes only while it is read.
-    """
+    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield their events. t: s."""
     c = scaled.config
     new = np.flatnonzero(~bank.confirmed & (bank.measured_time > c.confirm_time + 1e-9))
-    old = np.flatnonzero(bank.confirmed & (bank.last_seen < t)) if c.recapture else new[:0]
+    old = np.flatnonzero(bank.confirmed & (bank.last_seen < t)) if c.recapture_time > 0 else new[:0]
     recaptured = dict(_recaptured(bank, new, old, scaled)) if len(new) and len(old) else {}
     for row in new.tolist():
         place = tuple(bank.x[row, :2].tolist())
@@ -120,14 +100,6 @@ def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) 
 
 
 def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters) -> Iterator[tuple[int, int]]:
-    """Yields pairs (row of a new group, row of an unmeasured old group) that are the same group, nearest first.
-
-    new, old: rows of the bank to compare. No row occurs twice. A pair satisfies all of this:
-    - The new state lies in the old group's predicted region of position and velocity (squared Mahalanobis distance at
-      most 13.28).
-    - The velocities differ by no more than `merge_velocity` and a standard deviation.
-    - The old group was last measured before the new one's birth.
-    """
     d = bank.x[new][:, None] - bank.x[old]
     S = bank.P[new][:, None] + bank.P[old]
     S[..., :2, :2] += bank.extent[old]
@@ -142,14 +114,9 @@ def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters)
 
 
 def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-    """Remove the groups that were not measured for too long, at time t (s); yield a leave event for each confirmed one.
-
-    Too long is `confirm_time` for a tentative group, `coast_time` for a confirmed one, or `recapture_time` if that is
-    longer and recapture is on. The event's onset is the last measurement, its position the centroid moved back to that
-    time. It is a generator: the groups are removed when it has been read to its end.
-    """
+    """Remove groups that were not measured for too long, at time t (s); yield a leave event of each confirmed one."""
     c = scaled.config
-    patience = np.where(bank.confirmed, max(c.coast_time, c.recapture_time if c.recapture else 0.0), c.confirm_time)
+    patience = np.where(bank.confirmed, max(c.coast_time, c.recapture_time), c.confirm_time)
     dead: Bools = t - bank.last_seen > patience + 1e-9
     for row in np.flatnonzero(dead & bank.confirmed).tolist():
         last_seen = float(bank.last_seen[row])

@@ -24,24 +24,14 @@ SMOOTHING = 0.05
 
 def colour_bins(image: Image, points: Array) -> Ints:
     """Return the colour histogram bin (M,), 0 to 63, of the pixel at each point (M, 2) u, v in px: blue + 4 green + 16
-    red, 4 levels each.
-
-    image (H, W, 3) uint8, BGR. Coordinates are cut to whole px. Raises IndexError for a point beyond the right or lower
-    edge; coordinates of -1 and less count from that edge.
-    """
+    red, 4 levels each."""
     u, v = points.astype(np.int64).T
     level = image[v, u].astype(np.int64) * LEVELS // 256
     return np.asarray(level @ np.array([1, LEVELS, LEVELS**2]))
 
 
 def colour_log_ratio(bank: GroupBank, d2: Array, bins: Ints) -> Array:
-    """Return log p(c | g) - log p(c | other groups) (G, M) of each point's colour c for each group g.
-
-    0 where a group may not have the point, and for points that only one group may have. bank: of the G groups, with
-    their colour histograms. d2 (G, M): inf where a group may not have a point. bins (M,): histogram bins of the points'
-    colours. p(c | g) is the share of c in the smoothed histogram of g. The probability of the other groups is the mean
-    over those that may have the point.
-    """
+    """Return log p(c | g) - log p(c | other groups) (G, M) of each point's colour c for each group g."""
     ratio, may = np.zeros(d2.shape), np.isfinite(d2)
     count = may.sum(0)
     shared = np.flatnonzero(count > 1)
@@ -58,12 +48,7 @@ def colour_log_ratio(bank: GroupBank, d2: Array, bins: Ints) -> Array:
 def update_histograms(
     bank: GroupBank, chosen: Bools, claimants: Ints, bins: Ints, weights: Array, scaled: ScaledParameters
 ) -> None:
-    """Update the groups' colour histograms (in the bank) in place by their points that no other group may have.
-
-    chosen (G, M) bool: each group's points; claimants (M,): number of groups that may have a point; bins (M,): its
-    colour bin; weights (M,): people it stands for. The old histogram decays with the time constant `extent_time`, the
-    first one is taken as it is. A group without such points keeps its histogram.
-    """
+    """Update the groups' colour histograms (in the bank) in place by their points that no other group may have."""
     keep = np.exp(-scaled.dt / scaled.config.extent_time)
     for row in np.flatnonzero(chosen.any(1)).tolist():
         mine = chosen[row] & (claimants < 2)

@@ -21,11 +21,7 @@ LEAST_MEASURED = 0.55
 
 def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
     """Return True if so few people of the groups in rows i and j of the bank are measured that the two may be one
-    group.
-
-    Few are less than LEAST_MEASURED = 55 % of the sum of their sizes. Measured people are shared out by the probability
-    that they are a group's.
-    """
+    group."""
     return bool(LEAST_MEASURED * (bank.size[i] + bank.size[j]) > bank.own_people[i] + bank.own_people[j])
 
 
@@ -42,12 +38,7 @@ class DuplicateGroups:
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
         """Advance the clocks by a frame, at time t (s), and make one group lost of each pair whose clock has passed
-        `coast_time`.
-
-        Only confirmed groups measured in this frame take part; other pairs lose their clock. Lost is the group with the
-        smaller share of people of its own; if equal, the younger one. A lost group claims no points until it is
-        recaptured; `last_seen` is set back in the bank.
-        """
+        `coast_time`."""
         rows = np.flatnonzero(bank.confirmed & (bank.last_seen >= t))
         rows = rows[np.argsort(bank.id[rows])]
         pairs = {(int(bank.id[i]), int(bank.id[j])): (i, j) for i, j in _overlapping(bank, rows, scaled.config.gate)}
@@ -65,19 +56,10 @@ class DuplicateGroups:
 
 
 def _overlapping(bank: GroupBank, rows: Ints, gate: float) -> Iterator[tuple[int, int]]:
-    """Yields pairs (i, j), i before j in `rows`, of rows of the bank whose search regions overlap.
-
-    gate: squared Mahalanobis radius of a region, an ellipse about the group's centroid, whose covariance is the group's
-    extent.
-    """
     near = regions_overlap(bank.x[rows, :2], bank.extent[rows], gate)
     return ((int(rows[i]), int(rows[j])) for i, j in np.argwhere(np.triu(near, 1)).tolist())
 
 
 def _with_fewer_own(bank: GroupBank, i: int, j: int) -> int:
-    """Returns the row, i or j, with the smaller share of people of its own (expected among its points).
-
-    If equal, the younger group (later first_seen), then the larger id.
-    """
     share: Array = bank.own_people[[i, j]] / bank.size[[i, j]]
     return min((i, j), key=lambda row: (share[0] if row == i else share[1], -bank.first_seen[row], -bank.id[row]))

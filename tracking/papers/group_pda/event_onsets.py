@@ -52,13 +52,7 @@ class PairHistory:
 
     def merge_onset(self, merge_velocity: float) -> tuple[float, Array]:
         """Return when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit:
-        half-way between the centroids.
-
-        merge_velocity: m/s. The onset is the moment after the last one in which the pair was not yet near and alike;
-        the first moment if there is none, the last moment at the latest. Not near: the gap between nearest people is
-        above 1.5 m. Not alike: the velocity difference, by chords from 0.7 s before to 0.7 s after, is above 1.2
-        merge_velocity; only moments up to `alike_since` count. There must be a moment (else TypeError).
-        """
+        half-way between the centroids."""
         t, d = np.array([m.t for m in self.moments]), np.array([m.difference for m in self.moments])
         before = (chords(t, d, MERGE_CHORD) > MERGE_CHORD_MARGIN * merge_velocity) & (t <= self.alike_since)
         before |= np.array([m.gap for m in self.moments]) > MERGE_DISTANCE
@@ -68,12 +62,7 @@ class PairHistory:
 
 def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Array:
     """Return speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords from `half` s before to
-    after.
-
-    Unit: that of d per s. A chord spans at least one frame to each side if there is one. At both ends of the series
-    chords are shorter. With full_length they are as long there as elsewhere, but not centred on their times. A single
-    position has speed 0. None give an empty array, or IndexError with full_length.
-    """
+    after."""
     k, middle = np.arange(len(t)), t
     if full_length:
         middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
@@ -86,18 +75,7 @@ def split_onset(
     recent: list[tuple[float, Array]], parts: list[Array], metres_per_unit: Array, body_cov: Array, known: float
 ) -> tuple[float, Array]:
     """Return when, in s, a group began to divide into two parts, and its centroid (2,) at that time, in the unit of the
-    points.
-
-    recent: (time in s, points (K, 2)) of the group, oldest first. parts: the points (K, 2) of both parts, now.
-    metres_per_unit (2,): metres on the ground per unit along x and y. body_cov (2, 2): covariance of one person's
-    points. known: time in s at which the split is known; later moments of `recent` are ignored.
-
-    Going back from `known`, each moment's points are divided between the two centroids, which follow them. The nearest
-    people of the parts are taken to be nearer than the centroids by the same distance as now. The onset is the moment
-    after the last one in which the parts were together by the split rule (at most 1.5 m apart; 2.5 m if slower than 0.7
-    m/s); the first moment if there is none. With fewer than two moments the onset is `known`, and the place that
-    moment's centroid, or that of the first part.
-    """
+    points."""
     before = [(t, y * metres_per_unit) for t, y in recent if t <= known + 1e-9]
     if len(before) < 2:
         t, y = before[0] if before else (known, parts[0] * metres_per_unit)

@@ -17,6 +17,8 @@ from tracking.papers.group_pda.config import GroupPdaConfig
 
 WIDTH_PER_HEIGHT = 0.3
 """Width over height of a person in the image if there is no camera."""
+GRID = 0.1
+"""m: distance of the points of the grid."""
 LEAST_SINE_TILT = 0.2
 """Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured."""
 
@@ -35,18 +37,16 @@ class ForegroundPoints:
     def __init__(self, config: GroupPdaConfig, context: Context) -> None:
         assert context.background is not None
         self.config = config
-        self.foreground = Foreground(context, config, config.most_foreground)
+        self.foreground = Foreground(context, config)
         self.scale = required(_learned(self.foreground, context) if np.isnan(context.px_per_m) else context.px_per_m)
         self.foreground.px_per_m = self.scale
-        self.step = max(1, round(config.grid * self.scale))
+        self.step = max(1, round(GRID * self.scale))
         self.person = _person(context.camera, self.scale)
 
     def follow(self, config: GroupPdaConfig) -> None:
-        """Replace the config: settings of the background model and grid step change; what the model learned and the
-        scale stay."""
+        """Replace the config: settings of the background model change; what the model learned and the scale stay."""
         self.config = config
-        self.foreground.follow(config, config.most_foreground)
-        self.step = max(1, round(config.grid * self.scale))
+        self.foreground.follow(config)
 
     @property
     def people_per_point(self) -> float:
@@ -60,44 +60,26 @@ class ForegroundPoints:
         return np.asarray(np.eye(2) * np.square(self.person / 4), np.float64)
 
     def points(self, image: Image, outlines: list[Array]) -> Array | None:
-        """Return the grid points (M, 2) u, v in px that are foreground; None if more is foreground than
-        `most_foreground`.
-
-        image (H, W, 3) BGR uint8. outlines: points (V, 2) u, v in px round each group. The background model learns from
-        the picture except inside their convex hulls, so that people who stand still do not become background. M may be
-        0.
-
-        Raises InputError if the picture's size or dtype is not the background sample's.
-        """
+        """Return the grid points (M, 2) u, v in px that are foreground; None if too much is foreground."""
         seen = self.foreground.segment(image)
         self.foreground.adapt(seen, convex_areas(self.foreground.shape, outlines))
         return grid_points(seen.mask, self.step) if seen.plausible else None
 
 
 def grid_points(mask: Bools, step: int) -> Array:
-    """Return u, v (M, 2) in px of the centres of the foreground pixels on a grid of every `step`-th pixel, by rows.
-
-    mask (H, W): True for foreground. The grid begins at pixel step // 2 in both directions.
-    """
+    """Return u, v (M, 2) in px of the centres of the foreground pixels on a grid of every `step`-th pixel, by rows."""
     first = step // 2
     v, u = np.nonzero(mask[first::step, first::step])
     return np.asarray(np.stack([u, v], 1) * float(step) + (first + 0.5), np.float64)
 
 
 def sine_tilt(camera: Camera | None) -> float:
-    """Return the sine of the camera's downward tilt, the factor by which depth on the ground is shortened in the image.
-
-    It is at least 0.2, and 1 without a camera or straight above.
-    """
+    """Return the sine of the camera's downward tilt, the factor by which depth on the ground is shortened in the
+    image."""
     return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_SINE_TILT))
 
 
 def _learned(foreground: Foreground, context: Context) -> float:
-    """Returns the scale, px per m, learned from people who are alone in the background sample; nan if there are none.
-
-    foreground: the pipeline with its background model; context: of the sequence, with a background sample (else
-    AssertionError).
-    """
     assert context.background is not None
     size = PersonSize(context)
     foreground.learn_person_size(size, context.background)
@@ -105,10 +87,6 @@ def _learned(foreground: Foreground, context: Context) -> float:
 
 
 def _person(camera: Camera | None, scale: float) -> Array:
-    """Returns width and height (2,) in px of a person: the mean box at the image's centre over four headings.
-
-    Without a camera, and if the image's centre is above the horizon, it follows from the scale, px per m, instead.
-    """
     if camera is None:
         return scale * PERSON_HEIGHT * np.array([WIDTH_PER_HEIGHT, 1.0])
     from sim.scene.body import person_boxes

@@ -15,7 +15,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_mass_kernels as kernels
-from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import SPEED_PRIOR, ScaledParameters
 
 LISTS = ("members", "recent_points")
 """Fields of GroupBank that are lists, not arrays."""
@@ -83,10 +83,7 @@ class GroupBank:
 
     def positions(self, row: int) -> Array:
         """Return the positions (K, 2) x, y of the members of the group in `row`: last measured places, moved with its
-        centroid.
-
-        From pixels they are the vertices of the hull of its points.
-        """
+        centroid."""
         return self.members[row].offset + self.x[row, :2]
 
     def keep(self, kept: Bools) -> None:
@@ -114,11 +111,7 @@ class GroupBank:
 
 def alike_velocities(difference: Array, covariance: Array, doubt: float, scaled: ScaledParameters) -> Bools:
     """Return flags (...): True where two velocities differ by at most `merge_velocity` and `doubt` standard deviations
-    of the difference (ours, in place of SR_v of sec. 3.1).
-
-    difference (..., 2): of the velocities; covariance (..., 2, 2): its covariance; in the unit of the points and s. In
-    an image depth is stretched to metres on the ground. The standard deviation is that along the mean direction.
-    """
+    of the difference (ours, in place of SR_v of sec. 3.1)."""
     metres = scaled.metres_per_unit
     sd = np.sqrt(np.einsum("...aa,a->...", covariance, np.square(metres)) / 2)
     most = scaled.config.merge_velocity + doubt * sd
@@ -126,13 +119,8 @@ def alike_velocities(difference: Array, covariance: Array, doubt: float, scaled:
 
 
 def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float) -> GroupBank:
-    """Return a bank of tentative groups made from points alone (sec. 3.3), with velocity 0, in order of group number.
-
-    points (M, 2); weights (M,): people that each point stands for; group (M,): 0, 1, … without gaps, or -1 for no
-    group; t: time of the frame, s. Centroid and size are the weighted mean and sum. The extent is the covariance,
-    shrunk towards the prior and divided by the gate factor (both ours). The centroid's variance is point_sd^2 (1 + 1 /
-    size), that of the velocity speed_prior^2. No member is `known` yet. The bank is empty if no point has a group.
-    """
+    """Return a bank of tentative groups made from points alone (sec. 3.3), with velocity 0, in order of group
+    number."""
     count = int(group.max(initial=-1)) + 1
     if not count:
         return GroupBank.empty(scaled.colour_bins)
@@ -141,13 +129,13 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     people = np.asarray(np.bincount(g, w, count), float)
     mean = np.stack([np.bincount(g, w * y[:, a], count) for a in range(2)], 1) / people[:, None]
     d = y - mean[g]
-    prior, strength, c = scaled.constraint.prior, scaled.constraint.strength, scaled.config
+    prior, strength = scaled.constraint.prior, scaled.constraint.strength
     square = np.stack([np.bincount(g, w * d[:, a] * d[:, b], count) for a in range(2) for b in range(2)], 1)
     extent = (square.reshape(-1, 2, 2) + strength * prior) / (people + strength)[:, None, None]
     extent /= scaled.kernel_rules[kernels.GATE_FACTOR]
     P = np.zeros((count, 4, 4))
     P[:, [0, 1], [0, 1]] = (scaled.point_sd**2 / np.maximum(people, 1e-3))[:, None] + scaled.point_sd**2
-    P[:, [2, 3], [2, 3]] = (scaled.scale * c.speed_prior) ** 2
+    P[:, [2, 3], [2, 3]] = (scaled.scale * SPEED_PRIOR) ** 2
     many = np.bincount(g, minlength=count).tolist()
     members = [MemberPlaces(d[g == k], np.full(n, t), np.zeros(n, bool)) for k, n in enumerate(many)]
     zero, now = np.zeros(count), np.full(count, t)

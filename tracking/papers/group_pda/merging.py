@@ -62,14 +62,7 @@ class GroupMerging:
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
         """Merge the groups for which R_x (near, with like velocities) has held for `merge_time`; yield their events. t:
-        s.
-
-        The bank holds updated states and is changed in place. A group takes part if it is confirmed, was measured in
-        this frame and has no `null_time` (time without a feasible association): else its velocity is unknown. An event
-        is a merge if at least two of the groups were there for more than 1 s before the onset or are children of
-        another group. Else it is an enter. It is a generator: nothing, not even the histories, changes before it is
-        read.
-        """
+        s."""
         able = np.flatnonzero(bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0))
         near = {pair.ids: self._extended(pair) for pair in _near_pairs(bank, able, scaled, t)}
         unable = {int(g) for g in bank.id[bank.confirmed]} - set(bank.id[able].tolist())
@@ -94,23 +87,13 @@ class GroupMerging:
             yield WholeGroupEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
 
     def _extended(self, pair: NearPair) -> PairHistory:
-        """Returns the pair's history with this frame's moment added and moments older than 5 s dropped; stores nothing.
-
-        `alike_since` is kept while the pair stays alike, this time if it is alike for the first time, inf if it is not.
-        """
         before, now = self.histories.get(pair.ids, PairHistory(np.inf, [])), pair.moment
         moments = [m for m in before.moments if m.t > now.t - HISTORY_TIME]
         return PairHistory(min(before.alike_since, now.t) if pair.alike else np.inf, [*moments, now])
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
-    """Return a bank of one row, the union (eq. 3.1) of the groups in `rows` (at least one); `bank` is not changed.
-
-    Centroid and velocity are means weighted by size, sizes and colours sums; the extent contains the spread of the
-    centroids. P is that of a weighted mean of independent centroids, sum w^2 P_i (ours; w: shares of the size): the
-    spread of the centroids is no estimation error. The group with most people (rounded), then the oldest, then the
-    least id, gives the id. Times are the earliest first and the latest last measurement; recent points are empty.
-    """
+    """Return a bank of one row, the union (eq. 3.1) of the groups in `rows` (at least one); `bank` is not changed."""
     size = np.asarray(bank.size[rows].sum())
     w = bank.size[rows] / size
     x = w @ bank.x[rows]
@@ -131,14 +114,10 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
 
 
 def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[NearPair]:
-    """Yields the pairs of groups, out of the bank's `rows`, whose search regions overlap or whose points are linked.
-
-    The search regions are those of 0.9 gate, by the extents alone. t: s.
-    """
     close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
     close |= _linked(bank, rows, scaled)
     v, cov = bank.x[rows, 2:], bank.P[rows, 2:, 2:]
-    alike = alike_velocities(v[:, None] - v, cov[:, None] + cov, scaled.config.merge_doubt, scaled)
+    alike = alike_velocities(v[:, None] - v, cov[:, None] + cov, 0.0, scaled)
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
@@ -150,36 +129,18 @@ def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float)
 
 
 def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:
-    """Returns the distance, m, of the nearest people of the groups in rows a and b; d (2,): difference of their
-    centroids, m.
-
-    From points it is that of the nearest members' places. From pixels, which are parts of bodies, it is the distance of
-    the centroids less 1.1 standard deviations of either group's people in this direction; it may be negative.
-    """
     if not scaled.from_pixels:
         return _nearest(bank.positions(a) * scaled.metres_per_unit, bank.positions(b) * scaled.metres_per_unit)
     return float(np.hypot(*d)) - REACH * sum(_people_sd(bank, k, d, scaled) for k in (a, b))
 
 
 def _nearest(here: Array, there: Array) -> float:
-    """Returns the distance of the nearest two points, one of `here` (K, 2), one of `there` (L, 2), none empty; in their
-    unit.
-
-    Every hundredth point bounds the distance first, so that the search in the k-d tree of the others ends soon:
-    (K + L) log L.
-    """
     tree = cKDTree(there, balanced_tree=False, compact_nodes=False)
     most = tree.query(here[::100])[0].min()
     return float(tree.query(here, distance_upper_bound=1.001 * most + 1e-9)[0].min())
 
 
 def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) -> float:
-    """Returns the standard deviation, m, of the positions of the people of the group in `row` along a direction on the
-    ground.
-
-    way (2,): the direction, m, of any length. It is that of the extent without the prior that it was shrunk to and
-    without the extent of one body; at least 0.
-    """
     n, n0 = bank.size[row], scaled.constraint.strength
     factor = scaled.kernel_rules[GATE_FACTOR]
     people = ((n + n0) * factor * bank.extent[row] - n0 * scaled.constraint.prior) / n - scaled.body_cov
@@ -188,12 +149,6 @@ def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) 
 
 
 def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
-    """Returns flags (K, K): True if the groups in rows[i] and rows[j] of the bank have points within the link distance
-    of each other (ours).
-
-    From pixels the hulls of the points are compared (their bounding boxes, if a hull has fewer than 3 vertices). The
-    diagonal is True. This finds near groups whose extents lag because they rest while points are shared.
-    """
     found = np.eye(len(rows), dtype=bool)
     place, link = [bank.positions(r) for r in rows.tolist()], scaled.constraint.link
     low, high = (np.array([f(p, axis=0) for p in place]).reshape(-1, 2) for f in (np.min, np.max))
@@ -208,8 +163,6 @@ def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
 
 
 def _connected(pairs: list[Pair]) -> list[list[int]]:
-    """Returns the connected components of the graph whose edges are `pairs` of ids, each as a sorted list of ids (G_x);
-    their order has no meaning."""
     parts: list[set[int]] = []
     for pair in pairs:
         touched = [p for p in parts if p & set(pair)]

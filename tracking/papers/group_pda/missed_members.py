@@ -25,12 +25,7 @@ RECENT_POINTS = 64
 
 
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:
-    """Return new claims with the members missed at time t (s) appended as points that only their own group may have.
-
-    claims: which points each group may have; not changed. Only groups with any points in this frame (in their region or
-    attached) get missed members. Each counts as one person, with the time of its last measurement, and lies at its
-    predicted place. From pixels nobody is appended.
-    """
+    """Return new claims with the members missed at time t (s) appended as points that only their own group may have."""
     has_points = np.asarray(np.isfinite(claims.d2).any(axis=1))
     has_points[claims.owner[claims.owner >= 0]] = True
     place, row, last_seen = missed_members(bank, claims.points, scaled, t)
@@ -48,12 +43,7 @@ def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledPara
 
 def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> tuple[Array, Ints, Array]:
     """Return the places (K, 2), rows of the bank (K,) and last measurements (K,) in s of the members missed at time t
-    (s).
-
-    points (M, 2): of this frame. A member is missed if no point is within `carry_reach` of its predicted place (its
-    place relative to the centroid when last measured). Only `known` members (measured near their place before) that
-    were measured within the last `carry_time` count. There are none from pixels, or if carry_time is 0.
-    """
+    (s)."""
     c, recent = scaled.config, []
     if c.carry_time > 0 and not scaled.from_pixels:
         for row, members in enumerate(bank.members):
@@ -69,13 +59,7 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
 
 
 def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: ScaledParameters, t: float) -> None:
-    """Store each group's points of this frame as its members and recent points, in the bank, in place.
-
-    exclusive (G, M) bool: each group's points, a point at one group only; claims: the points with their times; t: s. A
-    group without points keeps its old ones. Else recent points of 3 s and older are dropped, and at most 64 of this
-    frame are added. A member is `known` if, relative to the centroid, one of the group's previous members was within
-    `carry_reach` of it. From pixels only the vertices of the points' convex hull are kept as members, all known.
-    """
+    """Store each group's points of this frame as its members and recent points, in the bank, in place."""
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
         kept = [p for p in bank.recent_points[row] if p[0] > t - RECENT_TIME]
@@ -90,11 +74,7 @@ def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: Sca
 
 
 def thinned(points: Array) -> Array:
-    """Return at most RECENT_POINTS = 64 of the points (M, 2), selected by a hash of their coordinates.
-
-    The choice does not depend on the points' order, and a grid of points leaves no pattern. 64 or fewer are returned as
-    they are.
-    """
+    """Return at most RECENT_POINTS = 64 of the points (M, 2), selected by a hash of their coordinates."""
     if len(points) <= RECENT_POINTS:
         return points
     scattered = np.sin(points @ np.array([12.9898, 78.233])) * 43758.5453

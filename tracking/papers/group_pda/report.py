@@ -37,13 +37,8 @@ class ReportFrame:
 def report_tracks(
     bank: GroupBank, events: list[WholeGroupEvent], scaled: ScaledParameters, frame: ReportFrame
 ) -> Tracks:
-    """Return Tracks with unit "group", sorted by id, of the confirmed groups measured within the last `report_coast` s.
-
-    Positions, velocities and covariances are those of the centroids, in m or px and s. The reported size is N, the
-    people measured, divided by the probability that a member is measured. Hulls go round the outlines of all members'
-    places; lists of members are empty, boxes None, scores 1. An event's start is its onset (a frame from 1 to this
-    one), its end and `emitted` are this frame; it has no members.
-    """
+    """Return Tracks with unit "group", sorted by id, of the confirmed groups measured within the last
+    `report_coast` s."""
     rows = np.flatnonzero(bank.confirmed & (frame.t - bank.last_seen <= scaled.config.report_coast + 1e-9))
     rows = rows[np.argsort(bank.id[rows])]
     id, x = bank.id[rows], bank.x[rows]
@@ -63,7 +58,5 @@ def report_tracks(
 
 
 def _hulls(places: list[Array], outline: Array) -> tuple[Array, ...]:
-    """Returns the convex hull (W, 2) of each group: of the outline (V, 2) moved to each of the group's places (K, 2),
-    all in one unit (m or px)."""
     # The places on their own hull suffice, and are few.
     return convex_hulls([(corner[:, None] + outline).reshape(-1, 2) for corner in convex_hulls(places)])

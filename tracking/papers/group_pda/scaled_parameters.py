@@ -12,6 +12,19 @@ from tracking.filters.components import Constraint
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.config import GroupPdaConfig
 
+SPEED_PRIOR = 1.3
+"""m/s: standard deviation of a newborn group's velocity, per axis, that of walking people."""
+SPLIT_SPEED = 0.5
+"""m/s: standard deviation of a child's velocity about its parent's, and speed at which a group's region widens while it
+has no feasible association (ours)."""
+COUNT_SHARE, PAPER_COUNT_SHARE = 0.15, 0.01
+"""sigma_n of m_N: the part that grows with N, per N; ours and, for next to none, with corrections off."""
+MISS_PROB = 0.02
+"""Prior probability of the miss hypothesis (ours)."""
+FREEZE_SHARE = 0.1
+"""People among a group's points who are another group's, per group size, above which extent and size rest (ours)."""
+LEAST_PEOPLE = 0.25
+"""From pixels: components with less foreground, in people, are noise (ours)."""
 COLOUR_BINS = 64
 """Bins of a group's colour histogram (tracking.papers.group_pda.colour)."""
 ASSOCIATIONS = {
@@ -50,20 +63,16 @@ class ScaledParameters:
 def scale_parameters(
     config: GroupPdaConfig, fps: float, scale: float, body_cov: Array | None = None, sine_tilt: float = 1.0
 ) -> ScaledParameters:
-    """Return the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre.
-
-    config: lengths in m, times in s. body_cov (2, 2): covariance of one person's pixels in px^2; None if the points are
-    people. sine_tilt: sine of the camera's tilt, above 0, the factor by which lengths in depth are shortened in the
-    image.
-    """
+    """Return the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre."""
     c, dt, pixels = config, 1 / fps, body_cov is not None
     point_sd = scale * (c.pixel_noise if pixels else c.point_noise)
     prior = (scale * c.person_spread) ** 2 * np.eye(2) if body_cov is None else body_cov
     link = 2 * scale * (c.pixel_radius if pixels else c.radius)
-    factor = gate_factor(c.gate) if c.gate_correction else 1.0
+    factor = gate_factor(c.gate) if c.corrections else 1.0
+    least = LEAST_PEOPLE if pixels and c.corrections else 0.0
     # Every extent is (sample covariance shrunk towards `prior`) / factor. G_y must use the same extents: otherwise
     # groups that it separates would be merged again.
-    constraint = Constraint(link, c.gate / factor, factor * prior, c.spread_weight, c.least_people if pixels else 0.0)
+    constraint = Constraint(link, c.gate / factor, factor * prior, c.spread_weight, least)
     F, Q = kalman.constant_velocity(dt, 2)
     return ScaledParameters(
         config=config,
@@ -84,39 +93,29 @@ def scale_parameters(
 def _kernel_rules(
     c: GroupPdaConfig, fps: float, constraint: Constraint, point_sd: float, factor: float, pixels: bool
 ) -> Array:
-    """Returns the array `rules` (19,) of the kernels; its slots are named in association_mass_kernels.
-
-    c: the config; fps: frames per s. constraint: by which points are one group. point_sd: standard deviation of a
-    measured position. factor: share of its covariance that a Gaussian keeps inside the gate, 1 without gate_correction.
-    pixels: the points are foreground pixels: then a member is always detected. With association "none" there is no miss
-    hypothesis and no freezing.
-    """
     rules = np.zeros(kernels.RULES)
     rules[kernels.GATE], rules[kernels.LINK] = constraint.gate, constraint.link
     rules[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.prior_entries
     rules[kernels.PRIOR_WEIGHT], rules[kernels.LEAST_WEIGHT] = c.spread_weight, constraint.least
     rules[kernels.POINT_SD] = point_sd
-    rules[kernels.COUNT_SD], rules[kernels.COUNT_SHARE] = c.count_noise, c.count_share
+    rules[kernels.COUNT_SD], rules[kernels.COUNT_SHARE] = (
+        c.count_noise,
+        COUNT_SHARE if c.corrections else PAPER_COUNT_SHARE,
+    )
     looks = 1 + c.carry_time * fps  # a member counts as present if measured in one of these frames
     rules[kernels.DETECT_PROB] = 1.0 if pixels else 1 - (1 - c.detect_prob) ** looks
-    rules[kernels.MISS_PROB] = c.miss_prob if c.miss else 0.0
-    rules[kernels.FREEZE_SHARE] = c.freeze_share if c.freeze else np.inf
-    dt = 1 / fps
-    rules[kernels.KEEP_EXTENT], rules[kernels.KEEP_SIZE] = np.exp(-dt / np.array([c.extent_time, c.size_time]))
+    ours = c.corrections and c.association != "none"
+    rules[kernels.MISS_PROB], rules[kernels.FREEZE_SHARE] = (MISS_PROB, FREEZE_SHARE) if ours else (0.0, np.inf)
+    rules[[kernels.KEEP_EXTENT, kernels.KEEP_SIZE]] = np.exp(-1 / fps / np.full(2, c.extent_time))
     rules[kernels.GATE_FACTOR] = factor
-    rules[kernels.REDRAWN] = c.centroid_noise == "redrawn"
+    rules[kernels.REDRAWN] = not c.corrections
     rules[kernels.ASSOCIATION] = ASSOCIATIONS[c.association]
     rules[kernels.LEAST_OTHERS] = 1e-9 if pixels else 1.0
-    if c.association == "none":
-        rules[kernels.MISS_PROB], rules[kernels.FREEZE_SHARE] = 0.0, np.inf
     return rules
 
 
 def gate_factor(gate: float) -> float:
     """Return c, below 1: Gaussian points in the plane that lie within the gate have c times the covariance of all
-    points.
-
-    c = F_chi2,4(gate) / F_chi2,2(gate), where gate is the squared Mahalanobis radius, above 0.
-    """
+    points."""
     tail = np.exp(-gate / 2)
     return float((1 - tail * (1 + gate / 2)) / (1 - tail))

@@ -17,23 +17,14 @@ from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.event_onsets import split_onset
 from tracking.papers.group_pda.group_bank import GroupBank, newborn
 from tracking.papers.group_pda.missed_members import thinned
-from tracking.papers.group_pda.scaled_parameters import ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 
 def split(
     bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
 ) -> WholeGroupEvent | None:
-    """Replace the group in `row` by those that its points (M, 2) form under G_y; return the event of a confirmed group.
-
-    G_y: linked points are one group, and such components whose regions overlap. weights (M,): people each point stands
-    for; t: s; ids: gives fresh ids. The bank is changed in place.
-    - Several groups: they are appended to the bank and the old row is removed. The largest (then the one nearest to the
-      old centroid) keeps the id, the others get fresh ids. The event is a split, from its measured onset.
-    - One group: it stays, and its `null_time` becomes 0. None is returned.
-    - No group, only noise or no point: it is removed. The event is a leave.
-
-    None is returned for a tentative group, whose parts stay tentative.
-    """
+    """Replace the group in `row` by those that its points (M, 2) form under G_y; return the event of a confirmed
+    group."""
     group = partition(points, weights, scaled.constraint)
     confirmed = bank.id[row] != NO_ID
     if group.max(initial=-1) < 1:
@@ -61,20 +52,13 @@ def split(
 def children(
     bank: GroupBank, row: int, points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float
 ) -> GroupBank:
-    """Return a bank of the groups into which the group in `row` splits; `bank` is not changed.
-
-    points (M, 2), weights (M,): people each stands for; group (M,): part 0, 1, … of each point, -1 none; t: s. The
-    parts are newborn from their points, without ids. Departures: they keep the parent's age and colours (a tentative
-    parent's `parent` and `origin`, too), and, with `inherit_velocity`, its velocity, with `split_speed` as further
-    standard deviation.
-    """
-    c = scaled.config
+    """Return a bank of the groups into which the group in `row` splits; `bank` is not changed."""
     parts = newborn(points, weights, group, scaled, t)
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:] = bank.colour_hist[row]
     if bank.id[row] == NO_ID:
         parts.parent[:], parts.origin[:] = bank.parent[row], bank.origin[row]
-    if c.inherit_velocity:
+    if scaled.config.corrections:
         parts.x[:, 2:] = bank.x[row, 2:]
-        parts.P[:, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * c.split_speed) ** 2 * np.eye(2)
+        parts.P[:, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
     return parts

@@ -173,13 +173,6 @@ class GroupPda:
         return report_tracks(bank, events, scaled, shown)
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
-        """Returns the frame's points (M, 2) x, y and the people (M,) that each stands for; None and (0,) without
-        information.
-
-        From pixels the points are grid pixels u, v; there is no information without an image or with too much
-        foreground. It lets the background learn and sets `colours`; InputError if the picture's size or dtype is not
-        the sample's. From points they are `detections.pos`, None without detections; it sets `plane`.
-        """
         if self.pixels is not None:
             found = None if frame.image is None else self.pixels.points(frame.image, self.outlines())
             if found is not None and frame.image is not None and self.config.appearance > 0:
@@ -191,12 +184,6 @@ class GroupPda:
         return np.ascontiguousarray(detections.pos[:, :2]), np.ones(len(detections.pos))
 
     def _outline(self, detections: Detections | None) -> Array:
-        """Returns the polygon (V, 2) that one member covers, about the origin: a grid cell, a footprint, or a usual
-        box.
-
-        Its unit is m on the ground, px in the image. The usual box is the median of the frame's boxes in the image, or
-        of an earlier frame's if there are none; if there never were any it is a footprint at the image's scale.
-        """
         if self.pixels is not None:
             return SQUARE * self.pixels.step / 2
         if self.plane == "ground":
@@ -215,15 +202,10 @@ class GroupPda:
         return [(bank.positions(r)[:, None] + cell).reshape(-1, 2) for r in rows]
 
     def _no_tracks(self, frame: Frame) -> Tracks:
-        """Returns Tracks without groups and events for this frame, before the plane of the points is known."""
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
         return Tracks(frame.index, frame.t, self.plane, "group", ids, ids, none, none, np.zeros((0, 4, 4)))
 
     def _scaled_parameters(self) -> ScaledParameters:
-        """Returns the present config's parameters in the unit of the points; computed anew if the config was replaced.
-
-        Raises InputError if points are in the image and the context's scale is unknown, zero or negative.
-        """
         if self.scaled is not None and self.scaled.config is self.config:
             return self.scaled
         if self.pixels is not None:
@@ -237,15 +219,10 @@ class GroupPda:
         return self.scaled
 
     def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> list[WholeGroupEvent]:
-        """Gate, associate and update (sec. 4), split, and add newborn groups (sec. 3.3); returns the events of splits.
-
-        points (M, 2) in m or px; weights (M,): people each stands for; t: s. The bank and `innovation` are changed. An
-        event is a split, or a leave of a group that has only noise.
-        """
         bank = self.bank
         region = search_regions(bank, scaled)
         d2 = gated_distances(bank, points, region, scaled, t)
-        owner = attached(points, d2, bank, scaled) if self.config.attach else np.full(len(points), -1)
+        owner = attached(points, d2, bank, scaled) if self.config.corrections else np.full(len(points), -1)
         claims = with_missed_members(claimed(points, weights, d2, owner, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         log_ratio = colour_log_ratio(bank, claims.d2, self.colours) if scaled.colour_bins else np.zeros((len(bank), 0))
@@ -260,11 +237,6 @@ class GroupPda:
         return events
 
     def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> list[WholeGroupEvent]:
-        """Split the groups that had no feasible association for `split_time`; returns events.
-
-        claims: which points each group may have. mine (G, M) bool: points of each group; t: s. An event may be a split,
-        or a leave of a group that has only noise; tentative groups give none.
-        """
         bank, events = self.bank, []
         due = np.flatnonzero((bank.null_time >= self.config.split_time - 1e-9) & (bank.null_time > 0))
         for row in due.tolist()[::-1]:  # from the last row on, as children are appended

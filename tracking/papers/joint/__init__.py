@@ -2,7 +2,5 @@
 
 tracker: the class and the order of a frame; decentralised_filter: Algorithm 1; distributions: the four distributions of
 Table 1; individuals: the proposal and eq. 3; group_events_kernels: the events of groups; partition_kernels: labels,
-cluster validity, co-membership; cluster_evidence_kernels, dirichlet_process_kernels: a Dirichlet process mixture as
-validity and as dynamics of partitions; people: association, births, losses; placement: the groups
-of new people; estimate: the output.
+cluster validity, co-membership; people: association, births, losses; estimate: the output.
 """

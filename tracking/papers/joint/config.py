@@ -6,9 +6,7 @@ writes; it names the command, the seeds and the scores of the fit.
 
 from __future__ import annotations
 
-import math
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -19,270 +17,92 @@ from sim.types import Array
 from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
 
-FITTED: dict[str, float] = tomllib.loads(Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8"))[
-    "params"
-]
-FITTED_MIXTURE: dict[str, float] = tomllib.loads(
-    Path(__file__).with_name("dirichlet_process.toml").read_text(encoding="utf-8")
+FITTED: dict[str, list[float]] = tomllib.loads(
+    Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8")
 )["params"]
-TERMS = (
-    "distance_early", "velocity_early", "spread_early", "distance_late", "velocity_late", "spread_late", "bias",
-)  # fmt: skip
-"""Terms of the event classifier, in the order of the features of group_events_kernels."""
-MIXTURE = ("concentration", "spread_degrees", "place_spread", "velocity_spread")
-"""Parameters of the Dirichlet process mixture, in the order of its slots in cluster_evidence_kernels."""
+SPEED_PRIOR = 1.3
+"""m/s: standard deviation of a new person's velocity, per axis, that of walking people (ours)."""
+GATE = 0.999
+"""Probability that a detection of a person is in the gate (ours)."""
+SCATTER, APART = 0.5, 2.0
+"""m: s_0, prior scatter of a cluster, as of one person more, and D_0, distance of a virtual other cluster (ours)."""
+SIZE_MEAN = 1.0
+"""mu of the prior over group sizes, people."""
 
 
-def mixture_of(values: Mapping[str, float]) -> Array:
-    """Return the Dirichlet process mixture (4,), as cluster_evidence_kernels.LOG_NEW and the following; values: by the
-    names of MIXTURE."""
-    concentration, *rest = (values[name] for name in MIXTURE)
-    return np.array([math.log(concentration), *rest])
-
-
-def _weight(event: str, term: str, unit: str, meaning: str) -> Any:
-    return param(FITTED[f"{event}_{term}"], (-100.0, 100.0), unit, f"{event}: {meaning}", tunable=False)
-
-
-def _mixture(name: str, values: tuple[float, float], unit: str, meaning: str) -> Any:
-    value = FITTED_MIXTURE[name]
-    return param(value, values, unit, f"Dirichlet process: {meaning} (ours)", "log", before=value)
+def _weights(event: str) -> Any:
+    meaning = f"{event}: weights of log(1 + d_KL), d_v, d_intra, at the earlier, then the later time; constant"
+    return param(tuple(FITTED[f"{event}_weights"]), (-100.0, 100.0), "", meaning, "vector")
 
 
 @dataclass(frozen=True)
 class JointConfig(BackgroundSettings):
-    """The parameters of the tracker `joint`; each field states default, range and unit.
+    """The parameters of the tracker `joint`, with those of the background model.
 
-    They are the numbers of particles, the variant of the paper, the individuals' proposal and dynamics, the cluster
-    validity, the events, births and losses, the estimate and the background model. Raises InputError if foreground_time
-    is shorter than background_time.
+    Raises InputError if a value is not allowed.
     """
 
     tracker: ClassVar[str] = "joint"
 
-    particles: int = param(
-        50, (1, 2000), "particles", "N_x, particles of individuals", "int", online=False, tunable=False
-    )
-    partitions: int = param(
-        50, (1, 500), "particles", "N_z, partitions under each particle", "int", online=False, tunable=False
-    )
-    variant: str = param(
-        "full",
-        ("full", "VAR1", "VAR1-standstill", "VAR2", "VAR3"),
-        "",
-        "full: the whole model; VAR1: groups do not move individuals; VAR1-standstill: the same, read literally; VAR2: "
-        "VAR1, and partitions are drawn uniformly; VAR3: VAR2, and partitions have no validity",
-        "categorical",
-        tunable=False,
-    )
-    individuals: str = param(
-        "filtered",
-        ("filtered", "measured"),
-        "",
-        "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)",
-        "categorical",
-        tunable=False,
-    )
-    weights: str = param(
-        "people",
-        ("people", "joint"),
-        "",
-        "people: each person is resampled by the own part of the weight, then the particles by the rest (ours); joint: "
-        "a particle has one weight (the paper)",
-        "categorical",
-    )
-
-    proposal: str = param(
-        "informed",
-        ("informed", "detection"),
-        "",
-        "second part of the proposal; informed: p(x' | x, y) (ours); detection: normal about the detection",
-        "categorical",
-    )
+    # fmt: off
+    particles: int = param(50, (1, 2000), "particles",
+        "N_x, particles of individuals", "int", online=False, tunable=False)
+    partitions: int = param(50, (1, 500), "particles",
+        "N_z, partitions under each particle", "int", online=False, tunable=False)
+    variant: str = param("full", ("full", "VAR1", "VAR1-standstill", "VAR2", "VAR3"), "",
+        "VAR1: groups move nobody; VAR2: and are uniform; VAR3: and have no validity", "categorical", tunable=False)
+    individuals: str = param("filtered", ("filtered", "measured"), "",
+        "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)", "categorical", tunable=False)
+    algorithm: str = param("ours", ("ours", "paper"), "",
+        "paper: a particle has one weight, the proposal is about the detection; ours: neither", "categorical")
     alpha: float = param(0.1, (0.0, 1.0), "share", "of the dynamics in the individuals' proposal")
-    place_noise: float = param(
-        0.25, (0.01, 2.0), "m/s^0.5", "jitter of the places in Sigma; the paper gives no Sigma", "log"
-    )
+    place_noise: float = param(0.25, (0.01, 2.0), "m/s^0.5",
+        "jitter of the places in Sigma; the paper gives no Sigma", "log")
     velocity_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
-    group_share: float = param(
-        0.25,
-        (0.0, 1.0),
-        "share",
-        "of the group's mean velocity in a member's motion, the rest is the own velocity; 1: eq. 5 (below 1: ours)",
-        before=1.0,
-    )
+    group_share: float = param(0.25, (0.0, 1.0), "share",
+        "of the group's mean velocity in a member's motion, the rest is the own velocity; 1: eq. 5 (below 1: ours)")
     point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")
-    pixel_noise: float = param(
-        0.15,
-        (0.005, 2.0),
-        "m",
-        "from pixels: standard deviation of the centre of a blob, per axis (ours)",
-        "log",
-        sees="pixels",
-    )
-    most_foreground: float = param(
-        0.6,
-        (0.05, 1.0),
-        "share",
-        "from pixels: a frame with a larger share of foreground is ignored (ours)",
-        sees="pixels",
-    )
-
-    validity: str = param(
-        "davies-bouldin",
-        ("davies-bouldin", "bayesian"),
-        "",
-        "davies-bouldin: the paper's cluster validity; bayesian: log p(Z, X) of a Dirichlet process mixture (ours)",
-        "categorical",
-        before="davies-bouldin",
-    )
-    validity_rate: float = param(
-        20.0, (0.0, 500.0), "1/s", "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)"
-    )
-    evidence_rate: float = param(
-        4.0,
-        (0.0, 100.0),
-        "1/s",
-        "of validity bayesian: weight of log p(Z, X) in p(Z | X), per second; splits and new people keep the "
-        "Davies-Bouldin index with validity_rate (ours)",
-        before=4.0,
-    )
-    belief_rate: float = param(
-        20.0, (0.0, 100.0), "1/s", "weight of the beliefs of pairs in log p(Z | X), per second (ours)", before=0.0
-    )
-    belief_memory: float = param(
-        0.2,
-        (0.0, 2.0),
-        "share",
-        "of the belief's `stay`, which is added for people who were reported in one group, and of `come`, which is "
-        "taken from the others (ours)",
-        before=0.0,
-    )
-    normaliser: str = param(
-        "energy",
-        ("energy", "sampled"),
-        "",
-        "energy: eq. 4 as printed; sampled: p(Z | X) has the mean 1 over the partitions of a particle (ours)",
-        "categorical",
-    )
-    scatter: float = param(
-        0.5, (0.05, 2.0), "m", "s_0: prior scatter of a cluster, as of one person more (ours)", "log"
-    )
-    apart: float = param(2.0, (0.5, 10.0), "m", "D_0: distance of a virtual other cluster (ours)", "log")
-
-    partition_dynamics: str = param(
-        "classifier",
-        ("classifier", "dirichlet"),
-        "",
-        "classifier: merges and splits of groups; dirichlet: labels of people drawn from an online Dirichlet process "
-        "mixture (ours, after the authors' later paper)",
-        "categorical",
-        online=False,
-        before="classifier",
-    )
-    concentration: float = _mixture(
-        "concentration", (1e-8, 10.0), "1/(m^2 (m/s)^2)", "c, concentration times the density of the prior of means"
-    )
-    spread_degrees: float = _mixture(
-        "spread_degrees", (0.5, 1000.0), "", "nu, degrees of freedom of the prior of a component's variance of places"
-    )
-    place_spread: float = _mixture("place_spread", (0.05, 5.0), "m", "s, scale of this prior, per axis")
-    velocity_spread: float = _mixture(
-        "velocity_spread", (0.02, 5.0), "m/s", "s_v, standard deviation of velocities in a component, per axis"
-    )
-    redraw_rate: float = param(
-        1.0, (0.05, 20.0), "1/s", "Dirichlet process: rate at which a person's label is drawn anew (ours)", "log",
-        before=1.0,
-    )  # fmt: skip
-
-    lag: float = param(
-        0.4, (0.05, 3.0), "s",
-        "between the two times of the features of events; the classifier is fitted at 0.4 s, for another lag it must "
-        "be fitted anew (ours)",
-        online=False,
-    )  # fmt: skip
-    event_rate: float = param(1.0, (0.05, 20.0), "", "factor of the rate of merges and splits (ours)", "log")
-    newcomers: str = param(
-        "validity",
-        ("validity", "alone"),
-        "",
-        "validity: a new person joins the nearest group with the probability of the validity (ours); alone: with label "
-        "0 (the paper)",
-        "categorical",
-    )
-    size_prior: str = param(
-        "merge",
-        ("merge", "all"),
-        "",
-        "events on which the prior over group sizes acts; all: the paper, merge: ours",
-        "categorical",
-    )
-    size_mean: float = param(1.0, (0.0, 20.0), "people", "mu of the prior over group sizes")
+    pixel_noise: float = param(0.15, (0.005, 2.0), "m",
+        "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log", sees="pixels")
+    validity_rate: float = param(20.0, (0.0, 500.0), "1/s",
+        "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)")
+    belief_rate: float = param(20.0, (0.0, 100.0), "1/s",
+        "weight of the beliefs of pairs in log p(Z | X), per second (ours)")
+    belief_memory: float = param(0.2, (0.0, 2.0), "share",
+        "of the belief's `stay` for people reported in one group, and of its `come` for others (ours)")
+    lag: float = param(0.4, (0.05, 3.0), "s",
+        "between the two times of the features of events, for which the classifier was fitted (ours)", online=False)
+    newcomers: str = param("validity", ("validity", "alone"), "",
+        "validity: new people may join the nearest group (ours); alone: with label 0 (the paper)", "categorical")
     size_std: float = param(5.0, (0.5, 50.0), "people", "sigma of the prior over group sizes", "log")
+    estimate: str = param("binder", ("binder", "histogram"), "",
+        "binder: the partition of least expected Binder loss (ours); histogram: Fig. 3", "categorical")
+    confirm_time: float = param(0.3, (0.0, 3.0), "s",
+        "a new person is tracked so long after the first measurement, or given up so long after the last (ours)")
+    coast_time: float = param(1.0, (0.1, 10.0), "s",
+        "people are removed who are missed for longer, in a group all together (ours)", "log")
+    # fmt: on
+    merge_weights: tuple[float, ...] = _weights("merge")
+    split_weights: tuple[float, ...] = _weights("split")
 
-    estimate: str = param(
-        "binder",
-        ("binder", "histogram"),
-        "",
-        "binder: the partition of least expected Binder loss (ours); histogram: Fig. 3",
-        "categorical",
-    )
-
-    speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity (ours)", "log")
-    gate: float = param(0.999, (0.9, 0.99999), "probability", "that a detection of a person is in the gate (ours)")
-    confirm_time: float = param(
-        0.3, (0.0, 3.0), "s",
-        "since its first measurement after which a new person is tracked, from the next frame on; it is given up after "
-        "so long without one (ours)",
-    )  # fmt: skip
-    coast_time: float = param(
-        1.0,
-        (0.1, 10.0),
-        "s",
-        "people are removed who are missed for longer, in a group all together (ours)",
-        "log",
-    )
-
-    merge_distance_early: float = _weight("merge", "distance_early", "", "weight of log(1 + d_KL), earlier time")
-    merge_velocity_early: float = _weight("merge", "velocity_early", "s/m", "weight of d_v, earlier time")
-    merge_spread_early: float = _weight("merge", "spread_early", "1/m", "weight of d_intra, earlier time")
-    merge_distance_late: float = _weight("merge", "distance_late", "", "weight of log(1 + d_KL), later time")
-    merge_velocity_late: float = _weight("merge", "velocity_late", "s/m", "weight of d_v, later time")
-    merge_spread_late: float = _weight("merge", "spread_late", "1/m", "weight of d_intra, later time")
-    merge_bias: float = _weight("merge", "bias", "", "constant")
-    split_distance_early: float = _weight("split", "distance_early", "", "weight of log(1 + d_KL), earlier time")
-    split_velocity_early: float = _weight("split", "velocity_early", "s/m", "weight of d_v, earlier time")
-    split_spread_early: float = _weight("split", "spread_early", "1/m", "weight of d_intra, earlier time")
-    split_distance_late: float = _weight("split", "distance_late", "", "weight of log(1 + d_KL), later time")
-    split_velocity_late: float = _weight("split", "velocity_late", "s/m", "weight of d_v, later time")
-    split_spread_late: float = _weight("split", "spread_late", "1/m", "weight of d_intra, later time")
-    split_bias: float = _weight("split", "bias", "", "constant")
+    @property
+    def own_weights(self) -> bool:
+        """True if people are resampled one by one."""
+        return self.algorithm == "ours"
 
     @property
     def classifier(self) -> Array:
         """The weights (2, 7) of Merge and Split: of the six features, then the constant."""
-        return np.array([[getattr(self, f"{event}_{term}") for term in TERMS] for event in ("merge", "split")])
-
-    @property
-    def largest_distance(self) -> float:
-        """Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom."""
-        return float(-2 * np.log1p(-self.gate))
-
-    @property
-    def scales(self) -> Array:
-        """The scales (2,) of the validity, as partition_kernels has them: s_0, D_0."""
-        return np.array([self.scatter, self.apart])
-
-    @property
-    def mixture(self) -> Array:
-        """The Dirichlet process mixture (4,), as mixture_of has it."""
-        return mixture_of({name: getattr(self, name) for name in MIXTURE})
+        return np.array([self.merge_weights, self.split_weights])
 
     def rules(self, dt: float, lag: float) -> Array:
-        """Return the rules (6,) of events in a step of dt s, as group_events_kernels has them.
+        """Return the rules (5,) of events in a step of dt s, as group_events_kernels has them; lag: s, a whole number
+        of frames."""
+        every = self.algorithm == "paper"
+        return np.array([dt / lag, self.validity_rate * lag, every, SIZE_MEAN, self.size_std])
 
-        lag: s, in which an event happens, a whole number of frames. The validity has the weight lambda_cl lag where the
-        parts of a split are drawn.
-        """
-        every = self.size_prior == "all"
-        return np.array([dt / lag, self.validity_rate * lag, self.event_rate, every, self.size_mean, self.size_std])
+
+LARGEST_DISTANCE = float(-2 * np.log1p(-GATE))
+"""Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom."""
+SCALES = np.array([SCATTER, APART])
+"""The scales (2,) of the validity, as partition_kernels has them."""

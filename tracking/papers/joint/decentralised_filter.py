@@ -73,10 +73,7 @@ class Nested:
 
 
 def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
-    """Return the particles of the next frame: steps 4 to 7, then 1 and 3. `old` is as after step 2.
-
-    uniforms (N_x,): of step 6.
-    """
+    """Return the particles of the next frame: steps 4 to 7, then 1 and 3. `old` is as after step 2."""
     new, log_w = model.individuals(old.x)  # step 4
     log_q = old.log_q + model.dynamics(new, old.x, old.z)  # step 5
     log_dynamics = log_sum(log_q)  # p_{N_z}(X' | X) / p_0(X' | X)
@@ -94,11 +91,7 @@ def joint_indices(nested: Nested, uniform: float) -> Ints:
 
 
 def component_indices(nested: Nested, uniforms: Array) -> tuple[Ints, Ints]:
-    """Return the indices of step 2 in two stages (ours): (N_x, K) of each component alone, then (N_x,) of the rest.
-
-    The rest is that of X as it was before its components were resampled: it selects partitions, and hardly places.
-    uniforms (K + 1,).
-    """
+    """Return the indices of step 2 in two stages (ours): (N_x, K) of each component alone, then (N_x,) of the rest."""
     single = systematic_resample_rows(nested.component_weights().T, uniforms[:-1]).T
     rest = systematic_resample_rows(nested.rest_weights()[None], uniforms[-1:])[0]
     return single, rest

@@ -10,14 +10,8 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.filters.person_streams import NOBODY, Keys, PersonStreams
-from tracking.papers.joint import (
-    cluster_evidence_kernels,
-    dirichlet_process_kernels,
-    group_events_kernels,
-    partition_kernels,
-)
-from tracking.papers.joint.config import JointConfig
-from tracking.papers.joint.decentralised_filter import log_sum
+from tracking.papers.joint import group_events_kernels, partition_kernels
+from tracking.papers.joint.config import SCALES, JointConfig
 from tracking.papers.joint.individuals import Proposal, precision_of, process_noise
 from tracking.papers.joint.individuals_kernels import group_dynamics, own_dynamics
 
@@ -58,14 +52,13 @@ class FrameModel:
         shape = x.shape[0], x.shape[1]
         normals = self.streams.normals(MOTION, self.key, shape[0], STATE)
         uniforms = self.streams.uniforms(CHOICES, self.key, shape[0], 1)[..., 0]
-        proposal = Proposal(self.sigma, self.noise, self.dt, c.alpha, c.proposal == "informed")
+        proposal = Proposal(self.sigma, self.noise, self.dt, c.alpha, c.own_weights)
         new, log_w = proposal.draw(old, self.z, normals, uniforms)
         if c.individuals == "measured":
             new, log_w = self._known(x, old), np.zeros(shape)
         return np.concatenate([new, x[..., :-STATE]], axis=-1), log_w
 
     def _known(self, x: Array, old: Array) -> Array:
-        """Returns the states (N_x, K, 4) of DEEPER-JIGT.2: places as measured, velocities over the lag."""
         seen = np.isfinite(self.z[:, 0])[:, None]
         place = np.where(seen, self.z, old[..., :2] + self.dt * old[..., 2:])
         frames = x.shape[-1] // STATE
@@ -90,8 +83,7 @@ class FrameModel:
         return np.asarray(out - own.sum(axis=1)[:, None])
 
     def groups(self, new: Array, x: Array, z: Ints) -> Ints:
-        """Step 7: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7, or the Dirichlet process (ours); uniform over all
-        partitions in VAR2 and VAR3."""
+        """Step 7: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7; uniform over all partitions in VAR2 and VAR3."""
         c, shape = self.config, z.shape
         out = z.copy()
         if c.variant in ("VAR2", "VAR3"):
@@ -99,45 +91,32 @@ class FrameModel:
                 stam_cumulated(shape[2]), self._of_partitions(shape, np.append(self.key, NOBODY), 1)[..., 0], out
             )  # fmt: skip
             return out
-        if c.partition_dynamics == "dirichlet":
-            chance = np.full(shape[2], -math.expm1(-c.redraw_rate * self.dt))
-            dirichlet_process_kernels.propose(
-                newest(new), out, chance, self._of_partitions(shape, self.key, 2), c.mixture
-            )  # fmt: skip
-            return out
         late, early = newest(new), np.ascontiguousarray(x[..., -STATE:])
         uniforms = self._of_partitions(shape, self.key, 3)
         lag = x.shape[-1] // STATE * self.dt
         group_events_kernels.propose(
-            early, late, out, uniforms, c.classifier, c.rules(self.dt, lag), c.scales
+            early, late, out, uniforms, c.classifier, c.rules(self.dt, lag), SCALES
         )  # fmt: skip
         return out
 
     def _of_partitions(self, shape: tuple[int, ...], key: Keys, columns: int) -> Array:
-        """Returns uniforms (N_x, N_z, K, columns) of people in partitions."""
         drawn = self.streams.uniforms(EVENTS, key, shape[0] * shape[1], columns)
         return drawn.reshape(shape[0], shape[1], len(key), columns)
 
     def energy(self, new: Array, z: Ints) -> Array:
-        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), or log p(Z_t, X_t) of the Dirichlet process mixture
-        (ours), both with a weight per second, plus the belief of the pairs in one group (ours); 0 in VAR3."""
+        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), per second, plus the belief of the pairs in one group
+        (ours); 0 in VAR3."""
         c = self.config
         out = np.zeros(z.shape[:2])
         if c.variant == "VAR3":
             return out
-        if c.validity == "bayesian":
-            cluster_evidence_kernels.log_evidences(newest(new), z, c.mixture, out)
-            out *= c.evidence_rate * self.dt
-        else:
-            partition_kernels.validities(newest(new), z, c.scales, out)
-            out *= -c.validity_rate * self.dt
+        partition_kernels.validities(newest(new), z, SCALES, out)
+        out *= -c.validity_rate * self.dt
         if c.belief_rate > 0:
             worth = np.empty_like(out)
             partition_kernels.pair_sums(self.belief, z, worth)
             out += c.belief_rate * self.dt * worth
-        if c.normaliser == "sampled":
-            out -= log_sum(out)[:, None] - math.log(z.shape[1])
-        return np.asarray(out)
+        return out
 
 
 def newest(x: Array) -> Array:

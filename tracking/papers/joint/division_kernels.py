@@ -172,8 +172,6 @@ def place_newcomers(points: Array, label: Ints, uniforms: Array, sharpness: floa
 
 @njit(cache=True)
 def _list_clusters(points, label, head, following, count, centre):  # type: ignore[no-untyped-def]
-    """Writes the head of each person's cluster (K,), the next member of it (K,), -1 for the last one, and by heads the
-    number of members (K,) and the mean place (K, 2)."""
     last = np.empty(len(label), np.int64)
     for k in range(len(label)):
         g = k if label[k] == 0 else label[k] - 1
@@ -191,7 +189,6 @@ def _list_clusters(points, label, head, following, count, centre):  # type: igno
 
 @njit(cache=True)
 def _centre_of(points, g, following, count, centre):  # type: ignore[no-untyped-def]
-    """Writes the mean place of the cluster with head g."""
     x, y, k = 0.0, 0.0, g
     while k >= 0:
         x, y, k = x + points[k, 0], y + points[k, 1], following[k]
@@ -200,7 +197,6 @@ def _centre_of(points, g, following, count, centre):  # type: ignore[no-untyped-
 
 @njit(cache=True)
 def _united(person, g, following, count):  # type: ignore[no-untyped-def]
-    """Adds a person alone to the cluster with head g; returns the head of both."""
     if person < g:
         following[person], count[person] = g, count[g] + 1
         return person
@@ -214,8 +210,6 @@ def _united(person, g, following, count):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _join_probability(points, person, g, following, count, sharpness, scales, own, other):  # type: ignore[no-untyped-def]
-    """Returns the probability that a person alone joins the cluster with head g and `count` members; own, other (D,):
-    work space. It has validity_of of both apart and as one, in closed form."""
     s0, apart = scales[SCATTER], scales[APART]
     single, all_of_them = _scatter(points, person, g, following, count, s0, own, other)
     away = 0.0
@@ -228,8 +222,6 @@ def _join_probability(points, person, g, following, count, sharpness, scales, ow
 
 @njit(cache=True)
 def _scatter(points, person, g, following, count, s0, both, other):  # type: ignore[no-untyped-def]
-    """Returns the scatters of the cluster with head g without and with the person; writes the mean states (D,) of both
-    and of the cluster."""
     dims = len(both)
     for d in range(dims):
         both[d], other[d] = points[person, d], 0.0

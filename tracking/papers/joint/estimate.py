@@ -17,11 +17,7 @@ def moments(state: Array, weights: Array) -> tuple[Array, Array]:
 
 def kept_while_missed(now: Array, id: Ints, seen: Bools, before: Array, before_id: Ints) -> Array:
     """Return the probability that each pair is in one group, (K, K), which stays while one of the two is not measured
-    (ours).
-
-    now (K, K): the probability in this frame; id (K,): people; seen (K,): who was measured; before (L, L), before_id
-    (L,): the probability returned in the last frame. That of a new pair is the one of its first frame.
-    """
+    (ours)."""
     out = now.copy()
     _, new, old = np.intersect1d(id, before_id, assume_unique=True, return_indices=True)
     rows, both = np.ix_(new, new), seen[new][:, None] & seen[new]
@@ -30,13 +26,8 @@ def kept_while_missed(now: Array, id: Ints, seen: Bools, before: Array, before_i
 
 
 def binder_partition(together: Array, label: Ints, before: Ints) -> list[Ints]:
-    """Return the groups of two or more people, as arrays of rows: the partition of least expected Binder loss (ours).
-
-    together (K, K): co-membership C, the probability that each pair is in one group; label (N_x, N_z, K): the sampled
-    partitions; before (K,): group of each person in the last frame, -1 for alone. The loss is the sum over pairs of
-    |1(k ~ l) - C_kl|. The search starts from the best sampled partition and from the last frame's, and moves one person
-    after the other.
-    """
+    """Return the groups of two or more people, as arrays of rows: the partition of least expected Binder loss
+    (ours)."""
     gain = together - 0.5
     sampled = np.empty(len(together), np.int64)
     partition_kernels.best_sampled(gain, label, sampled)
@@ -59,7 +50,6 @@ def groups_of(label: Ints) -> list[Ints]:
 
 
 def _numbered(group: Ints) -> Ints:
-    """Returns groups (K,), -1 for alone, as clusters numbered from 1, people alone included."""
     alone = group < 0
     named = np.where(alone, group.max(initial=0) + 1 + np.arange(len(group)), group)
     return np.asarray(np.unique(named, return_inverse=True)[1] + 1)

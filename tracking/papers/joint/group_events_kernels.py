@@ -28,9 +28,9 @@ LOG_KL_MOST = 8.0
 """Largest log(1 + d_KL); also its value without another group."""
 FEATURES = 6
 """d_KL, d_v, d_intra at the earlier time, then at the later one."""
-RATIO, SHARPNESS, RATE, SIZE_OF_ALL, SIZE_MEAN, SIZE_STD = range(6)
-"""Slots of `rules` (6,): time step over lag; weight of the validity in the choice of parts; factor of the rate of
-events; 1 if the size prior acts on all events, 0 if on Merge alone; its mean and standard deviation, people."""
+RATIO, SHARPNESS, SIZE_OF_ALL, SIZE_MEAN, SIZE_STD = range(5)
+"""Slots of `rules` (5,): time step over lag; weight of the validity in the choice of parts; 1 if the size prior acts on
+all events, 0 if on Merge alone; its mean and standard deviation, people."""
 ORDER, EVENT, PARTS = range(3)
 """Slots of a person's uniforms: place of its group in the order of visits; event; parts of a split."""
 
@@ -138,7 +138,7 @@ def event_probabilities(
     happening = merge + split
     if happening == 0:
         return 0.0, 0.0
-    quiet = max(none / total, 1e-12) ** (rules[RATIO] * rules[RATE])
+    quiet = max(none / total, 1e-12) ** rules[RATIO]
     return (1 - quiet) * merge / happening, (1 - quiet) * split / happening
 
 

@@ -59,11 +59,7 @@ class Proposal:
     informed: bool
 
     def draw(self, state: Array, z: Array, normals: Array, uniforms: Array) -> tuple[Array, Array]:
-        """Return new states (N, K, 4) and (N, K): log of p(y | x') N(x'; A x, Sigma) / pi(x').
-
-        state (N, K, 4); z (K, 2): the place measured of each person, nan for none; normals (N, K, 4); uniforms (N, K).
-        A person who was not measured follows the dynamics, and p(y | x') is 1.
-        """
+        """Return new states (N, K, 4) and (N, K): log of p(y | x') N(x'; A x, Sigma) / pi(x')."""
         mean = moved(state, self.dt)
         seen = np.isfinite(z[:, 0])
         target, cov = self.detected(mean, np.where(seen[:, None], z, 0.0))
@@ -97,7 +93,6 @@ class Proposal:
 
 
 def _coloured(normals: Array, cov: Array) -> Array:
-    """Returns normals (..., 4) x, y, vx, vy with the covariance cov (3,) of each axis, from standard normals."""
     a = np.sqrt(cov[PLACE])
     b = cov[CROSS] / a
     c = np.sqrt(max(cov[RATE] - b * b, 0.0))

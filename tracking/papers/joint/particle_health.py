@@ -26,7 +26,7 @@ class ParticleHealth:
         self.ancestor: Ints = np.zeros((particles, 0), np.int64)
 
     def weigh(self, nested: Nested, joint: bool) -> None:
-        """Add a frame; joint: each particle has one weight. Otherwise `effective` is of what is left without people."""
+        """Add a frame; joint: each particle has one weight."""
         self.frames += 1
         self.effective += effective_share(nested.weights() if joint else nested.rest_weights())
         own = nested.component_weights()

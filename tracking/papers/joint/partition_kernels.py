@@ -121,7 +121,6 @@ def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre:
 
 @njit(cache=True)
 def _ratio(centre, scatter, g, h, s0):  # type: ignore[no-untyped-def]
-    """Returns (S_g + S_h) / max(|c_g - c_h|, s_0)."""
     total = 0.0
     for d in range(centre.shape[1]):
         total += (centre[g, d] - centre[h, d]) ** 2
@@ -130,11 +129,6 @@ def _ratio(centre, scatter, g, h, s0):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _worst_near(centre, scatter, scales, worst):  # type: ignore[no-untyped-def]
-    """Raises the worst ratios (G,), which are those to the virtual cluster, by the clusters that are near enough.
-
-    A ratio R of two clusters can be above the worst one so far only if they are nearer than (S_g + S_h) / R, so that
-    the neighbours, which come first, bound how far one has to look.
-    """
     count, widest = len(scatter), scatter.max()
     cells, near = cell_list(centre, count), np.empty(count, np.int64)
     for g in range(count):
@@ -184,7 +178,6 @@ def next_member(k: int, label: Ints, last: Ints, following: Ints) -> int:
 
 @njit(cache=True)
 def _pair_sum(worth, label, last, following):  # type: ignore[no-untyped-def]
-    """Returns the sum of worth (K, K) over the pairs in one group of a label (K,)."""
     total = 0.0
     for k in range(len(label)):
         other = next_member(k, label, last, following)

@@ -57,10 +57,7 @@ class People:
 
     def absence(self, group: Ints) -> Array:
         """Return for how long each person has been missed, s, (K,); in a group of whom nobody was measured, the sum
-        over its members.
-
-        group (K,): of each person, -1 for alone. The evidence of members adds up, as if they were missed independently.
-        """
+        over its members."""
         same = ((group[:, None] == group) & (group >= 0)) | np.eye(len(group), dtype=bool)
         measured = (same & (self.missed == 0)).any(axis=1)
         return np.where(measured, self.missed, same @ self.missed)
@@ -123,11 +120,7 @@ class Newcomers:
 
 
 def associate(mean: Array, cov: Array, points: Array, noise: float, gate: float) -> tuple[Ints, Ints]:
-    """Return rows and columns (R,) of the associated people and points: least total of d^2 + ln |S| (one to one).
-
-    mean (K, 2), cov (K, 2, 2): of the predicted places, m; points (M, 2), m; noise: standard deviation of a point;
-    gate: largest d^2, the squared Mahalanobis distance.
-    """
+    """Return rows and columns (R,) of the associated people and points: least total of d^2 + ln |S| (one to one)."""
     if not len(mean) or not len(points):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     S = cov + noise**2 * np.eye(2)

@@ -45,10 +45,7 @@ class ReportedEvents:
     def events(
         self, changes: Iterable[GroupChange], old: Members, new: Members, scale: float
     ) -> tuple[GroupEvent, ...]:
-        """Return the events of the changes of groups in the last frame added; their members are ids of people.
-
-        old, new: members of the groups before and after. scale: reported units per metre.
-        """
+        """Return the events of the changes of groups in the last frame added; their members are ids of people."""
         changes = list(changes)
         if not changes:
             return ()
@@ -72,7 +69,6 @@ class ReportedEvents:
         return tuple(out)
 
     def _motion(self) -> tuple[list[int], TrackedMotion]:
-        """Returns the ids of the people of the recent frames, and their motion; velocities are chords of places."""
         ids = sorted({person for id, _ in self.recent for person in id.tolist()})
         pos = np.full((len(self.recent), len(ids), 2), np.nan)
         for t, (id, place) in enumerate(self.recent):

@@ -30,9 +30,6 @@ Departures, all ours:
 - People alone are groups of one in the events. A pair of groups draws its merge once. The classifier gives hazards; its
   features are a lag apart. The parts of a split are drawn by their validity. The size prior acts on Merge only.
 - p(Z | X) also has the beliefs of pairs (`tracking.grouping.pair_belief`), with a memory of the groups reported.
-- Options: log p(Z, X) of a Dirichlet process mixture as cluster validity (cluster_evidence_kernels), and the process in
-  place of events (dirichlet_process_kernels), as the authors have it later: Bazzani, Zanotto, Cristani, Murino, "Joint
-  individual-group modeling for tracking", IEEE PAMI 37(4), 2015. Both are reconstructions.
 - In eq. 5 a member moves with a share of the group's velocity and the rest of the own one.
 - The partition is that of least Binder loss. A member who is missed stays. Ids follow the identity rule; onsets of
   events are dated back.
@@ -51,17 +48,17 @@ from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, ordered_points
 from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping import reported_groups
+from tracking.grouping.belief import default_belief
 from tracking.grouping.pair_belief import PairBelief
 from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
-from tracking.papers.joint.belief_memory import remembered
-from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SPEED_PRIOR, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
-from tracking.papers.joint.distributions import BIRTHS, PARTITIONS, RESAMPLING, STATE, FrameModel
+from tracking.papers.joint.distributions import BIRTHS, PARTITIONS, PLACING, RESAMPLING, STATE, FrameModel, newest
+from tracking.papers.joint.division_kernels import place_newcomers
 from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
-from tracking.papers.joint.placement import place
 from tracking.papers.joint.reported_events import OWN_EVENTS, ReportedEvents
 
 
@@ -92,7 +89,7 @@ class Joint:
         """
         c, self.pixels, self.shown = self.config, None, np.zeros((0, 4))
         if context.background is not None:
-            self.pixels = ForegroundBlobs(c, c.most_foreground, context)
+            self.pixels = ForegroundBlobs(c, context)
             context = context.replace(px_per_m=self.pixels.scale)
         self.context = context
         self.frames = max(1, round(c.lag * context.fps))
@@ -115,7 +112,7 @@ class Joint:
         """
         if self.pixels is not None:
             if self.pixels.settings is not self.config:
-                self.pixels.follow(self.config, self.config.most_foreground)
+                self.pixels.follow(self.config)
             detections = self.pixels.detections(frame, self.shown)
         self.streams.frame += 1
         points, sizes = self._points(detections)
@@ -161,22 +158,19 @@ class Joint:
         return self.health.summary()
 
     def _points(self, detections: Detections | None) -> tuple[Array, Array | None]:
-        """Returns places (M, 2), m, in order of x, then y, and sizes of boxes (M, 2), px, or None; sets `plane`."""
         if detections is None:
             return np.zeros((0, 2)), None
         self.plane = "image" if detections.plane == "image" else "ground"
         return ordered_points(detections, self.unit)
 
     def _associate(self, points: Array) -> tuple[Ints, Ints]:
-        """Returns rows and columns (R,) of people and their points (M, 2), m, by predicted means and covariances."""
         c, ahead = self.config, moved(self.nested.x[..., :STATE], self.dt)
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
         mean, cov = estimate.moments(ahead, weights)
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
-        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, c.largest_distance)
+        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, LARGEST_DISTANCE)
 
     def _filter(self, z: Array) -> None:
-        """Steps 4 to 7, 1 and 3; z (K, 2): measured places, nan for none."""
         if not len(z):
             return
         beliefs = remembered(self.belief.log_odds, *self._before(), self.config.belief_memory)
@@ -185,20 +179,17 @@ class Joint:
         self.nested = decentralised_filter.advance(self.nested, model, uniforms)
 
     def _before(self) -> tuple[Ints, Array]:
-        """Returns the group (K,) of each person in the last frame, -1 for alone, and 1.0 for people reported then, else
-        0.0."""
         id = self.people.id
         known = np.isin(id, np.array(sorted(self.identities.people), np.int64)).astype(float)
         return reported_groups.known_groups(self.identities, id), known
 
     def _resample(self) -> None:
-        """Step 2."""
         nested, people = self.nested, len(self.people.id)
         if not people:
             return
         uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
-        self.health.weigh(nested, self.config.weights == "joint")
-        if self.config.weights == "joint":
+        self.health.weigh(nested, not self.config.own_weights)
+        if not self.config.own_weights:
             chosen = decentralised_filter.joint_indices(nested, float(uniforms[-1]))
             own = np.repeat(chosen[:, None], people, axis=1)
         else:
@@ -212,7 +203,6 @@ class Joint:
         )  # fmt: skip
 
     def _keep(self, rows: Bools) -> None:
-        """Remove all people but those where `rows` (K,) is True."""
         if rows.all():
             return
         n = self.nested
@@ -224,20 +214,16 @@ class Joint:
         self.health.keep(rows)
 
     def _newcomers(self, points: Array, sizes: Array | None) -> None:
-        """Follow people who are not confirmed, predicted to this frame, with the points (M, 2) of nobody; add those who
-        are confirmed."""
         c, new, frame = self.config, self.newcomers, self.streams.frame
         new.missed += self.dt
-        free = new.measure(points, sizes, self.noise, c.largest_distance)
-        new.start(points[free], None if sizes is None else sizes[free], self.noise, c.speed_prior, frame)
+        free = new.measure(points, sizes, self.noise, LARGEST_DISTANCE)
+        new.start(points[free], None if sizes is None else sizes[free], self.noise, SPEED_PRIOR, frame)
         sure = (new.age >= c.confirm_time - 1e-9) & (new.missed == 0)
         if sure.any():
             self._add(sure)
         new.keep(~sure & (new.missed <= c.confirm_time + 1e-9))
 
     def _add(self, rows: Bools) -> None:
-        """Draw the newcomers `rows` into the particles, with straight earlier states: alone in all partitions, or by
-        the validity."""
         n, c, key = self.nested, self.config, self.newcomers.key[rows]
         normals = self.streams.normals(BIRTHS, key, c.particles, STATE)
         if c.individuals == "measured":
@@ -253,13 +239,15 @@ class Joint:
         self.belief.add(self.nested.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
         self.health.add(past.shape[1])
         if c.newcomers == "validity":
-            place(self.nested, c, self.frames * self.dt, self.streams, key)
+            n = self.nested
+            drawn = self.streams.uniforms(PLACING, key, n.log_q.size, 2).reshape(*n.log_q.shape, len(key), 2)
+            uniforms = np.ascontiguousarray(drawn[..., 0])
+            place_newcomers(newest(n.x), n.z, uniforms, c.validity_rate * self.frames * self.dt, SCALES)
 
     def _report(self, frame: Frame, seen: Bools) -> Tracks:
-        """Returns the Tracks of the frame, on the ground in m, in the image in px; seen (K,): who was measured."""
         n, c, id = self.nested, self.config, self.people.id
         joint = n.weights()
-        weights = n.component_weights() if c.weights == "people" else np.repeat(joint[:, None], len(id), axis=1)
+        weights = n.component_weights() if c.own_weights else np.repeat(joint[:, None], len(id), axis=1)
         mean, cov = estimate.moments(n.x[..., :STATE], weights)
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
         box = boxes_at(pos, self.people.size) if self.plane == "image" else None
@@ -279,12 +267,11 @@ class Joint:
         )  # fmt: skip
 
     def _groups(self, joint: Array, seen: Bools) -> list[Ints]:
-        """Returns the rows of the members of each group; sets `together`; joint (N_x,): the weights of step 1."""
         n, c, id = self.nested, self.config, self.people.id
         if not len(id):
             self.together, self.paired = np.zeros((0, 0)), id.copy()
             return []
-        particle = n.rest_weights() if c.weights == "people" else joint
+        particle = n.rest_weights() if c.own_weights else joint
         weights = particle[:, None] * np.exp(n.log_q)
         now = np.empty((len(id), len(id)))
         partition_kernels.co_membership(n.z, weights, now)
@@ -293,3 +280,10 @@ class Joint:
         if c.estimate == "histogram":
             return estimate.histogram_partition(n.z, weights)
         return estimate.binder_partition(self.together, n.z, self._before()[0])
+
+
+def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:
+    """Return the log-odds (K, K) of pairs, more for people who were in one group, and less for others."""
+    belief = default_belief()
+    same = (group[:, None] >= 0) & (group[:, None] == group)
+    return np.asarray(log_odds + share * np.outer(known, known) * np.where(same, belief.stay, -belief.come))

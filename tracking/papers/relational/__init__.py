@@ -2,5 +2,5 @@
 
 tracker: the filter and the order of a frame; relations: who walks with whom; transition_kernels: motion and relations;
 sensor: weights; association_sums_kernels: sums over mappings of people to detections; particle_set: weights of people,
-estimates, resampling; slots: what is known of people beside the particles; occluders: who is behind a pillar.
+estimates, resampling; occluders: who is behind a pillar.
 """

@@ -105,7 +105,6 @@ def free_messages(W: Array, miss: Array, spare: Array) -> Array:
 
 @njit(cache=True)
 def _propagate(W, miss, spare, psi, mu, nu):  # type: ignore[no-untyped-def]
-    """Writes psi, mu and nu (n, m) of `propagated_sum`."""
     n, m = W.shape
     for j in range(m):
         for i in range(n):
@@ -224,7 +223,6 @@ def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
 
 @njit(cache=True)
 def _line_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no-untyped-def]
-    """Returns what `_component_sum` returns for one row or one column, all of whose pairs have a weight above 0."""
     total = 1.0
     for i in rows:
         total *= miss[i]
@@ -247,7 +245,6 @@ def _line_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no-unty
 
 @njit(cache=True)
 def _component_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no-untyped-def]
-    """Returns the log of the sum over mappings of these rows (n',) and columns (m',), and writes their marginals."""
     if len(columns) == 0:
         return math.log(miss[rows[0]]) if miss[rows[0]] > 0 else -math.inf
     if len(columns) == 1 or len(rows) == 1:

@@ -16,152 +16,63 @@ from sim.types import Array
 from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
 
-ROWS = 5
-"""Rows of the speed table (Table 3)."""
+KERNEL_WIDTH = 1.0
+"""Resampled particles are drawn apart by a kernel of so many optimal widths, if people have own weights (ours)."""
+RESAMPLE_SHARE = 0.5
+"""People with own weights are resampled if their effective number is at most this share of the particles (ours)."""
+BIRTH_DOUBT = 0.5
+"""Least probability that a detection is nobody's for it to start a person; the paper does not say which starts one."""
+NEWCOMER_SHARE = 0.5
+"""Probability that a new person near a group belongs to it (sec. 3.2)."""
+BODY_RADIUS = 0.25
+"""m: half the width of a body that hides others from a known camera (ours); not with the paper's sensor."""
+SPEED_PRIOR = 1.3
+"""m/s: standard deviation of a new person's velocity, per axis, that of walking people."""
 
 
 @dataclass(frozen=True)
 class ParticleConfig(BackgroundSettings):
-    """The parameters of the tracker `particle`, a particle filter without relations; each field states default, range
-    and unit.
+    """The parameters of the tracker `particle`, a particle filter without relations, and of the background model.
 
-    They are the number of particles, the speed table of the motion, the sensor, births, deaths, reporting and the
-    background model. A speed belongs to the first row of the speed table whose upper end it does not exceed. Raises
-    InputError if clutter_density is 0 and detect_prob is below 1, or if foreground_time is shorter than
-    background_time.
+    A speed belongs to the first row of the speed table (Table 3) whose upper end it does not exceed. Raises InputError
+    if a value is not allowed, or if clutter_density is 0 and detect_prob is below 1.
     """
 
     tracker: ClassVar[str] = "particle"
 
+    # fmt: off
     particles: int = param(1000, (50, 20000), "particles", "number of particles", "int", online=False, tunable=False)
-    resample_share: float = param(
-        0.5,
-        (0.0, 1.0),
-        "share",
-        "particles are resampled if their effective number is at most this share of them; 1: in every frame (the "
-        "paper), below 1 ours",
-    )
-    resampling: str = param(
-        "residual", ("residual", "systematic"), "", "residual: as in sec. 2.1; systematic: ours", "categorical"
-    )
-
-    kernel_width: float = param(
-        1.0,
-        (0.0, 3.0),
-        "",
-        "resampled particles are drawn apart by a kernel of so many optimal widths; 0: none (ours)",
-        before=0.0,
-    )
-    weights: str = param(
-        "factorised",
-        ("factorised", "joint"),
-        "",
-        "factorised: people have weights of their own (ours); joint: a particle has one weight (the paper)",
-        "categorical",
-        before="joint",
-    )
-
-    noise_scale: float = param(
-        3.0, (0.1, 10.0), "", "the standard deviations of the speed table are multiplied by this (ours)", "log"
-    )
-    speed_1: float = param(0.15, (0.0, 100.0), "m/s", "upper end of row 1 of the speed table", tunable=False)
-    speed_2: float = param(0.6, (0.0, 100.0), "m/s", "upper end of row 2 of the speed table", tunable=False)
-    speed_3: float = param(1.0, (0.0, 100.0), "m/s", "upper end of row 3 of the speed table", tunable=False)
-    speed_4: float = param(1.4, (0.0, 100.0), "m/s", "upper end of row 4 of the speed table", tunable=False)
-    drift_1: float = param(0.0, (0.0, 1000.0), "m/s^2", "row 1: mean deceleration (column B)", tunable=False)
-    drift_2: float = param(0.165, (0.0, 1000.0), "m/s^2", "row 2: mean deceleration", tunable=False)
-    drift_3: float = param(0.086, (0.0, 1000.0), "m/s^2", "row 3: mean deceleration", tunable=False)
-    drift_4: float = param(0.047, (0.0, 1000.0), "m/s^2", "row 4: mean deceleration", tunable=False)
-    drift_5: float = param(0.03, (0.0, 1000.0), "m/s^2", "row 5: mean deceleration", tunable=False)
-    diffusion_1: float = param(
-        0.074, (0.0, 1000.0), "m/s^1.5", "row 1: standard deviation of the velocity per root second (column C)",
-        tunable=False,
-    )  # fmt: skip
-    diffusion_2: float = param(0.238, (0.0, 1000.0), "m/s^1.5", "row 2: the same", tunable=False)
-    diffusion_3: float = param(0.196, (0.0, 1000.0), "m/s^1.5", "row 3: the same", tunable=False)
-    diffusion_4: float = param(0.123, (0.0, 1000.0), "m/s^1.5", "row 4: the same", tunable=False)
-    diffusion_5: float = param(0.094, (0.0, 1000.0), "m/s^1.5", "row 5: the same", tunable=False)
-    speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new person's velocity, per axis", "log")
-
-    point_noise: float = param(
-        0.08,
-        (0.005, 2.0),
-        "m",
-        "from points: standard deviation of a measured position, per axis (sec. 3.3)",
-        "log",
-        sees="points",
-    )
-    pixel_noise: float = param(
-        0.15,
-        (0.005, 2.0),
-        "m",
-        "from pixels: standard deviation of the centre of a blob, per axis (ours)",
-        "log",
-        sees="pixels",
-    )
-    outlier_share: float = param(
-        0.05,
-        (0.0, 0.5),
-        "share",
-        "measured positions that are displaced, as by partial occlusion; 0: none (ours)",
-    )
-    outlier_noise: float = param(
-        0.4,
-        (0.05, 3.0),
-        "m",
-        "standard deviation of a displaced position, per axis, at least that of a position (ours)",
-        "log",
-    )
-    body_radius: float = param(
-        0.25,
-        (0.0, 0.6),
-        "m",
-        "half the width of a body that hides others from a known camera; 0: nobody does (ours)",
-        before=0.0,
-    )
-    detect_prob: float = param(
-        0.95, (0.3, 1.0), "probability", "that a person who was measured in the last frame is measured (ours)"
-    )
-    hidden_time: float = param(
-        2.0, (0.05, 20.0), "s", "mean time until a person who is not measured is measured again (ours)", "log"
-    )
-    clutter_density: float = param(
-        0.002, (0.0, 1.0), "1/m^2", "false alarms per frame and square metre; 0: none (ours)"
-    )
+    weights: str = param("factorised", ("factorised", "joint"), "",
+        "factorised: people have own weights (ours); joint: a particle has one weight (the paper)", "categorical")
+    noise_scale: float = param(3.0, (0.1, 10.0), "",
+        "the standard deviations of the speed table are multiplied by this (ours)", "log")
+    speed_ends: tuple[float, ...] = param((0.15, 0.6, 1.0, 1.4), (0.0, 100.0), "m/s",
+        "speed table: upper ends of rows 1 to 4 (column A)", "vector")
+    drift: tuple[float, ...] = param((0.0, 0.165, 0.086, 0.047, 0.03), (0.0, 1000.0), "m/s^2",
+        "mean deceleration by row (column B)", "vector")
+    diffusion: tuple[float, ...] = param((0.074, 0.238, 0.196, 0.123, 0.094), (0.0, 1000.0), "m/s^1.5",
+        "standard deviation of the velocity per root second, by row (column C)", "vector")
+    point_noise: float = param(0.08, (0.005, 2.0), "m",
+        "from points: standard deviation of a measured position, per axis (sec. 3.3)", "log", sees="points")
+    pixel_noise: float = param(0.15, (0.005, 2.0), "m",
+        "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log", sees="pixels")
+    outlier_share: float = param(0.05, (0.0, 0.5), "share",
+        "measured positions that are displaced, as by partial occlusion; 0: none (ours)")
+    outlier_noise: float = param(0.4, (0.05, 3.0), "m",
+        "standard deviation of a displaced position, per axis, at least that of a position (ours)", "log")
+    detect_prob: float = param(0.95, (0.3, 1.0), "probability",
+        "that a person who was measured in the last frame is measured (ours)")
+    hidden_time: float = param(2.0, (0.05, 20.0), "s",
+        "mean time until a person who is not measured is measured again (ours)", "log")
+    clutter_density: float = param(0.002, (0.0, 1.0), "1/m^2",
+        "false alarms per frame and square metre; 0: none (ours)")
     birth_rate: float = param(0.003, (1e-5, 1.0), "1/(m^2 s)", "new people per square metre and second (ours)", "log")
-    birth_doubt: float = param(
-        0.5,
-        (0.05, 1.0),
-        "probability",
-        "least probability that a detection is nobody's for it to start a person (ours)",
-    )
-    time_window: float = param(
-        3.0, (0.1, 30.0), "s", "a person who is not measured for so long is removed (sec. 2.1.1)", "log"
-    )
-    least_existence: float = param(
-        0.02, (0.0, 0.5), "probability", "a person whose existence is less probable is removed (ours)"
-    )
-    report_existence: float = param(
-        0.5, (0.0, 1.0), "probability", "people whose existence is at least so probable are reported (ours)"
-    )
-
-    blobs: str = param(
-        "divided",
-        ("divided", "whole"),
-        "",
-        "from pixels: divided: blobs of several people are divided into detections of a person's size, parts of people "
-        "left out; whole: each blob is one detection (ours)",
-        "categorical",
-        sees="pixels",
-        before="whole",
-    )
-    most_foreground: float = param(
-        0.6,
-        (0.05, 1.0),
-        "share",
-        "from pixels: a frame with a larger share of foreground is ignored (ours)",
-        sees="pixels",
-    )
+    time_window: float = param(3.0, (0.1, 30.0), "s",
+        "a person who is not measured for so long is removed (sec. 2.1.1)", "log")
+    least_existence: float = param(0.02, (0.0, 0.5), "probability",
+        "a person whose existence is less probable is removed (ours)")
+    report_existence: float = param(0.5, (0.0, 1.0), "probability",
+        "people whose existence is at least so probable are reported (ours)")
 
     def check(self) -> None:
         """Refuse a sensor without clutter that misses people."""
@@ -182,19 +93,10 @@ class ParticleConfig(BackgroundSettings):
         """True if a particle has one weight for all people: in joint mode and with the paper's sensor."""
         return self.weights == "joint" or self.certain_sensor
 
-    @property
-    def speed_ends(self) -> Array:
-        """The upper ends of the first four rows of the speed table, (4,), m/s."""
-        return np.array([self.speed_1, self.speed_2, self.speed_3, self.speed_4])
-
     def speed_table(self, dt: float) -> Array:
-        """Return the speed table (5, 3) of a step of dt s: upper end of the speed in m/s (inf in the last row), mean
-        loss of speed in m/s (column B), standard deviation of the velocity per axis in m/s (column C)."""
-        drift = np.array([getattr(self, f"drift_{k}") for k in range(1, ROWS + 1)])
-        diffusion = np.array([getattr(self, f"diffusion_{k}") for k in range(1, ROWS + 1)])
-        return np.stack(
-            [np.append(self.speed_ends, np.inf), drift * dt, self.noise_scale * diffusion * np.sqrt(dt)], axis=1
-        )
+        """Return the speed table (5, 3) of a step of dt s, as transition_kernels has it."""
+        ends, drift, diffusion = ([*self.speed_ends, np.inf], np.array(self.drift), np.array(self.diffusion))
+        return np.stack([ends, drift * dt, self.noise_scale * diffusion * np.sqrt(dt)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -211,27 +113,21 @@ class RelationalConfig(ParticleConfig):
         0.15,
         (0.0, 10.0),
         "s",
-        "time constant with which people who walk together approach their mean velocity (ours); 0: they have it "
-        "(sec. 3.2)",
-        before=0.0,
+        "time in which people who walk together approach their mean velocity (ours); 0: they have it (sec. 3.2)",
     )
     common_noise: float = param(
         0.8,
         (0.0, 1.0),
         "share",
-        "of the variance of the velocity's noise, that people who walk together have in common (ours); 0: none "
-        "(sec. 3.2)",
-        before=0.0,
+        "of the velocity noise's variance, common to people who walk together (ours); 0: none (sec. 3.2)",
     )
     relation_evidence: str = param(
         "belief",
         ("belief", "state"),
         "",
-        "what says how probably a pair walks together in the long run; belief: that of the grouping about their tracks "
-        "so far; state: their distance and velocity difference in the particle (ours)",
+        "who walks together in the long run, by the belief or the particle's state (ours)",
         "categorical",
         online=False,
-        before="state",
     )
     relation_rate: float = param(
         1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
@@ -239,6 +135,4 @@ class RelationalConfig(ParticleConfig):
     relation_bias: float = param(5.9, (-40.0, 40.0), "", "log odds of walking together at the same place (ours)")
     relation_distance: float = param(3.3, (0.0, 40.0), "1/m", "loss of log odds per metre of distance (ours)")
     relation_velocity: float = param(5.9, (0.0, 40.0), "s/m", "loss of log odds per m/s of velocity difference (ours)")
-    newcomer_share: float = param(
-        0.5, (0.0, 1.0), "probability", "that a new person near a group belongs to it (sec. 3.2)"
-    )
+    # fmt: on

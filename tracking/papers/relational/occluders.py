@@ -18,10 +18,7 @@ MIDDLE = 0.85
 
 
 def hidden_share(pos: Array, weights: Array, camera: Camera | None, scene: Scene | None) -> Array:
-    """Return the probability (K,) that each person is behind a pillar or wall.
-
-    pos (P, K, 2), m; weights (P, K): of the particles, sum 1 for each person.
-    """
+    """Return the probability (K,) that each person is behind a pillar or wall."""
     if camera is None or scene is None or camera.kind != "pinhole" or not len(scene.pillars) + len(scene.walls):
         return np.zeros(pos.shape[1])
     hidden = np.zeros(pos.shape[:2], bool)
@@ -33,7 +30,6 @@ def hidden_share(pos: Array, weights: Array, camera: Camera | None, scene: Scene
 
 
 def _behind_pillar(pos: Array, pillar: Array, top: float, eye: Array) -> Bools:
-    """Returns (P, K) True where the line from eye (3,) to a person meets the pillar (3,) x, y, radius."""
     to_person, to_pillar = pos - eye[:2], pillar[:2] - eye[:2]
     toward = to_person[..., 0] * to_pillar[0] + to_person[..., 1] * to_pillar[1]
     along = np.clip(toward / np.maximum(np.square(to_person).sum(axis=2), 1e-12), 0.0, 1.0)
@@ -42,7 +38,6 @@ def _behind_pillar(pos: Array, pillar: Array, top: float, eye: Array) -> Bools:
 
 
 def _behind_wall(pos: Array, wall: Array, top: float, eye: Array) -> Bools:
-    """Returns (P, K) True where the line from eye (3,) to a person meets the wall (2, 2)."""
     to_person, side, start = pos - eye[:2], wall[1] - wall[0], wall[0] - eye[:2]
     det = to_person[..., 0] * side[1] - to_person[..., 1] * side[0]
     det = np.where(np.abs(det) < 1e-12, np.inf, det)
@@ -53,7 +48,6 @@ def _behind_wall(pos: Array, wall: Array, top: float, eye: Array) -> Bools:
 
 
 def _height(along: Array, eye: Array) -> Array:
-    """Returns the height of the line to the middle of a body at a share `along` of it, m."""
     return np.asarray(eye[2] + along * (MIDDLE - eye[2]))
 
 
@@ -64,10 +58,7 @@ LEAST_VISIBLE = 0.2
 
 
 def covered_by_people(particles: ParticleSet, camera: Camera | None, radius: float) -> tuple[Array, Array]:
-    """Return the probabilities (K,) that each person is hidden behind another one, and that the feet are (ours).
-
-    radius: half the width of a body, m; 0: people hide nobody, nor do they without a pinhole camera.
-    """
+    """Return the probabilities (K,) that each person is hidden behind another one, and that the feet are (ours)."""
     p, hidden, cut = particles, np.zeros(particles.people), np.zeros(particles.people)
     if camera is not None and camera.kind == "pinhole" and radius > 0:
         mean = np.stack([particle_set_kernels.column_sums(p.weights, p.pos[..., d]) for d in range(2)], axis=1)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.filters.particles import residual_resample, systematic_resample
+from tracking.filters.particles import residual_resample
 from tracking.papers.relational import particle_set_kernels
 
 Draws = Callable[[Ints], tuple[Array, Array]]
@@ -62,10 +62,7 @@ class ParticleSet:
         return particle_set_kernels.column_sums(self.weights, self.exist)
 
     def estimates(self) -> tuple[Array, Array, Array]:
-        """Return means (K, 4) and covariances (K, 4, 4) of x, y, m, vx, vy, m/s, and the existence (K,).
-
-        They are moments over the particles, each weighted by its weight and the person's existence in it.
-        """
+        """Return means (K, 4) and covariances (K, 4, 4) of x, y, m, vx, vy, m/s, and the existence (K,)."""
         mean, cov, exist = np.zeros((self.people, 4)), np.zeros((self.people, 4, 4)), np.zeros(self.people)
         particle_set_kernels.moments(self.pos, self.vel, self.exist, self.weights, mean, cov, exist)
         return mean, cov, exist
@@ -77,11 +74,7 @@ class ParticleSet:
         return label
 
     def share_weights(self, one_weight: bool) -> None:
-        """Give each particle one weight, the product of the people's, or each person weights of the own.
-
-        The latter begins while all weights are equal only, as after resampling: so no weight counts twice. Products
-        that are 0 in all particles, by underflow, become equal weights.
-        """
+        """Give each particle one weight, the product of the people's, or each person weights of the own."""
         if one_weight and not self.one_weight and self.people:
             weights = self.weights.prod(axis=1)
             if not weights.sum() > 0:
@@ -97,14 +90,9 @@ class ParticleSet:
         """Return the effective number of particles of each slot, (K,)."""
         return np.asarray(1 / particle_set_kernels.column_sums(self.weights, self.weights))
 
-    def resample(self, share: float, scheme: str, width: float, draws: Draws) -> None:
+    def resample(self, share: float, width: float, draws: Draws) -> None:
         """Resample each person whose effective number is at most this share of the particles (sec. 2.1); with one
-        weight all people together.
-
-        scheme: "residual" or "systematic". draws: random numbers of people; with one weight the uniforms are those of
-        the first one. width: of the kernel from which equal particles are drawn apart, in units of the optimal width;
-        0: none (the paper).
-        """
+        weight all people together."""
         few = np.flatnonzero(self.effective() <= share * self.count * (1 + 1e-9))
         if not len(few):
             return
@@ -112,10 +100,7 @@ class ParticleSet:
         chosen = np.empty((self.count, 1 if self.one_weight else len(few)), np.int64)
         for column, person in enumerate(few[: chosen.shape[1]].tolist()):
             weights = np.ascontiguousarray(self.weights[:, person])  # of one column numpy sums in another order
-            if scheme == "residual":
-                chosen[:, column] = residual_resample(weights, uniforms[column])
-            else:
-                chosen[:, column] = systematic_resample(weights, float(uniforms[column, 0]))
+            chosen[:, column] = residual_resample(weights, uniforms[column])
         if self.one_weight:
             for values in (self.pos, self.vel, self.exist, self.ancestor):
                 values[:] = values[chosen[:, 0]]
@@ -129,13 +114,6 @@ class ParticleSet:
             self._spread(few, width, normals)
 
     def _spread(self, members: Ints, width: float, normals: Array) -> None:
-        """Draw the states of slots `members`, of equal weights, from kernels about the particles (regularised particle
-        filter, Musso et al. 2001; ours); normals (R, 4, P).
-
-        The kernel is normal with h^2 times the covariance of the person's state, of dimension d = 4, and h = width (4 /
-        (P (d + 2)))^(1 / (d + 4)). States are drawn towards their mean before, so that the covariance stays (West
-        1993).
-        """
         h = min(width * (4 / (self.count * 6)) ** (1 / 8), 1.0)
         state = np.concatenate([self.pos[:, members], self.vel[:, members]], axis=2)
         state = np.ascontiguousarray(state.transpose(1, 2, 0))
@@ -182,5 +160,47 @@ class ParticleSet:
 
 
 def _order_key(pairs: Ints) -> Ints:
-    """Returns numbers (N,) by which pairs (N, 2) are in order of j, then i."""
     return np.asarray(pairs[:, 1] * LARGEST + pairs[:, 0])
+
+
+SPAN = 1.0
+"""Time over which ancestors are counted, s."""
+
+
+class ParticleDiversity:
+    """Sums over the frames of a sequence in which there are people.
+
+    effective: sum of the effective shares of the particles of the least effective person, over `frames`. distinct: sum
+    of the shares of particles that still have descendants after SPAN s, means over people, over `spans`. span: SPAN in
+    frames; age: frames since the last span began.
+    """
+
+    def __init__(self, fps: float) -> None:
+        self.span = max(1, round(SPAN * fps))
+        self.effective = self.distinct = 0.0
+        self.frames = self.spans = self.age = 0
+
+    def weigh(self, particles: ParticleSet) -> None:
+        """Add a frame in which the particles were weighed, before they are resampled."""
+        if particles.people:
+            self.effective += float(particles.effective().min()) / particles.count
+            self.frames += 1
+
+    def resample(self, particles: ParticleSet) -> None:
+        """Note that a frame is over; at the end of a span the ancestors of the particles are counted and begin anew."""
+        self.age += 1
+        if self.age < self.span:
+            return
+        if particles.people:
+            self.distinct += float(np.mean([len(np.unique(k)) for k in particles.ancestor.T])) / particles.count
+            self.spans += 1
+        particles.ancestor[:] = np.arange(particles.count)[:, None]
+        self.age = 0
+
+    def summary(self) -> dict[str, float | None]:
+        """Return means: shares of effective particles of the least effective person, and of particles with descendants
+        after SPAN s; None without people."""
+        return {
+            "effective_particles_of_a_person": self.effective / self.frames if self.frames else None,
+            "distinct_ancestors": self.distinct / self.spans if self.spans else None,
+        }

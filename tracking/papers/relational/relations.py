@@ -11,7 +11,7 @@ from sim.types import Array, Bools, Context, Frame, Ints, Tracks
 from tracking.grouping.belief import UNSEEN
 from tracking.grouping.pair_belief import PairBelief
 from tracking.papers.relational import particle_set_kernels, transition_kernels
-from tracking.papers.relational.config import ParticleConfig, RelationalConfig
+from tracking.papers.relational.config import NEWCOMER_SHARE, ParticleConfig, RelationalConfig
 from tracking.papers.relational.tracker import COUPLING, JOINING, RELATIONS, Particle
 from tracking.papers.relational.transition_kernels import DISTANCE, VELOCITY
 
@@ -38,7 +38,6 @@ class Relational(Particle):
 
     @property
     def _rules(self) -> Array:
-        """The parameters of relations (4,) as transition_kernels has them: RATE, BIAS, DISTANCE, VELOCITY."""
         c = self.config
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
@@ -84,8 +83,7 @@ class Relational(Particle):
         label = np.empty(p.exist.shape, np.int64)
         particle_set_kernels.group_labels(p.pairs, p.related, label)
         uniforms = self.streams.uniforms(JOINING, self.slots.key[-new:], 1, p.count)[0]
-        share = self.config.newcomer_share
-        pairs, related = transition_kernels.join(p.pos, p.exist, label, points, share, uniforms, self._rules)
+        pairs, related = transition_kernels.join(p.pos, p.exist, label, points, NEWCOMER_SHARE, uniforms, self._rules)
         p.pairs, p.related = np.concatenate([p.pairs, pairs]), np.concatenate([p.related, related])
 
     def _report(self, frame: Frame) -> Tracks:
@@ -109,5 +107,4 @@ class Relational(Particle):
 
 
 def _log_odds(belief: PairBelief) -> Array:
-    """Returns the log-odds (K, K) that pairs belong together; -inf for pairs without evidence."""
     return np.where(belief.log_odds == UNSEEN, -np.inf, belief.log_odds)

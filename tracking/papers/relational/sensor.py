@@ -59,13 +59,7 @@ class Sight:
 
 
 def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig) -> Weighing:
-    """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say.
-
-    points (M, 2): m; noise: standard deviation of a point per axis, m. Weights and existence of the particles are
-    changed, and whether a particle has one weight. If all weights vanish, which only the paper's sensor can bring
-    about, they are not, and the detections are nobody's. Without it nobody is detected for certain (ALMOST), so that a
-    miss leaves weights.
-    """
+    """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say."""
     people, count, certain = particles.people, len(points), config.certain_sensor
     if not people:
         return Weighing(False, np.zeros((0, count)), np.zeros(0), np.ones(count))
@@ -100,10 +94,6 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
 def _pairs(
     particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig
 ) -> tuple[Ints, Array]:
-    """Returns the pairs (N, 2) of a person and a detection that are possible, and their densities (P, N), 1/m^2.
-
-    With the paper's sensor all pairs are possible.
-    """
     wide = max(config.outlier_noise, noise)
     certain = config.outlier_share == 0
     share = np.zeros(particles.people) if certain else config.outlier_share + (1 - config.outlier_share) * sight.cut
@@ -125,10 +115,6 @@ def _pairs(
 def _free(
     particles: ParticleSet, pairs: Ints, density: Array, count: int, detect: Array, config: ParticleConfig
 ) -> Array:
-    """Returns the probability (K, M) that nobody else has a detection, for each person, means over the particles.
-
-    pairs (N, 2): a person and a detection that are possible; density (P, N); count: M.
-    """
     person = pairs[:, 0]
     mean = np.zeros((particles.people, count))
     found = particle_set_kernels.pair_sums(particles.weights, particles.exist, person, density)

@@ -76,8 +76,6 @@ def free_detections(W: Array, miss: Array) -> Array:
 
 @njit(cache=True)
 def _free_of_linked(W, miss, rows, columns, free):  # type: ignore[no-untyped-def]
-    """Writes the probabilities of `free_detections` for linked people, rows (n',), and their detections, columns
-    (m',)."""
     n, m = len(rows), len(columns)
     block, spare = np.empty((n, m)), np.ones(m)
     for a in range(n):

@@ -38,24 +38,74 @@ The preset `paper` switches off what has a parameter.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
 from tracking.detect.foreground_blobs import ForegroundBlobs
-from tracking.detect.point_detections import boxes_at, ordered_points
-from tracking.filters.person_streams import PersonStreams, birth_keys
+from tracking.detect.point_detections import boxes_at, followed_sizes, ordered_points
+from tracking.filters.person_streams import Keys, PersonStreams, birth_keys
 from tracking.image_scale import required
 from tracking.papers.relational import sensor, transition_kernels
-from tracking.papers.relational.config import ParticleConfig
+from tracking.papers.relational.config import (
+    BIRTH_DOUBT,
+    BODY_RADIUS,
+    KERNEL_WIDTH,
+    RESAMPLE_SHARE,
+    SPEED_PRIOR,
+    ParticleConfig,
+)
 from tracking.papers.relational.occluders import covered_by_people, hidden_share
-from tracking.papers.relational.particle_diversity import ParticleDiversity
-from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.slots import Slots
+from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
 
 MOTION, BIRTHS, RESAMPLING, SPREAD, RELATIONS, JOINING, COUPLING = range(7)
 """What random numbers are drawn for. Relations have streams of their own, so that they change no other draw."""
+
+
+@dataclass
+class Slots:
+    """The people of a sequence, one row for each of K slots of the particles (all ours).
+
+    id (K,): the track's id, -1 until the person is first reported. missed (K,): time without a measurement in which the
+    person could have been seen, s, 0 if measured in this frame. size (K, 2): width and height of the box, px, nan if
+    none was measured. next_id: the next new id.
+    """
+
+    id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    missed: Array = field(default_factory=lambda: np.zeros(0))
+    size: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
+    next_id: int = 1
+
+    def add(self, size: Array, key: Keys) -> None:
+        """Add people who are measured in this frame; size (M, 2): width, height of the boxes, px, nan without; key
+        (M,)."""
+        self.id = np.append(self.id, np.full(len(size), -1))
+        self.missed = np.append(self.missed, np.zeros(len(size)))
+        self.size, self.key = np.concatenate([self.size, size]), np.concatenate([self.key, key])
+
+    def keep(self, rows: Bools) -> None:
+        """Remove all people but those where `rows` (K,) is True."""
+        self.id, self.missed, self.size = self.id[rows], self.missed[rows], self.size[rows]
+        self.key = self.key[rows]
+
+    def measure(self, seen: Array, pairs: Array, sizes: Array | None, dt: Array) -> None:
+        """Note who was measured in a frame: those with seen (K,) above 1/2; dt (K,): s by which others count as
+        missed."""
+        self.missed = np.where(seen > 0.5, 0.0, self.missed + dt)
+        if sizes is None or not pairs.size:
+            return
+        best = pairs.argmax(axis=1)
+        sure = pairs[np.arange(len(best)), best] > 0.5
+        self.size[sure] = followed_sizes(self.size[sure], sizes[best[sure]], dt[sure, None])
+
+    def name(self, rows: Bools) -> None:
+        """Give new ids to the people where `rows` (K,) is True who have none."""
+        new = np.flatnonzero(rows & (self.id < 0))
+        self.id[new] = self.next_id + np.arange(len(new))
+        self.next_id += len(new)
 
 
 class Particle:
@@ -87,8 +137,7 @@ class Particle:
         self.shown: Tracks | None = None
         self.pixels = None
         if context.background is not None:
-            divide = self.config.blobs == "divided"
-            self.pixels = ForegroundBlobs(self.config, self.config.most_foreground, context, divide)
+            self.pixels = ForegroundBlobs(self.config, context, divide=True)
         if self.pixels is not None:
             self.context = context = context.replace(px_per_m=self.pixels.scale)
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
@@ -108,7 +157,7 @@ class Particle:
         """
         if self.pixels is not None:
             if self.pixels.settings is not self.config:
-                self.pixels.follow(self.config, self.config.most_foreground)
+                self.pixels.follow(self.config)
             known = None if self.shown is None else self.shown.box
             detections = self.pixels.detections(frame, np.zeros((0, 4)) if known is None else known)
         self.streams.frame += 1
@@ -117,8 +166,8 @@ class Particle:
             self._measure(detections)
         self.shown = tracks = self._report(frame)
         if detections is not None:
-            c = self.config
-            self.particles.resample(c.resample_share, c.resampling, c.kernel_width, self._own_draws)
+            one = self.particles.one_weight
+            self.particles.resample(1.0 if one else RESAMPLE_SHARE, 0.0 if one else KERNEL_WIDTH, self._own_draws)
             self.diversity.resample(self.particles)
         return tracks
 
@@ -149,7 +198,6 @@ class Particle:
         return required(self.context.px_per_m) if self.plane == "image" else 1.0
 
     def _forecast(self) -> None:
-        """Draw new attributes given the old relations (eq. 8), then new relations (eq. 7)."""
         p, c = self.particles, self.config
         noise = self.streams.normals(MOTION, self.slots.key, p.count, 2)
         shared, coupling, alike, spread = self._coupling()
@@ -159,7 +207,7 @@ class Particle:
         )
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
-        behind, self.cut = covered_by_people(p, camera, c.body_radius)
+        behind, self.cut = covered_by_people(p, camera, 0.0 if c.certain_sensor else BODY_RADIUS)
         self.hidden = 1 - (1 - self.hidden) * (1 - behind)
         self._relate()
 
@@ -170,18 +218,11 @@ class Particle:
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
     def _coupling(self) -> tuple[Array, Array, Array, Array]:
-        """Returns the normals that groups have in common (P, K, 2), and the coupling (2,), the rules (4,) by which
-        partners count, and the spread (N, 2) of the pairs of transition_kernels; people of `particle` have none."""
         return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4), np.zeros((0, 2))
 
-    def _relate(self) -> None:
-        """Draw new relations; people of `particle` have none."""
+    def _relate(self) -> None: ...
 
     def _measure(self, detections: Detections) -> None:
-        """Weigh the particles by a frame's detections; remove people and start new ones.
-
-        Sets `plane`.
-        """
         self.plane = "image" if detections.plane == "image" else "ground"
         points, sizes = ordered_points(detections, self.unit)
         missed = self.slots.missed > 0
@@ -191,48 +232,35 @@ class Particle:
         self.diversity.weigh(self.particles)
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
-        new = said.nobody >= self.config.birth_doubt
+        new = said.nobody >= BIRTH_DOUBT
         if new.any():
             self._start(points[new], np.full((int(new.sum()), 2), np.nan) if sizes is None else sizes[new])
 
     def _detection_probability(self) -> Array:
-        """Returns the probability (K,) that each person is measured if existing (ours).
-
-        A person who was missed in the last frame is measured again at the rate 1 / hidden_time. A person behind a known
-        pillar or wall, or behind another person, is not measured, except by the paper's sensor, nor counts as missed.
-        """
         c = self.config
         again = c.detect_prob if c.certain_sensor else min(c.detect_prob, -np.expm1(-self.dt / c.hidden_time))
         visible = 1.0 if c.certain_sensor else 1 - self.hidden
         return np.asarray(np.where(self.slots.missed > 0, again, c.detect_prob) * visible)
 
     def _remove(self) -> None:
-        """Remove people who are missed for longer than the time window (sec. 2.1.1) or exist with a low probability."""
         c = self.config
         keep = (self.particles.existence >= c.least_existence) & (self.slots.missed <= c.time_window + 1e-9)
         if not keep.all():
             self._keep(keep)
 
     def _keep(self, rows: Bools) -> None:
-        """Remove all slots but those where `rows` (K,) is True."""
         self.particles.keep(rows)
         self.slots.keep(rows)
 
     def _start(self, points: Array, sizes: Array) -> None:
-        """Add people at detections (secs. 2.1.1, 3.2): points (M, 2) m; sizes (M, 2): of the boxes, px, nan without.
-
-        Place and velocity are normal about the detection and about 0. The existence is the share of new people among
-        new people and false alarms (ours).
-        """
         p, c, key = self.particles, self.config, birth_keys(points, self.streams.frame)
         draws = self.streams.normals(BIRTHS, key, 2 * p.count, 2).reshape(2, p.count, len(points), 2)
         exist = c.birth_rate * self.dt / (c.birth_rate * self.dt + c.clutter_density)
-        p.add(points + self.noise * draws[0], c.speed_prior * draws[1], exist)
+        p.add(points + self.noise * draws[0], SPEED_PRIOR * draws[1], exist)
         self.slots.add(sizes, key)
         self._relate_newcomers(points)
 
     def _own_draws(self, people: Ints) -> tuple[Array, Array]:
-        """Returns uniforms (R, P) and normals (R, 4, P) by which the `people` (R,) are resampled."""
         count, key = self.particles.count, self.slots.key[people]
         uniforms, normals = (
             self.streams.uniforms(RESAMPLING, key, 1, count),
@@ -240,12 +268,9 @@ class Particle:
         )
         return uniforms[0], normals.reshape(len(key), 4, count)
 
-    def _relate_newcomers(self, points: Array) -> None:
-        """Relate the last slots, of new people at `points` (M, 2), m, to others; people of `particle` are alone."""
+    def _relate_newcomers(self, points: Array) -> None: ...
 
     def _report(self, frame: Frame) -> Tracks:
-        """Returns the Tracks of the frame: people who exist with at least `report_existence`, on the ground in m, in
-        the image in px."""
         mean, cov, exist = self.particles.estimates()
         rows = exist >= self.config.report_existence
         self.slots.name(rows)
@@ -257,6 +282,4 @@ class Particle:
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
         return Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
 
-    def _follow(self, state: Array) -> None:
-        """Take note of the mean states (K, 4) of a frame, x, y, m, vx, vy, m/s, nan for people who are not reported;
-        `particle` has no use for them."""
+    def _follow(self, state: Array) -> None: ...

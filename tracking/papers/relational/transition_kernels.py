@@ -34,7 +34,6 @@ FAR = 1e-6
 
 @njit(cache=True)
 def _boxes(pos):  # type: ignore[no-untyped-def]
-    """Returns the boxes (K, 4) round all particles of each person: least x, greatest x, least y, greatest y."""
     particles, n, _ = pos.shape
     box = np.empty((n, 4))
     for i in range(n):
@@ -268,8 +267,6 @@ def join(
 
 @njit(cache=True)
 def _neighbours(box, points, rules):  # type: ignore[no-untyped-def]
-    """Returns the people before each new one whose belonging is not below FAR in all particles, all in a row, and where
-    those of each new person end."""
     old, ends = len(box) - len(points), np.empty(len(points), np.int64)
     some, count = np.empty(64, np.int64), 0
     for m in range(len(points)):
@@ -287,7 +284,6 @@ def _neighbours(box, points, rules):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _relations(found: Ints, new: int, people: int, particles: int) -> tuple[Ints, Bools]:
-    """Returns pairs (N, 2) and relations (N, P) of R rows (R, 3): number of a new person, partner, particle."""
     ends = np.zeros(new + 1, np.int64)
     for r in range(len(found)):
         ends[found[r, 0] + 1] += 1

@@ -4,8 +4,8 @@
     m_total = p(y_i | xi_j, P_xi)^k_p p(lambda_i | v_j, P_v)^k_v            (eqs 9 to 11)
 Each point belongs to the group with the largest m_total among those in whose region it lies.
 
-Departures. k_p and k_v are exponents: as factors they cancel. S is the sum of the group's spread Sigma, the covariance
-P of its centroid and that of the point, C_i; the same for velocities.
+Departures. k_p = 1 and k_v are exponents: as factors they cancel. S is the sum of the group's spread Sigma, the
+covariance P of its centroid and that of the point, C_i; the same for velocities.
 """
 
 from __future__ import annotations
@@ -22,10 +22,7 @@ from tracking.papers.stereo.space_group import SpaceGroup
 
 
 def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: StereoConfig) -> Ints:
-    """Return for each of M points the number of its group in `groups`, (M,), -1 for none (eqs 8 to 11).
-
-    groups: predicted to this frame.
-    """
+    """Return for each of M points the number of its group in `groups`, (M,), -1 for none (eqs 8 to 11)."""
     if not groups or not len(points):
         return np.full(len(points), -1)
     x = np.stack([g.ekf.x[:, 0] for g in groups])
@@ -36,15 +33,13 @@ def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: Stereo
     near = d2 < config.gate
     g, m, position = g[near], m[near], position[near]
     _, velocity = _log_density(points.vel[m] - x[g][:, VEL], own[g], points.vel_cov[m], VEL, config)
-    total[g, m] = config.position_weight * position + config.velocity_weight * velocity
+    total[g, m] = position + config.velocity_weight * velocity
     inside = np.zeros(total.shape, bool)
     inside[g, m] = True
     return np.where(inside.any(0), total.argmax(0), -1)
 
 
 def _in_reach(x: Array, own: Array, points: SpacePoints, config: StereoConfig) -> tuple[Ints, Ints]:
-    """Returns groups and points (R,) that may be within the gate: the squared Mahalanobis distance is at least the
-    squared distance over the trace of S. x (G, 6), own (G, 6, 6): states of the groups, and what they add to S."""
     trace, square = np.einsum("gii->g", own[:, POS][:, :, POS]), np.zeros((len(x), len(points)))
     spread = np.einsum("mii->m", points.cov) if config.point_covariance else np.zeros(len(points))
     for d, k in enumerate(POS):
@@ -54,11 +49,6 @@ def _in_reach(x: Array, own: Array, points: SpacePoints, config: StereoConfig) -
 
 
 def _log_density(away: Array, own: Array, cov: Array, part: list[int], config: StereoConfig) -> tuple[Array, Array]:
-    """Returns squared Mahalanobis distances (R,) and log densities (R,), without their constant, of eqs 9 and 10.
-
-    away (R, 3): positions or velocities of points less those of groups; own (R, 6, 6): what the groups add to S; cov
-    (R, 3, 3): of the points; part: the entries of the state.
-    """
     S = own[:, part][:, :, part]
     if config.point_covariance:
         S = S + cov

@@ -11,135 +11,54 @@ from tracking.detect.background_settings import BackgroundSettings
 
 @dataclass(frozen=True)
 class StereoConfig(BackgroundSettings):
-    """The parameters of the tracker `stereo`, with those of the background model; each field states default, range and
-    unit.
+    """The parameters of the tracker `stereo`, with those of the background model.
 
-    They are matching, person or not, features, association, filter, grouping, merging, splitting and reporting. Raises
-    InputError if a value is not allowed or foreground_time is shorter than background_time.
+    Raises InputError if a value is not allowed.
     """
 
     tracker: ClassVar[str] = "stereo"
 
-    nearest: float = param(
-        2.5, (0.5, 20.0), "m",
-        "from pixels: depth of the nearest people; sets the largest disparity, rounded up to 15, 31, 47 … px", "log",
-        sees="pixels",
-    )  # fmt: skip
-    block: float = param(
-        0.27, (0.1, 1.0), "m", "from pixels: width of the block that is compared in matching", "log", sees="pixels"
-    )
-    least_height: float = param(
-        0.5, (0.0, 1.5), "m", "from pixels: a lower foreground region is no person (sec. 2)", sees="pixels"
-    )
-    most_height: float = param(
-        3.0, (1.6, 10.0), "m", "from pixels: a higher foreground region is no person (sec. 2)", sees="pixels"
-    )
-    least_width: float = param(
-        0.1, (0.0, 1.0), "m", "from pixels: a narrower foreground region is no person (sec. 2)", sees="pixels"
-    )
-    window_time: float = param(
-        0.33,
-        (0.05, 2.0),
-        "s",
-        "time window: features that lived shorter are not used; their velocity is the slope in it",
-    )
-    feature_spacing: float = param(
-        0.09, (0.03, 0.5), "m", "from pixels: least distance of a new feature from the others in the image", "log",
-        sees="pixels",
-    )  # fmt: skip
-    back_check: float = param(
-        0.7, (0.05, 5.0), "px",
-        "from pixels: a feature ends if u or v is so far off after following it forwards and backwards (ours)",
-        "log", sees="pixels",
-    )  # fmt: skip
-    most_features: int = param(
-        400, (20, 2000), "", "from pixels: largest number of features", "int", sees="pixels", tunable=False
-    )
-    disparity_noise: float = param(
-        0.15, (0.02, 2.0), "px", "from pixels: standard deviation of a feature's disparity", "log", sees="pixels"
-    )
-    pixel_noise: float = param(
-        0.3, (0.02, 3.0), "px", "from pixels: standard deviation of a feature's u and v", "log", sees="pixels"
-    )
-    surface_offset: float = param(
-        0.12, (0.0, 0.4), "m",
-        "from pixels: people's middle lies so far behind their visible surface; all points are moved by it, "
-        "horizontally (ours)",
-        sees="pixels",
-    )  # fmt: skip
-    point_noise: float = param(
-        0.06, (0.005, 1.0), "m", "from points: standard deviation of a measured coordinate", "log", sees="points"
-    )
-
+    # fmt: off
+    nearest: float = param(2.5, (0.5, 20.0), "m",
+        "from pixels: depth of the nearest people, which sets the largest disparity", "log", sees="pixels")
+    window_time: float = param(0.33, (0.05, 2.0), "s",
+        "time window: features that lived shorter are not used; their velocity is the slope in it")
+    disparity_noise: float = param(0.15, (0.02, 2.0), "px",
+        "from pixels: standard deviation of a feature's disparity", "log", sees="pixels")
+    pixel_noise: float = param(0.3, (0.02, 3.0), "px",
+        "from pixels: standard deviation of a feature's u and v", "log", sees="pixels")
+    surface_offset: float = param(0.12, (0.0, 0.4), "m",
+        "from pixels: people's middle lies so far behind their visible surface (ours)", sees="pixels")
+    point_noise: float = param(0.06, (0.005, 1.0), "m",
+        "from points: standard deviation of a measured coordinate", "log", sees="points")
     gate: float = param(11.34, (5.0, 30.0), "", "gamma: squared Mahalanobis radius of the search region (eq. 8)")
-    position_weight: float = param(
-        1.0, (0.0, 3.0), "", "k_p of eq. 9 as an exponent: as a factor it has no effect (ours)"
-    )
-    velocity_weight: float = param(
-        1.0, (0.0, 3.0), "", "k_v of eq. 10 as an exponent: as a factor it has no effect (ours)"
-    )
-    point_covariance: bool = param(
-        True, (True, False), "",
-        "points have covariances of their own; they and P count in regions and probabilities, hulls go round expected "
-        "places, and they are no part of the spread (ours)",
-        "categorical",
-    )  # fmt: skip
-    person_spread: float = param(
-        0.3, (0.05, 1.0), "m", "standard deviation of positions that a group's spread is shrunk to (ours)", "log"
-    )
-    velocity_spread: float = param(
-        0.25, (0.02, 2.0), "m/s", "standard deviation of velocities that a group's spread is shrunk to (ours)", "log"
-    )
-    spread_weight: float = param(10.0, (0.1, 200.0), "points", "weight of both, in points (ours)", "log")
+    velocity_weight: float = param(1.0, (0.0, 3.0), "",
+        "k_v of eq. 10 as an exponent, beside k_p = 1: as a factor it has no effect (ours)")
+    point_covariance: bool = param(True, (True, False), "",
+        "points have covariances, in regions, probabilities, hulls and spread (ours)", "categorical")
+    person_spread: float = param(0.3, (0.05, 1.0), "m",
+        "standard deviation of positions that a group's spread is shrunk to (ours)", "log")
+    spread_weight: float = param(10.0, (0.1, 200.0), "points", "weight of this prior, in points (ours)", "log")
     spread_time: float = param(1.0, (0.05, 20.0), "s", "time constant of the spread, alpha_s of eq. 7", "log")
-    accel_noise: float = param(
-        0.5, (0.05, 5.0), "m/s^1.5",
-        "process noise: square root of the spectral density of a white acceleration (eq. 2)", "log",
-    )  # fmt: skip
-    centroid_noise: float = param(
-        0.1, (0.005, 1.0), "m",
-        "v of eq. 5: measurement noise of a group's mean beside that of its points, as points come and go", "log",
-    )  # fmt: skip
-    density_width: float = param(
-        0.15, (0.05, 20.0), "m",
-        "from pixels: a feature counts in the mean by the inverse of the features' density on the ground, with a "
-        "kernel of this standard deviation; the largest: all features nearly alike (ours)",
-        "log", before=20.0, sees="pixels",
-    )  # fmt: skip
-
-    radius: float = param(
-        0.8, (0.1, 2.0), "m", "from pixels: radius of a feature's sphere; features 2 r apart are linked (eq. 12)",
-        sees="pixels",
-    )  # fmt: skip
-    point_radius: float = param(
-        0.75, (0.1, 2.0), "m", "from points: radius of a point's sphere; points 2 r apart are linked (eq. 12)",
-        sees="points",
-    )  # fmt: skip
-    least_group: int = param(
-        5, (1, 50), "", "from pixels: least number of linked features that form a group", "int", sees="pixels"
-    )
-    least_features: int = param(
-        3, (1, 20), "", "from pixels: least number of features that update a group (sec. 3.3)", "int", sees="pixels"
-    )
-    merge_gate: float = param(
-        9.0, (0.5, 30.0), "", "squared Mahalanobis radius of the six-dimensional regions of merging (eq. 13)"
-    )
+    accel_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5",
+        "process noise: square root of the spectral density of a white acceleration (eq. 2)", "log")
+    centroid_noise: float = param(0.1, (0.005, 1.0), "m",
+        "v of eq. 5: measurement noise of a group's mean beside that of its points, as points come and go", "log")
+    density_width: float = param(0.15, (0.05, 20.0), "m",
+        "from pixels: kernel of the density by whose inverse features count in the mean (ours)", "log", sees="pixels")
+    radius: float = param(0.8, (0.1, 2.0), "m",
+        "from pixels: radius of a feature's sphere; features 2 r apart are linked (eq. 12)", sees="pixels")
+    point_radius: float = param(0.75, (0.1, 2.0), "m",
+        "from points: radius of a point's sphere; points 2 r apart are linked (eq. 12)", sees="points")
+    merge_gate: float = param(9.0, (0.5, 30.0), "",
+        "squared Mahalanobis radius of the six-dimensional regions of merging (eq. 13)")
     split: bool = param(True, (True, False), "", "groups whose points are unlinked parts split (ours)", "categorical")
-    split_time: float = param(
-        0.5, (0.0, 3.0), "s", "time for which a group's points must be unlinked parts before it splits (ours)"
-    )
-    confirm_time: float = param(
-        0.3, (0.0, 3.0), "s",
-        "a new group is confirmed after so long with measurements, and deleted after so long without (ours)",
-    )  # fmt: skip
-    coast_time: float = param(
-        1.5, (0.0, 10.0), "s", "a confirmed group is deleted after so long without measurements (ours)"
-    )
-    report_coast: float = param(
-        0.5, (0.0, 5.0), "s", "time after the last measurement for which a group is reported (ours)"
-    )
-    most_foreground: float = param(
-        0.6, (0.05, 1.0), "share",
-        "from pixels: no group is measured in a frame with a larger share of foreground (ours)",
-        sees="pixels",
-    )  # fmt: skip
+    split_time: float = param(0.5, (0.0, 3.0), "s",
+        "time for which a group's points must be unlinked parts before it splits (ours)")
+    confirm_time: float = param(0.3, (0.0, 3.0), "s",
+        "a new group is confirmed after so long with measurements, and deleted after so long without (ours)")
+    coast_time: float = param(1.5, (0.0, 10.0), "s",
+        "a confirmed group is deleted after so long without measurements (ours)")
+    report_coast: float = param(0.5, (0.0, 5.0), "s",
+        "time after the last measurement for which a group is reported (ours)")
+    # fmt: on

@@ -75,13 +75,7 @@ class PlaceMeasurement:
 
 
 def inverse_densities(points: SpacePoints, width: float) -> Array:
-    """Return the inverse of the density of M points on the ground at each of them, (M,), up to a factor (ours).
-
-    The density at y_i is the sum over j of exp(-d' S^-1 d / 2), with d = y_j - y_i on the ground and S = width^2 I +
-    C_i + C_j; width: m. People who stand apart then weigh alike, however many features each of them shows. A density
-    below LEAST_DENSITY of the highest counts as that share of it: a few wrong matches, on the background beside people
-    for instance, then weigh less than a person. M is at least 1.
-    """
+    """Return the inverse of the density of M points on the ground at each of them, (M,), up to a factor (ours)."""
     d = points.pos[:, None, :2] - points.pos[:, :2]
     S = points.cov[:, None, :2, :2] + points.cov[:, :2, :2]
     a, b, c = S[..., 0, 0] + width**2, S[..., 0, 1], S[..., 1, 1] + width**2

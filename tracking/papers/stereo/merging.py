@@ -44,8 +44,6 @@ def overlap(a: SpaceGroup, b: SpaceGroup, gate: float) -> bool:
 
 
 def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[int, int]]:
-    """Returns the pairs of indices of groups whose regions may overlap: f(1/2) <= gate in
-    tracking.filters.ellipsoid_overlap."""
     if len(groups) < 2:
         return []
     x = np.stack([g.ekf.x for g in groups])
@@ -62,10 +60,7 @@ def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[int, i
 
 
 def pooled(states: Array, spreads: Array, counts: Array) -> tuple[Array, Array]:
-    """Return the state (D,) and Sigma (D, D) of a merged group (eqs 14, 15).
-
-    states (K, D), spreads (K, D, D), counts (K,): X_i, Sigma_i and N_i of the K groups.
-    """
+    """Return the state (D,) and Sigma (D, D) of a merged group (eqs 14, 15)."""
     n = counts / counts.sum()
     X = n @ states
     away = states - X
@@ -88,10 +83,6 @@ def connected(groups: Sequence[SpaceGroup], gate: float) -> list[list[SpaceGroup
 
 
 def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> WholeGroupEvent | None:
-    """Replaces the parts by their union in the list, and returns the event, None if at most one part is confirmed.
-
-    Children of parts become children of the union; a tentative union is a child if a part is.
-    """
     known = [g for g in parts if g.confirmed]
     settled = [g for g in known if g.first_seen <= t - SETTLED or g.parent != NO_ID]
     kept = max(settled or known or parts, key=lambda g: (g.count, -g.id))

@@ -17,6 +17,17 @@ from tracking.detect.stereo_people import PersonLimits, person_mask
 from tracking.detect.subtraction_stereo import SubtractionStereo
 from tracking.papers.stereo.config import StereoConfig
 
+BLOCK = 0.27
+"""m: width of the block that is compared in matching."""
+PERSON = 0.5, 3.0, 0.1
+"""m: least and largest height and least width of a foreground region that is a person (sec. 2)."""
+FEATURE_SPACING = 0.09
+"""m: least distance of a new feature from the others in the image."""
+BACK_CHECK = 0.7
+"""px: a feature ends if u or v is so far off after following it forwards and backwards (ours)."""
+MOST_FEATURES = 400
+"""Largest number of features."""
+
 
 class PicturePoints:
     """From a pair of pictures to points in space on people.
@@ -28,26 +39,20 @@ class PicturePoints:
 
     def __init__(self, config: StereoConfig, context: Context) -> None:
         self.camera = stereo_camera(context.camera)
-        self.foreground = Foreground(context, config, config.most_foreground)
+        self.foreground = Foreground(context, config)
         self.features = Features(self.camera, context.fps)
         self.follow(config)
 
     def follow(self, config: StereoConfig) -> None:
         """Replace the config: the matcher is made anew; features and what the background model learned stay."""
         self.config = config
-        self.foreground.follow(config, config.most_foreground)
+        self.foreground.follow(config)
         largest = self.camera.focal_px[0] * self.camera.baseline / config.nearest
-        block = odd(config.block * self.foreground.scale, 5)
+        block = odd(BLOCK * self.foreground.scale, 5)
         self.stereo = SubtractionStereo(largest, block)
 
     def points(self, image: Image, right: Image) -> SpacePoints:
-        """Return the features of people as points in space, none if more is foreground than `most_foreground`.
-
-        image, right (H, W, 3) BGR uint8. The background model learns from the left picture except where people are, and
-        from all of it if there is too much foreground. Points are moved by `surface_offset` away from the camera,
-        horizontally. Raises InputError if the left picture's size or dtype is not the background sample's, or the right
-        one's size is another.
-        """
+        """Return the features of people as points in space, none if too much is foreground."""
         if right.shape != image.shape:
             expected = f"the left picture's shape {image.shape}"
             raise InputError(place="right picture", got=str(right.shape), expected=expected, remedy="give a pair")
@@ -60,11 +65,11 @@ class PicturePoints:
         blobs = self.foreground.person_blobs(seen.mask)
         disparity = self.stereo.match(left, grey(right), blobs.label > 0).disparity
         deviations = (c.pixel_noise, c.pixel_noise, c.disparity_noise)
-        limits = PersonLimits(c.least_height, c.most_height, c.least_width, deviations)
+        limits = PersonLimits(*PERSON, deviations)
         people = person_mask(blobs, disparity, self.camera, limits)
         self.foreground.adapt(seen, people)
-        spacing = c.feature_spacing * self.foreground.scale
-        rules = FeatureRules(c.window_time, spacing, c.back_check, deviations, c.most_features)
+        spacing = FEATURE_SPACING * self.foreground.scale
+        rules = FeatureRules(c.window_time, spacing, BACK_CHECK, deviations, MOST_FEATURES)
         found = self.features.step(left, people, disparity, rules)
         return moved_away(found, self.camera, c.surface_offset)
 
@@ -78,7 +83,7 @@ def moved_away(points: SpacePoints, camera: Camera, offset: float) -> SpacePoint
 
 
 def stereo_camera(camera: Camera | None) -> Camera:
-    """Return the camera of a rectified pair unchanged. Raises InputError if it is None, has no baseline or distorts."""
+    """Return the camera of a rectified pair unchanged."""
     if camera is not None and camera.kind == "pinhole" and camera.baseline > 0 and not camera.radial:
         return camera
     got = "no camera" if camera is None else f"{camera.kind}, baseline {camera.baseline:g}, radial {camera.radial:g}"

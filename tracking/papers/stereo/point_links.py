@@ -33,11 +33,7 @@ class PointLinks:
         self.id, self.next_id, self.world = no_ids(), 1, np.zeros((0, 2, 3))
 
     def step(self, xyz: Array, config: StereoConfig) -> SpacePoints:
-        """Return the detections xyz (M, 3), m, of the next frame as points in space, in the same order.
-
-        The velocity is the slope over the time window. Without an earlier place it is 0, with a standard deviation of
-        SPEED.
-        """
+        """Return the detections xyz (M, 3), m, of the next frame as points in space, in the same order."""
         frames, M = max(round(config.window_time * self.fps), 1) + 1, len(xyz)
         past = self._past(frames)
         cost = np.linalg.norm(self._predicted(past)[:, None] - xyz, axis=2)
@@ -57,7 +53,6 @@ class PointLinks:
         self.id, self.world = no_ids(), np.zeros((0, 2, 3))
 
     def _past(self, frames: int) -> Array:
-        """Returns the places (N, frames, 3) of the last frames; frames that are not kept are nan."""
         kept = self.world[:, -frames:]
         return np.concatenate([np.full((len(kept), frames - kept.shape[1], 3), np.nan), kept], 1)
 

@@ -25,6 +25,8 @@ from tracking.papers.stereo.measurement import POS, VEL, Measurement, measured_s
 if TYPE_CHECKING:
     from filterpy.kalman import ExtendedKalmanFilter
 
+VELOCITY_SPREAD = 0.25
+"""m/s: standard deviation of velocities that a group's spread is shrunk to (ours)."""
 LEAST_VARIANCE = 1e-6
 """m^2, m^2/s^2: least eigenvalue of a spread."""
 
@@ -89,10 +91,8 @@ def predict(group: SpaceGroup, motion: Motion3D) -> None:
 
 
 def newborn(points: SpacePoints, measurement: Measurement, motion: Motion3D, t: float) -> SpaceGroup:
-    """Return a tentative group of M points, M at least 1, with their mean position, velocity and covariance (sec. 3.4).
-
-    measurement: gives the weights of the mean position; t: time of the frame, s.
-    """
+    """Return a tentative group of M points, M at least 1, with their mean position, velocity and covariance (sec.
+    3.4)."""
     from filterpy.kalman import ExtendedKalmanFilter
 
     config, n = motion.config, len(points)
@@ -101,38 +101,27 @@ def newborn(points: SpacePoints, measurement: Measurement, motion: Motion3D, t: 
     mean, weights = mean_position(points, measurement, config)
     ekf.x[POS, 0], ekf.x[VEL, 0] = mean, points.vel.mean(0)
     ekf.P[np.ix_(POS, POS)] = mean_covariance(points, weights, config)
-    ekf.P[np.ix_(VEL, VEL)] = points.vel_cov.mean(0) / n + config.velocity_spread**2 / n * np.eye(3)
+    ekf.P[np.ix_(VEL, VEL)] = points.vel_cov.mean(0) / n + VELOCITY_SPREAD**2 / n * np.eye(3)
     group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt)
     _place_members(group, points, config)
     return group
 
 
 def mean_position(points: SpacePoints, measurement: Measurement, config: StereoConfig) -> tuple[Array, Array]:
-    """Return the mean position (3,), m, of M points and their weights (M,) in it, with sum 1, by `measurement` (ours).
-
-    People who are near, or textured, show more features than others. The mean of all features would lie near them.
-    """
+    """Return the mean position (3,), m, of M points and their weights (M,) in it, with sum 1 (ours)."""
     weights = measurement.weights(points, config.density_width)
     weights = weights / weights.sum()
     return weights @ points.pos, weights
 
 
 def mean_covariance(points: SpacePoints, weights: Array, config: StereoConfig) -> Array:
-    """Return the covariance (3, 3), m^2, of the mean of M points as a measurement of their group's position.
-
-    It is that of the mean of the points' errors with weights (M,), sum 1, and centroid_noise^2 in each coordinate.
-    """
+    """Return the covariance (3, 3), m^2, of the mean of M points as a measurement of their group's position."""
     errors = np.einsum("m,mij->ij", weights**2, points.cov)
     return np.asarray(errors + config.centroid_noise**2 * np.eye(3))
 
 
 def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
-    """Return C_y (6, 6): covariance of the positions and velocities of M points, order x, x', y, y', z, z' (eq. 7).
-
-    Ours: with `point_covariance` the mean of the points' own covariances is subtracted, those of positions with
-    velocities, too; negative eigenvalues become 0. The result is shrunk to a diagonal prior worth `spread_weight`
-    points.
-    """
+    """Return C_y (6, 6): covariance of the positions and velocities of M points, order x, x', y, y', z, z' (eq. 7)."""
     n = len(points)
     y = np.zeros((n, 6))
     y[:, POS], y[:, VEL] = points.pos, points.vel
@@ -146,16 +135,12 @@ def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
         values, U = np.linalg.eigh(C)
         C = (U * np.maximum(values, 0.0)) @ U.T
     w = config.spread_weight
-    prior = np.square(np.tile([config.person_spread, config.velocity_spread], 3))
+    prior = np.square(np.tile([config.person_spread, VELOCITY_SPREAD], 3))
     return np.asarray((n * C + w * np.diag(prior)) / (n + w)) + LEAST_VARIANCE * np.eye(6)
 
 
 def measure(group: SpaceGroup, points: SpacePoints, measurement: Measurement, motion: Motion3D, t: float) -> None:
-    """Update a group, in place, by its M points of the frame at t s: state (eqs 4 to 6), Sigma (eq. 7) and N.
-
-    Z is the measurement of the mean position; its covariance is that of the mean, by the Jacobian at
-    the mean.
-    """
+    """Update a group, in place, by its M points of the frame at t s: state (eqs 4 to 6), Sigma (eq. 7) and N."""
     config = motion.config
     mean, weights = mean_position(points, measurement, config)
     J = measurement.jacobian(mean)
@@ -172,7 +157,6 @@ def measure(group: SpaceGroup, points: SpacePoints, measurement: Measurement, mo
 
 
 def _place_members(group: SpaceGroup, points: SpacePoints, config: StereoConfig) -> None:
-    """Sets the members of a group from its M points of the frame: with `point_covariance` their expected places."""
     offset = points.pos - group.pos
     spread = group.spread[np.ix_(POS, POS)]
     group.members = expected_places(offset, points.cov, spread) if config.point_covariance else offset
@@ -180,9 +164,5 @@ def _place_members(group: SpaceGroup, points: SpacePoints, config: StereoConfig)
 
 def expected_places(offset: Array, cov: Array, spread: Array) -> Array:
     """Return the expected offsets (M, 3), m, of a group's points from its centroid: Sigma (Sigma + C_i)^-1 (y_i - xi)
-    (ours). From pixels a point's depth is uncertain by more than a person is wide.
-
-    offset (M, 3): measured offsets; cov (M, 3, 3): C_i, covariances of the measured places; spread (3, 3): Sigma of
-    positions.
-    """
+    (ours)."""
     return np.asarray((spread @ np.linalg.solve(spread + cov, offset[..., None]))[..., 0])

@@ -19,12 +19,7 @@ from tracking.papers.stereo.space_group import Motion3D, SpaceGroup, newborn
 def split(
     group: SpaceGroup, points: SpacePoints, part: Ints, measurement: Measurement, motion: Motion3D, t: float
 ) -> list[SpaceGroup]:
-    """Return the children of a group whose M points have been in parts for `split_time`, [] if it does not split.
-
-    part (M,): number of the part of each point, from 0, -1 for none. t: time of the frame, s. The
-    clock `apart_since` of the group is kept here. When it splits, the group itself becomes its part with most points,
-    in place. Children have no id yet; they were first seen when the parts separated.
-    """
+    """Return the children of a group whose M points have been in parts for `split_time`, [] if it does not split."""
     count = int(part.max(initial=-1)) + 1
     if count < 2 or not motion.config.split:
         group.apart_since = float("nan")

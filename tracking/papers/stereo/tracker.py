@@ -11,7 +11,7 @@ covariance of its points' positions and velocities; N, the number of its points.
     Sigma <- alpha Sigma + (1 - alpha) C_y                 eq. 7               space_group
     (y - xi)' S^-1 (y - xi) < gamma                        eq. 8               association
     m_total = p(y)^k_p p(lambda)^k_v, the largest wins     eqs 9 to 11         association
-    new groups: points whose spheres overlap               eq. 12              initial_grouping
+    new groups: points whose spheres overlap               eq. 12              births_and_losses
     merging by the full state, weighted by N               eqs 13 to 15        merging
 
 The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in tracking.detect. Departures, all ours:
@@ -30,9 +30,8 @@ from tracking.detect.features import SpacePoints
 from tracking.grouping.whole_groups import GroupIds
 from tracking.image_scale import required
 from tracking.papers.stereo.association import associated
-from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost
+from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost, sphere_groups
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import Measurement, PairMeasurement, PlaceMeasurement
 from tracking.papers.stereo.merging import merge
 from tracking.papers.stereo.picture_points import PicturePoints
@@ -41,6 +40,10 @@ from tracking.papers.stereo.report import ShownFrame, space_tracks
 from tracking.papers.stereo.space_group import SpaceGroup, measure, motion_model, predict
 from tracking.papers.stereo.splitting import split
 
+LEAST_GROUP = 5
+"""From pixels: least number of linked features that form a group."""
+LEAST_FEATURES = 3
+"""From pixels: least number of features that update a group (sec. 3.3)."""
 FEATURE_OUTLINE = 0.5
 """Share of a person's footprint that a feature covers, as features lie all over the body."""
 
@@ -106,7 +109,6 @@ class Stereo:
         return space_tracks(self.groups, events, self.config.report_coast, shown)
 
     def _points(self, frame: Frame, detections: Detections | None) -> SpacePoints:
-        """Returns the points of the frame in m, none without information. Sets the plane, from points."""
         if self.pictures is not None:
             if frame.image is None or frame.right is None:
                 self.pictures.features.forget()
@@ -122,13 +124,9 @@ class Stereo:
         return self.links.step(xyz, self.config)
 
     def _measure(self, points: SpacePoints, t: float) -> None:
-        """Associate the points (sec. 3.3), update and split the groups, and add new ones (sec. 3.4).
-
-        A group with fewer points than `least_features` is predicted only (end of sec. 3.3); these points are not used.
-        """
         c, motion = self.config, self.motion
         radius, least, update = (
-            (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.least_group, c.least_features)
+            (c.point_radius, 1, 1) if self.pictures is None else (c.radius, LEAST_GROUP, LEAST_FEATURES)
         )
         owner = associated(self.groups, points, c)
         children: list[SpaceGroup] = []

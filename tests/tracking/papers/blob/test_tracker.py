@@ -275,13 +275,15 @@ def test_a_pair_in_a_gate_is_better_than_none(rho):
     assert associate([[18.4]], [rho]) == [(0, 0)]
 
 
-def test_pieces_are_found_by_a_track_narrower_than_one_always_seen():
-    config = BlobConfig(size_noise=0.05, size_accel_noise=5.0, size_rate_prior=0.01, speed_prior=5.0)
+def test_pieces_are_found_by_a_track_narrower_than_one_always_seen(monkeypatch):
+    monkeypatch.setattr("tracking.papers.blob.config.SIZE_RATE_PRIOR", 0.01)
+    config = BlobConfig(size_noise=0.05, size_accel_noise=5.0, speed_prior=5.0)
     assert len(people_after([at((100, 200)), [*at((100, 200)), [100, 192.5, 28, 83]]], config).id) == 1
 
 
 @pytest.mark.parametrize(
-    "config", [BlobConfig(), BlobConfig.frozen(), BlobConfig(confirm_ratio=1.05, tentative_time=0.1)]
+    "config",
+    [BlobConfig(), BlobConfig(association="nearest", gate=0.99), BlobConfig(confirm_ratio=1.05, tentative_time=0.1)],
 )
 @pytest.mark.parametrize("fps", [2.5, 7.0, 10.0, 25.0])
 def test_whoever_is_always_seen_is_confirmed(config, fps):
@@ -295,8 +297,9 @@ def test_whoever_is_always_seen_is_confirmed(config, fps):
 
 
 @pytest.mark.parametrize("start", [0.0, 0.1, 1.2, 4.1, 8.2, 1000.3])
-def test_a_tentative_track_has_its_time_whenever_it_starts(start):
-    tracker = Blob(BlobConfig(confirm_gate=0.1, tentative_time=1.0))
+def test_a_tentative_track_has_its_time_whenever_it_starts(start, monkeypatch):
+    monkeypatch.setattr("tracking.papers.blob.update_from_boxes.CONFIRM_GATE", 0.1)
+    tracker = Blob(BlobConfig(tentative_time=1.0))
     tracker.reset(CONTEXT, 0)
     first = []
     for k in range(14):

@@ -73,19 +73,6 @@ def test_pieces_of_a_person_lie_in_the_gate_and_start_no_track(config, broken):
     assert known[-1] == 1
 
 
-def test_without_splitting_the_parameters_of_templates_have_no_effect():
-    """They keep their defaults in the preset `paper`."""
-    silent = "evidence", "track_support", "entry_support", "person_noise", "orphan_gate"
-    frames = [[(60 + 4 * k, 180, TALL), (200 - 3 * k, 175, TALL)] for k in range(25)]
-    found = []
-    for end in ("default", "low", "high"):
-        changed = {name: getattr(BlobConfig.params()[name], end) for name in silent}
-        found.append(track(frames, BlobConfig.from_dict(PAPER.as_dict() | changed)))
-    for a, b, c in zip(*found, strict=True):
-        assert a.id.tolist() == b.id.tolist() == c.id.tolist()
-        assert a.box.tobytes() == b.box.tobytes() == c.box.tobytes()
-
-
 @pytest.mark.parametrize("scale", [0.0, -1.0])
 def test_a_scale_that_is_none_is_refused(scale):
     sample = painted.sample(np.random.default_rng(0))
@@ -253,20 +240,24 @@ def test_a_light_that_is_switched_starts_no_flood():
     frames = [painted.picture([p], r) for p in walk(60, 180, 4, 30)]
     for k in range(15, 30):
         frames[k] = np.clip(frames[k].astype(float) * [0.55, 1.3, 1.6], 0, 255).astype(np.uint8)
-    for gain in ("global", "none"):
+    for background in ("adaptive", "trained"):
         known = []
-        track(frames, BlobConfig(gain=gain), watch=lambda tracker, _, to=known: to.append(tracker.people.next_id))
-        assert known[-1] <= 4, gain
+        track(
+            frames,
+            BlobConfig(background=background),
+            watch=lambda tracker, _, to=known: to.append(tracker.people.next_id),
+        )
+        assert known[-1] <= 4, background
 
 
 def test_empty_frames_and_nobody():
     assert all(not len(t.id) for t in track([[]] * 10))
 
 
-def test_a_confirmed_person_who_stands_is_not_learned_as_background():
+def test_a_confirmed_person_who_stands_is_not_learned_as_background(monkeypatch):
     stands = [[(120.0, 180.0, TALL)]] * 60
-    quick = {"background_time": 2.0, "foreground_time": 2.0}
-    made = track(stands, BlobConfig(**quick))
+    monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)
+    made = track(stands, BlobConfig(background_time=2.0))
     assert mine(made[-1], stands[0][0])
 
 

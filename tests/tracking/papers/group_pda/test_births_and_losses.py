@@ -56,7 +56,7 @@ def test_a_lost_group_takes_its_id_back(seed: int) -> None:
     back = track(frames)
     assert ids(back) == {1}
     assert events(back, "enter", "leave") == [("enter", 1, (), (1,))]
-    fresh = track(frames, GroupPdaConfig(recapture=False))
+    fresh = track(frames, GroupPdaConfig(recapture_time=0.0))
     assert ids(fresh) == {1, 2}
     assert [e[0] for e in events(fresh, "enter", "leave")] == ["enter", "leave", "enter"]
 
@@ -223,7 +223,7 @@ def test_the_larger_part_keeps_the_id() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_children_have_their_parents_velocity(seed: int) -> None:
     frames, _ = parting(seed, 1.0, 0.5)
-    for config, kept in ((GroupPdaConfig(), 1.0), (GroupPdaConfig(inherit_velocity=False), 0.0)):
+    for config, kept in ((GroupPdaConfig(), 1.0), (GroupPdaConfig(corrections=False), 0.0)):
         made = track(frames, config)
         (k,) = (k for k, t in enumerate(made) if any(e.kind == "split" for e in t.events))
         assert made[k].vel == pytest.approx(np.repeat(kept * made[k - 1].vel, 2, 0), abs=1e-9)
@@ -297,7 +297,8 @@ def test_pixels_of_pairs_that_pass_each_other_keep_their_ids() -> None:
     assert np.sign(made[-1].vel[:, 0]).tolist() == np.sign(made[10].vel[:, 0]).tolist()
 
 
-def test_who_stands_for_long_does_not_become_background() -> None:
+def test_who_stands_for_long_does_not_become_background(monkeypatch: pytest.MonkeyPatch) -> None:
     """Unprotected he would be within two time constants."""
-    made = watched([[(80.0, 60.0)]] * 60, GroupPdaConfig(background_time=1.0, foreground_time=1.0))
+    monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)
+    made = watched([[(80.0, 60.0)]] * 60, GroupPdaConfig(background_time=1.0))
     assert all(t.id.tolist() == [1] for t in made[5:])

@@ -139,7 +139,7 @@ def test_groups_that_walk_through_each_other_keep_ids_and_sizes(ranks: tuple[int
 
 
 def test_all_points_in_the_region_make_each_group_both() -> None:
-    config = GroupPdaConfig(association="none", size_time=0.05)
+    config = GroupPdaConfig(association="none", extent_time=0.05)
     made = track(crossing(0), config)
     meeting = slice(35, 40)
     assert sizes(made[15]) == pytest.approx([4, 4])
@@ -315,12 +315,6 @@ def test_no_id_is_used_twice_and_events_speak_of_known_ones() -> None:
             gone |= set(e.before) - set(e.after)
         assert set(t.id.tolist()) <= known - gone
     assert len(gone) >= 4
-
-
-def test_the_first_defaults_stand_in_a_file() -> None:
-    first = GroupPdaConfig.frozen()
-    assert (first.carry_time, first.merge_velocity, first.pixel_radius) == (0.0, 0.5, 0.4)
-    assert ids(track(crossing(0), first)) == {1, 2}
 
 
 def clouds(seed: int, speed: float, count: int = 40) -> list[Array]:

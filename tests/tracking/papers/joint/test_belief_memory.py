@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.grouping.belief import default_belief
-from tracking.papers.joint.belief_memory import remembered
+from tracking.papers.joint.tracker import remembered
 
 
 def test_pairs_of_a_group_gain_and_others_lose():

@@ -21,8 +21,8 @@ def weights(merge=-100.0, split=-100.0):
     return table
 
 
-def rules(ratio=0.25, sharpness=8.0, rate=1.0, every=False, mean=1.0, std=np.inf):
-    return np.array([ratio, sharpness, rate, every, mean, std])
+def rules(ratio=0.25, sharpness=8.0, every=False, mean=1.0, std=np.inf):
+    return np.array([ratio, sharpness, every, mean, std])
 
 
 def proposed(pos, label, table, rule=None, count=COUNT, seed=0):

@@ -8,7 +8,7 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
-from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.config import LARGEST_DISTANCE, JointConfig
 from tracking.papers.joint.individuals import process_noise
 from tracking.papers.joint.partition_kernels import canonical, pair_sums
 from tracking.papers.joint.people import People
@@ -18,7 +18,10 @@ from tracking.run import track
 from tracking.stats import paired
 
 FPS = 10.0
-QUIET = {"merge_bias": -100.0, "split_bias": -100.0}
+QUIET = {
+    f"{event}_weights": (*weights[:-1], -100.0)
+    for event, weights in zip(("merge", "split"), JointConfig().classifier.tolist(), strict=True)
+}
 
 
 def detections(index, points):
@@ -52,7 +55,7 @@ def kalman(tracker, points, config):
         bank.step(Frame(k, (k - 1) / FPS), detections(k, [points[k - 1]]))
     new = bank.newcomers
     new.predict(1 / FPS)
-    new.measure(np.array([points[frames - 1]]), None, config.point_noise, config.largest_distance)
+    new.measure(np.array([points[frames - 1]]), None, config.point_noise, LARGEST_DISTANCE)
     place, rate, var, cross, rate_var = new.bank[:, 0]
     x, P = np.concatenate([place, rate]), np.kron([[var[0], cross[0]], [cross[0], rate_var[0]]], np.eye(2))
     A, H = np.eye(4) + np.eye(4, k=2) / FPS, np.eye(4)[:2]
@@ -66,14 +69,14 @@ def kalman(tracker, points, config):
     return np.array(out)
 
 
-@pytest.mark.parametrize("weights", ["people", "joint"])
-def test_people_alone_have_the_kalman_filter(weights):
+@pytest.mark.parametrize("algorithm", ["ours", "paper"])
+def test_people_alone_have_the_kalman_filter(algorithm):
     """Z all alone, no validity, exact association, locally optimal proposal (E2)."""
     config = JointConfig(
         particles=1000,
         partitions=1,
         place_noise=0.15,
-        weights=weights,
+        algorithm=algorithm,
         alpha=0.0,
         validity_rate=0.0,
         newcomers="alone",

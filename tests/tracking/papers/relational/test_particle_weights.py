@@ -58,7 +58,7 @@ def test_people_get_weights_of_their_own_only_after_resampling():
     particles.share_weights(False)
     assert particles.one_weight
     assert np.array_equal(particles.weights, before)
-    particles.resample(1.0, "residual", 0.0, drawn(particles, np.random.default_rng(0)))
+    particles.resample(1.0, 0.0, drawn(particles, np.random.default_rng(0)))
     particles.share_weights(False)
     assert not particles.one_weight
 
@@ -69,7 +69,7 @@ def test_with_one_weight_particles_are_resampled_as_a_whole():
     relate(particles, 0, 1, np.random.default_rng(3).random(400) < 0.5)
     particles.weigh(np.random.default_rng(4).normal(0, 1, (400, 1)))
     old = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related.T, strict=True)}
-    particles.resample(0.9, "systematic", 0.0, drawn(particles, np.random.default_rng(0)))
+    particles.resample(0.9, 0.0, drawn(particles, np.random.default_rng(0)))
     new = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related.T, strict=True)}
     assert new < old
 
@@ -82,7 +82,7 @@ def test_a_person_is_resampled_alone_and_takes_the_own_relations():
     particles.weights[:, 0] = few / 40
     old = {tuple(x) for x in particles.pos[few, 0]}
     others = particles.pos[:, 1:].copy()
-    particles.resample(0.9, "residual", 0.0, drawn(particles, np.random.default_rng(0)))
+    particles.resample(0.9, 0.0, drawn(particles, np.random.default_rng(0)))
     assert {tuple(x) for x in particles.pos[:, 0]} <= old
     assert np.array_equal(particles.pos[:, 1:], others)
     assert particles.pairs.tolist() == [[0, 1], [1, 2]]
@@ -141,7 +141,7 @@ def test_the_kernel_keeps_the_moments_and_draws_equal_particles_apart():
     particles = three(20_000)
     particles.pos[:] = particles.pos[np.random.default_rng(5).integers(0, 20, 20_000)]
     before = [np.cov(particles.pos[:, 0].T), particles.pos[:, 0].mean(axis=0)]
-    particles.resample(1.0, "systematic", 1.0, drawn(particles, np.random.default_rng(6)))
+    particles.resample(1.0, 1.0, drawn(particles, np.random.default_rng(6)))
     assert len(np.unique(particles.pos[:, 0, 0])) == 20_000
     np.testing.assert_allclose(particles.pos[:, 0].mean(axis=0), before[1], atol=0.003)
     np.testing.assert_allclose(np.cov(particles.pos[:, 0].T), before[0], rtol=0.05, atol=3e-4)
@@ -271,8 +271,9 @@ def test_products_of_weights_that_are_0_everywhere_become_equal():
     np.testing.assert_allclose(particles.weights, 1 / 400, rtol=1e-12)
 
 
-def test_a_detection_that_is_certainly_nobodys_starts_a_person_at_the_largest_doubt():
-    tracker = Particle(ParticleConfig(birth_doubt=1.0))
+def test_a_detection_that_is_certainly_nobodys_starts_a_person_at_the_largest_doubt(monkeypatch):
+    monkeypatch.setattr("tracking.papers.relational.tracker.BIRTH_DOUBT", 1.0)
+    tracker = Particle(ParticleConfig())
     tracker.reset(Context(10.0, float("nan")), 0)
     for k in range(5):
         found = Detections(k + 1, k / 10, "ground", np.zeros((1, 2)), None, None, np.ones(1))

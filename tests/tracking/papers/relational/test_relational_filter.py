@@ -28,13 +28,12 @@ ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
 """The paper's rule: partners count fully."""
 AT_ONCE = np.array([1.0, 0.0])
 """The paper's coupling: members of a group have its mean velocity, and noise of their own."""
-CERTAIN = {"detect_prob": 1.0, "clutter_density": 0.0, "resample_share": 1.0}
+CERTAIN = {"detect_prob": 1.0, "clutter_density": 0.0}
 
 
 def flat_table(diffusion):
     """A speed table without drift and with one diffusion."""
-    rows = range(1, 6)
-    return {f"drift_{k}": 0.0 for k in rows} | {f"diffusion_{k}": diffusion for k in rows} | {"noise_scale": 1.0}
+    return {"drift": [0.0] * 5, "diffusion": [diffusion] * 5, "noise_scale": 1.0}
 
 
 def move(particles, noise, table, coupling, dt, shared=None, alike=ALWAYS, spread=0.0):
@@ -101,11 +100,12 @@ def kalman(points, r, speed, spread, dt):
     return np.array(out)
 
 
-def test_one_person_converges_to_the_kalman_filter():
+def test_one_person_converges_to_the_kalman_filter(monkeypatch):
     """The error of the mean falls as the root of the number of particles (E1)."""
     rng, fps, frames = np.random.default_rng(5), 10.0, 12
     points = np.cumsum(rng.normal(0.1, 0.03, (frames, 2)), axis=0)
-    config = ParticleConfig(**CERTAIN, **flat_table(0.5), point_noise=0.1, speed_prior=0.8)
+    monkeypatch.setattr("tracking.papers.relational.tracker.SPEED_PRIOR", 0.8)
+    config = ParticleConfig(**CERTAIN, **flat_table(0.5), point_noise=0.1)
     true = np.stack([kalman(points[:, d], 0.1, 0.8, 0.5 * fps**-0.5, 1 / fps) for d in (0, 1)], axis=1)
     counts, errors = [500, 2000, 8000], []
     for count in counts:
@@ -186,7 +186,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         particles.pos[:, 1] = 1e6  # never near the detection
         if seen:
             sensor.weigh(particles, points, sight([0.9, 0.0], [False, True]), r, config)
-            particles.resample(1.0, "residual", 0.0, drawn(particles, rng))
+            particles.resample(1.0, 0.0, drawn(particles, rng))
         out.append(particles.vel[:, 1].var(axis=0).mean())
     return np.array(out)
 

@@ -14,8 +14,8 @@ from tracking.detect.features import SpacePoints
 from tracking.filters.ellipsoid_overlap import separation
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo.association import associated
+from tracking.papers.stereo.births_and_losses import sphere_groups
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.initial_grouping import sphere_groups
 from tracking.papers.stereo.measurement import POS, VEL, PairMeasurement, PlaceMeasurement
 from tracking.papers.stereo.merging import merge, overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera
@@ -261,19 +261,27 @@ def beside(gap: float, frames: int) -> list[SpacePoints]:
     return made
 
 
+def count_single_features(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One feature forms and updates a group."""
+    for name in ("LEAST_GROUP", "LEAST_FEATURES"):
+        monkeypatch.setattr(f"tracking.papers.stereo.tracker.{name}", 1)
+
+
 @pytest.mark.parametrize(("gap", "parts"), [(1.6, 1), (1.9, 2)])
-def test_parts_that_would_merge_at_once_do_not_split(gap: float, parts: int) -> None:
+def test_parts_that_would_merge_at_once_do_not_split(gap: float, parts: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Points are linked up to 1.5 m, and the regions of two points of one velocity overlap up to 1.7 m."""
-    tracker, _ = scripted(beside(gap, 90), StereoConfig(radius=0.75, least_group=1, least_features=1))
+    count_single_features(monkeypatch)
+    tracker, _ = scripted(beside(gap, 90), StereoConfig(radius=0.75))
     assert len(tracker.groups) == parts
     assert tracker.groups[0].first_seen == 0.0
     if parts == 1:
         assert tracker.groups[0].apart_since == pytest.approx(1.0, abs=0.1), "the clock runs on"
 
 
-def test_the_clock_of_a_split_stops_while_a_group_is_not_measured() -> None:
+def test_the_clock_of_a_split_stops_while_a_group_is_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    count_single_features(monkeypatch)
     steps = beside(1.8, 90)
-    config = StereoConfig(radius=0.75, least_group=1, least_features=1)
+    config = StereoConfig(radius=0.75)
     steps = steps[: round(FPS) + 18]
     lost = [None if FPS + 2 < k < FPS + 17 else points for k, points in enumerate(steps)]
     seen, after = scripted(steps, config)[0], scripted(lost, config)[0]

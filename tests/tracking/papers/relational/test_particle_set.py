@@ -7,8 +7,7 @@ import pytest
 
 from sim.types import Context, Detections, Frame
 from tests.reference_relational import drawn
-from tracking.papers.relational.particle_diversity import ParticleDiversity
-from tracking.papers.relational.particle_set import ParticleSet
+from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
 from tracking.papers.relational.relations import Relational
 
 
@@ -25,7 +24,7 @@ def test_shares_of_effective_particles_and_of_ancestors():
     particles, found = two(100), ParticleDiversity(2.0)
     particles.weights[:, 0] = np.repeat([0.1, 0.0], [10, 90])
     found.weigh(particles)
-    particles.resample(0.5, "residual", 0.0, drawn(particles, np.random.default_rng(0)))
+    particles.resample(0.5, 0.0, drawn(particles, np.random.default_rng(0)))
     found.resample(particles)
     assert found.summary() == {"effective_particles_of_a_person": pytest.approx(0.1), "distinct_ancestors": None}
     found.resample(particles)
@@ -36,7 +35,7 @@ def test_shares_of_effective_particles_and_of_ancestors():
 def test_ancestors_of_people_who_come_and_go():
     particles = two(50)
     particles.weights[:, 1] = np.arange(50) == 7
-    particles.resample(0.5, "residual", 0.0, drawn(particles, np.random.default_rng(0)))
+    particles.resample(0.5, 0.0, drawn(particles, np.random.default_rng(0)))
     particles.keep(np.array([False, True]))
     particles.add(np.zeros((50, 1, 2)), np.zeros((50, 1, 2)), 1.0)
     assert (particles.ancestor[:, 0] == 7).all()
