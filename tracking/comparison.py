@@ -19,8 +19,8 @@ from sim.types import Array, Sequence, Tracks
 from tracking.oracle import oracle
 from tracking.ranking import Ranking, rank
 from tracking.recording_intervals import recording_rankings
-from tracking.run import TrackingRun
-from tracking.run_info import input_name
+from tracking.running.run import TrackingRun
+from tracking.running.run_info import input_name
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer, Scores
 from tracking.scoring.frame_weights import weighted_scorers

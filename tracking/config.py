@@ -20,7 +20,7 @@ from scenarios.limits import is_number
 from scenarios.loading.toml_files import closest
 from sim.io.files.numeric_text import read_number
 from tracking.parameter_files import file_of, preset_file, presets, read, toml_text
-from tracking.user_code import tracker_failed, user_code
+from tracking.running.user_code import tracker_failed, user_code
 
 Scale = Literal["linear", "log", "int", "categorical", "vector"]
 Value = float | int | str | bool | tuple[float, ...]

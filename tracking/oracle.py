@@ -17,8 +17,8 @@ import numpy as np
 
 from sim.types import EVENT_KINDS, Context, DetectionMode, Detections, Frame, Groups, Ints, Sequence, Tracks, Truth
 from tracking.grouping.foot_points import groups_of_people
-from tracking.prepare import prepare
-from tracking.run import TrackingRun
+from tracking.running.prepare import prepare
+from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import Scorer
 from tracking.scoring.one_plane import in_one_plane
 from tracking.scoring.people_comparison import Similarity

@@ -19,7 +19,7 @@ from scenarios.errors import InputError
 from scenarios.loading.toml_files import closest
 from sim.types import Tracker
 from tracking.config import Config
-from tracking.user_code import tracker_failed, user_code, what_was_raised
+from tracking.running.user_code import tracker_failed, user_code, what_was_raised
 
 REGISTRY = {
     "blob": "tracking.papers.blob.tracker:Blob",

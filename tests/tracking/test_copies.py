@@ -14,7 +14,7 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tracking.environment.env import TuningEnv
-from tracking.prepare import prepare
+from tracking.running.prepare import prepare
 from tracking.tracker_registry import find, names
 
 PICTURES = [

@@ -12,7 +12,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context
 from tracking.parameter_space import decode
-from tracking.prepare import prepare
+from tracking.running.prepare import prepare
 from tracking.tracker_registry import find, names
 
 POINTS = ["camera.fps=5", "duration=4", "sensor.detect_prob=0.9", "sensor.clutter_rate=1"]

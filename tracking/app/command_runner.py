@@ -24,7 +24,7 @@ from tracking.app.command_result import (
     print_interrupted,
     print_result,
 )
-from tracking.interrupts import recorded_interrupts
+from tracking.running.interrupts import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
 LONGEST_WARNING = 400

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from scenarios.printable import printable
-from tracking.interrupts import raise_if_interrupted
+from tracking.running.interrupts import raise_if_interrupted
 
 if TYPE_CHECKING:
     from rich.progress import Progress

@@ -15,7 +15,7 @@ from sim.io.store.manifest import is_sequence
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
-from tracking.run import TrackingRun
+from tracking.running.run import TrackingRun
 
 DEPTH = 3
 """Tracks are looked for in this many levels of folders below the path."""

@@ -24,14 +24,14 @@ from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
 from sim.types import DetectionMode, Image, Tracker
 from tracking.config import Config
-from tracking.detection_mode import choose_mode
 from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, SourceCache
+from tracking.environment.episode_source import Source, SourceSpec, sources
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
-from tracking.episode_source import Source, SourceSpec, sources
 from tracking.keyword_options import documented, from_keywords, option
 from tracking.parameter_space import Space, decode, decode_and_build, encode, space_of
-from tracking.prepare import Params, config_of
+from tracking.running.detection_mode import choose_mode
+from tracking.running.prepare import Params, config_of
 from tracking.scoring.people_comparison import Similarity
 from tracking.tracker_registry import checked, config_class, find
 

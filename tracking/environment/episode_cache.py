@@ -17,7 +17,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Frame, Truth
-from tracking.episode_source import Source
+from tracking.environment.episode_source import Source
 
 if TYPE_CHECKING:
     from tracking.objective import ObjectiveScorer

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
 from tracking.environment.episode_cache import OpenedSource, SourceCache
-from tracking.episode_source import Source, sources
-from tracking.prepare import Params, prepare
-from tracking.time_limit import TimeLimited
+from tracking.environment.episode_source import Source, sources
+from tracking.running.prepare import Params, prepare
+from tracking.running.time_limit import TimeLimited
 
 __all__ = ["Episode", "Rollout", "Source", "SourceCache", "play", "sources", "streams_for"]
 
@@ -192,7 +192,7 @@ class Rollout:
 
     def _every_score(self, px_per_m: float) -> Mapping[str, float]:
         from tracking.grouping.foot_points import completed
-        from tracking.run import TrackingRun
+        from tracking.running.run import TrackingRun
 
         context, mode, judge = self.prepared.context, self.prepared.mode, self.opened.judge
         tracks = completed(

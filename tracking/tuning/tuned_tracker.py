@@ -10,8 +10,8 @@ from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source, SourceCache, play, streams_for
 from tracking.grouping.link_rule import LinkRule
+from tracking.running.time_limit import TimeLimited
 from tracking.scoring.people_comparison import Similarity
-from tracking.time_limit import TimeLimited
 
 RULE = LinkRule.tracker
 
@@ -42,7 +42,7 @@ class TunedTracker:
 
     def check_input(self, source: Source, detections: DetectionMode, similarity: Similarity | None) -> None:
         """Raises InputError if the tracker cannot work on this source with these detections and this similarity."""
-        from tracking.detection_mode import choose_mode
+        from tracking.running.detection_mode import choose_mode
 
         known = get_args(Similarity)
         if similarity not in (None, *known):

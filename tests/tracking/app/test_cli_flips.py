@@ -553,7 +553,7 @@ ELSEWHERE = {
     ("generate", "sensor"),  # tests/tracking/app/test_fit.py
     ("track", "sensor"),
     ("track", "grouping"),  # tests/tracking/tuning/test_rule.py
-    ("track", "step_timeout"),  # tests/tracking/test_time_limit.py
+    ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("generate", "stride"),  # tests/sim/test_stride.py
     ("coco", "min_visibility"),  # tests/sim/io/export/test_coco.py
     *((command, "person_class") for command in ("coco", "score", "track")),  # tests/sim/io/formats/test_mot_people.py

@@ -10,7 +10,6 @@ from sim.io.formats.mot_folder import frame_rate
 from sim.io.source import RecordingOptions, holds_sequences, open_source
 from sim.io.store.run_seal import WHOLE, reject_foreign, run_folder
 from sim.types import Sequence
-from tracking import run as runs
 from tracking.app import option_parsing
 from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
@@ -20,7 +19,8 @@ from tracking.app.stored_tracks import StoredTracks, find_tracks, run_folders
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.grouping.pair_probabilities import pair_probabilities
-from tracking.run import TrackingRun
+from tracking.running import run as runs
+from tracking.running.run import TrackingRun
 
 TEXT = "mot text"
 """Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence."""

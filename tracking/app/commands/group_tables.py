@@ -13,7 +13,7 @@ from scenarios.printable import counted, printable, shortened
 from sim.types import EVENT_KINDS
 from tracking.app.commands.score_tables import empty_table, with_title
 from tracking.grouping.plausibility import median_speed
-from tracking.run import TrackingRun
+from tracking.running.run import TrackingRun
 
 LISTED = 20
 """Most groups that are listed one by one."""

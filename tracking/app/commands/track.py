@@ -21,9 +21,9 @@ from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
-from tracking.run import TrackingRun
-from tracking.run_info import input_summary
-from tracking.time_limit import TimeLimited
+from tracking.running.run import TrackingRun
+from tracking.running.run_info import input_summary
+from tracking.running.time_limit import TimeLimited
 
 ROW_KEYS = (
     "sequence", "detections", "input", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames",
@@ -46,7 +46,7 @@ class TrackerSetup:
 
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
         """Tracks the sequence and returns its tracks, with groups and events. Nothing is written."""
-        from tracking.run import track
+        from tracking.running.run import track
 
         return track(
             self.limited or self.tracker, sequence, params=self.config, detections=self.detections,
@@ -146,7 +146,7 @@ def _config(tracker: str, params: str | None, settings: list[str]) -> Config | N
 def _check_modes(
     setup: TrackerSetup, needs: tuple[str, ...], sequences: list[Sequence], background: str | None
 ) -> None:
-    from tracking.detection_mode import choose_mode
+    from tracking.running.detection_mode import choose_mode
 
     modes = [choose_mode(needs, sequence, setup.detections) for sequence in sequences]
     if background is not None and "image" not in modes:

@@ -15,7 +15,7 @@ from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptio
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.stored_tracks import find_tracks, match_tracks
-from tracking.run import TrackingRun
+from tracking.running.run import TrackingRun
 
 Step = Callable[[str], None]
 """Reports that one picture of the named sequence is done."""

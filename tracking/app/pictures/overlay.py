@@ -26,7 +26,7 @@ from tracking.drawing.layer_painting import (
     paint_layer,
 )
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
-from tracking.run import grouped
+from tracking.running.run import grouped
 
 TruthPlacement = Literal["beside", "over", "only"]
 Panel = list[tuple[Layer, LayerStyle]]

@@ -29,7 +29,7 @@ from tracking.app.replay_page.page_rows import (
 )
 from tracking.app.replay_page.video import PageVideo
 from tracking.drawing.plan_area import plan_area
-from tracking.run import grouped
+from tracking.running.run import grouped
 
 HERE = Path(__file__).parent
 

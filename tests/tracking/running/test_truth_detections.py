@@ -9,10 +9,10 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Sequence, Tracks
-from tracking.prepare import prepare
-from tracking.run import track
+from tracking.running.prepare import prepare
+from tracking.running.run import track
+from tracking.running.truth_detections import from_truth, perfect
 from tracking.scoring import evaluate
-from tracking.truth_detections import from_truth, perfect
 
 
 @pytest.fixture(scope="module")

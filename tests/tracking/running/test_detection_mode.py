@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.types import Detections, Sequence
-from tracking.detection_mode import check_detections, choose_mode
+from tracking.running.detection_mode import check_detections, choose_mode
 
 
 def source(**has):

@@ -12,8 +12,8 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence
 from tracking.app.cli import run
-from tracking.run import track
-from tracking.time_limit import LONGEST, TimeLimited
+from tracking.running.run import track
+from tracking.running.time_limit import LONGEST, TimeLimited
 
 pytestmark = pytest.mark.slow  # processes that hang and are ended
 

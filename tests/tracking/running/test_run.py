@@ -15,8 +15,8 @@ from sim.types import Context, Detections, Frame, GroupEvent, Groups, Sequence, 
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
-from tracking.prepare import prepare
-from tracking.run import TrackingRun, track
+from tracking.running.prepare import prepare
+from tracking.running.run import TrackingRun, track
 
 FPS, LENGTH = 10.0, 30
 

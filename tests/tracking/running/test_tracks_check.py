@@ -7,8 +7,8 @@ import pytest
 
 from scenarios.errors import WorkError
 from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks
-from tracking.run import track
-from tracking.tracks_check import ReportHistory, check_tracks
+from tracking.running.run import track
+from tracking.running.tracks_check import ReportHistory, check_tracks
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1]])
 

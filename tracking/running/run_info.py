@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from sim.types import Sequence, Tracks
-from tracking.detection_mode import input_kind
-from tracking.image_scale import ImageScale
-from tracking.prepare import PreparedTracker
+from tracking.running.detection_mode import input_kind
+from tracking.running.image_scale import ImageScale
+from tracking.running.prepare import PreparedTracker
 
 SENSOR_SETTINGS_SHOWN = 6
 """Most sensor settings that `input_summary` shows; run.json holds all of them."""

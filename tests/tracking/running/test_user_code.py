@@ -15,10 +15,10 @@ from sim.types import Detections, Frame, Sequence
 from sim.workers.pool import run_pickled
 from tracking.app.cli import run
 from tracking.config import Config, param
-from tracking.interrupts import is_interruption, recorded_interrupts
-from tracking.run import track
+from tracking.running.interrupts import is_interruption, recorded_interrupts
+from tracking.running.run import track
+from tracking.running.user_code import user_code
 from tracking.tracker_registry import find
-from tracking.user_code import user_code
 
 ABRUPT = [SystemExit(0), SystemExit("done"), GeneratorExit(), BaseException("what"), StopIteration(), ValueError("no")]
 

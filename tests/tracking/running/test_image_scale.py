@@ -10,9 +10,9 @@ from sim.scene.boxes import scale_of_all_boxes
 from sim.scene.camera import px_per_m_at_centre
 from sim.sequence import simulate
 from sim.types import Groups, Sequence, Tracks
-from tracking import image_scale
-from tracking.image_scale import ImageScale, learned_by
-from tracking.run import grouped
+from tracking.running import image_scale
+from tracking.running.image_scale import ImageScale, learned_by
+from tracking.running.run import grouped
 from tracking.scoring import user_arrays
 
 

@@ -1,10 +1,11 @@
-"""Run a tracker over a whole sequence: `track` returns its tracks of every frame and what run.json holds.
+"""Runs a tracker over a whole sequence: `track` returns its tracks of every frame and what run.json holds.
 
 Input: a tracker (name, class or instance) and a sequence. Output: a `TrackingRun`.
 """
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -17,18 +18,21 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
-from tracking import image_scale
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
-from tracking.prepare import Params, prepare
-from tracking.run_info import Speed, known_people_info, run_info
-from tracking.time_limit import TimeLimited
-from tracking.weak_detections import weak_detections
+from tracking.running import image_scale
+from tracking.running.prepare import Params, PreparedTracker, prepare
+from tracking.running.run_info import Speed, known_people_info, run_info
+from tracking.running.time_limit import TimeLimited
 
 if TYPE_CHECKING:
     from tracking.grouping.pair_probabilities import PairProbabilities
 
 OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "frames")
 """Keys of run.json that follow from tracks and sequence, whoever made the tracks."""
+
+
+MOST = 0.5
+"""Share of weak detections from which on a warning is given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +88,7 @@ def track(
 
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
-            (tracking.time_limit), which stops a step that hangs.
+            (tracking.running.time_limit), which stops a step that hangs.
         sequence: As `sim.simulate` or `sim.io.source.open_sequence` return it.
         params: A config, values by name, the name of a preset, or a TOML file; None for the tracker's defaults.
         detections: "image", "file" or "truth"; None for the first of them that can work.
@@ -106,7 +110,7 @@ def track(
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
-    weak = weak_detections(prepared)
+    weak = _weak_detections(prepared)
     if weak is not None:
         warnings.warn(weak, UserWarning, stacklevel=2)
     prepared.reset(seed)
@@ -139,6 +143,24 @@ def track(
     speed = Speed(len(reported) / spent, len(reported) / whole) if reported else Speed()
     info = run_info(prepared, tracks, seed, sensor or {}, scale, speed)
     return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
+
+
+def _weak_detections(prepared: PreparedTracker) -> str | None:
+    # A detector whose scores lie below score_start makes a run without tracks, though nothing is wrong.
+    least = getattr(prepared.config, "score_start", None)
+    found = [f.detections.score for f in prepared.frames_given or () if f.detections is not None]
+    score = np.concatenate([np.zeros(0), *found])
+    if least is None or not len(score):
+        return None
+    weak = int((score < least).sum())
+    if weak <= MOST * len(score):
+        return None
+    low, quarter, half, high = np.quantile(score, (0, 0.25, 0.5, 1))
+    return (
+        f"{prepared.sequence.name}: {weak} of {len(score)} detections score below score_start = {least:g}, so that "
+        f"they start no track. Scores are {low:.3g} to {high:.3g}, with median {half:.3g}, after any map named above. "
+        f"Lower it, as with --set score_start={math.floor(100 * quarter) / 100:g}, or give other scores"
+    )
 
 
 def group(

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from scenarios.errors import FlockscopeError, WorkError
-from tracking.interrupts import is_interruption
+from tracking.running.interrupts import is_interruption
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from sim.types import Context, Detections, Frame, Tracker, Tracks
 from sim.workers.pool import RemoteTraceback, WorkerProcess
 from tracking import tracker_registry
 from tracking.config import Config
-from tracking.image_scale import learned_by
+from tracking.running.image_scale import learned_by
 
 GRACE = 5.0
 """s after the limit at which a process ends itself, should its parent be gone."""

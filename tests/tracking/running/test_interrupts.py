@@ -5,7 +5,7 @@ import signal
 import pytest
 
 from tracking.app.cli import run
-from tracking.interrupts import raise_if_interrupted, recorded_interrupts
+from tracking.running.interrupts import raise_if_interrupted, recorded_interrupts
 
 TRACKER = """
 import os, signal, time

@@ -1,7 +1,7 @@
 """Before the first frame: a tracker instance with its config, its detections and its context, ready for one sequence.
 
 `prepare(tracker, sequence)` returns a `PreparedTracker`, whose `reset` and `step` check what goes in and what comes
-out. `tracking.run.track` is the loop over it. The environment drives a `PreparedTracker` itself.
+out. `tracking.running.run.track` is the loop over it. The environment drives a `PreparedTracker` itself.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ import numpy as np
 from scenarios.errors import FlockscopeError, InputError
 from scenarios.limits import INTEGER
 from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
-from tracking import image_scale, tracker_registry
+from tracking import tracker_registry
 from tracking.config import Config
-from tracking.detection_mode import check_detections, choose_mode, frames_with_detections
-from tracking.image_scale import ImageScale
-from tracking.time_limit import TimeLimited
-from tracking.tracks_check import ReportHistory, check_tracks
-from tracking.user_code import tracker_failed, user_code
+from tracking.running import image_scale
+from tracking.running.detection_mode import check_detections, choose_mode, frames_with_detections
+from tracking.running.image_scale import ImageScale
+from tracking.running.time_limit import TimeLimited
+from tracking.running.tracks_check import ReportHistory, check_tracks
+from tracking.running.user_code import tracker_failed, user_code
 
 Params = Config | Mapping[str, Any] | str | Path | None
 """A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Detections, Frame, Sequence
-from tracking.tracks_check import finite
+from tracking.running.tracks_check import finite
 
 InputKind = Literal["points", "boxes", "pixels", "stereo"]
 
@@ -82,7 +82,7 @@ def frames_with_detections(
     if mode == "file":
         found: list[Detections | None] = [f.detections for f in sequence.without_pictures()]
     else:
-        from tracking.truth_detections import from_truth
+        from tracking.running.truth_detections import from_truth
 
         found = list(from_truth(sequence, sensor, seed))
     nonempty = [d for d in found if d is not None and len(d.pos)]
