@@ -49,6 +49,7 @@ def decode(
     found = _attempt(space, point, base, allowed)
     if found is not None:
         return found
+    # The nearest allowed config on the line from `base` to a refused point, by bisection.
     origin, near, far, best = encode(space, base), 0.0, 1.0, base
     for _ in range(HALVINGS):
         share = (near + far) / 2

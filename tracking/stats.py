@@ -140,5 +140,6 @@ def block_weights(frames: int, block: int, draws: int, r: np.random.Generator) -
     rows = np.arange(draws)[:, None]
     np.add.at(change, (rows, starts), 1.0)
     np.add.at(change, (rows, starts + length), -1.0)
+    # The first frame follows the last one, so that every frame is drawn equally often.
     weights = np.cumsum(change, axis=1)
     return np.asarray(weights[:, :frames] + weights[:, frames:-1])

@@ -53,7 +53,8 @@ def find(spec: str) -> type[Tracker]:
 
 
 def _from_file(path: Path) -> Any:
-    """Returns the module of a Python file, imported under a private name that depends on its path and content."""
+    # The private name hides no other module. An unchanged file is imported once, so that a config keeps fitting its
+    # tracker; a changed file is imported again.
     if not path.is_file():
         raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
     resolved = path.resolve()
@@ -61,7 +62,7 @@ def _from_file(path: Path) -> Any:
     name = f"_flockscope_{resolved.stem}_{content.hexdigest()[:12]}"
     if name in sys.modules:
         return sys.modules[name]
-    if str(resolved.parent) not in sys.path:
+    if str(resolved.parent) not in sys.path:  # last, so that files beside it hide no installed module
         sys.path.append(str(resolved.parent))
     spec = importlib.util.spec_from_file_location(name, resolved)
     assert spec is not None

@@ -261,6 +261,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
+    # A file that is opened later would take the number of a closed stream, and get what is printed.
     for number, mode in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
         try:
             os.fstat(number)

@@ -115,7 +115,7 @@ def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: Det
 
 
 def _with_frame(pos: Array, frame: Ints) -> Array:
-    """Returns positions pos (N, 2) in m with a third column, frame (N,) times 1e6, that keeps frames apart: (N, 3)."""
+    # The third column keeps frames apart in a k-d tree.
     return np.column_stack([pos, frame * FRAME_DISTANCE])
 
 

@@ -94,7 +94,7 @@ def frames_with_detections(
 
 
 def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
-    """Raise InputError if a frame's detections cannot be given to a tracker with these needs; else return nothing."""
+    """Raises InputError if a frame's detections cannot be given to a tracker with these needs."""
     rows = len(detections.pos)
     arrays = [a for a in (detections.pos, detections.vel, detections.box, detections.score) if a is not None]
     for a in arrays:

@@ -213,6 +213,7 @@ def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...
     from tracking.grouping.foot_points import completed
 
     known = image_scale.before_frames(sequence)
+    # Labels of all frames tell the scale better than boxes of the first frames.
     truth = sequence.truth if known.frames or not np.isfinite(known.px_per_m) else None
     px_per_m = known.px_per_m if truth is None else truth.px_per_m
     pixels = getattr(tracks, "info", {}).get("detections") == "image"

@@ -38,7 +38,7 @@ def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iter
 
 def shuffled(detections: Detections, seed: int) -> Detections:
     """Returns the detections of a frame in an order that depends on the seed and the number of the frame alone."""
-    d = detections
+    d = detections  # the order of labels would tell who is who
     order: Ints = rng(seed, "delivery", d.index).permutation(len(d.pos))
     vel, box = (None if a is None else a[order] for a in (d.vel, d.box))
     return d.replace(pos=d.pos[order], vel=vel, box=box, score=d.score[order] if len(d.score) else d.score)

@@ -87,7 +87,7 @@ def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: 
 
 def pareto_front(candidates: Sequence[Candidate], goals: Sequence[Goal]) -> list[Candidate]:
     """Returns the candidates that no other dominates on the validation scenes, best first goal first."""
-    known = [c for c in candidates if not np.isnan(c.validation).any()]
+    known = [c for c in candidates if not np.isnan(c.validation).any()]  # nothing is known of the others' rank
 
     def dominates(one: Candidate, other: Candidate) -> bool:
         gains = [g.gain(b, a) for g, a, b in zip(goals, one.validation, other.validation, strict=True)]

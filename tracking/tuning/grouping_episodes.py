@@ -65,7 +65,7 @@ def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int 
     for id in np.unique(truth.id).tolist():
         own = np.flatnonzero(truth.id == id)
         new = np.sqrt(1 - stay**2) * rng(seed, "label", id, repeat=repeat).standard_normal((len(own), 2))
-        new[0] /= np.sqrt(1 - stay**2)
+        new[0] /= np.sqrt(1 - stay**2)  # so that the standard deviation is stationary from the first row on
         error[own] = errors.sd * lfilter([1.0], [1.0, -stay], new, axis=0)
     if not errors.filmed:
         return truth.replace(pos=truth.pos + error)

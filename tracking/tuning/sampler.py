@@ -124,5 +124,5 @@ class HillClimbingSampler(BaseSampler):
 
 
 def _reflected(point: Array) -> Array:
-    """Returns `point`, coordinates of any shape, with those beyond an end of [-1, 1] mirrored at that end."""
+    # Beyond 3 or -3 the mirror image would land outside again, behind the other end.
     return np.clip(np.where(np.abs(point) > 1, np.sign(point) * 2 - point, point), -1.0, 1.0)

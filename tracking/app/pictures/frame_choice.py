@@ -47,6 +47,7 @@ def _evenly(n: int, k: int) -> list[int]:
 
 def _in_widest_gap(chosen: list[int], people: Ints) -> int:
     length = len(people)
+    # The ends count as an eighth of the length further out, so that frames near them are chosen, too.
     marks = np.array([1 - length // 8, *sorted(chosen), length + length // 8])
     for k in np.argsort(-np.diff(marks), kind="stable"):
         low, high = marks[k], marks[k + 1]

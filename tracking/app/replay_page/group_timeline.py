@@ -53,7 +53,7 @@ def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
         lane = last[name] if last.get(name, -1) in free else (free[0] if free else len(free_from))
         if lane == len(free_from):
             free_from.append(0)
-        free_from[lane] = end + 1
+        free_from[lane] = end + 1  # one frame stays empty between two bars of a lane
         last[name] = lane
         made.append(Bar(name, start, end, lane, size))
     return made

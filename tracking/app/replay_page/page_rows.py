@@ -187,7 +187,7 @@ def ellipses(extent: Array) -> Array:
 
 def simplified(hull: Array, least: float) -> Array:
     """Returns a convex polygon (V, 2) without the corners nearer than `least` to the line through their neighbours."""
-    for odd in (1, 0):
+    for odd in (1, 0):  # every other corner at a time, so that no two neighbours go at once
         n = len(hull)
         if n > 3:
             before, after = np.roll(hull, 1, axis=0), np.roll(hull, -1, axis=0)
