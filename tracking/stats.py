@@ -37,7 +37,7 @@ Scale = Literal["share", "below one", "count", "length", "plain"]
 
 
 def mean_interval(values: Array) -> tuple[Array, Array, Array]:
-    """Return mean, low end and high end, (K,) each, of Student's 95 % intervals of the mean over S sequences."""
+    """Returns mean, low end and high end, (K,) each, of Student's 95 % intervals of the mean over S sequences."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     some, two = np.maximum(count, 1), np.maximum(count, 2)
@@ -61,7 +61,7 @@ def joint_level(count: int) -> float:
 
 
 def paired(first: Array, second: Array) -> tuple[Array, Array, Array]:
-    """Return mean, low end and high end, (K,) each, of second - first over the same S sequences; both (S, K)."""
+    """Returns mean, low end and high end, (K,) each, of second - first over the same S sequences; both (S, K)."""
     return mean_interval(second - first)
 
 

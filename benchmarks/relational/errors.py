@@ -17,8 +17,8 @@ from sim.types import Array, Bools, Context, Detections, Frame, Plane, Sequence,
 from tracking.filters.assignment import optimal
 from tracking.papers.relational.config import ParticleConfig
 from tracking.running.prepare import prepare
+from tracking.running.tracker_registry import find
 from tracking.stats import mean_interval, paired
-from tracking.tracker_registry import find
 
 FILTERS = ("particle", "relational")
 DIFFERENCE = "relational − particle"

@@ -9,7 +9,7 @@ import pytest
 from scenarios.errors import InputError
 from tracking.config import Config, param, preset_file, read_params
 from tracking.papers.blob.config import BlobConfig
-from tracking.tracker_registry import find, names
+from tracking.running.tracker_registry import find, names
 
 
 @dataclasses.dataclass(frozen=True)

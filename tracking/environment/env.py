@@ -32,8 +32,8 @@ from tracking.keyword_options import documented, from_keywords, option
 from tracking.parameter_space import Space, decode, decode_and_build, encode, space_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.prepare import Params, config_of
+from tracking.running.tracker_registry import checked, config_class, find
 from tracking.scoring.people_comparison import Similarity
-from tracking.tracker_registry import checked, config_class, find
 
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 OBSERVATIONS = ("statistics", "parameters", "none")

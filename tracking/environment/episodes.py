@@ -204,7 +204,7 @@ class Rollout:
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:
     """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none."""
-    from tracking.tracker_registry import find
+    from tracking.running.tracker_registry import find
 
     needs = set((find(tracker) if isinstance(tracker, str) else tracker).needs)
     if detections in ("file", "truth") or (detections is None and needs & {"boxes", "points"}):

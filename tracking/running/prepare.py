@@ -19,9 +19,8 @@ import numpy as np
 from scenarios.errors import FlockscopeError, InputError
 from scenarios.limits import INTEGER
 from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
-from tracking import tracker_registry
 from tracking.config import Config
-from tracking.running import image_scale
+from tracking.running import image_scale, tracker_registry
 from tracking.running.detection_mode import check_detections, choose_mode, frames_with_detections
 from tracking.running.image_scale import ImageScale
 from tracking.running.time_limit import TimeLimited

@@ -16,8 +16,8 @@ from scenarios.limits import is_number
 from sim.arrays import Frozen
 from sim.types import Context, Detections, Frame, Tracker, Tracks
 from sim.workers.pool import RemoteTraceback, WorkerProcess
-from tracking import tracker_registry
 from tracking.config import Config
+from tracking.running import tracker_registry
 from tracking.running.image_scale import learned_by
 
 GRACE = 5.0

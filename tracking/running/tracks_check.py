@@ -1,4 +1,4 @@
-"""Check of the Tracks that a tracker's `step` returns: types, shapes, ids, groups, events; the first fault in words.
+"""Checks the Tracks that a tracker's `step` returns: types, shapes, ids, groups, events; the first fault in words.
 
 `check_tracks` is the entry. The private functions each check one part and return a `Fault`, or None if there is none.
 """
@@ -28,7 +28,7 @@ class ReportHistory:
     ids: set[int] = field(default_factory=set)  # all track ids, of people or of groups
 
     def clear(self) -> None:
-        """Forget everything, in place, for the start of another sequence."""
+        """Forgets everything, in place, for the start of another sequence."""
         self.plane_and_unit, self.own_events = None, ()
         self.ids.clear()
 

@@ -79,7 +79,7 @@ class TunedTracker:
 
 def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = None) -> TunedTracker:
     """Returns what is to be tuned; `grouping` is the baseline rule of groups."""
-    from tracking.tracker_registry import checked, code_hash, config_class, find, located
+    from tracking.running.tracker_registry import checked, code_hash, config_class, find, located
 
     if tracker == RULE:
         if step_timeout is not None:

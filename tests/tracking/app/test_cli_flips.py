@@ -17,9 +17,10 @@ from scenarios.loading.validation import validate
 from scenarios.schema.scenario import Scenario
 from sim.io.store.sequence_folder import sequence_files
 from sim.io.store.track_files import tracks_files
-from tracking import track, tracker_registry
+from tracking import track
 from tracking.app.cli import app, run
 from tracking.app.commands.scenarios import list_keys
+from tracking.running import tracker_registry
 
 pytestmark = pytest.mark.slow
 

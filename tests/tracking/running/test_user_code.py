@@ -17,8 +17,8 @@ from tracking.app.cli import run
 from tracking.config import Config, param
 from tracking.running.interrupts import is_interruption, recorded_interrupts
 from tracking.running.run import track
+from tracking.running.tracker_registry import find
 from tracking.running.user_code import user_code
-from tracking.tracker_registry import find
 
 ABRUPT = [SystemExit(0), SystemExit("done"), GeneratorExit(), BaseException("what"), StopIteration(), ValueError("no")]
 

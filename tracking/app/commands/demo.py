@@ -11,7 +11,6 @@ from pathlib import Path
 from scenarios.printable import printable
 from sim.io.files.output_paths import output_path
 from sim.types import Sequence
-from tracking import tracker_registry
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.demo_page import PixelScene, RankingTable, ResultSection, demo_page
@@ -22,6 +21,7 @@ from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.replay_page.video import PageVideo
 from tracking.comparison import compare
+from tracking.running import tracker_registry
 from tracking.running.run import TrackingRun
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")

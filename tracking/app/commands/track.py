@@ -58,7 +58,7 @@ def track(options: TrackOptions) -> CommandResult:
     """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
     from sim.io.files.atomic import lock_folder
     from sim.io.store.run_seal import reject_foreign
-    from tracking.tracker_registry import find
+    from tracking.running.tracker_registry import find
 
     setup = _setup(options)
     option_parsing.output_folder(options.out)
@@ -127,7 +127,7 @@ def _setup(options: TrackOptions) -> TrackerSetup:
 
 
 def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:
-    from tracking.tracker_registry import find
+    from tracking.running.tracker_registry import find
 
     kind: type[Config] | None = getattr(find(tracker), "config_class", None)
     if kind is not None:

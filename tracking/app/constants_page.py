@@ -1,6 +1,6 @@
 """The constants of a tracker's package as a Markdown table for the docs, read from its source.
 
-    python -m tracking.constants_table group_pda
+    python -m tracking.app.constants_page group_pda
 
 A constant is a number with an upper-case name at the top of a module, and a text after it that says what it is. Names
 of slots and columns have no such number, or none of their own, and are left out.
@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
-PAPERS = Path(__file__).parent / "papers"
+PAPERS = Path(__file__).parents[1] / "papers"
 """Folder of the trackers' packages."""
 
 

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from scenarios.errors import InputError
-from tracking import tracker_registry
+from tracking.running import tracker_registry
 
 STRANGER = """
 from dataclasses import dataclass
