@@ -13,9 +13,13 @@ from typing import Any
 import numpy as np
 
 from sim.types import Sequence, Tracks
+from sim.versions import installed
 from tracking.running.detection_mode import input_kind
 from tracking.running.image_scale import ImageScale
 from tracking.running.prepare import PreparedTracker
+
+PACKAGES = ("flockscope", "numpy", "scipy")
+"""Packages whose versions run.json holds."""
 
 SENSOR_SETTINGS_SHOWN = 6
 """Most sensor settings that `input_summary` shows; run.json holds all of them."""
@@ -86,7 +90,7 @@ def _facts(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, be
         "causal_from": begins,
         "frames": len(tracks),
         **({"box_scale": list(sequence.source["box_scale"])} if "box_scale" in sequence.source else {}),
-        "versions": _versions(),
+        "versions": installed(PACKAGES),
     }
 
 
@@ -116,16 +120,3 @@ def input_name(info: Mapping[str, Any]) -> str:
         return ""
     more = [*(f"{key} = {value}" for key, value in sensor.items()), f"seed {info.get('seed')}"] if sensor else []
     return str(kind) if mode == "image" else f"{kind} ({', '.join([str(mode), *more])})"
-
-
-def _versions() -> dict[str, str]:
-    """Returns the installed versions of flockscope, numpy and scipy by name."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    found = {}
-    for name in ("flockscope", "numpy", "scipy"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found

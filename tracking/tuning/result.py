@@ -14,6 +14,7 @@ from typing import Any
 
 from scenarios.printable import counted
 from sim.io.files.atomic import write_file
+from sim.versions import installed
 from tracking.config import Config
 from tracking.tuning.comparison import Candidate, Comparison, TrialRecord
 from tracking.tuning.plots import history_plot, importance_plot, pareto_plot
@@ -122,7 +123,7 @@ class TuningResult:
             name = line.partition(" = ")[0]
             moved = name in old and config.as_dict().get(name) != old[name]
             lines.append(f"{line}  # default {old[name]}" if moved else line)
-        packages = ", ".join(f"{name} {version}" for name, version in versions().items())
+        packages = ", ".join(f"{name} {version}" for name, version in installed(PACKAGES).items())
         comments = [*self.lines(chosen), f"versions: {packages}"]
         return "\n".join([*(f"# {comment}" for comment in comments), *lines, ""])
 
@@ -154,7 +155,7 @@ class TuningResult:
             "importance": dict(self.importance),
             "notes": list(self.notes),
             "left_out": list(self.left_out),
-            "versions": versions(),
+            "versions": installed(PACKAGES),
         }  # fmt: skip
 
     def write(self, path: str | Path) -> list[Path]:
@@ -183,19 +184,6 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         "trial": candidate.trial, "training": list(candidate.training), "validation": list(candidate.validation),
         "params": candidate.config.as_dict(),
     }  # fmt: skip
-
-
-def versions() -> dict[str, str]:
-    """Returns a dict of installed versions by package name."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    found = {}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
 
 
 def _without_nan(value: Any) -> Any:

@@ -8,7 +8,6 @@ an estimate of its value.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from contextlib import closing, suppress
 
 import numpy as np
@@ -18,6 +17,7 @@ from optuna.exceptions import UpdateFinishedTrialError
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
 from tracking.tuning.goals import Goal, finite_mean
+from tracking.tuning.options import Progress
 from tracking.tuning.parallel_episodes import PlayEpisodes
 from tracking.tuning.sampler import ERROR, PRUNED
 from tracking.tuning.search_plan import SearchPlan
@@ -28,8 +28,6 @@ PAUSE = 0.5
 
 LEAST_LOSS = 1e-12
 """Least difference between the best value and the estimate of a pruned trial."""
-
-Progress = Callable[[int, int, str], None]
 
 
 def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> None:
