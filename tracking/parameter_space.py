@@ -82,7 +82,6 @@ def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config
 
 
 def _point(action: ArrayLike, size: int) -> Array:
-    """Returns the action as a vector (size,), clipped to [-1, 1]."""
     try:
         point = np.asarray(action)
     except ValueError:  # rows of different lengths

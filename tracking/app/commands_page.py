@@ -20,7 +20,6 @@ def command_sections() -> str:
 
 
 def _commands(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
-    """Yields (full name, command) of each command below a typer group, in order of declaration."""
     for name, command in group.commands.items():
         if hasattr(command, "commands"):
             yield from _commands(command, f"{prefix}{name} ")

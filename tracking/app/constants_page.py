@@ -28,7 +28,6 @@ def constants_table(package: str) -> str:
 
 
 def _constants(body: list[ast.stmt]) -> Iterator[tuple[str, float, str]]:
-    """Yields name, value and meaning of the constants among the statements of a module."""
     for statement, after in pairwise(body):
         match statement, after:
             case ast.Assign([target], value), ast.Expr(ast.Constant(str(text))):

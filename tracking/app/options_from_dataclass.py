@@ -57,7 +57,6 @@ def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
 
 
 def _default(field: dataclasses.Field[Any]) -> Any:
-    """Returns the default of a dataclass field; a `default_factory` is called."""
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
     return inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default

@@ -113,7 +113,6 @@ def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[
 
 
 def _by_name(stored: list[StoredTracks]) -> dict[str, StoredTracks]:
-    """Returns the stored tracks by the name of their sequence. Raises InputError if two have the same name."""
     found: dict[str, StoredTracks] = {}
     for each in stored:
         name = each.path.stem if each.name is None else each.name

@@ -147,7 +147,6 @@ def array_bytes(root: object) -> int:
 
 
 def _parts(one: Any) -> list[Any]:
-    """Returns the objects that `one` holds."""
     if isinstance(one, tuple | list):
         return list(one)
     if isinstance(one, dict):

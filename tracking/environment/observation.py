@@ -116,7 +116,6 @@ class Observer:
         return np.array([squashed(s, values.get(s.name, 0.0)) for s in STATISTICS], np.float32)
 
     def _values(self, px_per_m: float) -> dict[str, float]:
-        """Returns a dict of the known statistics by name, before they are mapped to [0, 1]."""
         last = self._tracks[-1]
         seconds = len(self._tracks) / self.fps
         known = last.plane != "image" or px_per_m > 0
@@ -202,7 +201,6 @@ def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
 
 
 def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dict[str, float]:
-    """Returns a dict; {} if no frame has known detections."""
     count = np.bincount(found.frame - found.first, minlength=frames)[[f - found.first for f in found.frames]]
     if not len(count):
         return {}
@@ -217,7 +215,6 @@ def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dic
 
 
 def _picture_values(brightness: Sequence[float]) -> dict[str, float]:
-    """Returns a dict: brightness of the last picture, and lights, the mean relative change from picture to picture."""
     if not brightness:
         return {}
     level = np.array(brightness)

@@ -65,7 +65,6 @@ def _on_ground(opened: OpenedSource, tracks: list[Tracks]) -> bool:
 
 
 def _bounds(opened: OpenedSource) -> tuple[Array, Array]:
-    """Returns the least and the greatest x, y, (2,) each, that the picture of the source `opened` must show."""
     scene = opened.sequence.scene
     if scene is not None:
         return np.zeros(2), scene.size

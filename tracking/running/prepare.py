@@ -128,7 +128,6 @@ def prepare(
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:
-    """Returns the tracker's name, an instance and its config (None without parameters)."""
     limited = tracker if isinstance(tracker, TimeLimited) else None
     tracker = tracker.tracker if isinstance(tracker, TimeLimited) else tracker
     if not isinstance(tracker, str | type):

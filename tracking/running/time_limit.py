@@ -145,6 +145,6 @@ def _step(number: int, frame: Frame) -> tuple[Tracks, float]:
 
 
 def _frozen(value: Any) -> Any:
-    """Returns a Frozen with read-only arrays, as it was before it was pickled; so are the Frozen in its fields."""
+    # Arrays that were pickled can be written again.
     changes = {f.name: _frozen(part) for f in fields(value) if isinstance(part := getattr(value, f.name), Frozen)}
     return value.replace(**changes)

@@ -59,7 +59,6 @@ def _has_open_frames(event: Any) -> bool:
 
 
 def _with_frames(event: Any, index: int) -> Any:
-    """Returns the event with `emitted` and `end` set to frame `index` where they are None; anything else as it is."""
     if not _has_open_frames(event):
         return event
     emitted = index if event.emitted is None else event.emitted

@@ -109,7 +109,6 @@ class HillClimbingSampler(BaseSampler):
         return {name: getattr(config, name) if name in moved else value for name, value in parent.items()}
 
     def _parent(self, study: optuna.Study) -> dict[str, Any]:
-        """Returns the values by name of one of the study's three best unpruned trials."""
         trials = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
         whole = [t for t in trials if PRUNED not in t.user_attrs and t.params.keys() == self._plan.defaults.keys()]
         if not whole:

@@ -84,7 +84,6 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
 
 
 def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]]:
-    """Yields seed and truth of every scene of these names with every seed."""
     from scenarios.loading.resolve import resolve
     from tracking.fitting.grouping_scenes import simulated
 

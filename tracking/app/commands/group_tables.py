@@ -61,7 +61,6 @@ def group_tables(rows: Sequence[Row]) -> Any:
 
 
 def _table(title: str, rows: Sequence[Row], cells: Callable[[Sequence[Row]], dict[str, object]]) -> Any:
-    """Returns a table of `cells`, values by column, of each row alone and, of several rows, of all together."""
     table = empty_table()
     table.add_column("sequence", overflow="fold")
     for name in cells(rows):
@@ -74,7 +73,6 @@ def _table(title: str, rows: Sequence[Row], cells: Callable[[Sequence[Row]], dic
 
 
 def _group_counts(rows: Sequence[Row]) -> dict[str, object]:
-    """Returns the cells of the table of groups for these runs together, by column."""
     groups = [g for row in rows for g in row["groups"]]
     sizes, seconds = Counter(min(g["size"], 4) for g in groups), [g["seconds"] for g in groups]
     return {

@@ -64,7 +64,6 @@ def _block_means(scored: ScoredSequence) -> Means:
 
 
 def _by_detections(rows: list[SequenceScores]) -> list[list[SequenceScores]]:
-    """Returns the rows, each the scores of one sequence, in lists of equal detections given to the tracker."""
     return [[row for row in rows if row.given == given] for given in _givens(rows)]
 
 

@@ -116,7 +116,6 @@ def usual_key(comparison: ComparedRuns) -> str:
 
 
 def _names(texts: list[str]) -> dict[str, str]:
-    """Returns the texts on the command line by a short name."""
     short = [text.rpartition(":")[2] if is_class(text) else Path(text).name for text in texts]
     if len(set(texts)) < len(texts):
         twice = next(text for text in texts if texts.count(text) > 1)
@@ -155,7 +154,6 @@ def _ranked(
 
 
 def _pairs(comparison: ComparedRuns, ranking: Ranking) -> list[tuple[str, str]]:
-    """Returns the names of each pair of runs, the better one first."""
     return list(combinations((comparison.runs[k] for k in ranking.order.tolist()), 2))
 
 
@@ -296,7 +294,6 @@ def _sequence_table(c: ComparedRuns) -> Any:
 
 
 def _score_differences(every: RankedRuns) -> Any:
-    """Returns a table of the differences of all scores of the only pair of runs."""
     (pair,) = every.pairs
     known = [key for keys in TABLES.values() for key in keys if math.isfinite(pair["scores"][key]["mean"])]
     keys = [key for key in known if key != "objective" or usual_key(every.comparison) == key]
@@ -311,7 +308,6 @@ def _can_be_sure(comparison: ComparedRuns, ranking: Ranking) -> bool:
 
 
 def _pair_differences(every: RankedRuns) -> Any:
-    """Returns a table of the differences of each pair of runs in the score that ranks."""
     rows = {printable(f"{pair['run']} minus {pair['minus']}"): (every.key, pair) for pair in every.pairs}
     return with_title(f"differences, {arrow(every.key)}", _difference_table("runs", rows))
 

@@ -135,7 +135,6 @@ def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
 
 
 def _points(rows: PageRows) -> list[Array]:
-    """Returns arrays of points (N, 2), in the rows' unit."""
     return [rows.pos, *(rows.groups.hull if rows.groups is not None else ())]
 
 
@@ -157,7 +156,6 @@ def _near_strangers(truth: Truth | None) -> list[list[int]]:
 
 
 def _detections(sequence: Sequence) -> Json | None:
-    """Returns the detections of all frames as encoded columns; None if there is none in any frame."""
     if not sequence.has_detections:
         return None
     found = [
