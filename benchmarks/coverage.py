@@ -32,7 +32,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Tracks, Truth
 from tracking.recording_intervals import SCALES, presence
-from tracking.run import track
+from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.frame_weights import weighted_scorers
 from tracking.stats import block_intervals, mean_interval

@@ -33,7 +33,7 @@ from sim.types import Array, Bools, Frame, Sequence
 from tracking.detect import foreground as pipeline_module
 from tracking.detect.background import Background
 from tracking.detect.foreground import Foreground, Segmented
-from tracking.run import track
+from tracking.running.run import track
 from tracking.stats import paired
 
 FPS, SECONDS = 7, 30

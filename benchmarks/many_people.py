@@ -18,7 +18,7 @@ from multiprocessing import get_context
 import numpy as np
 
 from sim.types import Context, Detections, Frame
-from tracking.tracker_registry import find, names
+from tracking.running.tracker_registry import find, names
 
 FPS, SCALE = 10.0, 40.0
 NEWCOMERS, SOON = (300, 1000), 6

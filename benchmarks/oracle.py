@@ -39,7 +39,7 @@ from sim.io.source import open_source
 from sim.sequence import observe
 from sim.types import Sequence as Recording
 from tracking.oracle import oracle
-from tracking.run import track
+from tracking.running.run import track
 from tracking.scoring.evaluation import Scorer
 from tracking.scoring.hota import hota
 from tracking.scoring.people_comparison import Similarity

@@ -54,8 +54,8 @@ from tracking.grouping.link_rule import LinkRule, find_links
 from tracking.grouping.merge_split_events import TrackedMotion
 from tracking.papers.blob import new_people
 from tracking.papers.blob.update_from_pixels import PixelUpdater
-from tracking.prepare import PreparedTracker, prepare
-from tracking.tracks_check import ReportHistory
+from tracking.running.prepare import PreparedTracker, prepare
+from tracking.running.tracks_check import ReportHistory
 
 STRETCH = 10  # frames
 RUNS = 3

@@ -16,12 +16,12 @@ from benchmarks.support.options import add_seeds, new_parser, seeds_text
 from benchmarks.support.tables import head, row
 from sim.dataset.generate import generate
 from sim.workers.start import WorkerOptions
-from tracking import tracker_registry
 from tracking.app.command_options import ScoreOptions, TrackOptions
 from tracking.app.commands.score_ranking import COLUMNS, rank_words, ranking
 from tracking.app.commands.score_tables import number
 from tracking.app.commands.track import track
 from tracking.app.sequence_workers import OpenedAs
+from tracking.running import tracker_registry
 
 
 def print_ranking(title: str, options: ScoreOptions) -> None:

@@ -40,10 +40,10 @@ from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.recording_intervals import recording_differences
-from tracking.run import track
+from tracking.running.run import track
+from tracking.running.tracker_registry import find
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.frame_weights import weighted_scorers
-from tracking.tracker_registry import find
 from tracking.tuning import tune
 from tracking.tuning.options import TuneOptions
 from tracking.tuning.search_plan import search_plan

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Iterable
 from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -20,8 +21,14 @@ DISTRIBUTION = "flockscope"
 @lru_cache(maxsize=2)
 def versions(drawn: bool) -> dict[str, str]:
     """Returns the versions of Python, flockscope and libraries, by name; `drawn` adds those that pictures depend on."""
-    found = {"python": platform.python_version()}
-    for name in (DISTRIBUTION, *LIBRARIES, *(PICTURE_LIBRARIES if drawn else ())):
+    names = (DISTRIBUTION, *LIBRARIES, *(PICTURE_LIBRARIES if drawn else ()))
+    return {"python": platform.python_version(), **installed(names)}
+
+
+def installed(names: Iterable[str]) -> dict[str, str]:
+    """Returns the versions of installed distributions by name, "unknown" of others."""
+    found = {}
+    for name in names:
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:

@@ -96,7 +96,7 @@ def test_there_is_a_house():
     assert len(of("scenarios")) > 10
     assert len(of("sim")) > 30
     assert len(of("tracking")) > 20
-    assert "sim.types" in imports("tracking.run")
+    assert "sim.types" in imports("tracking.running.run")
 
 
 def test_imports_go_one_way():
@@ -120,7 +120,7 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
     assert names
     hidden = (
         "tracking.scoring",
-        "tracking.truth_detections",
+        "tracking.running.truth_detections",
         "tracking.app",
         "sim.truth.label",
         "sim.truth.merge_split_events",

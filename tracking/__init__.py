@@ -3,18 +3,18 @@
 `tracking.track(tracker, sequence)` returns a run's tracks, `tracking.group(sequence)` the groups of labelled people,
 `tracking.evaluate(truth, tracks)` the scores of either, `tracking.compare(sequences, runs)` a ranking of several runs,
 and `tracking.tune(tracker, suite)` searches parameters. Each is imported when it is first used.
-`import tracking` also registers the Gymnasium environment (tracking.gymnasium_registration).
+`import tracking` also registers the Gymnasium environment (tracking.environment.registration).
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tracking.gymnasium_registration import register_when_imported
+from tracking.environment.registration import register_when_imported
 
 if TYPE_CHECKING:
     from tracking.comparison import compare
-    from tracking.run import group, track
+    from tracking.running.run import group, track
     from tracking.scoring import evaluate
     from tracking.tuning import tune
 
@@ -25,8 +25,8 @@ register_when_imported()
 _HOME = {
     "compare": "tracking.comparison",
     "evaluate": "tracking.scoring",
-    "group": "tracking.run",
-    "track": "tracking.run",
+    "group": "tracking.running.run",
+    "track": "tracking.running.run",
     "tune": "tracking.tuning",
 }
 

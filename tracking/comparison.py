@@ -19,8 +19,8 @@ from sim.types import Array, Sequence, Tracks
 from tracking.oracle import oracle
 from tracking.ranking import Ranking, rank
 from tracking.recording_intervals import recording_rankings
-from tracking.run import TrackingRun
-from tracking.run_info import input_name
+from tracking.running.run import TrackingRun
+from tracking.running.run_info import input_name
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer, Scores
 from tracking.scoring.frame_weights import weighted_scorers
@@ -36,27 +36,26 @@ UNKNOWN = "unknown"
 
 @dataclass(frozen=True, eq=False)
 class ComparedSequence:
-    """The scores of R runs on one sequence.
+    """The scores of R runs on one sequence."""
 
-    scores: of each run. inputs: what each run got, in words, "unknown" if it does not say. oracles: by input, in
-    alphabetical order; if no run says what it got, that of the stored detections, else of the labels. blocks: by score,
-    the ranking with intervals by weights of blocks of frames; None without.
-    """
-
-    scores: list[Scores]
-    inputs: list[str]
-    oracles: Mapping[str, Scores]
-    blocks: Mapping[str, Ranking] | None = None
+    scores: list[Scores]  # of each run
+    inputs: list[str]  # what each run got, in words
+    oracles: Mapping[str, Scores]  # by input; if no run says what it got, of the stored detections, else of the labels
+    blocks: Mapping[str, Ranking] | None = None  # by score, the ranking with intervals by weights of blocks of frames
 
 
 @dataclass(frozen=True, eq=False)
 class ComparedRuns:
     """The scores of R runs on S sequences.
 
-    runs: names, in the order given. sequences: names. scores: for each run a list of `Scores`, one per sequence.
-    inputs: for each run, what it got, in words; several if it got different inputs on different sequences. oracles: for
-    each input, in alphabetical order, the scores of its oracle on each sequence, None where no run got this input.
-    similarity: how people were compared in all of them. blocks: of `ComparedSequence`, for a single recording.
+    Attributes:
+        runs: Names, in the order given.
+        sequences: Names.
+        scores: For each run a list of `Scores`, one per sequence.
+        inputs: For each run, what it got, in words; several if it got different inputs on different sequences.
+        oracles: For each input the scores of its oracle on each sequence, None where no run got this input.
+        similarity: How people were compared in all of them.
+        blocks: For a single recording, by score, the ranking with intervals by weights of blocks of frames.
     """
 
     runs: tuple[str, ...]
@@ -86,9 +85,8 @@ class ComparedRuns:
     def to_arrow(self, key: str = "objective") -> pyarrow.Table:
         """Returns the ranking by a score as a table, one row per run, best first, after the oracles.
 
-        Columns: run; input, in words; first, last: the range of ranks, null for oracles; mean, low, high: of the score,
-        with its 95 % interval within the score's range; then the mean of every score of the catalogue that is known for
-        some run.
+        Columns: run; input; first, last: the range of ranks, null for oracles; mean, low, high: of the score, with its
+        95 % interval; then the mean of every score of the catalogue that is known for some run.
         """
         import pyarrow as pa
 
@@ -133,14 +131,18 @@ def compare(
     group_match: GroupMatch = "hull",
     blocks: int = 0,
 ) -> ComparedRuns:
-    """Returns the scores of several runs on the same labelled sequences, all compared alike, and those of the oracles.
+    """Scores several runs on the same labelled sequences, all compared alike, beside the oracles of their inputs.
 
-    runs: by name, the tracks of each sequence in the order of `sequences`, as `track` returns them. similarity: of
-    people, "boxes", "ground" or "image"; None: by the data (tracking.scoring.one_plane). group_match: of groups, by
-    "hull" or "members". blocks: number of draws of blocks of frames for the intervals of a single recording; 0: none.
+    Args:
+        sequences: Labelled sequences.
+        runs: By name, the tracks of each sequence in the order of `sequences`, as `track` returns them.
+        similarity: Of people, "boxes", "ground" or "image"; None: by the data (tracking.scoring.one_plane).
+        group_match: Of groups, by "hull" or "members".
+        blocks: Number of draws of blocks of frames for the intervals of a single recording; 0: none.
 
-    Raises InputError if a run lacks a sequence, a sequence lacks labels, the sequences are not comparable in one way,
-    runs cannot be compared with the truth or with each other, or `blocks` is given for several sequences.
+    Raises:
+        InputError: A run lacks a sequence, a sequence lacks labels, sequences or runs cannot be compared in one way, or
+            `blocks` is given for several sequences.
     """
     given = list(sequences)
     check_blocks(blocks, len(given))
@@ -168,10 +170,7 @@ def check_blocks(blocks: int, sequences: int) -> None:
 
 
 def joined(names: SequenceOf[str], sequences: SequenceOf[str], found: SequenceOf[ComparedSequence]) -> ComparedRuns:
-    """Returns the comparison of runs with these names; found: for each sequence, the result of `compare_one`.
-
-    Raises InputError if people were not compared in one way on all sequences.
-    """
+    """Returns the comparison of runs with these names; found: for each sequence, the result of `compare_one`."""
     ways: dict[Similarity, str] = {}
     for sequence, one in zip(sequences, found, strict=True):
         ways.setdefault(one.scores[0].similarity, sequence)
@@ -200,10 +199,7 @@ def compare_one(
     blocks: int = 0,
     oracles: bool = True,
 ) -> ComparedSequence:
-    """Returns the scores of each run of one sequence, and of the oracles of their inputs, all compared alike.
-
-    oracles: False leaves them out. Raises InputError as `compare`.
-    """
+    """Returns the scores of each run of one sequence, and of the oracles of their inputs, all compared alike."""
     infos = [run.info if isinstance(run, TrackingRun) else {} for run in runs]
     inputs = [input_name(info) for info in infos]
     with scorer_of(sequence) as scorer:
@@ -224,11 +220,7 @@ def compare_one(
 
 @contextmanager
 def scorer_of(sequence: Sequence) -> Iterator[Scorer]:
-    """Gives a scorer of the sequence's truth; what it cannot compare becomes an InputError that names the sequence.
-
-    Raises InputError if the sequence has no labels, the runs cannot be compared as asked, or an id occurs twice in one
-    frame.
-    """
+    """Gives a scorer of the sequence's truth; what it cannot compare becomes an InputError that names the sequence."""
     if sequence.truth is None:
         raise InputError(
             file=sequence.source.get("path", sequence.name), got="no labels", expected="a sequence with truth",

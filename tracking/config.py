@@ -2,13 +2,14 @@
 
 A field is declared as `gate: float = param(0.99, (0.9, 0.9999), "probability", "share of ...")`. Parameters are
 seconds, metres and rates, never frame counts. The search space of `tune`, the action space of the environment and the
-table in the docs are read from the declarations. Presets are TOML files:
-tracking.parameter_files.
+table in the docs are read from the declarations. Files are TOML: an optional `tracker = "name"` and a table [params];
+tracking/presets/NAME/TRACKER.toml is the preset NAME of a tracker.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import os.path
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,36 +18,32 @@ from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack, cast
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
-from scenarios.loading.toml_files import closest
+from scenarios.loading.toml_files import closest, parse, toml_value
 from sim.io.files.numeric_text import read_number
-from tracking.parameter_files import file_of, preset_file, presets, read, toml_text
-from tracking.user_code import tracker_failed, user_code
+from tracking.running.user_code import tracker_failed, user_code
 
 Scale = Literal["linear", "log", "int", "categorical", "vector"]
 Value = float | int | str | bool | tuple[float, ...]
 
+PRESETS = Path(__file__).parent / "presets"
+"""Folder with a folder for each preset, which holds TRACKER.toml."""
+
 
 @dataclass(frozen=True)
 class Param:
-    """One declared parameter of a tracker.
-
-    name; default; unit and meaning: texts for the docs. scale: "linear", "log", "int", "categorical", or "vector" for
-    as many numbers as the default has. low, high: range, both ends allowed; -inf and inf if scale is "categorical".
-    choices: the allowed values if scale is "categorical", else empty. online: it may change between two frames.
-    tunable: searches may change it. sees: "pixels" or "points" if it has an effect only with these, else "".
-    """
+    """One declared parameter of a tracker, as `param` describes it."""
 
     name: str
     default: Value
     unit: str
     meaning: str
-    scale: Scale
-    low: float = float("-inf")
+    scale: Scale  # "vector": as many numbers as the default has
+    low: float = float("-inf")  # both ends are allowed
     high: float = float("inf")
-    choices: tuple[Value, ...] = ()
-    online: bool = True
-    tunable: bool = True
-    sees: str = ""
+    choices: tuple[Value, ...] = ()  # of a categorical parameter
+    online: bool = True  # it may change between two frames
+    tunable: bool = True  # searches may change it
+    sees: str = ""  # "pixels" or "points" if it has an effect only with these
 
     @property
     def ours(self) -> bool:
@@ -55,8 +52,7 @@ class Param:
 
     @property
     def expected(self) -> str:
-        """The allowed values in words, for error messages: "one of a, b", "an integer from 1 to 5" or "a number from 0
-        to 1"."""
+        """The allowed values in words, for error messages."""
         if self.scale == "categorical":
             return "one of " + ", ".join(str(c) for c in self.choices)
         kind = "an integer" if self.scale == "int" else "a number"
@@ -64,12 +60,7 @@ class Param:
         return f"{kind} from {self.low:g} to {self.high:g}"
 
     def check(self, value: object, file: object = "") -> Value:
-        """Return the value as float, as int if scale is "int" (3.0 is allowed), or as a tuple of floats if it is
-        "vector"; a choice is returned as it is.
-
-        file: only for the error message, "" for none. Raises InputError if the value has a wrong type (a bool is no
-        number), is out of range (both ends are inside), is nan, or is no choice of the same type.
-        """
+        """Returns the value in the type of the parameter: 3.0 is allowed where scale is "int"; raises InputError."""
         if self.scale == "categorical":
             if any(type(value) is type(c) and value == c for c in self.choices):
                 return value  # type: ignore[return-value]
@@ -86,11 +77,7 @@ class Param:
         raise InputError(file=file, place=self.name, got=repr(value), expected=self.expected, remedy=remedy)
 
     def parse(self, text: str) -> Value:
-        """Return the value that `text` stands for: a choice, else a number, as int if scale is "int", else as float;
-        if scale is "vector" numbers, separated by commas.
-
-        True and False may be in lower case. Raises InputError if the text stands for no allowed value.
-        """
+        """Returns the value that a text stands for; numbers of a vector are separated by commas."""
         for choice in self.choices:
             if text == str(choice) or (isinstance(choice, bool) and text.lower() == str(choice).lower()):
                 return choice
@@ -103,16 +90,11 @@ class Param:
 
 
 class ParamUse(TypedDict, total=False):
-    """Optional keywords of `param`: where and when the parameter is used.
+    """Optional keywords of `param`."""
 
-    online: True (default) if it may change between two frames. tunable: True (default) if searches may change it.
-    sees: "pixels" or "points" if it has an effect only with these, and searches over others leave it out; "" (default):
-    it has an effect with both.
-    """
-
-    online: bool
-    tunable: bool
-    sees: Literal["", "pixels", "points"]
+    online: bool  # True (default) if it may change between two frames
+    tunable: bool  # True (default) if searches may change it
+    sees: Literal["", "pixels", "points"]  # with what alone it has an effect; searches over others leave it out
 
 
 def param(
@@ -123,12 +105,19 @@ def param(
     scale: Scale = "linear",
     **use: Unpack[ParamUse],
 ) -> Any:
-    """Return a dataclass field that declares a parameter with its default.
+    """Declares a parameter as a field of a config.
 
-    values: (low, high), both allowed, or the choices if scale is "categorical". unit, meaning: texts for the docs.
-    scale: how a search moves: "linear" or "log" for numbers, "int" for whole numbers, "categorical" for choices,
-    "vector" for a tuple of numbers, which no search moves. use: keywords online, tunable, sees, described at ParamUse.
-    The default itself is checked only when a config is created. Raises ValueError if a number has not two `values`.
+    Args:
+        default: Checked only when a config is created.
+        values: (low, high), both allowed, or the choices if scale is "categorical".
+        unit: For the docs.
+        meaning: For the docs; the word "ours" marks a departure from the paper.
+        scale: How a search moves: "linear" or "log" for numbers, "int" for whole numbers, "categorical" for choices;
+            "vector" for a tuple of numbers, which no search moves.
+        use: online, tunable, sees, as in `ParamUse`.
+
+    Raises:
+        ValueError: A number has not two `values`.
     """
     categorical = scale == "categorical"
     if scale == "vector":
@@ -140,11 +129,16 @@ def param(
 
 @dataclass(frozen=True)
 class Config:
-    """Base class of configs. A subclass is a frozen dataclass that sets `tracker` and declares its fields with `param`.
+    """Base class of configs: a subclass is a frozen dataclass that sets `tracker` and declares its fields with `param`.
 
-    tracker: name of the tracker, for files and messages. Creating a config converts numbers to float, or to int if the
-    scale is "int". It raises InputError if a value is not allowed or if `check` refuses the values together, and
-    WorkError if `check` raises anything but a FlockscopeError.
+    Numbers are converted to float, or to int if the scale is "int".
+
+    Attributes:
+        tracker: Name of the tracker, for files and messages.
+
+    Raises:
+        InputError: A value is not allowed, or `check` refuses the values together.
+        WorkError: `check` raises anything but a FlockscopeError.
     """
 
     tracker: ClassVar[str] = ""
@@ -156,31 +150,22 @@ class Config:
             self.check()
 
     def check(self) -> None:
-        """Raise InputError if the parameters contradict each other; a subclass overrides this. Here nothing
-        is checked."""
+        """Raises InputError if the parameters contradict each other; for subclasses."""
 
     @classmethod
     def params(cls) -> dict[str, Param]:
-        """Return all declared parameters by name, in order of the fields, inherited ones first.
-
-        Fields that are not declared with `param` are left out; {} if there is no parameter.
-        """
+        """Returns all parameters that are declared with `param` by name, inherited ones first."""
         found = [f for f in dataclasses.fields(cls) if "param" in f.metadata]
         return {f.name: dataclasses.replace(f.metadata["param"], name=f.name) for f in found}
 
     @classmethod
     def space(cls, *, online: bool = False) -> tuple[Param, ...]:
-        """Return the tunable parameters, in order of the fields; with `online` only those that may change between two
-        frames."""
+        """Returns the tunable parameters; with `online` only those that may change between two frames."""
         return tuple(p for p in cls.params().values() if p.tunable and (p.online or not online))
 
     @classmethod
     def known(cls, name: str, file: object = "") -> Param:
-        """Return the declared parameter of this name.
-
-        file: only for the error message, "" for none. Raises InputError, with the most similar name, if there is no
-        such parameter.
-        """
+        """Returns the declared parameter of this name; raises InputError with the most similar one, about `file`."""
         declared = cls.params()
         if name in declared:
             return declared[name]
@@ -189,46 +174,44 @@ class Config:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, object], file: object = "") -> Self:
-        """Return the config with these values by parameter name, and defaults for the others.
+        """Returns the config with these values by parameter name, and defaults for the others.
 
-        file: only for the error message, "" for none. Raises InputError for unknown names, values that are not allowed,
-        and values that contradict each other.
+        Raises:
+            InputError: A name is unknown, a value is not allowed, or values contradict each other; it names `file`.
         """
         return cls(**{name: cls.known(name, file).check(value, file) for name, value in values.items()})
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
-        """Return the config in a TOML file: optional `tracker = "name"` and a table [params]; the rest has its default.
+        """Returns the config in a TOML file; parameters that it lacks have their defaults.
 
-        Raises InputError if the file cannot be read, is no TOML, is of another tracker, or has unknown keys, or values
-        that are not allowed or contradict each other.
+        Raises:
+            InputError: The file cannot be read, is of another tracker or has other keys, or as `from_dict`.
         """
-        return cls.from_dict(read(path, cls.tracker), path)
+        return cls.from_dict(read_params(path, cls.tracker), path)
 
     @classmethod
     def preset(cls, name: str) -> Self:
-        """Return the preset of this name; "paper" switches every departure from the tracker's paper off.
+        """Returns the preset of this name; "paper" switches every departure from the tracker's paper off.
 
-        It is the file tracking/presets/NAME/TRACKER.toml; parameters that the file lacks have their defaults. Raises
-        InputError, with the known names, if the tracker has no such preset.
+        Raises:
+            InputError: The tracker has no such preset.
         """
         return cls.from_toml(preset_file(cls.tracker, name))
 
     @classmethod
     def load(cls, source: str | Path) -> Self:
-        """Return the preset of the name `source` if the tracker has one, else the config in the TOML file `source`.
+        """Returns the preset of the name `source` if the tracker has one, else the config in the TOML file `source`.
 
-        A file that has the name of a preset is given with a folder, as ./paper. Raises InputError if there is neither,
-        or as `from_toml`.
+        A file that has the name of a preset is given with a folder, as ./paper.
         """
         return cls.from_toml(file_of(cls.tracker, source))
 
     def with_set(self, *assignments: str) -> Self:
-        """Return a copy with assignments "name=value" applied, from left to right, and checked as a whole at the end.
+        """Returns a copy with assignments "name=value" or "tracker.name=value" applied, checked as a whole at the end.
 
-        A literal "tracker." at the very beginning, whatever the tracker is called, and spaces around name and value are
-        ignored; of two values for one name the last counts. Raises InputError for an assignment without "=", an unknown
-        name, a value that is not allowed, or values that contradict each other.
+        Raises:
+            InputError: An assignment has no "=", or as `from_dict`.
         """
         changes: dict[str, Any] = {}
         for assignment in assignments:
@@ -240,22 +223,16 @@ class Config:
         return dataclasses.replace(self, **changes)
 
     def as_dict(self) -> dict[str, Value]:
-        """Return the values of all parameters by name, in order of the fields."""
+        """Returns the values of all parameters by name, in order of the fields."""
         return {name: getattr(self, name) for name in self.params()}
 
     def to_toml(self) -> str:
-        """Return the text of a TOML file, with the tracker's name and all values, from which `from_toml` reads an equal
-        config.
-        """
+        """Returns the text of a TOML file from which `from_toml` reads an equal config."""
         return toml_text(self.tracker, self.as_dict())
 
     @classmethod
     def table(cls) -> str:
-        """Return all parameters as a Markdown table for the docs: parameter, default, range, unit, meaning.
-
-        The range of a categorical parameter lists its choices; " (log)" follows the range if scale is "log". A column
-        for each preset of the tracker follows the default; it is empty where the preset leaves the default.
-        """
+        """Returns all parameters as a Markdown table for the docs: default, presets, range, unit, meaning."""
         named = {name: cls.preset(name).as_dict() for name in presets(cls.tracker)}
         head = ["parameter", "default", *(f"preset `{name}`" for name in named), "range", "unit", "meaning"]
         rows = [head, ["---"] * len(head)]
@@ -267,7 +244,50 @@ class Config:
 
 
 def _range(p: Param) -> str:
-    """Returns the range of a parameter, or its choices, as a cell of a Markdown table; " (log)" follows if scale is
-    "log"."""
     span = ", ".join(f"`{c}`" for c in p.choices) if p.choices else f"{p.low:g} to {p.high:g}"
     return span + (" (log)" if p.scale == "log" else "")
+
+
+def read_params(path: str | Path, tracker: str) -> dict[str, object]:
+    """Returns the table [params] of a TOML file of this tracker, unchecked; {} if there is none."""
+    content = parse(Path(path))
+    name = content.pop("tracker", tracker)
+    if name != tracker:
+        remedy = "give the file to the tracker it was made for"
+        raise InputError(file=path, place="tracker", got=repr(name), expected=tracker, remedy=remedy)
+    values = content.pop("params", {})
+    if content or not isinstance(values, dict):
+        got, remedy = ", ".join(content) or "params", "put the parameters under [params]"
+        raise InputError(file=path, got=got, expected="tracker and [params]", remedy=remedy)
+    return values
+
+
+def toml_text(tracker: str, values: Mapping[str, object]) -> str:
+    """Returns the text of a TOML file with the tracker's name and all values."""
+    lines = [f"{name} = {toml_value(value)}" for name, value in values.items()]
+    return "\n".join([f"tracker = {toml_value(tracker)}", "", "[params]", *lines, ""])
+
+
+def presets(tracker: str) -> tuple[str, ...]:
+    """Returns the names of the presets of a tracker, sorted; () if it has none."""
+    return tuple(sorted(found.parent.name for found in PRESETS.glob("*/*.toml") if found.stem == tracker))
+
+
+def preset_file(tracker: str, name: str) -> Path:
+    """Returns the file of the preset `name` of a tracker. Raises InputError, with the known names, if there is none."""
+    known = presets(tracker)
+    if name not in known:
+        expected = "one of " + ", ".join(known) if known else f"nothing: {tracker} has no presets"
+        raise InputError(place="preset", got=name, expected=expected, remedy="check the name")
+    return PRESETS / name / f"{tracker}.toml"
+
+
+def file_of(tracker: str, source: str | Path) -> Path:
+    """Returns the file of the preset that a text `source` names, else the path `source`."""
+    known = presets(tracker)
+    if isinstance(source, str) and source in known:
+        return preset_file(tracker, source)
+    if known and not os.path.exists(source):
+        expected = f"a parameter file, or a preset of {tracker}: {', '.join(known)}"
+        raise InputError(file=source, got="No such file or directory", expected=expected, remedy="check the path")
+    return Path(source)

@@ -25,21 +25,12 @@ T = TypeVar("T")
 def option(
     help: str, *, low: float | None = None, below: float | None = None, metavar: str | None = None
 ) -> dict[str, Any]:
-    """Returns the metadata of a dataclass field for an option, with the keys help, low, below, metavar.
-
-    help: text for users. low, below: the range of a number, `low` included and `below` excluded; None is no limit, and
-    without `low` nothing is checked. metavar: what stands for the value in the help of a command, None for the default.
-    """
+    """Returns the metadata of a dataclass field for an option, with the keys help, low, below, metavar."""
     return {"help": help, "low": low, "below": below, "metavar": metavar}
 
 
 def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
-    """Returns an instance of the options dataclass `kind` with the given values by name and otherwise its defaults.
-
-    function: name of the function for the error message. Raises InputError if a name is no option, with the most
-    similar option, or if an option without default is missing. Types and ranges are checked only by the dataclass
-    itself.
-    """
+    """Returns an instance of the options dataclass `kind` with the given values by name and otherwise its defaults."""
     known = [f for f in fields(kind) if f.init]  # type: ignore[arg-type]
     names = [f.name for f in known]
     for name in given:
@@ -53,12 +44,7 @@ def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
 
 
 def check_ranges(options: Any) -> None:
-    """Raises InputError at the first number, in order of the fields, of an options dataclass that lies outside its
-    declared range; else returns nothing.
-
-    The message names the option with two hyphens, for example `--trials`. nan lies outside every range. Options without
-    a lower limit are not checked. Of an option with one, anything but a number (None, a text) raises TypeError.
-    """
+    """Raises InputError at the first number of an options dataclass that lies outside its declared range."""
     for f in fields(options):
         low, below, value = f.metadata.get("low"), f.metadata.get("below"), getattr(options, f.name)
         if low is None or (value >= low and (below is None or value < below)):
@@ -68,12 +54,9 @@ def check_ranges(options: Any) -> None:
 
 
 def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
-    """Returns a decorator that gives a function the signature and, in its docstring, the list of options of a
-    dataclass.
+    """Returns a decorator that gives a function the signature and the list of options of a dataclass.
 
-    kind: the options dataclass. positional: so many of the first options may be given without their name. A first
-    parameter `self` is kept. The decorator returns the same function with `__signature__` and `__doc__` replaced; it
-    still takes what it was written to take.
+    The first `positional` options may be given without their name. A first parameter `self` is kept.
     """
 
     def decorate(function: F) -> F:
@@ -88,8 +71,7 @@ def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
 
 
 def options_text(kind: type) -> str:
-    """Returns the options of an options dataclass, one a line: "name=default: help text", without "=default" if
-    required."""
+    """Returns the options of an options dataclass, one a line."""
     return "\n".join(f"{f.name}{'' if _required(f) else f'={f.default!r}'}: {f.metadata['help']}" for f in fields(kind))
 
 

@@ -17,8 +17,8 @@ import numpy as np
 
 from sim.types import EVENT_KINDS, Context, DetectionMode, Detections, Frame, Groups, Ints, Sequence, Tracks, Truth
 from tracking.grouping.foot_points import groups_of_people
-from tracking.prepare import prepare
-from tracking.run import TrackingRun
+from tracking.running.prepare import prepare
+from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import Scorer
 from tracking.scoring.one_plane import in_one_plane
 from tracking.scoring.people_comparison import Similarity
@@ -46,14 +46,7 @@ class _Detections:
 
 
 def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None) -> TrackingRun:
-    """Returns the oracle's tracks of a sequence with truth.
-
-    given: the content of run.json of the run beside which it stands: "input", "detections" (the mode), "sensor" and
-    "seed" say what that tracker got; {} stands for the stored detections, else the labels. similarity: as of
-    `evaluate`.
-
-    Raises InputError if the sequence has no such detections.
-    """
+    """Returns the oracle's tracks of a sequence with truth."""
     truth = sequence.truth
     assert truth is not None, "an oracle knows the truth"
     mode: DetectionMode = given.get("detections") or ("file" if sequence.has_detections else "truth")
@@ -80,7 +73,6 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
 
 
 def _named(t: Tracks, id: Ints, group: Ints, row: Ints) -> Tracks:
-    """Returns tracks with the ids and groups of the true people in these rows (N,); those of row -1 are left out."""
     kept = row >= 0
     box = None if t.box is None else t.box[kept]
     return t.replace(
@@ -90,7 +82,6 @@ def _named(t: Tracks, id: Ints, group: Ints, row: Ints) -> Tracks:
 
 
 def _visible_places(truth: Truth, index: int) -> Tracks:
-    """Returns the true places on the ground of the people visible in one frame, with true ids and groups."""
     assert truth.pos is not None, "people before a calibrated pair have places"
     rows = np.arange(len(truth.id))[truth.rows(index)]
     rows = rows[truth.visibility[rows] > 0]
@@ -101,7 +92,6 @@ def _visible_places(truth: Truth, index: int) -> Tracks:
 
 
 def _visible_boxes(truth: Truth, index: int) -> Tracks:
-    """Returns the boxes of what is visible of each person in one frame, with true ids and groups."""
     box = truth.box if truth.visible_box is None else truth.visible_box
     assert box is not None, "people in pictures have boxes"
     rows = np.arange(len(truth.id))[truth.rows(index)]
@@ -114,6 +104,5 @@ def _visible_boxes(truth: Truth, index: int) -> Tracks:
 
 
 def _with_events(t: Tracks, truth: Truth) -> Tracks:
-    """Returns tracks with the true events that start in their frame; neither events nor groups are derived."""
     events = tuple(replace(e, emitted=t.index) for e in truth.events or () if e.start == t.index)
     return t.replace(groups=groups_of_people(t), events=events, own_events=EVENT_KINDS)

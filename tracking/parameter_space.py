@@ -31,40 +31,25 @@ HALVINGS = 6
 
 
 def space_of(kind: type[Config], mode: DetectionMode | None = None, *, online: bool = False) -> Space:
-    """Return the tunable parameters of a config class that have an effect in this detection mode, in order of the
-    fields.
-
-    Mode "image" leaves out parameters for points, "file" and "truth" those for pixels, None leaves out none. online:
-    only parameters that may change between two frames.
-    """
+    """Returns the tunable parameters of a config class that have an effect in this detection mode."""
     without_effect = {"image": "points", None: None}.get(mode, "pixels")
     return tuple(p for p in kind.space(online=online) if p.sees == "" or p.sees != without_effect)
 
 
 def encode(space: Space, config: Config) -> Array:
-    """Return the vector (P,) in [-1, 1] of the config's values of the P parameters in `space`, in their order.
-
-    low is -1 and high 1; whole numbers and choices have the middle of their part of [-1, 1]. An empty space gives (0,).
-    """
+    """Returns the vector (P,) in [-1, 1] of the config's values of the P parameters in `space`, in their order."""
     return np.array([_to_unit(p, getattr(config, p.name)) for p in space])
 
 
 def decode(
     space: Space, action: ArrayLike, base: Config, allowed: Callable[[Config], object] = lambda config: None
 ) -> Config:
-    """Return the config at the vector `action` (P,), which is clipped to [-1, 1]; other parameters are those of `base`.
-
-    space: the P parameters, in the vector's order. allowed: a function of a config that raises InputError to refuse it.
-    A config is not allowed if its own `check` or `allowed` raises InputError. If the action's config is not allowed,
-    six bisections look for an allowed one on the line from `base`, which must be allowed, to the action. The farthest
-    one found is returned; `base` itself if none is.
-
-    Raises InputError if the action has another shape or is not finite.
-    """
+    """Returns the config at the vector `action` (P,), which is clipped to [-1, 1]."""
     point = _point(action, len(space))
     found = _attempt(space, point, base, allowed)
     if found is not None:
         return found
+    # The nearest allowed config on the line from `base` to a refused point, by bisection.
     origin, near, far, best = encode(space, base), 0.0, 1.0, base
     for _ in range(HALVINGS):
         share = (near + far) / 2
@@ -74,13 +59,7 @@ def decode(
 
 
 def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Callable[[Config], T]) -> tuple[Config, T]:
-    """Return the config at the vector `action` (P,), clipped to [-1, 1], and the result of `build` for it.
-
-    space: the P parameters, in the vector's order; other parameters are those of `base`. A config for which its own
-    check or `build` raises InputError is not allowed. Then the farthest allowed one that six bisections find on the
-    line from `base` to the action is taken, so that `build` may be called several times. Raises InputError if the
-    action has another shape or is not finite, or if only `base` is left and `build` refuses it.
-    """
+    """Returns the config at the vector `action` (P,), clipped to [-1, 1], and the result of `build` for it."""
     made: dict[Config, T] = {}
 
     def attempt(config: Config) -> None:
@@ -93,10 +72,6 @@ def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Calla
 
 
 def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config], object]) -> Config | None:
-    """Returns the config at a vector (P,) in [-1, 1], with other parameters as in `base`, or None if it is not allowed.
-
-    It is not allowed if its own check or `allowed` raises InputError.
-    """
     values = {p.name: _from_unit(p, float(a)) for p, a in zip(space, point, strict=True)}
     try:
         config = dataclasses.replace(base, **values)
@@ -107,10 +82,6 @@ def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config
 
 
 def _point(action: ArrayLike, size: int) -> Array:
-    """Returns the action as a vector (size,), clipped to [-1, 1].
-
-    Raises InputError if it is no array of numbers, has another shape or is not finite.
-    """
     try:
         point = np.asarray(action)
     except ValueError:  # rows of different lengths
@@ -126,11 +97,6 @@ def _point(action: ArrayLike, size: int) -> Array:
 
 
 def _to_unit(p: Param, value: Value) -> float:
-    """Returns the coordinate in [-1, 1] of a parameter's value: low is -1 and high 1, on a linear or logarithmic scale.
-
-    A whole number or choice has the middle of its part, where all have equal parts. Raises ValueError for a value that
-    is no choice.
-    """
     if p.scale == "categorical":
         return _middle(p.choices.index(value), len(p.choices))
     assert isinstance(value, int | float)
@@ -143,11 +109,6 @@ def _to_unit(p: Param, value: Value) -> float:
 
 
 def _from_unit(p: Param, a: float) -> Value:
-    """Returns the value of a parameter at a coordinate a in [-1, 1]: -1 is low and 1 high, on a linear or logarithmic
-    scale.
-
-    Whole numbers and choices divide [-1, 1] into equal parts. Other numbers are limited to the parameter's range.
-    """
     share = (a + 1) / 2
     if p.scale == "categorical":
         return p.choices[_part(share, len(p.choices))]
@@ -165,11 +126,8 @@ def _whole(p: Param) -> tuple[int, int]:
 
 
 def _middle(k: int, count: int) -> float:
-    """Returns the middle of part k (from 0) of the range [-1, 1] divided into `count` equal parts."""
     return (2 * k + 1) / count - 1
 
 
 def _part(share: float, count: int) -> int:
-    """Returns the index, from 0, of the part that contains `share`, if [0, 1] is divided into `count` equal parts; 1 is
-    in the last part."""
     return min(int(share * count), count - 1)

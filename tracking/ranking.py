@@ -19,35 +19,23 @@ from tracking.stats import FEWEST, joint_level, mean_interval, student
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """R runs in order of their means, best first; runs of equal mean in the order given. A mean is over sequences, or
-    the score of a single recording.
+    """R runs in order of their means over sequences, best first; runs of equal mean in the order given."""
 
-    - order (R,): index of each run as given. mean, low, high (R,): the mean and its own 95 % interval.
-    - first, last (R,): the range of ranks, from 1.
-    - less, less_low, less_high (R, R): mean of run i minus run j over the same sequences, with the joint interval.
-    - better (R, R): run i is surely better than run j.
-    - sequences: number of sequences in which all scores are known; only these count. 1 for a single recording.
-    """
-
-    order: Ints
-    mean: Array
+    order: Ints  # (R,) index of each run as given
+    mean: Array  # (R,), with its own 95 % interval
     low: Array
     high: Array
-    first: Ints
+    first: Ints  # (R,) range of ranks, from 1
     last: Ints
-    less: Array
+    less: Array  # (R, R) mean of run i minus run j over the same sequences, with the joint interval
     less_low: Array
     less_high: Array
-    better: Bools
-    sequences: int
+    better: Bools  # (R, R) run i is surely better than run j
+    sequences: int  # where all scores are known; only these count. 1 for a single recording
 
 
 def rank(values: Array, upwards: bool = True) -> Ranking:
-    """Returns the ranking of R runs by their scores on S sequences, values (R, S); nan where unknown.
-
-    upwards: a larger score is better. With fewer than 6 sequences (FEWEST) no difference is sure, so all runs share all
-    ranks.
-    """
+    """Returns the ranking of R runs by their scores on S sequences, values (R, S); nan where unknown."""
     known = np.isfinite(values).all(axis=0)
     scores = values[:, known]
     runs, count = scores.shape
@@ -58,11 +46,7 @@ def rank(values: Array, upwards: bool = True) -> Ranking:
 def ordered(
     own: tuple[Array, Array, Array], pairs: tuple[Array, Array, Array], upwards: bool, count: int, sure: bool = True
 ) -> Ranking:
-    """Returns the ranking of R runs by their means and intervals.
-
-    own: mean, low, high (R,). pairs: mean differences (R, R), row minus column, and the ends of their joint intervals.
-    count: number of sequences. sure: False if no difference is to be called sure.
-    """
+    """Returns the ranking of R runs by their means and intervals."""
     mean, own_low, own_high = own
     less, low, high = pairs
     runs = len(mean)
@@ -76,9 +60,6 @@ def ordered(
 
 
 def _joint_intervals(scores: Array) -> tuple[Array, Array, Array]:
-    """Returns the mean differences (R, R) of runs' scores (R, S), row minus column, and the ends of their intervals,
-    which hold all together with the probability LEVEL. The ends are nan for fewer than two sequences.
-    """
     runs, count = scores.shape
     if count < 2:
         unknown = np.full((runs, runs), np.nan)

@@ -21,9 +21,7 @@ from tracking.stats import DRAWS, LEVEL, Scale, block_intervals, joint_level
 
 
 def scale_of(score: Score) -> Scale:
-    """Returns the scale of a score of the catalogue: "share" (0 to 1), "below one" (any value up to 1), "count",
-    "length" (0 or more), or "plain".
-    """
+    """Returns on which scale the error of a score is nearly symmetric."""
     if score.unit == "count":
         return "count"
     if score.unit == "1":
@@ -38,22 +36,14 @@ SCALES = tuple(map(scale_of, ALL))
 def recording_intervals(
     truth: Truth, score: Callable[[Array], Array], draws: int = DRAWS
 ) -> tuple[Array, Array, Array]:
-    """Returns the scores (K,) of one recording, and the low and the high ends (K,) of their 95 % intervals.
-
-    truth: of the recording. score: from weights (D, length) of its frames to all scores (D, K), nan where unknown, as
-    `weighted_scorer` gives it. draws: number of draws of weights.
-    """
+    """Returns the scores (K,) of one recording, and the low and the high ends (K,) of their 95 % intervals."""
     return block_intervals(score, truth.length, truth.fps, _presence(truth), draws, SCALES)
 
 
 def recording_differences(
     truth: Truth, first: Callable[[Array], Array], second: Callable[[Array], Array], draws: int = DRAWS
 ) -> tuple[Array, Array, Array]:
-    """Returns the differences (K,) of the scores of two runs of one recording, first minus second, and the low and the
-    high ends (K,) of their 95 % intervals.
-
-    first, second: as `score` in `recording_intervals`. Both get the same weights in each draw.
-    """
+    """Returns the differences (K,) of two runs of one recording, first - second, and their 95 % intervals."""
 
     def difference(weights: Array) -> Array:
         return first(weights) - second(weights)
@@ -64,11 +54,7 @@ def recording_differences(
 def recording_rankings(
     truth: Truth, scores: Sequence[Callable[[Array], Array]], draws: int = DRAWS
 ) -> dict[str, Ranking]:
-    """Returns the ranking of R runs of one recording by each score of the catalogue.
-
-    scores: of each run, as `score` in `recording_intervals`. All get the same weights in each draw. The intervals of
-    all pairs hold together with 95 %.
-    """
+    """Returns the ranking of R runs of one recording by each score of the catalogue."""
     runs, keys = len(scores), len(ALL)
     pairs = list(combinations(range(runs), 2))
 
@@ -93,17 +79,11 @@ def recording_rankings(
 
 
 def _presence(truth: Truth) -> float:
-    """Returns the mean number of frames for which a person is present, also in frames between sparse labels."""
     return presence(truth.id) * truth.length / max(annotated_frames(truth).count, 1)
 
 
 def presence(id: Ints) -> float:
-    """Returns the mean number of frames for which a person is present, 1 without people.
-
-    id (R,): ids of people in frames, one row per person and frame. The mean is over these rows, so that a person counts
-    by the frames of its presence. For so long an error may last: a person who was confused with another stays so until
-    it leaves.
-    """
+    """Returns the mean number of frames for which a person is present, 1 without people."""
     if not len(id):
         return 1.0
     frames = np.bincount(numbered(id)[1])

@@ -37,14 +37,7 @@ Scale = Literal["share", "below one", "count", "length", "plain"]
 
 
 def mean_interval(values: Array) -> tuple[Array, Array, Array]:
-    """Return mean, low end and high end, (K,) each, of Student's 95 % intervals of the mean over S sequences; values
-    (S, K).
-
-    The ends are mean +- t s / sqrt(S), with the standard deviation s over sequences and the quantile t for S - 1
-    degrees of freedom. nan and infinite values are left out, for each column by itself. The ends of a column with fewer
-    than two numbers are nan; without any number the mean is nan, too. Average several runs of one sequence (tracker
-    seeds) before the call.
-    """
+    """Returns mean, low end and high end, (K,) each, of Student's 95 % intervals of the mean over S sequences."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     some, two = np.maximum(count, 1), np.maximum(count, 2)
@@ -56,34 +49,26 @@ def mean_interval(values: Array) -> tuple[Array, Array, Array]:
 
 
 def student(degrees: Array | float, level: Array | float = LEVEL) -> Array:
-    """Return the t with which Student's t, of so many degrees of freedom (above 0), lies within +- t with probability
-    `level`; of the shape that both have together.
-    """
+    """Returns the t with which Student's t, of so many degrees of freedom, lies within +- t at probability `level`."""
     from scipy.special import stdtrit
 
     return np.asarray(stdtrit(degrees, (1 + np.asarray(level)) / 2))
 
 
 def joint_level(count: int) -> float:
-    """Return the level of each of `count` intervals that hold all together with probability LEVEL (Bonferroni)."""
+    """Returns the level of each of `count` intervals that hold all together with probability LEVEL (Bonferroni)."""
     return 1 - (1 - LEVEL) / max(count, 1)
 
 
 def paired(first: Array, second: Array) -> tuple[Array, Array, Array]:
-    """Return mean, low end and high end, (K,) each, of second - first over the same S sequences; both (S, K).
-
-    The interval is Student's 95 % interval of the mean difference. Pairs with a nan or infinity are left out, for each
-    column by itself; with fewer than two pairs the ends are nan, without any the mean, too.
-    """
+    """Returns mean, low end and high end, (K,) each, of second - first over the same S sequences; both (S, K)."""
     return mean_interval(second - first)
 
 
 def wilson(hits: int, count: int) -> tuple[float, float, float]:
-    """Return the share of `hits` out of `count`, and the low and high end of its 95 % interval, within 0 to 1 (Wilson
-    1927).
+    """Returns the share of `hits` out of `count` and its 95 % interval (Wilson 1927): nan, 0 and 1 if count is 0.
 
-    hits: 0 to count. The interval holds all p with (share - p)^2 <= z^2 p (1 - p) / count, where z = 1.96 is the normal
-    quantile. If count is 0: nan, 0 and 1.
+    The interval holds all p with (share - p)² <= z² p (1 - p) / count, where z = 1.96 is the normal quantile.
     """
     if count == 0:
         return float("nan"), 0.0, 1.0
@@ -102,23 +87,7 @@ def block_intervals(
     scales: Sequence[Scale] | None = None,
     levels: Array | float = LEVEL,
 ) -> tuple[Array, Array, Array]:
-    """Return the scores (K,) of one recording, and the low and the high ends (K,) of their intervals.
-
-    score: takes weights (D, frames) of the frames, and returns scores (D, K), nan where undefined. It is called twice:
-    with weights of 1, and with `draws` draws. frames: number in the recording; fps: frames per second. likeness:
-    the number of frames for which errors persist. scales: the values that each score can have; None: any, as for a
-    difference of two trackers under equal weights. levels: confidence level of the intervals, one or (K,).
-
-    A draw puts together blocks of consecutive frames (circular block bootstrap, Politis & Romano 1992); a frame's
-    weight is how often it was drawn. With K blocks, the standard error s is the standard deviation over draws times
-    sqrt(K / (K - 1)). The interval is g(score) +- t s on a scale g on which the error is more symmetric: logit for
-    shares, -log(1 - x) for scores up to 1, the square root for counts, the logarithm for lengths. t is Student's
-    quantile for K - 1 degrees of freedom. The score always lies in its interval.
-
-    The ends are nan where no interval can be believed: the score is the same in all draws, as at the best or worst
-    value, or is undefined in more than 5 % of them. With less than two blocks all ends are nan. The random numbers are
-    fixed. Under SURE = 60 seconds the intervals are indicative.
-    """
+    """Returns the scores (K,) of one recording, and the low and the high ends (K,) of their intervals."""
     whole = np.asarray(score(np.ones((1, frames))), float)[0]
     ends = np.full((2, len(whole)), np.nan)
     block = block_length(frames, fps, likeness)
@@ -136,10 +105,7 @@ def block_intervals(
 
 
 def _ends(x: float, half: float, scale: Scale) -> tuple[float, float]:
-    """Returns the ends of the interval of a score x: g(x) +- half |g'(x)|, taken back by the inverse of g.
-
-    half: half the width on the plain scale. scale: chooses g. At a limit of its scale a score has no interval (nan).
-    """
+    """Returns the ends of the interval of a score x: g(x) +- half |g'(x)|, taken back by the inverse of g."""
     if scale == "share":
         if not 0 < x < 1:
             return float("nan"), float("nan")
@@ -158,26 +124,14 @@ def _ends(x: float, half: float, scale: Scale) -> tuple[float, float]:
 
 
 def block_length(frames: int, fps: float, likeness: float = 1.0) -> int:
-    """Return the length of a block in frames: twice `likeness`, but at least a twentieth and at most a fifth of the
-    recording.
-
-    frames: number in the recording, 0 gives 0; fps: frames per second. likeness: the number of frames for which errors
-    persist. An error across the end of a block is cut; in blocks of twice its length a sixth of the variance is lost.
-    A block is never shorter than 1 s, except in a recording of less than a second.
-    """
+    """Returns frames of a block: twice `likeness`, within a twentieth and a fifth of the recording."""
     few, many = BLOCKS
     wanted = min(max(ceil(2 * likeness), ceil(frames / many)), ceil(frames / few))
     return min(frames, max(1, ceil(SHORTEST_BLOCK * fps), wanted))
 
 
 def block_weights(frames: int, block: int, draws: int, r: np.random.Generator) -> Array:
-    """Return weights (draws, frames): how often each frame is drawn if blocks of `block` consecutive frames are put
-    together.
-
-    Blocks start at any frame; the first frame follows the last one, so that every frame is drawn equally often. The
-    last block of a draw is cut, so that each row sums up to `frames`. block: 1 to `frames`; frames: above 0. r: the
-    generator, which is advanced.
-    """
+    """Returns weights (draws, frames): how often each frame is drawn, in blocks of `block` consecutive frames."""
     count = -(-frames // block)
     starts = r.integers(0, frames, (draws, count))
     length = np.full(count, block)
@@ -186,5 +140,6 @@ def block_weights(frames: int, block: int, draws: int, r: np.random.Generator) -
     rows = np.arange(draws)[:, None]
     np.add.at(change, (rows, starts), 1.0)
     np.add.at(change, (rows, starts + length), -1.0)
+    # The first frame follows the last one, so that every frame is drawn equally often.
     weights = np.cumsum(change, axis=1)
     return np.asarray(weights[:, :frames] + weights[:, frames:-1])

@@ -31,7 +31,7 @@ from sim.sequence import simulate
 from sim.types import Detections, Frame
 from sim.types import Sequence as Recording
 from tracking.papers.blob.config import BlobConfig
-from tracking.prepare import prepare
+from tracking.running.prepare import prepare
 from tracking.stats import mean_interval
 
 PEERS = ("sort", "bytetrack", "ocsort")

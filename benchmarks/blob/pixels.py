@@ -24,7 +24,7 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Sequence as Recording
 from tracking.papers.blob.config import BlobConfig
-from tracking.run import track
+from tracking.running.run import track
 
 KEYS = "HOTA", "DetA", "AssA", "MOTA", "IDF1"
 ABLATIONS: dict[str, dict[str, object]] = {

@@ -24,7 +24,7 @@ from sim.workers.pool import process_pool
 from tracking.detect import background
 from tracking.detect.background_training import Trained, train
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.run import TrackingRun, track
+from tracking.running.run import TrackingRun, track
 from tracking.scoring import evaluate
 from tracking.scoring.one_plane import in_one_plane
 

@@ -34,8 +34,8 @@ from sim.scene.camera_placement import place_camera
 from sim.sequence import observe
 from sim.types import DetectionMode, Motion, Truth
 from sim.workers.pool import process_pool
-from tracking import tracker_registry
 from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.running import tracker_registry
 from tracking.stats import wilson
 
 DIFFERENCES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.6, 2.0)  # m/s

@@ -15,7 +15,7 @@ from sim.sequence import simulate
 from sim.types import DetectionMode
 from sim.types import Sequence as Recording
 from tracking.papers.joint.config import JointConfig
-from tracking.run import track
+from tracking.running.run import track
 from tracking.scoring import evaluate
 from tracking.stats import paired
 

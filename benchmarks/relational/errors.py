@@ -16,9 +16,9 @@ from sim.sequence import simulate
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
 from tracking.papers.relational.config import ParticleConfig
-from tracking.prepare import prepare
+from tracking.running.prepare import prepare
+from tracking.running.tracker_registry import find
 from tracking.stats import mean_interval, paired
-from tracking.tracker_registry import find
 
 FILTERS = ("particle", "relational")
 DIFFERENCE = "relational − particle"

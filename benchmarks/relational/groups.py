@@ -18,7 +18,7 @@ from sim.types import Array, Sequence, Tracks
 from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
 from tracking.grouping.link_rule import LinkRule
-from tracking.prepare import prepare
+from tracking.running.prepare import prepare
 from tracking.stats import paired
 
 COLUMNS = ("HOTA", "IDF1", "group_F1_hull", "pairwise_F1")
@@ -37,7 +37,7 @@ def tracked(
     name: str, seed: int, sequence: Sequence, given: argparse.Namespace, mode: str = "file", sensor: Any = None,
     further: int = 0,
 ) -> list[Tracks]:  # fmt: skip
-    """Returns the tracks of a tracker; mode, sensor: as of `tracking.prepare`; further: number of the filter seed."""
+    """Returns the tracks of a tracker; mode, sensor: as of `prepare`; further: number of the filter seed."""
     config = None if name == "blob" else config_of(name, given.counts[0], given)
     ready = prepare(name, sequence, params=config, detections=mode, sensor=sensor, seed=seed)
     ready.reset(seed + further * OFFSET)

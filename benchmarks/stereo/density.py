@@ -31,7 +31,7 @@ from sim.geometry.polygons import convex_hull
 from sim.scene.camera import project
 from sim.types import Camera, Tracks
 from sim.types import Sequence as Recording
-from tracking.run import track
+from tracking.running.run import track
 from tracking.scoring import evaluate
 from tracking.stats import mean_interval
 

@@ -30,7 +30,7 @@ from sim.sequence import simulate
 from sim.types import DetectionMode, Tracks
 from sim.types import Sequence as Recording
 from tracking.papers.stereo.config import StereoConfig
-from tracking.run import TrackingRun, track
+from tracking.running.run import TrackingRun, track
 from tracking.scoring import evaluate
 from tracking.stats import mean_interval
 

@@ -7,10 +7,9 @@ import dataclasses
 import pytest
 
 from scenarios.errors import InputError
-from tracking import parameter_files
-from tracking.config import Config, param
+from tracking.config import Config, param, preset_file, read_params
 from tracking.papers.blob.config import BlobConfig
-from tracking.tracker_registry import find, names
+from tracking.running.tracker_registry import find, names
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,7 +99,7 @@ WITH_PRESETS = [find(name).config_class for name in names()]
 @pytest.mark.parametrize("kind", WITH_PRESETS, ids=names())
 def test_the_paper_preset_names_every_parameter_that_is_ours(kind):
     """A parameter whose meaning says "ours" has its off value in the file, or a value without effect."""
-    given = parameter_files.read(parameter_files.preset_file(kind.tracker, "paper"), kind.tracker)
+    given = read_params(preset_file(kind.tracker, "paper"), kind.tracker)
     ours = {name for name, p in kind.params().items() if p.ours}
     assert ours
     assert not ours - given.keys(), "give them their off values in tracking/presets/paper"

@@ -14,8 +14,8 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tracking.environment.env import TuningEnv
-from tracking.prepare import prepare
-from tracking.tracker_registry import find, names
+from tracking.running.prepare import prepare
+from tracking.running.tracker_registry import find, names
 
 PICTURES = [
     "camera.fps=5", "duration=3", "camera.image=[240,180]", "camera.focal_px=200", "camera.height=6",

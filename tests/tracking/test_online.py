@@ -12,8 +12,8 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context
 from tracking.parameter_space import decode
-from tracking.prepare import prepare
-from tracking.tracker_registry import find, names
+from tracking.running.prepare import prepare
+from tracking.running.tracker_registry import find, names
 
 POINTS = ["camera.fps=5", "duration=4", "sensor.detect_prob=0.9", "sensor.clutter_rate=1"]
 PIXELS = ["camera.fps=5", "duration=2", "camera.image=[160,120]"]

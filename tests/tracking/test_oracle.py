@@ -9,7 +9,7 @@ import tracking
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tracking.oracle import oracle
-from tracking.run import track
+from tracking.running.run import track
 from tracking.scoring import evaluate
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scenarios.errors import InputError
 from tracking.config import Config, param
 from tracking.parameter_space import decode, encode
-from tracking.tracker_registry import find, names
+from tracking.running.tracker_registry import find, names
 
 CONFIGS = [find(name).config_class for name in names()]
 

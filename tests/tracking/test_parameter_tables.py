@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tracking.app.constants_page import constants_table
 from tracking.config import Config
-from tracking.constants_table import constants_table
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
@@ -42,5 +42,5 @@ def test_the_page_holds_the_table(config: type[Config], page: str) -> None:
 )
 def test_the_page_of_a_tracker_holds_its_constants(package: str, page: str) -> None:
     assert constants_table(package) in (REFERENCE / "trackers" / page).read_text(encoding="utf-8"), (
-        f"put the output of python -m tracking.constants_table {package} into the page"
+        f"put the output of python -m tracking.app.constants_page {package} into the page"
     )

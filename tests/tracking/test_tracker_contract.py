@@ -22,9 +22,9 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import DetectionMode, Frame, Sequence, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups
-from tracking.prepare import PreparedTracker, prepare
-from tracking.run import track
-from tracking.tracker_registry import find, names
+from tracking.running.prepare import PreparedTracker, prepare
+from tracking.running.run import track
+from tracking.running.tracker_registry import find, names
 
 FPS = 5
 LENGTHS = {"file": 30, "image": 12}

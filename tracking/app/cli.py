@@ -13,8 +13,14 @@ import typer
 
 from tracking.app.command_options import (
     CocoOptions,
+    FitGroupingOptions,
+    FitJointOptions,
+    FitRelationalOptions,
+    FitSensorOptions,
     GenerateOptions,
     GroupOptions,
+    Json,
+    Out,
     OverlayOptions,
     ReplayCommandOptions,
     ScenariosOptions,
@@ -26,9 +32,7 @@ from tracking.app.command_options import (
 )
 from tracking.app.command_result import INTERRUPTED, CommandResult
 from tracking.app.commands.tune import tune
-from tracking.app.fit_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.options_from_dataclass import options_from
-from tracking.app.shared_options import Json, Out
 from tracking.app.strict_command import StrictTyper
 
 app = StrictTyper(
@@ -61,8 +65,7 @@ def _start(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Takes the options of the command itself: --version prints the version and ends the command line with
-    exit code 0."""
+    """Takes the options of the command itself."""
 
 
 @app.command()
@@ -131,7 +134,7 @@ app.command()(tune)
 @options_from(ReplayCommandOptions)
 def replay(options: ReplayCommandOptions) -> CommandResult:
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
-    from tracking.app.commands.replay import replay
+    from tracking.app.commands.datasets import replay
 
     return replay(options)
 
@@ -158,7 +161,7 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
 @options_from(FitJointOptions)
 def fit_joint(options: FitJointOptions) -> CommandResult:
     """Learn the merges and splits of the tracker joint from simulated truth."""
-    from tracking.app.commands.fit_joint import fit_joint
+    from tracking.app.commands.fit import fit_joint
 
     return fit_joint(options)
 
@@ -167,7 +170,7 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
 @options_from(FitRelationalOptions)
 def fit_relational(options: FitRelationalOptions) -> CommandResult:
     """Learn the speed table and the relations of the tracker relational from simulated truth."""
-    from tracking.app.commands.fit_relational import fit_relational
+    from tracking.app.commands.fit import fit_relational
 
     return fit_relational(options)
 
@@ -241,23 +244,14 @@ def webdataset(options: WebdatasetOptions) -> CommandResult:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Runs one command line, prints its result on stdout or its error on stderr, and returns the exit code.
-
-    arguments: the words after `flockscope`; none: the help is printed. Exit codes: 0 done; 1 the work failed or a check
-    found problems; 2 wrong input or usage; 130 Ctrl-C. Errors are not raised. Only if the environment variable
-    FLOCKSCOPE_DEBUG is set, an unexpected exception is raised.
-    """
+    """Runs one command line, prints its result on stdout or its error on stderr, and returns the exit code."""
     from tracking.app.command_runner import run_command
 
     return run_command(app, list(arguments) or ["--help"])
 
 
 def main() -> None:
-    """Runs the command line of this process (sys.argv) and never returns: the process ends with the command's exit
-    code.
-
-    Raises SystemExit for that. After Ctrl-C (code 130) it ends the process at once, without exit handlers.
-    """
+    """Runs the command line of this process (sys.argv) and never returns."""
     _open_streams()
     code = run(sys.argv[1:])
     if code == INTERRUPTED:
@@ -267,12 +261,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Opens stdin, stdout and stderr if the caller has closed them, else a file would take their number and get what is
-    printed; and lets both print every character.
-
-    A closed stdout then fails when it is written, a closed stderr swallows all. A character that their encoding lacks
-    is printed as an escape.
-    """
+    # A file that is opened later would take the number of a closed stream, and get what is printed.
     for number, mode in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
         try:
             os.fstat(number)

@@ -12,40 +12,99 @@ from typing import Annotated, Literal
 
 import typer
 
-from tracking.app.shared_options import (
-    Background,
-    BoxFactor,
-    Calibration,
-    Cluster,
-    Detections,
-    Detector,
-    Fps,
-    Images,
-    Out,
-    Params,
-    People,
-    PersonClass,
-    Probabilities,
-    Processes,
-    Rule,
-    Scale,
-    Set,
-    Source,
-    StepTimeout,
-    Streams,
-    Tracker,
-    Tracks,
-    Workers,
-)
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
+Set = Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a value. Can be given several times.")]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
+Source = Annotated[
+    Path, typer.Argument(metavar="SOURCE", help="Sequence or dataset: generated, MOT, video, BIWI, CAVIAR.")
+]
+People = Annotated[
+    Path, typer.Argument(metavar="SOURCE|TRACKS", help="Labelled people, MOT text with ids, or output of `track`.")
+]
+Tracker = Annotated[
+    str, typer.Argument(metavar="TRACKER", help="Name of a tracker, or file.py:Class, or module:Class.")
+]
+Tracks = Annotated[Path | None, typer.Argument(metavar="TRACKS", help="Output of `track`, or MOT text.")]
+Detections = Annotated[
+    Literal["image", "truth", "file"] | None,
+    typer.Option(
+        help="Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow."
+    ),
+]
+Fps = Annotated[
+    float | None,
+    typer.Option("--fps", help="Frames per second of a recording, in place of its own. Not for generated sequences."),
+]
+Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metre of a recording without a camera.")]
+PersonClass = Annotated[
+    int | None,
+    typer.Option("--class", min=0, metavar="N", help="Class of people (column 8) in MOT texts. Default: 1."),
+]
+BoxFactor = Annotated[
+    str | None,
+    typer.Option(
+        "--box-scale",
+        metavar="X|X,Y",
+        help="Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.",
+    ),
+]
+Calibration = Annotated[
+    Path | None,
+    typer.Option("--camera", metavar="FILE", help="Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair."),
+]
+Detector = Annotated[
+    Path | None, typer.Option("--sensor", metavar="FILE.toml", help="Detector profile, as `fit sensor` writes it.")
+]
+Workers = Annotated[
+    int, typer.Option("--workers", min=1, help="Processes. On a cluster: the least number of tasks at a time.")
+]
+Processes = Annotated[int, typer.Option("--workers", min=1, help="Processes that share the sequences.")]
+Cluster = Annotated[
+    str | None,
+    typer.Option("--cluster", metavar="tcp://HOST:PORT", help="Scheduler of a dask cluster that does the work."),
+]
+StepTimeout = Annotated[
+    float | None,
+    typer.Option(
+        "--step-timeout",
+        metavar="SECONDS",
+        help="Stop a tracker whose reset or step takes longer. It then runs in a process of its own.",
+    ),
+]
+Streams = Annotated[
+    str,
+    typer.Option(
+        "--streams", metavar="A,B,…", help="Pictures to store: left, right, disparity, ids, background; or none."
+    ),
+]
+Images = Annotated[
+    Literal["jpg", "png", "mp4"] | None,
+    typer.Option(help="Format of left, right and background pictures. Default: jpg."),
+]
+Rule = Annotated[
+    Path | None,
+    typer.Option(
+        "--grouping",
+        metavar="rule|belief|FILE.toml",
+        help="What derives groups (default: belief), or a file of `tune grouping` or `fit grouping`.",
+    ),
+]
+Probabilities = Annotated[
+    bool, typer.Option("--probabilities", help="Store the probability that two people belong together.")
+]
+Params = Annotated[
+    str | None,
+    typer.Option("--params", metavar="FILE.toml|PRESET", help="The tracker's parameters: a file, or paper."),
+]
+Background = Annotated[
+    str | None,
+    typer.Option("--background", metavar="first:N|spread:N", help="Frames a background model is trained on."),
+]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScenariosOptions:
-    """Options of the command `scenarios`, which lists scenarios and suites, or explains one.
-
-    name: scenario, *.toml file or suite to explain; None: list all. settings: texts "key=value" for it, [] if absent.
-    out: SVG file for a drawing; None: no drawing. schema: list every key of a scenario file instead.
-    """
+    """Options of `scenarios`."""
 
     name: Annotated[str | None, typer.Argument(help="Scenario, *.toml file or suite to explain.")] = None
     settings: Set = field(default_factory=list)
@@ -57,13 +116,7 @@ class ScenariosOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class GenerateOptions:
-    """Options of the command `generate`, which simulates scenarios and stores them as a dataset.
-
-    names: scenarios, *.toml files or suites. seeds: "A:B" (A to B - 1) or one number. out: folder to write. settings:
-    texts "key=value". sensor: file of a detector profile; None: the scenario's own. streams: names of the pictures to
-    store, or "none". images: format of pictures; None: jpg. stride: N stores every N-th frame. workers: number of
-    processes. cluster: address of a dask scheduler; None: this machine.
-    """
+    """Options of `generate`."""
 
     names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
     seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one seed.")]
@@ -81,18 +134,7 @@ class GenerateOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class TrackOptions:
-    """Options of the command `track`, which runs a tracker on a sequence or dataset and stores its tracks.
-
-    tracker: its name, file.py:Class or module:Class. source, out: paths. params: file of the tracker's parameters, or
-    name of a preset; None: its defaults. settings: texts "key=value". detections: "image", "truth" or "file"; None: the
-    first of image, file, truth that tracker and source allow. sensor: file of a detector profile, None if not given.
-    grouping: file of a rule that derives groups, None if not given. seed: of the tracker's and the sensor's random
-    numbers. fps: frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file;
-    None if not given. background: "first:N" or "spread:N", the frames that a background model is trained on; None if
-    not given. step_timeout: seconds that each reset and step of the tracker may take; None: no limit.
-    person_class: class of people in MOT texts; None: 1. box_scale: factor of the boxes in MOT texts; None: 1.
-    workers: number of processes.
-    """
+    """Options of `track`."""
 
     tracker: Tracker
     source: Source
@@ -115,13 +157,7 @@ class TrackOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class GroupOptions:
-    """Options of the command `group`, which finds the groups of people whose ids are known.
-
-    source: path of labelled people, a text with ids, or stored tracks. out: folder to write. grouping: file of the
-    parameters that decide who belongs together; None: the defaults. probabilities: store those of all pairs. fps:
-    frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration; None if not given.
-    person_class: class of people in MOT texts; None: 1. box_scale: factor of the boxes in MOT texts; None: 1.
-    """
+    """Options of `group`."""
 
     source: People
     out: Out
@@ -136,16 +172,7 @@ class GroupOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ScoreOptions:
-    """Options of the command `score`, which compares tracks with the truth.
-
-    truth: path. tracks: paths of runs or texts, or names of tracker classes; several are ranked. similarity: how people
-    are compared, "boxes", "ground" or "image"; None: by the data. group_match: how groups are compared, by "hull" or
-    "members". blocks: number of draws of blocks of frames for the intervals of a single recording; 0: no such
-    intervals. by: the score that ranks several runs; None: objective, or the part of it that all have. all: show each
-    sequence of a ranking. csv: file for all scores of a ranking. fps: frames per second; None: the recording's own.
-    px_per_m: pixels per metre; None if not given. person_class: class of people in MOT texts; None: 1. box_scale:
-    factor of the boxes in MOT texts; None: 1. workers: number of processes.
-    """
+    """Options of `score`."""
 
     truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")]
     tracks: Annotated[
@@ -187,16 +214,7 @@ class ScoreOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayCommandOptions:
-    """Options of the command `replay`, which renders recorded trajectories with a simulated camera and stores a
-    dataset.
-
-    source: recording or dataset. out: folder to write. camera: TOML file with [camera], [sensor], [light], [picture];
-    None: all defaults. seeds: "A:B" (A to B - 1) or one number. start: second at which to begin. duration: seconds to
-    replay; None: to the end. settings: texts "key=value". sensor: file of a detector profile, None if not given.
-    streams: names of the pictures to store, with commas, or "none". images: format of pictures; None: jpg. fps: frames
-    per second; None: the recording's own. calibration: file of a camera, for a recording that has boxes only; None if
-    not given.
-    """
+    """Options of `replay`."""
 
     source: Source
     out: Out
@@ -233,13 +251,7 @@ class ReplayCommandOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions:
-    """Options of the command `view`, which writes a page that replays sequences.
-
-    source: sequence or dataset. tracks: stored tracks; None: only the truth. out: HTML file, or a folder for several
-    sequences. video: pictures "inside" the page, "beside" it as a video file, "none", or "auto" (beside from 12 MB on).
-    fps: frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file; None if not
-    given.
-    """
+    """Options of `view`."""
 
     source: Source
     tracks: Tracks = None
@@ -257,11 +269,7 @@ class ViewOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class SheetOptions:
-    """Options of the command `sheet`, which draws several frames of a sequence in one picture.
-
-    source: sequence or dataset. out: PNG file, or a folder for several sequences. frames: number of frames to show, 1
-    to 64. fps: frames per second; None: the recording's own.
-    """
+    """Options of `sheet`."""
 
     source: Source
     out: Annotated[
@@ -273,13 +281,7 @@ class SheetOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class OverlayOptions:
-    """Options of the command `overlay`, which writes a video with tracks or truth drawn over the pictures.
-
-    source: sequence or dataset. tracks: stored tracks; None: only the truth. out: MP4 file, or a folder for several
-    sequences. truth: drawn "beside" the tracks, "over" the same picture, or "only" it; None: not drawn if there are
-    tracks. fps: frames per second; None: the recording's own. px_per_m: pixels per metre, camera: calibration file;
-    None if not given.
-    """
+    """Options of `overlay`."""
 
     source: Source
     tracks: Tracks = None
@@ -299,12 +301,7 @@ class OverlayOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class CocoOptions:
-    """Options of the command `export coco`, which writes COCO files.
-
-    folder: a sequence or dataset with labelled boxes. out: JSON file; with several splits, each has its own.
-    min_visibility: people less visible are left out, 0 to 1.
-    person_class: class of people in MOT texts; None: 1.
-    """
+    """Options of `export coco`."""
 
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A sequence or dataset with labelled boxes.")]
     out: Annotated[
@@ -322,11 +319,7 @@ class CocoOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class WebdatasetOptions:
-    """Options of the command `export webdataset`, which writes tar shards.
-
-    folder: a generated sequence or dataset. out: folder to write. shard_size: the largest shard, as "500MB" or "2GB"; a
-    larger sequence has its own. samples: a sample is a whole "sequence" or one labelled "frame".
-    """
+    """Options of `export webdataset`."""
 
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")]
     out: Out
@@ -339,3 +332,51 @@ class WebdatasetOptions:
     samples: Annotated[
         Literal["sequence", "frame"], typer.Option(help="A sample: a sequence with all its files, or a labelled frame.")
     ] = "sequence"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitSensorOptions:
+    """Options of `fit sensor`."""
+
+    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Recordings with gt and det, pooled.")]
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")]
+    fps: Fps = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitRelationalOptions:
+    """Options of `fit relational`."""
+
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.toml", help="File to write: parameters of relational, for --params.")
+    ]
+    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one seed.")] = (
+        "30000:30004"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitJointOptions:
+    """Options of `fit joint`."""
+
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.toml", help="File to write: parameters of joint, for --params.")
+    ]
+    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds of the scenes to fit to.")] = "30000:30002"
+    check: Annotated[str | None, typer.Option("--check", metavar="A:B", help="Other seeds, to score the fit with.")] = (
+        None
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitGroupingOptions:
+    """Options of `fit grouping`."""
+
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write, for --grouping.")]
+    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds of the scenes to fit to.")] = "30000:30002"
+    check: Annotated[str | None, typer.Option("--check", metavar="A:B", help="Other seeds, to score the fit with.")] = (
+        None
+    )

@@ -29,25 +29,15 @@ WIDTH = 160
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What a command returns.
+    """What a command returns."""
 
-    data: the content of the JSON object that --json prints, without its "status". text: what people see without --json,
-    a string or anything that the library rich can print; "" by default. It is printed letter by letter, markup of rich
-    and control characters included. code: the exit code, 0 (default), or 1 if a check found problems.
-    """
-
-    data: dict[str, Any]
-    text: Any = ""
-    code: int = 0
+    data: dict[str, Any]  # content of the JSON object that --json prints, without its "status"
+    text: Any = ""  # printed without --json: a string, letter by letter, or what rich can print
+    code: int = 0  # exit code: 0, or 1 if a check found problems
 
 
 def print_result(result: CommandResult, as_json: bool) -> int:
-    """Prints the result of a command on stdout and returns its exit code, 0 or 1.
-
-    as_json: print one JSON object, "status" ("ok" or "failed") and then result.data, with nan and infinity as null;
-    else result.text. Raises OSError if stdout cannot be written, as with a closed pipe or a full disk, and TypeError
-    for data that JSON cannot hold.
-    """
+    """Prints the result of a command on stdout and returns its exit code, 0 or 1."""
     if as_json:
         _print_json({"status": STATUS[result.code], **result.data})
     else:
@@ -57,11 +47,6 @@ def print_result(result: CommandResult, as_json: bool) -> int:
 
 
 def _rendered(tables: Any) -> str:
-    """Returns what the library rich prints of `tables`, anything it can print: as wide as the terminal and coloured
-    there, else 160 columns of plain text.
-
-    Every string in `tables`, as a cell, is printed letter by letter: as data, not as markup of rich.
-    """
     from rich.console import Console
     from rich.text import Text
 
@@ -77,11 +62,7 @@ def _rendered(tables: Any) -> str:
 
 
 def print_error(error: FlockscopeError, as_json: bool) -> int:
-    """Prints an error and returns its exit code, 2 for wrong input (InputError), 1 if the work failed.
-
-    as_json: print one JSON object with "status" ("refused" or "failed") and "error" (file, place, got, expected,
-    remedy) on stdout; else one line "error: ..." on stderr. Raises OSError if that cannot be written.
-    """
+    """Prints an error and returns its exit code, 2 for wrong input (InputError), 1 if the work failed."""
     if as_json:
         _print_json({"status": STATUS[error.exit_code], "error": error.as_dict()})
     else:
@@ -90,11 +71,7 @@ def print_error(error: FlockscopeError, as_json: bool) -> int:
 
 
 def print_interrupted(as_json: bool) -> int:
-    """Prints that Ctrl-C ended the command and that the same command continues; returns 130.
-
-    as_json: print one JSON object with "status" ("interrupted") and "error" (file, place, got, expected, remedy) on
-    stdout; else one line "interrupted: ..." on stderr. Raises OSError if that cannot be written.
-    """
+    """Prints that Ctrl-C ended the command and that the same command continues; returns 130."""
     remedy = "run the same command again: completed parts are kept"
     error = WorkError(got="an interruption", expected="to finish", remedy=remedy)
     if as_json:
@@ -105,11 +82,7 @@ def print_interrupted(as_json: bool) -> int:
 
 
 def as_flockscope_error(error: BaseException) -> FlockscopeError:
-    """Returns, not raises, the error for users that stands for an unexpected exception.
-
-    An OSError becomes a WorkError (exit code 1) if the disk or memory is full or the disk is broken, else an InputError
-    (exit code 2) about the path. Any other exception becomes a WorkError that calls it a bug.
-    """
+    """Returns, not raises, the error for users that stands for an unexpected exception."""
     if isinstance(error, OSError):
         return _system_error(error)
     remedy = f"this is a bug: {DEBUG}=1 shows where"
@@ -127,8 +100,6 @@ def _system_error(error: OSError) -> FlockscopeError:
 
 
 def _print_json(data: dict[str, Any]) -> None:
-    """Prints the data on stdout as one line of JSON. Control characters in texts, and characters that stdout cannot
-    encode, are escapes of JSON."""
     unicode = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
     text = json.dumps(as_json_value(data), ensure_ascii=not unicode, allow_nan=False)
     if not text.isprintable():
@@ -137,12 +108,7 @@ def _print_json(data: dict[str, Any]) -> None:
 
 
 def as_json_value(value: Any) -> Any:
-    """Returns a copy of the value in types that `json` can write.
-
-    Dictionaries (keys as text), lists, tuples and ranges (as lists) are converted entry by entry; numpy arrays and
-    numbers become lists and Python numbers; paths become text; nan and infinity become None. Any other value is
-    returned as it is, even if `json` cannot write it.
-    """
+    """Returns a copy of the value in types that `json` can write."""
     if isinstance(value, dict):
         return {str(key): as_json_value(v) for key, v in value.items()}
     if isinstance(value, list | tuple | range):

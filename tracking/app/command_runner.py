@@ -24,7 +24,7 @@ from tracking.app.command_result import (
     print_interrupted,
     print_result,
 )
-from tracking.interrupts import recorded_interrupts
+from tracking.running.interrupts import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
 LONGEST_WARNING = 400
@@ -32,15 +32,7 @@ LONGEST_WARNING = 400
 
 
 def run_command(app: typer.Typer, arguments: list[str]) -> int:
-    """Runs the command that the arguments name, prints its result or error, and returns its exit code.
-
-    app: the commands. arguments: the words after `flockscope`; with "--json" one JSON object is printed on stdout.
-    Beside --help or --version, "--json" is not passed on. Each UserWarning's text is printed once on stderr. Exit
-    codes: 0 done; 1 the work failed or a check found problems; 2 wrong input or usage; 130 Ctrl-C.
-
-    Raises nothing, unless the environment variable FLOCKSCOPE_DEBUG is set: then an error that stems from another
-    exception is raised instead of printed.
-    """
+    """Runs the command that the arguments name, prints its result or error, and returns its exit code."""
     as_json = "--json" in arguments
     if as_json and not HELP.isdisjoint(arguments):  # some levels of the command line know --help but not --json
         arguments = [argument for argument in arguments if argument != "--json"]
@@ -56,7 +48,6 @@ def run_command(app: typer.Typer, arguments: list[str]) -> int:
 
 
 def _run_and_print(app: typer.Typer, arguments: list[str], as_json: bool) -> int:
-    """Runs the command, prints its result or error, and returns its exit code; Ctrl-C passes as KeyboardInterrupt."""
     try:
         result = _run_quietly(app, arguments) if as_json else _run(app, arguments)
         return _print(result, as_json) if isinstance(result, CommandResult) else result
@@ -67,13 +58,6 @@ def _run_and_print(app: typer.Typer, arguments: list[str], as_json: bool) -> int
 
 
 def _run_quietly(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
-    """As `_run`, but leaves stdout to the JSON object: a help text becomes the result, other printed text goes to
-    stderr.
-
-    If the command printed itself (as --help) with exit code 0, returns a CommandResult whose data is {"text": what it
-    printed}. Raises FlockscopeError for everything that goes wrong, KeyboardInterrupt for Ctrl-C; printed text goes to
-    stderr then, too.
-    """
     printed = io.StringIO()
     try:
         with redirect_stdout(printed):
@@ -87,11 +71,6 @@ def _run_quietly(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
 
 
 def _run(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
-    """Returns the command's result, or the exit code of a command that printed itself, as --help does.
-
-    app: the commands. arguments: the words after `flockscope`. Raises FlockscopeError for everything that goes wrong
-    (InputError for wrong usage, see as_flockscope_error for other exceptions), KeyboardInterrupt for Ctrl-C.
-    """
     command: Any = typer.main.get_command(app)
     usage_error: Any = typer.BadParameter.__base__  # the class of all usage errors, typer's own or click's
     try:
@@ -110,18 +89,12 @@ def _run(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
 
 
 def _comes_from_interrupt(error: BaseException | None) -> bool:
-    """True if a KeyboardInterrupt (Ctrl-C) is the error itself or one of the exceptions that caused it;
-    False for None."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
 
 
 def _usage(error: Any) -> InputError:
-    """Returns the InputError for a wrong command line; a missing option or argument is named with its meaning.
-
-    error: the usage exception of typer or click, with its message.
-    """
     where = "flockscope" if error.ctx is None else error.ctx.command_path
     message = error.format_message().rstrip(".").removeprefix("Got ")
     got, expected, remedy = message[:1].lower() + message[1:], "a command line as in the help", f"see {where} --help"
@@ -134,11 +107,6 @@ def _usage(error: Any) -> InputError:
 
 
 def _print(result: CommandResult, as_json: bool) -> int:
-    """Prints the result and returns its exit code, 0 or 1. A closed pipe is no error.
-
-    as_json: one JSON object, else text. Any other failure to write, as a full disk, is printed on stderr, and 1 is
-    returned. After a failure stdout leads nowhere (os.devnull).
-    """
     try:
         return print_result(result, as_json)
     except OSError as error:
@@ -151,8 +119,6 @@ def _print(result: CommandResult, as_json: bool) -> int:
 
 
 def _print_warnings_once() -> Callable[..., None]:
-    """Returns a replacement for `warnings.showwarning` that prints each different text once, as "warning: TEXT" on
-    stderr. A long text is cut in the middle."""
     printed: set[str] = set()
 
     def warn(message: Warning | str, *_: object) -> None:

@@ -20,11 +20,6 @@ def command_sections() -> str:
 
 
 def _commands(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
-    """Yields (full name, command) of each command below a typer group, in order of declaration.
-
-    prefix: words before the name, with a space at the end, or "". A group inside the group is replaced by its commands:
-    "fit sensor".
-    """
     for name, command in group.commands.items():
         if hasattr(command, "commands"):
             yield from _commands(command, f"{prefix}{name} ")
@@ -40,8 +35,6 @@ def _section(name: str, command: Any) -> str:
 
 
 def _cell(text: str) -> str:
-    """Returns text for a cell of a Markdown table: on one line, white space as single spaces, "|" with a backslash
-    before it."""
     return " ".join(text.split()).replace("|", "\\|")
 
 

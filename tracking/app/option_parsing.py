@@ -14,11 +14,7 @@ SUBJECTS = ("tracker", "sensor", "scenario")
 
 
 def seeds(text: str, option: str = "--seeds") -> range:
-    """Returns the seeds of the text "a:b", a to b - 1 (empty if b <= a), or of one number, a range of length 1.
-
-    option: the option's name for the error message. Raises InputError for any other text, as a negative number or one
-    of more than 18 digits.
-    """
+    """Returns the seeds of the text "a:b", a to b - 1 (empty if b <= a), or of one number, a range of length 1."""
     found = re.fullmatch(r"([0-9]{1,18})(?::([0-9]{1,18}))?", text.strip())
     if found is None:
         raise InputError(
@@ -32,20 +28,13 @@ def seeds(text: str, option: str = "--seeds") -> range:
 
 
 def settings(texts: Iterable[str], default: str, subjects: Iterable[str]) -> list[tuple[str, str]]:
-    """Splits `--set` texts into pairs (subject, "key=value"), in the order given.
-
-    A key may start with "tracker.", "sensor." or "scenario."; that word is the subject and is removed. Any other key
-    belongs to the subject `default` and stays whole. subjects: those that the command allows. Raises InputError for a
-    text without "=" or without a key, for a subject that is not in `subjects`, and for a key that is given twice.
-    Values are not checked.
-    """
+    """Splits `--set` texts into pairs (subject, "key=value"), in the order given."""
     found = [_setting(text, default, tuple(subjects)) for text in texts]
     _refuse_repeated(found, default)
     return found
 
 
 def _refuse_repeated(settings: list[tuple[str, str]], default: str) -> None:
-    """Raises InputError if two settings (subject, "key=value") have the same subject and key."""
     earlier: dict[tuple[str, str], str] = {}
     for subject, text in settings:
         key, _, value = text.partition("=")
@@ -59,11 +48,7 @@ def _refuse_repeated(settings: list[tuple[str, str]], default: str) -> None:
 
 
 def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, str]:
-    """Returns (subject, "key=value") of one `--set` text: the subject is "tracker", "sensor" or "scenario" if the key
-    starts with that word and a dot, which are removed; else it is `default`.
-
-    Raises InputError if "=" or the key is missing, or the subject is not in `subjects`.
-    """
+    """Returns (subject, "key=value") of one `--set` text."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise InputError(
@@ -83,20 +68,13 @@ def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, s
 
 
 def scenario_settings(texts: Iterable[str]) -> list[str]:
-    """Returns `--set` texts of a command on scenarios as "key=value", in the order given.
-
-    The prefix "scenario." is removed, "sensor." is kept. Raises InputError for a text without "=" or without a key, for
-    a key that starts with "tracker.", and for a key that is given twice. Values are not checked.
-    """
+    """Returns `--set` texts of a command on scenarios as "key=value", in the order given."""
     found = settings(texts, "scenario", ("scenario", "sensor"))
     return [f"sensor.{text}" if subject == "sensor" else text for subject, text in found]
 
 
 def sensor_settings(file: Path | None) -> tuple[str, ...]:
-    """Returns the texts "sensor.key=value" of the file of `--sensor`, a detector profile in TOML; () for None.
-
-    Raises InputError if the file is missing, is no TOML with a table [sensor], or has a wrong key or value.
-    """
+    """Returns the texts "sensor.key=value" of the file of `--sensor`, a detector profile in TOML; () for None."""
     if file is None:
         return ()
     from scenarios import sensor_settings
@@ -105,12 +83,7 @@ def sensor_settings(file: Path | None) -> tuple[str, ...]:
 
 
 def pictures(streams: str, images: str | None) -> tuple[tuple[str, ...], str]:
-    """Returns (names of the streams, picture format) from the texts of `--streams` and `--images`.
-
-    streams: names with commas between them; "none" or empty names give none. The names themselves are not checked.
-    images: "jpg", "png" or "mp4"; None gives "jpg". Raises InputError if `images` is given and none of the streams is
-    stored in that format.
-    """
+    """Returns (names of the streams, picture format) from the texts of `--streams` and `--images`."""
     from sim.io.store.streams import coding
 
     words = () if streams.strip() == "none" else tuple(word.strip() for word in streams.split(",") if word.strip())
@@ -121,22 +94,14 @@ def pictures(streams: str, images: str | None) -> tuple[tuple[str, ...], str]:
 
 
 def toml_values(texts: Iterable[str]) -> dict[str, Any]:
-    """Returns texts "key=value" as a dictionary from key to value; of equal keys the last counts.
-
-    A key with dots, as "a.b", stays one key. A value is read as TOML; a bare word (a letter, then letters, digits or
-    _ . * : -) as a string. Raises InputError for a text that cannot be read so.
-    """
+    """Returns texts "key=value" as a dictionary from key to value; of equal keys the last counts."""
     from scenarios.loading.overrides import parse_setting
 
     return {".".join(steps): value for steps, value in map(parse_setting, texts)}
 
 
 def output_file(out: Path, suffix: str) -> Path:
-    """Returns `out` unchanged. Nothing is created.
-
-    suffix: the required ending with its dot, as ".html"; upper case is allowed in `out`. Raises InputError if `out` is
-    an existing folder or ends otherwise.
-    """
+    """Returns `out` if it is a file name with this suffix; else raises InputError."""
     is_folder = out.is_dir()
     if is_folder or out.suffix.lower() != suffix:
         got, better = (f"{out}, a folder", out / "page") if is_folder else (str(out), out.with_suffix(""))
@@ -146,10 +111,7 @@ def output_file(out: Path, suffix: str) -> Path:
 
 
 def output_folder(out: Path) -> Path:
-    """Returns `out` unchanged. Nothing is created; it need not exist.
-
-    Raises InputError if `out`, or its nearest parent that exists, is a file.
-    """
+    """Returns `out` if it is, or can become, a folder; else raises InputError."""
     existing = next(p for p in (out, *out.parents) if p.exists())
     if not existing.is_dir():
         raise InputError(

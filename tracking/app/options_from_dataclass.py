@@ -21,21 +21,14 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar, get_type_hints
 
+from tracking.app.command_options import Json
 from tracking.app.command_result import CommandResult
-from tracking.app.shared_options import Json
 
 T = TypeVar("T")
 
 
 def options_from(options: type[T]) -> Callable[[Callable[[T], CommandResult]], Callable[..., CommandResult]]:
-    """Returns a decorator for a command function that takes one instance of the dataclass `options`.
-
-    The decorated function takes one keyword argument per field, in the order of the fields, and builds the instance. A
-    field without a default is a required option, or a required argument if it is annotated with `typer.Argument`. A
-    `default_factory` is called once, when `options_from` is; Typer gets that value. Every command also takes `--json`,
-    which needs no field: `tracking.app.command_runner` reads it from the command line. Name and docstring stay those of
-    the command.
-    """
+    """Returns a decorator for a command function that takes one instance of the dataclass `options`."""
     parameters = _parameters(options)
 
     def decorate(command: Callable[[T], CommandResult]) -> Callable[..., CommandResult]:
@@ -54,8 +47,6 @@ def options_from(options: type[T]) -> Callable[[Callable[[T], CommandResult]], C
 
 
 def _parameters(options: type) -> list[inspect.Parameter]:
-    """Returns one keyword-only parameter per field of the dataclass `options`, in order, and then one for `json`, False
-    by default."""
     types = get_type_hints(options, include_extras=True)
     found = [_parameter(f.name, types[f.name], _default(f)) for f in dataclasses.fields(options)]
     return [*found, _parameter("json", Json, False)]
@@ -66,8 +57,6 @@ def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
 
 
 def _default(field: dataclasses.Field[Any]) -> Any:
-    """Returns the default of a dataclass field; a `default_factory` is called. `inspect.Parameter.empty` if it has
-    none."""
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
     return inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default

@@ -5,14 +5,17 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from scenarios.printable import printable
-from tracking.interrupts import raise_if_interrupted
+from tracking.running.interrupts import raise_if_interrupted
 
 if TYPE_CHECKING:
     from rich.progress import Progress
+
+    from sim.types import Sequence
 
 PATIENCE = 2.0
 """s before anything is shown."""
@@ -21,12 +24,16 @@ PAUSE = 10.0
 """s between lines if stderr is no terminal."""
 
 
+def total_frames(sequences: Iterable[Sequence]) -> int | None:
+    """Returns the number of frames of all sequences, None if one of them does not know its length."""
+    lengths = [sequence.length for sequence in sequences]
+    return None if None in lengths else sum(length or 0 for length in lengths)
+
+
 class ProgressMeter:
     """Counts finished items of a long work and shows them on stderr. A context manager; leaving it removes the bar.
 
-    On a terminal a bar appears 2 s after entering, from a thread; elsewhere `update` prints a line, at most every 10 s
-    and not in the first 2 s. what: name of the work. total: number of all items, None if unknown. done: items finished,
-    0 at first. item: name of the current item, "" for none. An instance can be entered once.
+    On a terminal a bar appears 2 s after entering, from a thread. Elsewhere `update` prints a line, at most every 10 s.
     """
 
     def __init__(self, what: str, total: int | None = None) -> None:
@@ -49,17 +56,11 @@ class ProgressMeter:
                 self._bar.stop()
 
     def step(self, item: str = "", amount: int = 1) -> None:
-        """Adds `amount` finished items (1 by default) and shows the count. item: name to show, "" for none.
-
-        Raises KeyboardInterrupt if the user has pressed Ctrl-C and Python lost it; then nothing is added.
-        """
+        """Adds `amount` finished items (1 by default) and shows the count. item: name to show, "" for none."""
         self.update(self.done + amount, self.total, item)
 
     def update(self, done: int, total: int | None, item: str = "") -> None:
-        """Sets the number of finished items, `done`, and of all items, `total` (None if unknown), and shows them.
-
-        item: name to show, "" for none. Raises KeyboardInterrupt if the user has pressed Ctrl-C and Python lost it.
-        """
+        """Sets the number of finished items, `done`, and of all items, `total` (None if unknown), and shows them."""
         raise_if_interrupted()
         self.done, self.total, self.item = done, total, printable(item)
         if self._bar is not None:
@@ -69,8 +70,6 @@ class ProgressMeter:
             print(f"{self.what}: {done}{'' if total is None else f' of {total}'} {self.item}".rstrip(), file=sys.stderr)
 
     def _show(self) -> None:
-        """Shows the bar if stderr is a terminal and the meter has not been left meanwhile. Runs in the
-        timer's thread."""
         if not sys.stderr.isatty():
             return
         from rich.console import Console

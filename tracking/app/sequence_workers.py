@@ -58,13 +58,7 @@ def over_sequences(
     source: OpenedAs,
     workers: int,
 ) -> Iterator[R]:
-    """Yields function(sequence, job) for each sequence and its job, in order.
-
-    sequences: all of the source. workers: number of processes; with 1 this process does the work. Other processes get
-    function and job as pickles and open the source once. Warnings of the function are given here, in order. Raises the
-    error of the first sequence that fails, in order; no sequence is begun after it is raised, and those under way are
-    finished. Raises WorkError, naming the sequence, if three processes died of one.
-    """
+    """Yields function(sequence, job) for each sequence and its job, in order."""
     from sim.workers.start import results_in_order, start_workers
 
     workers = min(workers, len(sequences))

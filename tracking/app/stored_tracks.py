@@ -1,4 +1,4 @@
-"""Finds stored tracks below a path, and matches them with sequences by name."""
+"""Finds stored tracks below a path, matches them with sequences by name, and chooses the folders of new ones."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from sim.io.files.output_paths import output_paths
 from sim.io.files.own_files import is_hidden
 from sim.io.formats.box_columns import BoxScale
+from sim.io.store.manifest import is_sequence
 from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
-from tracking.app.not_tracks import refuse_other_things
-from tracking.run import TrackingRun
+from tracking.running.run import TrackingRun
 
 DEPTH = 3
 """Tracks are looked for in this many levels of folders below the path."""
@@ -28,18 +29,20 @@ SHOWN = 3
 """Most parameters that the error on two configs names."""
 
 
+OTHER_FILES = (".toml", ".py", ".json", ".ini", ".html", ".svg", ".jpg", ".png", ".mp4", ".xml")
+"""Endings of files that hold no tracks."""
+
+DATASET = ("", "*", "*/*")
+"""Where a stored sequence lies below a sequence folder, a split of a dataset, or a dataset."""
+
+
 @dataclass(frozen=True)
 class StoredTracks:
-    """The stored tracks of one sequence, not read yet.
+    """The stored tracks of one sequence, not read yet."""
 
-    name: the sequence's name: from run.json, or else the name of the folder or, without suffix, of the text; None for a
-    file that the user gave itself. path: the folder with the tracks, or the file. info: the content of run.json as a
-    dictionary, empty for tracks of another program and for a run that was not finished.
-    """
-
-    name: str | None
-    path: Path
-    info: dict[str, Any]
+    name: str | None  # from run.json, else of the folder or text; None for a file that the user gave itself
+    path: Path  # the folder with the tracks, or the file
+    info: dict[str, Any]  # content of run.json; {} for tracks of another program and for a run that was not finished
 
     def check(self) -> None:
         """Raises InputError if these are tracks of a run of ours that is unfinished, damaged or mixed with another."""
@@ -48,14 +51,7 @@ class StoredTracks:
             check_run(folder)
 
     def read(self, sequence: Sequence, box_scale: BoxScale | None = None) -> TrackingRun:
-        """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`.
-
-        box_scale: factors of x and y of the boxes of a text of another program; None: 1. It has no effect on a run.
-
-        Whether a run is whole is left to `check`. Raises InputError if run.json states another frame rate or other
-        labels than the sequence's, or there are no tracks. Also if a MOTChallenge text has a frame beyond the
-        sequence's length, or an event's frame is outside the tracks. Warns about a text without rows.
-        """
+        """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`."""
         fps, seal = self.info.get("fps"), (self.path if self.path.is_dir() else self.path.parent) / RUN
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             raise InputError(
@@ -78,13 +74,7 @@ class StoredTracks:
 
 
 def find_tracks(path: Path) -> list[StoredTracks]:
-    """Returns all stored tracks at or below a path, not read yet, in the order of their paths; text files of a folder
-    come last.
-
-    path: a file of a run, a text in MOTChallenge format, a folder with a run or a tracks.txt, or a folder that holds
-    such folders or *.txt files, at most three levels down. Hidden folders are left out. Of a run only run.json is read.
-    Raises InputError if the path does not exist or holds no tracks, or if a run.json is damaged or has no seal.
-    """
+    """Returns all stored tracks at or below a path, not read yet, in the order of their paths."""
     if not path.exists():
         raise InputError(file=path, got="no such file or folder", expected=EXPECTED, remedy="check the path")
     refuse_other_things(path, EXPECTED)
@@ -97,11 +87,6 @@ def find_tracks(path: Path) -> list[StoredTracks]:
 
 
 def _below(folder: Path, depth: int) -> list[StoredTracks]:
-    """Returns the stored tracks in a folder and in `depth` levels of folders below it; none found: an empty list.
-
-    A folder with a run or a tracks.txt counts as one and is not searched further. Hidden folders are left out. Raises
-    InputError if a run.json is damaged or has no seal.
-    """
     if is_run(folder):
         info = read_run(folder) if (folder / RUN).is_file() else {}
         return [StoredTracks(info.get("sequence", folder.name), folder, info)]
@@ -115,15 +100,7 @@ def _below(folder: Path, depth: int) -> list[StoredTracks]:
 
 
 def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[tuple[Sequence, StoredTracks]]:
-    """Returns each sequence with the stored tracks of the same name, in the order of `sequences`; [] without sequences.
-
-    A single file that was given itself matches a single sequence whatever their names; otherwise its name is that
-    of the file without suffix. Tracks of other sequences are ignored. `stored` must not be empty if there is a
-    sequence.
-
-    Raises InputError if a sequence has no tracks, two of `stored` have the same name, a matched run is not whole, or
-    two matched runs have different trackers, parameters or grouping rules.
-    """
+    """Returns each sequence with the stored tracks of the same name, in the order of `sequences`."""
     if len(sequences) == len(stored) == 1 and stored[0].name is None:
         matched = [(sequences[0], stored[0])]
     else:
@@ -136,7 +113,6 @@ def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[
 
 
 def _by_name(stored: list[StoredTracks]) -> dict[str, StoredTracks]:
-    """Returns the stored tracks by the name of their sequence. Raises InputError if two have the same name."""
     found: dict[str, StoredTracks] = {}
     for each in stored:
         name = each.path.stem if each.name is None else each.name
@@ -150,11 +126,6 @@ def _by_name(stored: list[StoredTracks]) -> dict[str, StoredTracks]:
 
 
 def _named(sequence: Sequence, by_name: dict[str, StoredTracks], stored: list[StoredTracks]) -> StoredTracks:
-    """Returns the tracks of the sequence. Raises InputError if there are none; of an unfinished run among
-    `stored`, which cannot tell what it tracked, that it is unfinished.
-
-    If tracks have the name of the sequence's folder, the error names the seqinfo.ini that calls it otherwise.
-    """
     if sequence.name in by_name:
         return by_name[sequence.name]
     for each in stored:
@@ -172,10 +143,6 @@ def _named(sequence: Sequence, by_name: dict[str, StoredTracks], stored: list[St
 
 
 def _refuse_mixture(stored: Iterable[StoredTracks]) -> None:
-    """Raises InputError if two runs differ in tracker, config or grouping rule.
-
-    Tracks without run.json are left out.
-    """
     runs = [each for each in stored if each.info]
     for each in runs[1:]:
         first = runs[0]
@@ -192,10 +159,31 @@ def _method(stored: StoredTracks) -> list[Any]:
 
 
 def _method_words(stored: StoredTracks, other: StoredTracks) -> str:
-    """Returns the tracker's name and in brackets the first parameters that differ from those of `other`, at most 3."""
     mine, theirs = ({**(s.info.get("config") or {}), **(s.info.get("grouping") or {})} for s in (stored, other))
     tracker = str(stored.info.get("tracker"))
     if tracker != str(other.info.get("tracker")):
         return tracker
     changed = [f"{key} = {value}" for key, value in mine.items() if theirs.get(key) != value][:SHOWN]
     return f"{tracker} ({', '.join(changed)})" if changed else tracker
+
+
+def refuse_other_things(path: Path, expected: str) -> None:
+    """Raises InputError if the path is a generated sequence or dataset, or a file that cannot hold tracks."""
+    if path.is_file() and path.suffix.lower() in OTHER_FILES:
+        raise InputError(
+            file=path, got=f"a {path.suffix.lower()} file, no tracks", expected=expected, remedy="check the path"
+        )
+    folders = (folder for pattern in DATASET for folder in ([path] if not pattern else path.glob(pattern)))
+    if path.is_dir() and any(is_sequence(folder) for folder in folders):
+        raise InputError(
+            file=path, got="a generated dataset, no tracks", expected=expected,
+            remedy="give the --out of `flockscope track`",
+        )  # fmt: skip
+
+
+def run_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
+    """Returns the folder for each sequence's run: `out` itself if the source is one sequence, else one below it."""
+    own = Path(sequences[0].source.get("path", source))
+    if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
+        return [out]
+    return output_paths(out, [sequence.name for sequence in sequences], source=source)

@@ -45,7 +45,6 @@ class StrictCommand(TyperCommand):
 
 
 def _check_number(option: str, text: str) -> None:
-    """Raises InputError if a text that Python reads as a number has other characters than a number in a file may."""
     from sim.io.files.numeric_text import is_number_text
 
     if not is_number_text(text):

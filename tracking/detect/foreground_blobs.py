@@ -13,7 +13,7 @@ from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.divided_blobs import divided
 from tracking.detect.foreground import Foreground, convex_areas
 from tracking.detect.person_size import PersonSize
-from tracking.image_scale import required
+from tracking.running.image_scale import required
 
 
 class ForegroundBlobs:

@@ -4,8 +4,8 @@ An episode tracks one whole sequence. An action sets the parameters to search, e
 tracking.parameter_space). With decision_every=None one action before the first frame sets them all, and the episode is
 one step long. Else an action sets those that may change between frames, every `decision_every` frames. Observations are
 statistics of the run. A step's reward is S(frames so far) - S(frames before it), S being the objective of
-`tracking.evaluate` (mean of HOTA and group_F1), 0 for no frames; the rewards sum to it. `import tracking`
-registers it."""
+`tracking.evaluate` (mean of HOTA and group_F1), 0 for no frames; the rewards sum to it. `import tracking` registers it.
+"""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
 from sim.types import DetectionMode, Image, Tracker
 from tracking.config import Config
-from tracking.detection_mode import choose_mode
 from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, SourceCache
+from tracking.environment.episode_source import Source, SourceSpec, sources
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
-from tracking.episode_source import Source, SourceSpec, sources
 from tracking.keyword_options import documented, from_keywords, option
 from tracking.parameter_space import Space, decode, decode_and_build, encode, space_of
-from tracking.prepare import Params, config_of
+from tracking.running.detection_mode import choose_mode
+from tracking.running.prepare import Params, config_of
+from tracking.running.tracker_registry import checked, config_class, find
 from tracking.scoring.people_comparison import Similarity
-from tracking.tracker_registry import checked, config_class, find
 
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 OBSERVATIONS = ("statistics", "parameters", "none")
@@ -44,12 +44,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, kw_only=True)
 class TuningEnvOptions:
-    """The keyword arguments of the environment. tracker; suite: what is played; seeds (0 to 99), set: seeds and
-    "key=value" settings of scenarios; detections: the tracker's input, None chooses it; similarity: "ground",
-    "image" or "boxes", None by the data; params: to begin with, as for `tracking.track`; decision_every: frames between
-    actions, None: one action per episode; observation: "statistics", "parameters" (both) or "none"; cache: bytes of
-    sequences kept; tracker_seed: the same in all episodes; render_mode: "rgb_array" or None. InputError if one with
-    fixed values is unknown; others are checked when used."""
+    """The keyword arguments of the environment; the metadata of each field hold its meaning."""
 
     tracker: AnyTracker = field(metadata=option('Registered name, "file.py:Class", "module:Class" or a class.'))
     suite: SourceSpec | Source = field(
@@ -88,19 +83,23 @@ class TuningEnvOptions:
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
-    """An episode is one run of a tracker; an action, float32 (P,) in [-1, 1], sets its parameters; the reward is the
-    gain in score. Observations: float32 (K,), statistics in [0, 1] and parameters in [-1, 1]. Arguments: the fields of
-    TuningEnvOptions. State: sources, cache; config, rollout (the run, None before it) and score of the episode. Raises
-    InputError if an argument is wrong, there is no parameter to search, a source lacks the detections, or simulated
-    sources have seeds of two splits."""
+    """One episode is one run of a tracker: an action sets its parameters, the reward is the gain in score.
+
+    An action is float32 (P,) in [-1, 1], an observation float32 (K,): statistics in [0, 1] and parameters in [-1, 1].
+
+    State: sources, cache; config, rollout (the run, None before it) and score of the episode.
+    """
 
     metadata = METADATA
 
     @documented(TuningEnvOptions, positional=2)
     def __init__(self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", **options: Any) -> None:
-        """Makes the environment; the first episode begins with `reset`. tracker: a name, "file.py:Class",
-        "module:Class" or class. suite: what is played. options: other fields of TuningEnvOptions. Raises InputError if
-        an argument is unknown or wrong, no parameter can be searched, or a source is unreadable or lacks detections."""
+        """Makes the environment; the first episode begins with `reset`.
+
+        Raises:
+            InputError: An argument is unknown or wrong, no parameter can be searched, a source is unreadable or lacks
+                the detections, or simulated sources have seeds of two splits.
+        """
         given = from_keywords(TuningEnvOptions, "TuningEnv", {"tracker": tracker, "suite": suite, **options})
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
         self.tracker_seed, self.decision_every = given.tracker_seed, given.decision_every
@@ -134,8 +133,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return names[self.observation]
 
     def _metadata(self, fps: float) -> dict[str, Any]:
-        """Returns the environment's metadata: "render_modes", and "render_fps" for one picture per action (per frame if
-        an episode is one action), rounded, at least 1. fps: frames per second."""
         return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
 
     def _clear_episode(self) -> None:
@@ -144,13 +141,24 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.config, self.score, self.scores, self.refused = self.base, 0.0, dict[str, float](), ""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begins an episode on a source that the env's generator draws; returns observation (float32) and info dict.
-        seed: reseeds the generator, None goes on with it. options: "scenario" and "seed" restrict the draw to sources
-        of this name and seed; "params" are the parameters to begin with. Info keys: scenario, seed, frame (number of
-        frames tracked), objective (0 while unknown), scores (by key, {} at first), names (of the action's parameters),
-        params (all, by name), refused ("" if none). InputError if an option is unknown, no source fits, the source
-        cannot be opened or has no labels, the parameters are wrong, or, with `decision_every`, the tracker refuses them
-        or keeps no `config`; then also WorkError if its `reset` fails. The running episode goes on after an error."""
+        """Begins an episode on a source that the environment's generator draws.
+
+        The running episode goes on after an error.
+
+        Args:
+            seed: Reseeds the generator; None goes on with it.
+            options: "scenario" and "seed" restrict the draw to sources of this name and seed; "params" are the
+                parameters to begin with.
+
+        Returns:
+            The observation, and a dict: scenario, seed, frame (number of frames tracked), objective (0 while unknown),
+            scores (by key), names (of the action's parameters), params (all, by name), refused ("" if nothing).
+
+        Raises:
+            InputError: An option is unknown, no source fits, the source cannot be opened or has no labels, or the
+                parameters are refused.
+            WorkError: The tracker's own `reset` fails.
+        """
         super().reset(seed=seed)
         options = options or {}
         for name in options:
@@ -170,12 +178,21 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Sets the parameters and tracks on, to the end or for `decision_every` frames.
 
-        Returns observation, reward (gain of the objective, which is 0 while unknown), True at the end of the sequence,
-        False (never truncated), info dict as of `reset`. action: (P,) numbers, clipped to [-1, 1]. Refused parameters
-        are moved towards those that the episode began with. If the tracker refuses a config between frames it keeps the
-        one before, and `info["refused"]` holds the error. After the end: the sequence is tracked anew with one action
-        per episode, else reward 0. Raises InputError before `reset`, or for an action of another shape or not finite;
-        IncomparableError if the tracks cannot be compared with the truth; and the tracker's errors."""
+        Refused parameters are moved towards those that the episode began with. If the tracker refuses a config between
+        frames it keeps the one before. After the end the sequence is tracked anew with one action per episode; else the
+        reward is 0.
+
+        Args:
+            action: (P,), clipped to [-1, 1].
+
+        Returns:
+            Observation, gain of the objective, whether the sequence has ended, False, and the dict of `reset`.
+
+        Raises:
+            InputError: Before `reset`, for an action of another shape or not finite, or from the tracker.
+            IncomparableError: The tracks cannot be compared with the truth.
+            WorkError: The tracker fails.
+        """
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
@@ -198,8 +215,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         )  # fmt: skip
 
     def _advance(self, upto: int | None) -> bool:
-        """Tracks to frame number `upto`, None: the last. Returns True if the sequence has ended. Raises the tracker's
-        errors."""
         assert self.rollout is not None
         for frame, tracks in self.rollout.advance(upto):
             if self.observation != "none":
@@ -209,9 +224,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return done == self.rollout.length or upto is None or done < upto
 
     def _advance_with(self, config: Config) -> bool:
-        """Tracks `decision_every` frames with this config, or with the last one if the tracker refuses it (InputError).
-        Returns True if the sequence has ended. Sets `config`, and `refused` to the error's text or "". Raises the
-        tracker's other errors, and its InputError if it refuses both."""
         assert self.rollout is not None
         assert self.decision_every is not None
         upto = len(self.rollout.tracks) + self.decision_every
@@ -228,8 +240,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             return self._advance(upto)
 
     def render(self) -> Image | None:
-        """Returns the last frame with detections and tracks, uint8 (H, W, 3) RGB; None without a render_mode. Before
-        the first frame only the scene or an empty picture is drawn. InputError if the source has no labels."""
+        """Returns the last frame with detections and tracks, uint8 (H, W, 3) RGB; None without a render_mode."""
         if self.render_mode is None:
             return None
         from tracking.environment.picture import episode_picture
@@ -290,7 +301,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
 
 
 def _check_split(among: Iterable[Source]) -> None:
-    """Raises InputError if the seeds of the simulated sources are of two splits, such as training and test."""
     seeds = sorted({s.seed for s in among if s.simulated})
     found = {split_of(range(seed, seed + 1)) for seed in seeds}
     if len(found) > 1:
@@ -299,9 +309,6 @@ def _check_split(among: Iterable[Source]) -> None:
 
 
 def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: DetectionMode | None) -> DetectionMode:
-    """Returns the input of the tracker, "image", "file" or "truth", the same in all episodes: `wanted` if given. Else
-    the first recording among the sources `among` decides; without recordings "image" or "file", by what the tracker
-    takes. InputError if a recording does not have it or cannot be opened."""
     among = tuple(among)
     for source in among:
         if not source.simulated:
@@ -313,9 +320,6 @@ def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: Det
 
 
 def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:
-    """Returns the parameters that an action sets: tunable ones of the config class `kind` with an effect in this
-    `mode`. every: frames between actions, which leaves only parameters that may change then; None: one action per
-    episode. InputError if there are none, or if `every` is no whole number above 0."""
     if every is not None and (not isinstance(every, int | np.integer) or isinstance(every, bool) or every < 1):
         got, expected = repr(every), "a number of frames, 1 or more, or None"
         raise InputError(place="decision_every", got=got, expected=expected, remedy="correct it")
@@ -328,7 +332,6 @@ def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | Non
 
 
 def _check_choice(place: str, got: object, known: Iterable[object]) -> None:
-    """Raises InputError, with `place` as the option's name, if `got` is not among the known values."""
     known = tuple(known)
     if got not in known:
         remedy = f"did you mean {closest(str(got), map(str, known))}?" if known else "remove it"

@@ -17,7 +17,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Frame, Truth
-from tracking.episode_source import Source
+from tracking.environment.episode_source import Source
 
 if TYPE_CHECKING:
     from tracking.objective import ObjectiveScorer
@@ -30,13 +30,9 @@ TIMES_COUNTED = 2
 
 
 class OpenedSource:
-    """A source whose sequence is open. Its detections, truth and background are kept once used.
+    """A source whose sequence is open; its detections, truth and background are kept once used.
 
-    - source: what is opened. streams: the pictures that are drawn if the source is simulated ("left", "right",
-      "background"); () draws none.
-    - sequence: the opened Sequence; it keeps its frames without pictures, and its background.
-
-    Raises InputError if the source cannot be opened.
+    `streams` are the pictures that are drawn if the source is simulated: "left", "right", "background".
     """
 
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
@@ -71,10 +67,6 @@ class OpenedSource:
 
 
 def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
-    """Returns a function that calls `compute` at its first call and returns that same result at every call.
-
-    The result is kept where `array_bytes` finds it. If `compute` raises an error, the next call tries again.
-    """
     kept: list[T] = []
 
     def first_result() -> T:
@@ -88,9 +80,8 @@ def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
 class SourceCache:
     """Opened sources for reuse; the least recently used one is dropped first. len() gives their number.
 
-    limit: bytes of arrays that all opened sources may hold together (256 MiB by default); the source in use is kept
-    whatever its size. The bytes of a source are counted when the next source is opened, and again after its second use.
-    Raises InputError if `limit` is negative. State: the opened sources and their bytes.
+    limit: bytes of arrays that all of them may hold together. The source in use is kept whatever its size. The bytes
+    of a source are counted when the next one is opened, and again after its second use.
     """
 
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
@@ -112,12 +103,7 @@ class SourceCache:
         return sum(self._bytes.values())
 
     def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
-        """Returns the opened source; it is opened now, or was opened earlier with the same `streams` and is still kept.
-
-        streams: the pictures that are drawn if the source is simulated ("left", "right", "background"). Before a source
-        is opened anew, the least recently used ones are dropped while all together exceed the limit. Raises InputError
-        if the source cannot be opened.
-        """
+        """Returns the opened source; one that was opened with the same `streams` and is still kept is used again."""
         key = (*source.key, streams)
         if self._opened and next(reversed(self._opened)) == key:
             return self._opened[key]
@@ -142,11 +128,7 @@ class SourceCache:
 
 
 def array_bytes(root: object) -> int:
-    """Returns the bytes of all numpy arrays that can be reached from the object `root`; each array counts once, a view
-    as its base.
-
-    Containers, functions, methods and objects of the packages sim and tracking are searched; other objects are not.
-    """
+    """Returns the bytes of all numpy arrays that can be reached from the object `root`."""
     arrays: dict[int, int] = {}
     seen: set[int] = set()
     waiting: list[Any] = [root]
@@ -165,10 +147,6 @@ def array_bytes(root: object) -> int:
 
 
 def _parts(one: Any) -> list[Any]:
-    """Returns the objects that `one` holds: items of a tuple or list, values of a dict, the object of a bound method,
-    what a function's closure refers to and the function that it wraps, fields and attributes of an object of sim or
-    tracking. Else [].
-    """
     if isinstance(one, tuple | list):
         return list(one)
     if isinstance(one, dict):

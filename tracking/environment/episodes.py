@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
 from tracking.environment.episode_cache import OpenedSource, SourceCache
-from tracking.episode_source import Source, sources
-from tracking.prepare import Params, prepare
-from tracking.time_limit import TimeLimited
+from tracking.environment.episode_source import Source, sources
+from tracking.running.prepare import Params, prepare
+from tracking.running.time_limit import TimeLimited
 
 __all__ = ["Episode", "Rollout", "Source", "SourceCache", "play", "sources", "streams_for"]
 
@@ -32,13 +32,15 @@ AnyTracker = str | type[Tracker] | TimeLimited
 class Episode:
     """The result of an episode: one tracker on one sequence.
 
-    - name, seed: of the source, a scenario or recording.
-    - objective: mean of HOTA and group_F1, or the one that is known; nan if there is nothing to score.
-    - scores: by key of the catalogue, without those that are nan.
-    - frames: number of frames played.
-    - seconds_tracking: time in the tracker with the checks of what it returns, s; `reset` included, reading frames not.
-    - seconds_scoring: time for groups and scores, s.
-    - left_out: why the scene could not be played, as its script did not come true; "" if it was.
+    Attributes:
+        name: Of the scenario or recording.
+        seed: Of the source.
+        objective: Mean of HOTA and group_F1, or the one that is known; nan if there is nothing to score.
+        scores: By key of the catalogue, without those that are nan.
+        frames: Number of frames played.
+        seconds_tracking: Time in the tracker with the checks of what it returns, s; without reading frames.
+        seconds_scoring: Time for groups and scores, s.
+        left_out: Why the scene could not be played, as its script did not come true; "" if it was.
     """
 
     name: str
@@ -62,17 +64,25 @@ def play(
     every_score: bool = False,
     similarity: Similarity | None = None,
 ) -> Episode:
-    """Plays one episode and returns its result.
+    """Plays one episode; its objective equals `tracking.evaluate` of the tracks of `tracking.track`.
 
-    tracker: name, file.py:Class, module:Class, class or TimeLimited. config: its parameters, None for the defaults.
-    detections: its input, None chooses one that works. tracker_seed: seed of the tracker's random numbers. cache:
-    keeps the opened source, None keeps nothing. every_score: compute the whole catalogue, else the objective and its
-    two parts. similarity: how people are compared, None by the data. A simulated source is drawn as pictures only if
-    `detections` is "image" or the tracker takes neither boxes nor points. The objective equals that of
-    `tracking.evaluate(sequence.truth, tracking.track(…), similarity=similarity)`.
+    A simulated source is drawn as pictures only if `detections` is "image" or the tracker takes neither boxes nor
+    points.
 
-    Raises InputError if an argument is wrong, tracker and source do not fit, the source has no labels, or the tracks
-    lack the boxes or positions to compare; WorkError if the tracker fails.
+    Args:
+        tracker: Name, file.py:Class, module:Class, class or TimeLimited.
+        source: What is played.
+        config: The tracker's parameters; None for the defaults.
+        detections: The tracker's input; None chooses one that works.
+        tracker_seed: Seed of the tracker's random numbers.
+        cache: Keeps the opened source; None keeps nothing.
+        every_score: Computes the whole catalogue, else the objective and its two parts.
+        similarity: How people are compared; None by the data.
+
+    Raises:
+        InputError: An argument is wrong, tracker and source do not fit, the source has no labels, or the tracks lack
+            the boxes or positions to compare.
+        WorkError: The tracker fails.
     """
     rollout = Rollout(
         tracker, source, config, detections=detections, tracker_seed=tracker_seed, cache=cache, similarity=similarity
@@ -85,14 +95,8 @@ def play(
 class Rollout:
     """An episode that is played frame by frame; the arguments are those of `play`.
 
-    - tracker: name, file.py:Class, module:Class or class; config: its parameters, None for the defaults.
-    - source: what is played; cache: keeps it opened, None keeps nothing.
-    - detections: the tracker's input, None chooses one that works; tracker_seed: of its random numbers.
-    - similarity: how people are compared, None by the data.
-
     State: the prepared tracker; tracks, one `Tracks` per frame so far; last, the last frame, None before the first;
-    seconds spent on tracking and scoring. Raises InputError if an argument is wrong, tracker and source do not fit, or
-    the source has no labels, and WorkError if the tracker's `reset` fails.
+    seconds spent on tracking and scoring.
     """
 
     def __init__(
@@ -137,9 +141,7 @@ class Rollout:
     def advance(self, upto: int | None = None) -> Iterator[tuple[Frame, Tracks]]:
         """Plays to frame number `upto` (from 1), or to the last one; yields each frame and the tracker's tracks.
 
-        The frame is as the tracker got it. A frame is played when the iterator is asked for it, and none if `upto` is
-        reached already. Raises InputError if the tracker refuses a frame or a picture cannot be read, and WorkError if
-        the tracker fails. The next call then begins with the same frame.
+        A frame is played when the iterator is asked for it. After an error the next call begins with the same frame.
         """
         last = self.length if upto is None else min(upto, self.length)
         while len(self.tracks) < last:
@@ -157,10 +159,7 @@ class Rollout:
             yield frame, tracks
 
     def episode(self, every_score: bool = False) -> Episode:
-        """Returns the result of the frames so far; objective is nan if there is nothing to score.
-
-        every_score: compute the whole catalogue, else the objective and its two parts. Raises InputError as `scores`.
-        """
+        """Returns the result of the frames so far; objective is nan if there is nothing to score."""
         scores = self.scores(every_score)
         return Episode(
             self.source.name,
@@ -173,12 +172,7 @@ class Rollout:
         )
 
     def scores(self, every: bool = False) -> dict[str, float]:
-        """Returns a dict of the scores of the frames so far by key, without those that are nan.
-
-        every: the whole catalogue; else objective, HOTA and group_F1. The time is added to `seconds_scoring`.
-        Raises InputError if the tracks lack the boxes or positions to compare, or groups must be derived in the image
-        and the image scale is 0 or less.
-        """
+        """Returns the scores of the frames so far by key, without nan: objective, HOTA and group_F1, or all."""
         from tracking.scoring.people_comparison import IncomparableError
 
         start = time.perf_counter()
@@ -198,7 +192,7 @@ class Rollout:
 
     def _every_score(self, px_per_m: float) -> Mapping[str, float]:
         from tracking.grouping.foot_points import completed
-        from tracking.run import TrackingRun
+        from tracking.running.run import TrackingRun
 
         context, mode, judge = self.prepared.context, self.prepared.mode, self.opened.judge
         tracks = completed(
@@ -209,13 +203,8 @@ class Rollout:
 
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:
-    """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none.
-
-    tracker: name, file.py:Class, module:Class, class or TimeLimited. Pictures are needed if `detections` is "image", or
-    is None and the tracker takes neither boxes nor points. They are "left" and "background", and "right" if the
-    tracker takes stereo. Raises InputError if a tracker given by name cannot be found or imported.
-    """
-    from tracking.tracker_registry import find
+    """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none."""
+    from tracking.running.tracker_registry import find
 
     needs = set((find(tracker) if isinstance(tracker, str) else tracker).needs)
     if detections in ("file", "truth") or (detections is None and needs & {"boxes", "points"}):

@@ -34,14 +34,11 @@ TWO_PEOPLE = 1.5
 
 @dataclass(frozen=True)
 class Statistic:
-    """One number of the observation: its name and its meaning in words.
-
-    half: the value that 0.5 stands for, in `unit`; None for a share, which stands for itself. unit: such as "s" or
-    "m/s", "" for plain numbers, "share" for shares."""
+    """One number of the observation."""
 
     name: str
-    half: float | None
-    unit: str
+    half: float | None  # the value that 0.5 stands for, in `unit`; None for a share, which stands for itself
+    unit: str  # such as "m/s", "" for plain numbers, "share" for shares
     meaning: str
 
 
@@ -85,10 +82,11 @@ NAMES = tuple(s.name for s in STATISTICS)
 
 
 class Observer:
-    """Collects frames and tracks between two decisions, for the statistics of the observation. fps: frames per second.
+    """Collects frames and tracks between two decisions, for the statistics of the observation.
 
     State: frames and tracks since the last decision, the tracks of the frame before them, the first frame of each id,
-    the brightness of the pictures, from 0 (black) to 1."""
+    the brightness of the pictures, from 0 (black) to 1.
+    """
 
     def __init__(self, fps: float) -> None:
         self.fps = fps
@@ -99,8 +97,7 @@ class Observer:
         self._brightness: list[float] = []
 
     def add(self, frame: Frame, tracks: Tracks) -> None:
-        """Adds the next frame, as the tracker got it, and its tracks (one `Tracks`). Of the left picture only the mean
-        brightness is kept, nothing without one."""
+        """Adds the next frame, as the tracker got it, and its tracks (one `Tracks`)."""
         self._tracks.append(tracks)
         self._frames.append(Frame(frame.index, frame.t, detections=frame.detections))
         for id in tracks.id.tolist():
@@ -109,22 +106,16 @@ class Observer:
             self._brightness.append(float(frame.image[::PIXEL_STEP, ::PIXEL_STEP].mean()) / 255)
 
     def statistics(self, px_per_m: float) -> NDArray[np.float32]:
-        """Returns the statistics (K,) float32 in [0, 1] of the frames since the last call, in the order of STATISTICS.
+        """Returns the statistics (K,) of the frames since the last call, in the order of STATISTICS, and forgets them.
 
-        px_per_m: scale of tracks in the image; nan or 0 if unknown, then all statistics of lengths, speeds and of
-        tracks against detections are 0. A statistic that is not known is 0; all are 0 if no frame was added. Frames so
-        far are forgotten, apart from the last tracks, the last brightness and the first frame of each id."""
+        Unknown ones are 0. Without a scale (px_per_m nan or 0) all lengths and speeds of tracks in the image are.
+        """
         values = self._values(px_per_m) if self._tracks else {}
         self._before, self._tracks, self._frames = self._tracks[-1:] or self._before, [], []
         self._brightness = self._brightness[-1:]
         return np.array([squashed(s, values.get(s.name, 0.0)) for s in STATISTICS], np.float32)
 
     def _values(self, px_per_m: float) -> dict[str, float]:
-        """Returns a dict of the known statistics by name, before they are mapped to [0, 1]. At least one frame must be
-        added.
-
-        px_per_m: scale of tracks in the image. If they are in the image and it is nan or 0, density and all statistics
-        of `_movement` are missing; for tracks on the ground it has no effect."""
         last = self._tracks[-1]
         seconds = len(self._tracks) / self.fps
         known = last.plane != "image" or px_per_m > 0
@@ -150,13 +141,7 @@ class Observer:
         }
 
     def _movement(self, rows: TrackRows, found: DetectionRows) -> dict[str, float]:
-        """Returns a dict of medians: speed, speed_spread (interquartile range; m/s), acceleration (m/s²), crowding
-        (distance to the nearest other track), gate (sqrt(trace / 2) of the position's covariance), correction (d,
-        reported from expected position; m), correction_sigma (d' C^-1 d / 2, C the track's covariance before); and the
-        values of `_innovations` if any detections are known. A statistic without values is 0.
-
-        rows: tracks in m, with the frame before the window, if any, as number 0. found: detections of the window in m.
-        """
+        """Returns medians over the window, m and s; d' C^-1 d / 2 for the names in "sigma"."""
         now = rows.frame >= len(self._before)
         before, after = consecutive_rows(rows)
         expected = rows.pos + rows.vel / self.fps
@@ -177,11 +162,7 @@ class Observer:
 
 
 def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict[str, float]:
-    """Returns a dict: orphans (share of detections near no expected position, frame 0 left out), missed (share of
-    tracks without detections), innovation, residual (median distance in m of the expected position, and of the one
-    reported in the next frame, from the mean of the track's detections there), innovation_sigma (median of
-    d' C^-1 d / 2, d the innovation, C the track's covariance before). expected (R, 2), m: where each row of `rows` is
-    expected one frame later. found: the detections, m. Only rows whose next frame has known detections count."""
+    """Returns shares and medians of detections against expected positions (R, 2) of the rows one frame later, m."""
     looked = np.isin(rows.frame + 1, found.frames)
     here = np.flatnonzero(looked)
     owner = nearest_expected(expected[here], rows.frame[here] + 1, rows.reach[here], found)
@@ -206,10 +187,6 @@ def _innovations(rows: TrackRows, expected: Array, found: DetectionRows) -> dict
 
 
 def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
-    """Returns a dict: merges (with form), splits (with dissolve; 1/min), grouped (share of people in a group),
-    group_size (mean, people), as the tracker reports them. tracks: one `Tracks` per frame, at least one; seconds: their
-    duration. Of a tracker of whole groups, grouped is the share of groups of size 1.5 or more, of those of known size.
-    Without tracks or groups a value is 0."""
     kinds = [e.kind for t in tracks for e in t.events]
     merges, splits = (sum(kind in pair for kind in kinds) for pair in (("merge", "form"), ("split", "dissolve")))
     values = {"merges": 60 * merges / seconds, "splits": 60 * splits / seconds}
@@ -224,12 +201,6 @@ def _group_values(tracks: Sequence[Tracks], seconds: float) -> dict[str, float]:
 
 
 def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dict[str, float]:
-    """Returns a dict; {} if no frame has known detections. Keys: seen (share of frames with known detections), and over
-    these frames: detections (mean number), flicker (standard deviation / (mean + 1) of it), score (mean), weak (share
-    of scores below 0.5), surplus (detections / (detections + tracks)).
-
-    found: detections of a window of `frames` frames; rows: the tracks. Without a detection the values are 0, except
-    seen."""
     count = np.bincount(found.frame - found.first, minlength=frames)[[f - found.first for f in found.frames]]
     if not len(count):
         return {}
@@ -244,10 +215,6 @@ def _detection_values(found: DetectionRows, rows: TrackRows, frames: int) -> dic
 
 
 def _picture_values(brightness: Sequence[float]) -> dict[str, float]:
-    """Returns a dict: brightness of the last picture, and lights, the mean relative change from picture to picture.
-
-    brightness: of consecutive pictures, each in [0, 1]. A change is divided by the earlier brightness, at least 0.001.
-    {} without pictures; lights is 0 with one picture."""
     if not brightness:
         return {}
     level = np.array(brightness)
@@ -256,9 +223,7 @@ def _picture_values(brightness: Sequence[float]) -> dict[str, float]:
 
 
 def _squared_sigmas(shift: Array, cov: Array) -> Array:
-    """Returns d' C^-1 d / 2 of N shifts d (`shift` (N, 2), m) with covariances C (`cov` (N, 2, 2), m²).
-
-    Rows without a positive determinant are left out, so the result may be shorter than N."""
+    """Returns d' C^-1 d / 2 of N shifts d (`shift` (N, 2), m) with covariances C (`cov` (N, 2, 2), m²)."""
     det = cov[:, 0, 0] * cov[:, 1, 1] - cov[:, 0, 1] * cov[:, 1, 0]
     good = det > 0
     (x, y), c = shift[good].T, cov[good]
@@ -277,10 +242,7 @@ def share(which: Bools) -> float:
 
 
 def squashed(statistic: Statistic, value: float) -> float:
-    """Returns the value of a statistic mapped to [0, 1]: a share is clipped, another value x becomes x / (x + half).
-
-    half: the statistic's value that 0.5 stands for. Negative values and nan become 0, infinity becomes 1; a share that
-    is nan or infinite becomes 0."""
+    """Returns the value of a statistic mapped to [0, 1]: a share is clipped, another value x becomes x / (x + half)."""
     if not np.isfinite(value):
         return 0.0 if statistic.half is None else float(value > 0)
     if statistic.half is None:
@@ -289,9 +251,7 @@ def squashed(statistic: Statistic, value: float) -> float:
 
 
 def table() -> str:
-    """Returns the statistics as the Markdown table of docs/reference/environment.md.
-
-    Columns: number from 0, name, value that is shown as 0.5, meaning."""
+    """Returns the statistics as the Markdown table of docs/reference/environment.md."""
     lines = [
         f"| {k} | `{s.name}` | {'share' if s.half is None else f'{s.half:g} {s.unit}'.strip()} | {s.meaning} |"
         for k, s in enumerate(STATISTICS)

@@ -23,21 +23,14 @@ EXTENT_SIGMAS = 2.0
 
 @dataclass(frozen=True, eq=False)
 class TrackRows:
-    """R reported tracks in frames, frame by frame; len() gives R.
+    """R reported tracks in frames, frame by frame."""
 
-    - frame (R,): counted from 0 at the first frame given.
-    - id (R,): of the track.
-    - pos (R, 2): x, y in m; vel (R, 2): in m/s, 0 if unknown.
-    - cov (R, 2, 2): covariance of the position, m².
-    - reach (R,): distance within which detections belong to the track, m.
-    """
-
-    frame: Ints
-    id: Ints
-    pos: Array
-    vel: Array
-    cov: Array
-    reach: Array
+    frame: Ints  # (R,) from 0 at the first frame given
+    id: Ints  # (R,)
+    pos: Array  # (R, 2) x, y in m
+    vel: Array  # (R, 2) m/s, 0 if unknown
+    cov: Array  # (R, 2, 2) covariance of the position, m²
+    reach: Array  # (R,) distance within which detections belong to the track, m
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -45,28 +38,19 @@ class TrackRows:
 
 @dataclass(frozen=True, eq=False)
 class DetectionRows:
-    """D detections, frame by frame; len() gives D.
+    """D detections of a window, frame by frame."""
 
-    - frame (D,): counted like the frames of the TrackRows, from 0.
-    - pos (D, 2): x, y in m.
-    - score (D,): the detector's, in [0, 1]; 1 if unknown.
-    - frames: numbers of the frames whose detections are known, frames without a detection included.
-    - first: number of the first frame of the window.
-    """
-
-    frame: Ints
-    pos: Array
-    score: Array
-    frames: tuple[int, ...]
-    first: int
+    frame: Ints  # (D,) counted like the frames of the TrackRows
+    pos: Array  # (D, 2) x, y in m
+    score: Array  # (D,) in [0, 1]; 1 if unknown
+    frames: tuple[int, ...]  # whose detections are known, frames without a detection included
+    first: int  # frame of the window
 
     def __len__(self) -> int:
         return len(self.frame)
 
     def neighbours(self, reach: float) -> float:
-        """Returns the mean number of other detections of the same frame within `reach` (m) of a detection, 0 without
-        detections.
-        """
+        """Returns the mean number of other detections of the same frame within `reach` (m) of a detection."""
         if not len(self):
             return 0.0
         tree = _tree(self.pos, self.frame)
@@ -74,11 +58,7 @@ class DetectionRows:
 
 
 def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
-    """Returns the tracks of consecutive frames as rows in m; frame k of the list gets number k, from 0.
-
-    tracks: one `Tracks` per frame. scale: units of their plane per metre (px per m in the image, else 1), not 0. Of
-    positions in space x, y remain. Unknown velocities become 0.
-    """
+    """Returns the tracks of consecutive frames as rows in m; frame k of the list gets number k, from 0."""
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
     id = np.concatenate([np.zeros(0, np.int64), *(t.id for t in tracks)])
     pos, vel = (
@@ -92,11 +72,7 @@ def track_rows(tracks: Sequence[Tracks], scale: float) -> TrackRows:
 
 
 def _reach(t: Tracks, scale: float) -> Array:
-    """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame.
-
-    t: the frame's `Tracks`. scale: units of their plane per metre, not 0. The distance is 1 m for a person. For a group
-    (unit "group") 2 standard deviations are added, sqrt(trace of its extent / 2) / scale each, 0 if unknown.
-    """
+    """Returns the distance (N,) in m within which detections belong to each of the N tracks of a frame."""
     reach = np.full(len(t.id), REACH)
     if t.unit != "group" or t.groups is None or not len(t.groups.id):
         return reach
@@ -106,12 +82,7 @@ def _reach(t: Tracks, scale: float) -> Array:
 
 
 def detection_rows(detections: Sequence[Detections | None], plane: str, scale: float, first: int) -> DetectionRows:
-    """Returns the detections of consecutive frames as rows in m; entry k of the list gets frame number first + k.
-
-    Frames without detections (None), or with detections in another plane than `plane` ("ground", "space" or "image"),
-    are left out; frames with 0 detections are kept. Of positions in space x, y remain. A detection without score has
-    score 1. scale: units of the plane per metre (px per m in the image, else 1).
-    """
+    """Returns the detections of consecutive frames as rows in m; entry k of the list gets frame number first + k."""
     known = [(first + k, d) for k, d in enumerate(detections) if d is not None and (d.plane == plane or not len(d.pos))]
     frame = np.repeat([f for f, _ in known], [len(d.pos) for _, d in known]).astype(np.int64)
     pos = np.concatenate([np.zeros((0, 2)), *(d.pos[:, :2] for _, d in known)]) / scale
@@ -120,10 +91,7 @@ def detection_rows(detections: Sequence[Detections | None], plane: str, scale: f
 
 
 def consecutive_rows(rows: TrackRows) -> tuple[Ints, Ints]:
-    """Returns the indices of pairs of rows of one track in consecutive frames: earlier rows (K,), later rows (K,).
-
-    Pairs are sorted by id, then frame. Both are empty without pairs.
-    """
+    """Returns the indices of pairs of rows of one track in consecutive frames: earlier rows (K,), later rows (K,)."""
     order = np.lexsort((rows.frame, rows.id))
     a, b = order[:-1], order[1:]
     same: Bools = (rows.id[a] == rows.id[b]) & (rows.frame[a] + 1 == rows.frame[b])
@@ -131,11 +99,7 @@ def consecutive_rows(rows: TrackRows) -> tuple[Ints, Ints]:
 
 
 def nearest_distances(pos: Array, frame: Ints) -> Array:
-    """Returns the distance in m from each of N positions to the nearest other one of the same frame.
-
-    pos (N, 2): x, y in m; frame (N,): number of the frame. Positions that are alone in their frame are left out, so the
-    result may be shorter than N. Empty if N is below 2.
-    """
+    """Returns the distance in m from each of N positions to the nearest other one of the same frame."""
     if len(pos) < 2:
         return np.zeros(0)
     distance = _tree(pos, frame).query(_with_frame(pos, frame), k=2)[0][:, 1]
@@ -143,12 +107,7 @@ def nearest_distances(pos: Array, frame: Ints) -> Array:
 
 
 def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: DetectionRows) -> Ints:
-    """Returns for each of D detections the index of the nearest expected position of its frame, (D,), -1 if there is
-    none within that position's reach.
-
-    expected (N, 2): x, y in m; frame (N,): number of their frame; reach (N,): greatest distance in m at which a
-    detection belongs to the position. A position farther away is never taken, even if its reach is greater.
-    """
+    """Returns for each of D detections the nearest expected position of its frame within reach; -1 for none."""
     if not len(expected) or not len(detections):
         return np.full(len(detections), -1)
     distance, nearest = _tree(expected, frame).query(_with_frame(detections.pos, detections.frame))
@@ -156,7 +115,7 @@ def nearest_expected(expected: Array, frame: Ints, reach: Array, detections: Det
 
 
 def _with_frame(pos: Array, frame: Ints) -> Array:
-    """Returns positions pos (N, 2) in m with a third column, frame (N,) times 1e6, that keeps frames apart: (N, 3)."""
+    # The third column keeps frames apart in a k-d tree.
     return np.column_stack([pos, frame * FRAME_DISTANCE])
 
 

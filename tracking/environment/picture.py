@@ -25,12 +25,7 @@ LETTER = 0.5
 
 
 def episode_picture(opened: OpenedSource, rollout: Rollout | None, score: float) -> Image:
-    """Returns the last tracked frame with its detections and tracks, uint8 (H, W, 3) RGB, height and width even.
-
-    opened: the source. rollout: the episode. Before the first frame, and if it is None, only the scene or an empty
-    picture is drawn. Detections are drawn only if the frame has no image. A text line above shows source, seed, number
-    of frames and `score`, a number or "nan". Raises InputError if the source has no labels.
-    """
+    """Returns the last tracked frame with its detections and tracks, uint8 (H, W, 3) RGB, height and width even."""
     frame, tracks = (None, []) if rollout is None else (rollout.last, rollout.tracks)
     canvas = _canvas(opened, frame, tracks)
     if frame is not None:
@@ -49,13 +44,6 @@ def episode_picture(opened: OpenedSource, rollout: Rollout | None, score: float)
 
 
 def _canvas(opened: OpenedSource, frame: Frame | None, tracks: list[Tracks]) -> Canvas:
-    """Returns a canvas to draw on: the frame's image, a plan of the ground, or an empty image.
-
-    opened: the source; tracks: one `Tracks` per frame so far. With pictures it is the frame's image, empty if `frame`
-    is None or has none. Without pictures it is a plan if the tracks (before the first frame, the truth) lie on the
-    ground, else an empty image into which the image coordinates fit. Both have a fixed size, SIZE. InputError if labels
-    are needed (no tracks or no scene) and missing.
-    """
     sequence = opened.sequence
     if sequence.has_images and sequence.image_size is not None:
         shown = None if frame is None else frame.image
@@ -73,20 +61,10 @@ def _canvas(opened: OpenedSource, frame: Frame | None, tracks: list[Tracks]) -> 
 
 
 def _on_ground(opened: OpenedSource, tracks: list[Tracks]) -> bool:
-    """Returns True if the last tracks are not in the image; without tracks, if the truth of `opened` has positions.
-
-    InputError if there are no tracks and no labels.
-    """
     return tracks[-1].plane != "image" if tracks else opened.truth.pos is not None
 
 
 def _bounds(opened: OpenedSource) -> tuple[Array, Array]:
-    """Returns the least and the greatest x, y, (2,) each, that the picture of the source `opened` must show.
-
-    They are those of the scene, in m; without a scene of all detections, else of all labels (upper left corners of
-    boxes if there are no positions), with a margin of 1 unit (m or px). (0, 0) and (1, 1) if there is nothing.
-    InputError if there are neither scene nor labels.
-    """
     scene = opened.sequence.scene
     if scene is not None:
         return np.zeros(2), scene.size
@@ -101,20 +79,12 @@ def _bounds(opened: OpenedSource) -> tuple[Array, Array]:
 
 
 def _draw_detections(canvas: Canvas, detections: Detections, plane: str) -> None:
-    """Draws a grey disc of 2.5 px on the canvas for each detection. plane: of the tracks, "ground", "space" or "image".
-
-    Nothing is drawn if one of detections and tracks is in the image and the other is not.
-    """
     if detections.plane == plane or detections.plane != "image" != plane:
         for at in detections.pos[:, :2]:
             canvas.disc(at, 2.5, THING)
 
 
 def _layer(opened: OpenedSource, tracks: list[Tracks], canvas: Canvas) -> Layer:
-    """Returns the marks of the last 3 s of tracks, in the coordinates of the canvas (plan or image).
-
-    opened: the source, whose camera and scene place marks in an image; tracks: one `Tracks` per frame so far.
-    """
     recent = tracks[-round(TRAIL_SECONDS * opened.sequence.fps) - 1 :]
     if canvas.upwards:
         return plan_layer_of_tracks(recent)

@@ -21,28 +21,19 @@ FAST_KEYS = ("objective", "HOTA", "group_F1")
 
 @dataclass(frozen=True)
 class Goal:
-    """One score to improve.
+    """One score to improve."""
 
-    key: its name in the catalogue of scores, or "frames/s" for the tracker's speed. higher: True if greater values are
-    better.
-    """
-
-    key: str
-    higher: bool = True
+    key: str  # in the catalogue of scores, or "frames/s" for the tracker's speed
+    higher: bool = True  # True if greater values are better
 
     def of(self, episode: Episode) -> float:
-        """Returns the score of one episode, nan if the episode does not have it.
-
-        For the key "frames/s" it is frames / seconds in the tracker, nan if that is 0 s.
-        """
+        """Returns the score of one episode, nan if the episode does not have it."""
         if self.key == SPEED:
             return episode.frames / episode.seconds_tracking if episode.seconds_tracking else float("nan")
         return episode.scores.get(self.key, float("nan"))
 
     def mean(self, episodes: Sequence[Episode]) -> float:
-        """Returns the mean over the episodes that have the score, nan if none has. For the key "frames/s" it is all
-        frames / all seconds in the tracker, nan for 0 s.
-        """
+        """Returns the mean over the episodes that have the score, nan if none has."""
         if self.key == SPEED:
             seconds = sum(e.seconds_tracking for e in episodes)
             return sum(e.frames for e in episodes) / seconds if seconds else float("nan")
@@ -60,11 +51,7 @@ def finite_mean(values: Iterable[float]) -> float:
 
 
 def goals_of(keys: Iterable[str]) -> tuple[Goal, ...]:
-    """Returns one goal per key, in the order given; the catalogue of scores says which direction is better.
-
-    keys: names of scores, or "frames/s"; a single text counts as the keys of its letters. Raises InputError if there is
-    no key, if a key is unknown or given twice, or if neither direction of its score is better.
-    """
+    """Returns one goal per key, in the order given; the catalogue of scores says which direction is better."""
     from tracking.scoring.catalogue import CATALOGUE
 
     found: list[Goal] = []

@@ -23,19 +23,12 @@ from tracking.grouping.link_rule import LinkRule
 
 @dataclass(frozen=True)
 class LabelErrors:
-    """How the labelled positions of people err.
+    """How the labelled positions of people err."""
 
-    - sd: standard deviation of a position in each coordinate, m; for boxes it is multiplied by the true image scale.
-    - time: correlation time of the errors, s: after it their correlation is 1/e.
-    - filmed: True for boxes in the image without velocities, False for positions on the ground.
-    - scale: the image scale (px per m) is multiplied by a random factor between 1 / scale and scale, whose logarithm
-      is uniform; 1 leaves it.
-    """
-
-    sd: float
-    time: float
-    filmed: bool
-    scale: float = 1.0
+    sd: float  # standard deviation of each coordinate, m; of boxes it is multiplied by the true image scale
+    time: float  # correlation time, s
+    filmed: bool  # boxes in the image without velocities; False: positions on the ground
+    scale: float = 1.0  # the image scale is multiplied by a log-uniform factor from 1 / scale to scale
 
 
 SURVEYED, FILMED = LabelErrors(0.02, 0.1, filmed=False), LabelErrors(0.06, 0.1, filmed=True, scale=1.5)
@@ -44,16 +37,7 @@ Meet_WalkTogether1, where they jump by 0.05 m between frames at 25 fps. The scal
 
 
 def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Episode:
-    """Returns the episode of the baseline rule of groups on the people of a source, whose identity is known.
-
-    Simulated people get label errors: FILMED (boxes in the image, 0.06 m, wrong scale) with odd seeds, SURVEYED (ground
-    positions, 0.02 m) with even ones. Recorded people are taken as labelled, with the image scale of the recording. The
-    true groups are those of the labels without errors. `scores` has every score of the catalogue that is not nan,
-    `seconds_tracking` is the time for groups. The opened source is kept in `source_cache`.
-
-    Raises InputError if the source has no labels or cannot be read, or if people are in the image without a scale.
-    Fails an assertion if simulated people have no boxes.
-    """
+    """Returns the episode of the baseline rule of groups on the people of a source, whose identity is known."""
     from tracking.scoring.evaluation import evaluate
 
     truth = source_cache.open(source).truth
@@ -74,20 +58,14 @@ def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Epis
 
 
 def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int = 0) -> Truth:
-    """Returns a copy of the truth with label errors: a first-order autoregressive process per person and coordinate.
-
-    Each person has a random stream of its own, chosen by seed, id and repeat (copy of a suite entry). The process steps
-    from row to row of the person, over frames of absence too; its standard deviation is `errors.sd` from the first row
-    on. With `errors.filmed` the boxes are moved, not resized, and `pos` and `vel` become None; else only `pos` changes.
-    `errors.scale` is not used. Fails an assertion if `truth` has no `pos` or no `box`.
-    """
+    """Returns a copy of the truth with label errors: a first-order autoregressive process per person and coordinate."""
     assert truth.pos is not None, "simulated people have positions"
     assert truth.box is not None, "scenes have cameras"
     stay, error = float(np.exp(-1 / (truth.fps * errors.time))), np.empty_like(truth.pos)
     for id in np.unique(truth.id).tolist():
         own = np.flatnonzero(truth.id == id)
         new = np.sqrt(1 - stay**2) * rng(seed, "label", id, repeat=repeat).standard_normal((len(own), 2))
-        new[0] /= np.sqrt(1 - stay**2)
+        new[0] /= np.sqrt(1 - stay**2)  # so that the standard deviation is stationary from the first row on
         error[own] = errors.sd * lfilter([1.0], [1.0, -stay], new, axis=0)
     if not errors.filmed:
         return truth.replace(pos=truth.pos + error)

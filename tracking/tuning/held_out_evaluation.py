@@ -33,24 +33,14 @@ STORED = "judged "
 
 @dataclass(frozen=True)
 class HeldOutEvaluator:
-    """Plays configs on the validation and test scenes, which the search did not use.
-
-    plan: the search. play: function play(sources, values, every_score) that yields episodes. report: called with a text
-    before each set of scenes, does nothing by default.
-    """
+    """Plays configs on the validation and test scenes, which the search did not use."""
 
     plan: SearchPlan
     play: PlayEpisodes
     report: Callable[[str], None] = field(default=lambda text: None)
 
     def validated(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Returns the candidates in order, with their values on the validation scenes and their gain over the first
-        one.
-
-        The first candidate must be the defaults; a FlockscopeError of theirs is raised. Another candidate with an error
-        on a validation scene is left out. `gain` compares the first goal, of the first candidate with itself; it is
-        None if no scene has its score. Errors of the workers are raised.
-        """
+        """Returns the candidates that can be played, with validation values and gain over the first, the defaults."""
         found = list[Candidate]()
         defaults: Sequence[Episode] = ()
         for k, candidate in enumerate(candidates):
@@ -67,13 +57,7 @@ class HeldOutEvaluator:
         return found
 
     def simplified(self, config: Config, value: float, order: Sequence[str]) -> tuple[Config, float]:
-        """Returns the config with needless changes reset to the defaults, and its value by the first goal on the
-        validation scenes.
-
-        value: that of `config` on these scenes. order: names of searched parameters (others raise KeyError or
-        AttributeError), tried one after the other; unchanged ones are skipped. A parameter is reset if that does not
-        make the value worse or unknown, and causes no error. Errors of the workers are raised.
-        """
+        """Returns the config without changes that bring nothing in validation, tried in `order`, and its value."""
         goal = self.plan.goals[0]
         changed = [name for name in order if getattr(config, name) != self.plan.defaults[name]]
         for k, name in enumerate(changed):
@@ -91,12 +75,7 @@ class HeldOutEvaluator:
         return config, value
 
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
-        """Returns the comparisons of the config with the defaults, suite by suite of the tests, and notes (texts).
-
-        Compared are the goals, objective, HOTA, group_F1, pairwise_F1 and event_F1, without scores that no
-        sequence has. A suite on which the config causes an error has a note instead of comparisons. An error of the
-        defaults, errors of the workers, and InputError for a test suite that cannot be read are raised.
-        """
+        """Returns the comparisons of the config with the defaults, suite by suite of the tests, and notes (texts)."""
         found, notes = list[Comparison](), list[str]()
         for name, sources in self.plan.tests.items():
             self.report(f"test on {name}")
@@ -118,13 +97,6 @@ class HeldOutEvaluator:
     def _episodes(
         self, sources: Sequence[Source], config: Config, every_score: bool
     ) -> list[Episode] | FlockscopeError:
-        """Returns the episodes of all sources with this config, or the first FlockscopeError that one of them raises.
-
-        Its cause may be the parameters or a source, as one without labels. The order is that of `sources`. Errors of
-        the workers themselves (one that dies, a lost cluster) are raised.
-
-        every_score: compute the whole catalogue of scores.
-        """
         found = []
         for result in self.play(sources, config.as_dict(), every_score):
             if isinstance(result, FlockscopeError):
@@ -134,13 +106,7 @@ class HeldOutEvaluator:
 
 
 def stored_in_study(study: SearchStudy, play: PlayEpisodes) -> PlayEpisodes:
-    """Returns a function like `play` that stores complete sets of episodes in the study and takes them from there.
-
-    play: play(sources, values, every_score) yields one result per source, the episode or the error of these parameters.
-    A set is known by its sources, parameters and `every_score`. A set with an error, which ends with it, or one that
-    its taker did not read to the end, is not stored. New and stored episodes have only these scores: the goals,
-    objective, HOTA, group_F1, pairwise_F1 and event_F1.
-    """
+    """Returns a function like `play` that stores complete sets of episodes in the study and takes them from there."""
     kept = {*COMPARED_KEYS, *(goal.key for goal in study.plan.goals)}
 
     def stored(

@@ -31,9 +31,7 @@ HEAD = b'{"op_code":'
 class TrialLocks:
     """Locks on single bytes of the file `path`, shared by the processes of a search; the file is created if missing.
 
-    Byte 0: a trial is chosen; 1: lines are written; 2 + n: trial n is played. State: the open file; closing it, or the
-    end of the process, releases every lock. Needs a system with fcntl. Raises OSError if the file cannot be opened for
-    writing.
+    State: the open file; closing it, or the end of the process, releases every lock.
     """
 
     def __init__(self, path: Path) -> None:
@@ -57,10 +55,7 @@ class TrialLocks:
             yield
 
     def hold_trial(self, number: int) -> None:
-        """Locks trial `number` (from 0) for this process until `release_trial` or `close`.
-
-        Waits until no other process holds the lock.
-        """
+        """Locks trial `number` (from 0) for this process until `release_trial` or `close`."""
         import fcntl
 
         fcntl.lockf(self._file, fcntl.LOCK_EX, 1, FIRST_TRIAL + number)
@@ -72,10 +67,7 @@ class TrialLocks:
         fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
 
     def is_abandoned(self, number: int) -> bool:
-        """Returns True if no other process holds the lock on trial `number` (from 0).
-
-        Releases this process's own lock on the trial, if it holds one.
-        """
+        """Returns True if no other process holds the lock on trial `number` (from 0)."""
         import fcntl
 
         try:
@@ -91,11 +83,7 @@ class TrialLocks:
 
 
 class LockedJournal(JournalFileBackend):
-    """Optuna's journal file at `path`, created if missing, and written under `locks`. An incomplete last line is
-    removed when the journal is opened, and before each writing.
-
-    Raises ValueError if the file is not a journal of Optuna, and OSError if it cannot be opened.
-    """
+    """Optuna's journal file at `path`, written under `locks`, without incomplete last lines."""
 
     def __init__(self, path: Path, locks: TrialLocks) -> None:
         self._path, self._locks = path, locks
@@ -105,11 +93,7 @@ class LockedJournal(JournalFileBackend):
             self._remove_incomplete_line()
 
     def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        """Appends one JSON line per log (a dict); removes an incomplete last line first. No logs append nothing.
-
-        Waits for the lock on writing. Raises OSError if writing fails, and TypeError if a log cannot be written as
-        JSON.
-        """
+        """Appends one JSON line per log (a dict); removes an incomplete last line first. No logs append nothing."""
         text = "".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs)
         with self._locks.locked(WRITING):
             self._remove_incomplete_line()
@@ -117,17 +101,12 @@ class LockedJournal(JournalFileBackend):
                 file.write(text.encode())
 
     def _check_head(self) -> None:
-        """Raises ValueError if the file does not begin as an Optuna journal; an empty or cut beginning is accepted."""
         with open(self._path, "rb") as file:
             head = file.read(len(HEAD))
         if not HEAD.startswith(head):
             raise ValueError("no journal of Optuna")
 
     def _remove_incomplete_line(self) -> None:
-        """Removes a last line without line end from the file, the whole content if it has no line end.
-
-        A file that is empty or ends with a line end stays as it is. The lock on writing must be held.
-        """
         with open(self._path, "r+b") as file:
             size = file.seek(0, os.SEEK_END)
             if size == 0:

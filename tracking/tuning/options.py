@@ -23,30 +23,7 @@ and what is done now.
 
 @dataclass(frozen=True, kw_only=True)
 class TuneOptions:
-    """The options of a search; the metadata of each field hold its help text and range.
-
-    - tracker: a name, file.py:Class, module:Class, a class, or "grouping"; suite: what to tune on, the name of a suite
-      or scenario or a TOML file, or several of them.
-    - trials: number to finish, the defaults included; seed: of the search; finalists: number of best trials that
-      validation chooses from.
-    - prune: p-value below which a losing trial is stopped, 0 never.
-    - seeds, validation, test: ranges of seeds for training, validation and test. None takes as few as make 16, 48 and
-      100 episodes, at least two per scene.
-    - check: second suite to test on; "" takes friends-meet or crossing, None takes none.
-    - objective: scores to improve, the first decides; () takes the tracker's own.
-    - detections: the tracker's input; None: "file" if it takes boxes or points, else "image" ("truth" for grouping).
-    - similarity: how people are compared, "ground", "image" or "boxes"; None: by the data, as `evaluate` does.
-    - set: "key=value" settings that stay fixed; only: parameters to search, () takes all tunable ones.
-    - out: TOML file for the result, None writes none.
-    - storage: journal file or Optuna URL of the study, None for a journal beside `out` (memory without `out`); study:
-      its name, None for that of `out`.
-    - workers: number of processes; cluster: address of a dask scheduler or None.
-    - step_timeout: seconds that each `reset` and `step` may take, in a process of the tracker's own; None: no limit.
-    - progress: called as progress(finished, trials, text), or None.
-
-    Raises InputError if a number with a declared range lies outside it; everything else is checked by the search. Where
-    a help text names an option as --name, the Python argument of that name is meant.
-    """
+    """The options of a search; the metadata of each field hold its help text and range."""
 
     tracker: str | type[Tracker] = field(
         metadata=option("Tracker to tune: a name, file.py:Class, module:Class; or `grouping`.", metavar="TRACKER")

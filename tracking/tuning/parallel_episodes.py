@@ -24,25 +24,15 @@ CACHE_BYTES = 512 * 2**20
 
 @dataclass(frozen=True)
 class EpisodeTask:
-    """One episode to play by a worker.
-
-    - tracker: a name, file.py:Class, module:Class or class.
-    - source: the scene with its seed.
-    - values: the tracker's parameters by name; others have their defaults.
-    - detections: the tracker's input, "image", "file" or "truth".
-    - every_score: True to compute the whole catalogue of scores.
-    - code: hash of the tracker's file where the search runs, "" if there is no file.
-    - step_timeout: seconds that each `reset` and `step` may take, None for no limit.
-    - similarity: how people are compared, None by the data.
-    """
+    """One episode to play by a worker."""
 
     tracker: str | type[Tracker]
     source: Source
-    values: dict[str, Any]
+    values: dict[str, Any]  # the tracker's parameters by name; others have their defaults
     detections: DetectionMode
     every_score: bool
-    code: str
-    step_timeout: float | None = None
+    code: str  # hash of the tracker's file where the search runs, "" if there is no file
+    step_timeout: float | None = None  # seconds that each `reset` and `step` may take
     similarity: Similarity | None = None
 
 
@@ -59,18 +49,7 @@ def episode_player(
     cluster: str | None = None,
     similarity: Similarity | None = None,
 ) -> Iterator[PlayEpisodes]:
-    """Opens the workers for the time of the context and returns the function play(sources, values, every_score).
-
-    That function yields one result per source in order: the episode, or the FlockscopeError that these parameters
-    (values by name) or the source caused. It goes on after an error. Nothing is played before its first result is
-    taken. When its taker stops, no further episode is begun.
-    detections: the tracker's input, "image", "file" or "truth". workers: number of processes, 1 for this process;
-    cluster: address of a dask scheduler, None for no cluster. similarity: how people are compared.
-
-    Raises InputError if a class is to be played by other processes, if `workers` is below 1, or if the address is wrong
-    or dask is missing. Raises WorkError if no scheduler answers. The function raises WorkError if workers are lost or
-    their tracker file differs.
-    """
+    """Opens the workers for the time of the context and returns the function play(sources, values, every_score)."""
     from sim.workers.start import results_in_order, start_workers
 
     if isinstance(tracker.tracker, type) and (workers > 1 or cluster):
@@ -95,11 +74,7 @@ def episode_player(
 
 
 def play_task(task: EpisodeTask) -> EpisodeOrError:
-    """Plays an episode in a worker, which keeps the tracker class and its opened sources for later tasks.
-
-    Returns the episode, or the FlockscopeError that the task's parameters cause. Raises WorkError if the worker's
-    tracker file differs from that of the search, and InputError if the tracker cannot be found there.
-    """
+    """Plays an episode in a worker, which keeps the tracker class and its opened sources for later tasks."""
     return _attempt(task, *_tracker_and_cache(task.tracker, task.code, task.step_timeout))
 
 

@@ -28,29 +28,19 @@ BLUE, ORANGE, RED = "#0b6bcb", "#d4600a", "#b42318"
 
 @dataclass(frozen=True)
 class Axes:
-    """Axes of a plot on a page of 760 × 400 px: 70 px from its left, 20 from its right, 78 from its top, 48 from its
-    bottom. x, y: each the range (low, high) of the data that fills the plot, in the data's unit, low below high (not
-    checked).
-    """
+    """Axes of a plot; x and y are the ranges (low, high) of the data that fill it."""
 
     x: tuple[float, float]
     y: tuple[float, float]
 
     def to_page(self, x: float, y: float) -> tuple[float, float]:
-        """Returns the place (u, v) of the data point (x, y) on the page, px from the left and px from the top.
-
-        Points outside the ranges lie outside the axes. Raises ZeroDivisionError if a range is empty.
-        """
+        """Returns the place (u, v) of the data point (x, y) on the page, px from the left and px from the top."""
         across = (x - self.x[0]) / (self.x[1] - self.x[0])
         up = (y - self.y[0]) / (self.y[1] - self.y[0])
         return LEFT + across * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM)
 
     def elements(self, x_label: str, y_label: str) -> list[str]:
-        """Returns the SVG elements of grid lines, tick labels and the two axis labels, one text each.
-
-        x_label stands below the x axis, y_label above the y axis. Grid lines are horizontal. Raises ZeroDivisionError
-        if a range is empty, and ValueError if its low end is above the high one.
-        """
+        """Returns the SVG elements of grid lines, tick labels and the two axis labels, one text each."""
         (left, bottom), (right, top) = self.to_page(self.x[0], self.y[0]), self.to_page(self.x[1], self.y[1])
         made = []
         for value in ticks(*self.y):
@@ -64,13 +54,7 @@ class Axes:
 
 
 def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
-    """Returns an SVG text: plot of the first goal's training value of every trial, in the order of the search.
-
-    plan: gives the goal, the title and the defaults. records: finished trials; trials without values (impossible) are
-    not drawn but counted in the title. Pruned trials are hollow: their values are estimates. The defaults are a dashed
-    line, the best unpruned value so far a stepped line. Values far on the worse side of the unpruned trials' range are
-    ticks at the edge. Raises ValueError if no trial has a value.
-    """
+    """Returns an SVG text: plot of the first goal's training value of every trial, in the order of the search."""
     goal, trials = plan.goals[0], [t for t in records if t.values]
     unpruned = [t for t in trials if not t.pruned]
     default = next((t.values[0] for t in unpruned if t.params == plan.defaults), None)
@@ -103,12 +87,7 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
 
 
 def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: Config) -> str:
-    """Returns an SVG text: bar plot of the share of each parameter in the first goal's training values, greatest first.
-
-    plan: gives the title, defaults and units. importance: share by name of a searched parameter; at least one must be
-    above 0, else ValueError (no parameter) or ZeroDivisionError is raised. Beside each bar stand the default and, if
-    the winner `config` changed it, the new value; such bars are orange, others blue.
-    """
+    """Returns as SVG a bar for the importance of each parameter."""
     ranked = sorted(importance.items(), key=lambda pair: -pair[1])
     most, body = max(importance.values()), []
     left, wide = 190, WIDTH - 190 - 250
@@ -127,13 +106,7 @@ def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: C
 
 
 def pareto_plot(plan: SearchPlan, candidates: Sequence[Candidate], front: Sequence[Candidate]) -> str:
-    """Returns an SVG text: plot of the first two goals of the candidates on the validation scenes, the front joined by
-    a line.
-
-    plan: gives the goals, the title and the defaults. candidates: each with a validation value of every goal; front:
-    those of them that no other dominates (is at least as good in all goals and better in one). Raises ValueError if the
-    plan has one goal only.
-    """
+    """Returns as SVG the candidates by the first two goals."""
     one, two = plan.goals[:2]
     points = [c.validation[:2] for c in candidates]
     axes = Axes(_range([p[0] for p in points], 0.08), _range([p[1] for p in points], 0.08))
@@ -150,10 +123,7 @@ def pareto_plot(plan: SearchPlan, candidates: Sequence[Candidate], front: Sequen
 
 
 def ticks(low: float, high: float) -> list[float]:
-    """Returns round numbers in [low, high] at equal distances (1, 2 or 5 times a power of ten), two to six of them.
-
-    low must be below high, else ValueError is raised.
-    """
+    """Returns round numbers in [low, high] at equal distances (1, 2 or 5 times a power of ten), two to six of them."""
     raw = (high - low) / 5
     step: float = 10.0 ** math.floor(math.log10(raw))
     step *= next(m for m in (1, 2, 5, 10) if m * step >= raw * (1 - 1e-9))
@@ -162,21 +132,12 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def _clipped_range(values: Sequence[float], unpruned: Sequence[float]) -> tuple[float, float]:
-    """Returns the range (low, high) of the unpruned values with a margin of 15 % of its width, but no wider than all
-    values need.
-
-    values: all values, not empty; unpruned: those of them that are no estimates; if empty all values are used. One
-    extreme trial must not flatten all others.
-    """
     low, high = _range(unpruned or values, 0.15)
     return max(low, min(values) - 0.02 * (high - low)), min(high, max(values) + 0.1 * (high - low))
 
 
 def _range(values: Sequence[float], pad: float) -> tuple[float, float]:
-    """Returns (low, high): the range of the values, wider by `pad` times its width on both sides; low is below high.
-
-    Equal values get a margin of 5 % of their size, at least 0.05. Without values about 0 to 1.
-    """
+    """Returns (low, high): the range of the values, wider by `pad` times its width on both sides; low is below high."""
     low, high = min(values, default=0.0), max(values, default=1.0)
     room = pad * (high - low) or max(abs(high), 1.0) * 0.05
     return low - room, high + room
@@ -201,11 +162,6 @@ def _dot(u: float, v: float, colour: str, hollow: bool = False) -> str:
 
 
 def _page(title: str, body: list[str], legend: list[tuple[str, str]], height: float = HEIGHT) -> str:
-    """Returns the SVG file as text: title, legend beneath it, body.
-
-    body: SVG elements. legend: pairs (colour, meaning); the colours "dashes" and "hollow" stand for a dashed line and a
-    hollow dot. height: of the page in px.
-    """
     u, shown = 20.0, list[str]()
     for colour, meaning in legend:
         if colour == "dashes":

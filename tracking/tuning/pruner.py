@@ -20,23 +20,17 @@ LEAST_SCENES = 2
 
 
 class SignedRankPruner(BasePruner):
-    """Prunes a trial if its values on the scenes played so far are surely worse than those of the best trial on the
-    same scenes.
+    """Prunes a trial whose values on the scenes so far are surely worse than the best trial's on the same scenes.
 
-    p: a trial is pruned if the one-sided p-value of Wilcoxon's signed-rank test is below this; 0 never prunes. Values
-    must be reported with the number of the scene as step. For studies with one goal.
+    A trial is pruned if the one-sided p-value of Wilcoxon's signed-rank test is below p; 0 never prunes. Values must be
+    reported with the number of the scene as step. For studies with one goal.
     """
 
     def __init__(self, p: float) -> None:
         self.p = p
 
     def prune(self, study: optuna.Study, trial: FrozenTrial) -> bool:
-        """Returns True if the trial is to be pruned: its p-value is below `p`, and its mean on the common scenes is
-        worse.
-
-        Common scenes are those on which both this trial and the best complete trial have a value. False if no trial is
-        complete, or fewer than two scenes are common. Raises RuntimeError if the study has several goals.
-        """
+        """Returns True if the trial is to be pruned."""
         try:
             best = study.best_trial.intermediate_values
         except ValueError:
@@ -47,12 +41,7 @@ class SignedRankPruner(BasePruner):
 
 
 def signed_rank_p_value(gains: Sequence[float]) -> float:
-    """Returns the one-sided p-value of Wilcoxon's signed-rank test: small if the gains are mostly negative.
-
-    It is the probability, if every sign were random, of a sum of positive ranks no greater than observed. Ranks are
-    those of the absolute values, averaged over equal values. Zeros take part in the ranking and have no sign. 1 without
-    gains.
-    """
+    """Returns the one-sided p-value of Wilcoxon's signed-rank test: small if the gains are mostly negative."""
     d = np.asarray(gains, float)
     _, place, count = np.unique(np.abs(d), return_inverse=True, return_counts=True)
     last = np.cumsum(count)

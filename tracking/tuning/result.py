@@ -14,6 +14,7 @@ from typing import Any
 
 from scenarios.printable import counted
 from sim.io.files.atomic import write_file
+from sim.versions import installed
 from tracking.config import Config
 from tracking.tuning.comparison import Candidate, Comparison, TrialRecord
 from tracking.tuning.plots import history_plot, importance_plot, pareto_plot
@@ -31,17 +32,19 @@ MANY = 4
 class TuningResult:
     """The result of `tracking.tune`.
 
-    - plan: the search.
-    - config: the winner, all its parameters.
-    - front: with several goals the candidates that no other dominates, best first goal first; else ().
-    - candidates: the defaults first, then the best trials, with their values on the validation scenes.
-    - trials: all finished ones in the order of the search, pruned and impossible ones included.
-    - importance: share (0 to 1) of each parameter, by name, in the first goal's training values.
-    - comparisons: winner and defaults on the test scenes; () if the defaults won.
-    - taken_back: names of parameters that the best trial changed and the winner does not.
-    - validation: two tuples, values by goal of the defaults and of the winner on the validation scenes.
-    - notes: remarks for the reader; study: name of the study. left_out: a line for each scene whose script did not
-      come true.
+    Attributes:
+        plan: The search.
+        config: The winner, all its parameters.
+        front: With several goals the candidates that no other dominates, best first goal first; else ().
+        candidates: The defaults, then the best trials, with their values on the validation scenes.
+        trials: All finished ones in the order of the search, pruned and impossible ones included.
+        importance: Share (0 to 1) of each parameter, by name, in the first goal's training values.
+        comparisons: Of winner and defaults on the test scenes; () if the defaults won.
+        taken_back: Names of parameters that the best trial changed and the winner does not.
+        validation: Values by goal of the defaults and of the winner on the validation scenes.
+        notes: Remarks for the reader.
+        study: Name of the study.
+        left_out: A line for each scene whose script did not come true.
     """
 
     plan: SearchPlan = field(repr=False)
@@ -64,9 +67,7 @@ class TuningResult:
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:
-        """A dict: parameter name to (default, new value), for every parameter in which the winner differs from the
-        defaults.
-        """
+        """Default and new value of each parameter that the winner changed, by name."""
         old, new = self.default.as_dict(), self.config.as_dict()
         return {name: (old[name], new[name]) for name in new if old[name] != new[name]}
 
@@ -90,11 +91,7 @@ class TuningResult:
         return "\n".join(self.lines())
 
     def lines(self, chosen: Candidate | None = None) -> list[str]:
-        """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner.
-
-        chosen: a candidate of the front, whose validation values are shown instead of the winner's, and no comparisons
-        and notes; None for the winner. Training values are never shown, as the search has optimised them.
-        """
+        """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner."""
         plan, seeds = self.plan, self.plan.seeds
         names = ", ".join(goal.key for goal in plan.goals)
         chosen_similarity = plan.options.similarity
@@ -118,11 +115,7 @@ class TuningResult:
         return [*lines, *self.notes, *(f"left out: {scene}" for scene in self.left_out)]
 
     def to_toml(self, chosen: Candidate | None = None) -> str:
-        """Returns a TOML text of all parameters of the winner, or of `chosen`, a candidate of the front.
-
-        `flockscope track --params` reads it. Comments hold the lines of `lines(chosen)`, the versions of the packages,
-        and the default of changed parameters.
-        """
+        """Returns a TOML text of all parameters of the winner, or of `chosen`, a candidate of the front."""
         config = self.config if chosen is None else chosen.config
         old = self.default.as_dict()
         lines = []
@@ -130,17 +123,12 @@ class TuningResult:
             name = line.partition(" = ")[0]
             moved = name in old and config.as_dict().get(name) != old[name]
             lines.append(f"{line}  # default {old[name]}" if moved else line)
-        packages = ", ".join(f"{name} {version}" for name, version in versions().items())
+        packages = ", ".join(f"{name} {version}" for name, version in installed(PACKAGES).items())
         comments = [*self.lines(chosen), f"versions: {packages}"]
         return "\n".join([*(f"# {comment}" for comment in comments), *lines, ""])
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns everything as nested dicts and lists for JSON; an unknown number is nan.
-
-        Keys: settings, counts (trials, episodes, pruned, impossible), params, changed, taken_back, validation,
-        comparisons, candidates, front (empty with one goal), importance, notes, left_out, versions. `changed` (by
-        parameter) and `validation` (by goal) hold dicts of default and tuned value.
-        """
+        """Returns everything as nested dicts and lists for JSON; an unknown number is nan."""
         plan, seeds = self.plan, self.plan.seeds
         return {
             "settings": plan.identity()
@@ -167,17 +155,11 @@ class TuningResult:
             "importance": dict(self.importance),
             "notes": list(self.notes),
             "left_out": list(self.left_out),
-            "versions": versions(),
+            "versions": installed(PACKAGES),
         }  # fmt: skip
 
     def write(self, path: str | Path) -> list[Path]:
-        """Writes the parameters to `path` (TOML), and beside it all figures (.json) and the plots (.svg); returns all
-        paths written, `path` first.
-
-        The other names are `path` with another suffix. With several goals each candidate of the front gets a file, too
-        (.front-1.toml …, best first goal first). Existing files are replaced. Raises OSError if a file cannot be
-        written.
-        """
+        """Writes the parameters to `path` (TOML), and beside it all figures (.json) and the plots (.svg)."""
         target = Path(path)
         files = {".json": json.dumps(_without_nan(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
         if len(self.plan.goals) > 1:
@@ -188,10 +170,7 @@ class TuningResult:
         return [target, *(target.with_suffix(suffix) for suffix in files)]
 
     def plots(self) -> dict[str, str]:
-        """Returns the plots as SVG text by file suffix: ".history.svg", ".importance.svg", ".front.svg".
-
-        The second is missing if all shares are 0, the third with one goal.
-        """
+        """Returns the plots as SVG text by file suffix: ".history.svg", ".importance.svg", ".front.svg"."""
         plots = {".history.svg": history_plot(self.plan, self.trials)}
         if any(self.importance.values()):
             plots[".importance.svg"] = importance_plot(self.plan, self.importance, self.config)
@@ -207,26 +186,8 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def versions() -> dict[str, str]:
-    """Returns a dict of installed versions by package name: flockscope, optuna, numpy, scipy, numba; "unknown" if it is
-    not installed.
-    """
-    from importlib.metadata import PackageNotFoundError, version
-
-    found = {}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
-
-
 def _without_nan(value: Any) -> Any:
-    """Returns a copy of `value`, nested dicts, lists and tuples, with None for nan and infinity, which JSON lacks.
-
-    Tuples become lists; anything else stays as it is.
-    """
+    """Returns a copy of `value`, nested dicts, lists and tuples, with None for nan and infinity, which JSON lacks."""
     if isinstance(value, dict):
         return {key: _without_nan(v) for key, v in value.items()}
     if isinstance(value, list | tuple):
@@ -235,10 +196,6 @@ def _without_nan(value: Any) -> Any:
 
 
 def _short_settings(settings: Sequence[str]) -> Iterator[str]:
-    """Yields settings ("key=value") for the text, cut to 40 characters.
-
-    More than 4 settings that begin with "sensor." are replaced by one text with their number, which comes first.
-    """
     sensor = [setting for setting in settings if setting.startswith("sensor.")]
     profile = len(sensor) > MANY
     if profile:

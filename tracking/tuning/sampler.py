@@ -42,11 +42,7 @@ TPE_FROM = 10
 
 
 def distribution(p: Param) -> BaseDistribution:
-    """Returns Optuna's distribution of the declared parameter p, in the unit of the parameter.
-
-    It is categorical over its choices, integer (whole numbers from `low` to `high`), or a float range from `low` to
-    `high` inclusive, log scale if declared so.
-    """
+    """Returns Optuna's distribution of the declared parameter p, in the unit of the parameter."""
     if p.scale == "categorical":
         return CategoricalDistribution(cast(Any, p.choices))
     if p.scale == "int":
@@ -55,20 +51,15 @@ def distribution(p: Param) -> BaseDistribution:
 
 
 def place_in_search(trials: Sequence[FrozenTrial], trial: FrozenTrial) -> int:
-    """Returns the place of a trial in the search, 0 for the defaults; a repeated trial has the place of its first try.
-
-    trials: all trials of the study. The place is the number of trials begun before it that are no repetitions.
-    """
+    """Returns the place of a trial in the search, 0 for the defaults."""
     number = trial.user_attrs.get(AGAIN, trial.number)
     return sum(t.number < number and AGAIN not in t.user_attrs for t in trials)
 
 
 class HillClimbingSampler(BaseSampler):
-    """Optuna sampler that moves a few parameters of a good finished trial (one of the best three, or of the Pareto
-    front); every fourth trial is drawn by TPE (a density model of all trials), once ten are complete.
+    """Optuna sampler that moves a few parameters of one of the best trials; every fourth trial is drawn by TPE.
 
-    plan: the search. The parameters of a trial depend only on the seed of the search, its place in it and the trials
-    finished before. State: of the current trial its random generator, its TPE sampler, and whether TPE is used.
+    State: of the current trial its random generator, its TPE sampler, and whether TPE is used.
     """
 
     def __init__(self, plan: SearchPlan) -> None:
@@ -77,11 +68,7 @@ class HillClimbingSampler(BaseSampler):
         self._rng, self._tpe, self._use_tpe = np.random.default_rng(seed), TPESampler(seed=seed), False
 
     def before_trial(self, study: optuna.Study, trial: FrozenTrial) -> None:
-        """Seeds the generators for this trial from the seed of the search and the trial's place in the study; decides
-        whether TPE draws it.
-
-        TPE draws every fourth trial (places 3, 7, 11 …, from 0), once ten trials are complete.
-        """
+        """Seeds the generators for this trial from the seed of the search and the trial's place in the study."""
         trials = study.get_trials(deepcopy=False)
         place = place_in_search(trials, trial)
         entropy = np.random.SeedSequence([self._plan.options.seed, place])
@@ -91,40 +78,22 @@ class HillClimbingSampler(BaseSampler):
         self._use_tpe = place % TPE_EVERY == TPE_EVERY - 1 and complete >= TPE_FROM
 
     def infer_relative_search_space(self, study: optuna.Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
-        """Returns the distributions by name that `sample_relative` draws from.
-
-        They are those of all searched parameters, or of those that TPE draws jointly from the study if TPE draws this
-        trial.
-        """
+        """Returns the distributions by name that `sample_relative` draws from."""
         return self._tpe.infer_relative_search_space(study, trial) if self._use_tpe else self._space
 
     def sample_relative(
         self, study: optuna.Study, trial: FrozenTrial, search_space: dict[str, BaseDistribution]
     ) -> dict[str, Any]:
-        """Returns a dict of values by parameter name: a good trial of the study with some parameters moved, or what TPE
-        draws.
-
-        search_space: distributions by name; used by TPE only. Raises InputError if the config refuses the good trial.
-        """
+        """Returns a dict of values by parameter name."""
         return self._tpe.sample_relative(study, trial, search_space) if self._use_tpe else self._moved(study)
 
     def sample_independent(
         self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
     ) -> Any:
-        """Returns the value that TPE draws for the parameter `param_name` alone, from its distribution, given the
-        study.
-        """
+        """Returns the value that TPE draws for the parameter `param_name` alone."""
         return self._tpe.sample_independent(study, trial, param_name, param_distribution)
 
     def _moved(self, study: optuna.Study) -> dict[str, Any]:
-        """Returns the values by name of a good trial of the study with some parameters moved, about three on average,
-        at least one.
-
-        A moved parameter takes a normal step on its range mapped to [-1, 1], mirrored at the ends. Its standard
-        deviation is drawn for each parameter anew, from 1/20 to 1 with a uniform logarithm. A whole number takes the
-        value in whose part of [-1, 1] the step ends; a categorical one is drawn anew. If the config refuses the values,
-        a point on the line back to the good trial is taken. Raises InputError if the config refuses the good trial.
-        """
         space, rng = self._plan.space, self._rng
         parent = self._parent(study)
         base = self._plan.config(parent)
@@ -140,14 +109,6 @@ class HillClimbingSampler(BaseSampler):
         return {name: getattr(config, name) if name in moved else value for name, value in parent.items()}
 
     def _parent(self, study: optuna.Study) -> dict[str, Any]:
-        """Returns the values by name of one of the study's three best unpruned trials; the defaults if there is none.
-
-        The best has a probability of 0.6, the second of 0.24, the third of 0.16; if there are fewer, the last has the
-        rest.
-
-        With several goals it is a trial of the Pareto front, each equally likely. Trials over other parameters are
-        ignored with one goal.
-        """
         trials = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
         whole = [t for t in trials if PRUNED not in t.user_attrs and t.params.keys() == self._plan.defaults.keys()]
         if not whole:
@@ -162,8 +123,5 @@ class HillClimbingSampler(BaseSampler):
 
 
 def _reflected(point: Array) -> Array:
-    """Returns `point`, coordinates of any shape, with those beyond an end of [-1, 1] mirrored at that end.
-
-    Those beyond 3 or -3 would land outside again, beyond the other end; they become that end, -1 or 1.
-    """
+    # Beyond 3 or -3 the mirror image would land outside again, behind the other end.
     return np.clip(np.where(np.abs(point) > 1, np.sign(point) * 2 - point, point), -1.0, 1.0)

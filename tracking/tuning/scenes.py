@@ -28,22 +28,12 @@ CHECK_SUITES = ("friends-meet", "crossing")
 
 
 def suite_names(suite: Scenes) -> tuple[str, ...]:
-    """Returns the names of suites, scenarios or files as texts, in the order given.
-
-    A single name or path becomes a tuple of one.
-    """
+    """Returns the names of suites, scenarios or files as texts, in the order given."""
     return (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite))
 
 
 def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
-    """Returns the seeds, or the default of the split if they are None.
-
-    split: "train", "val" or "test". scenes: number of scenes that each seed is played with, 1 or more. The default
-    begins at the first seed of the split (0, 10000 or 20000). It makes at least 16, 48 or 100 episodes, with at least
-    two seeds.
-
-    Raises InputError if `seeds` is no range, is empty, or reaches out of the range of the split.
-    """
+    """Returns the seeds, or the default of the split if they are None."""
     low, high = next((low, high) for name, low, high in SPLITS if name == split)
     if seeds is None:
         return range(low, low + max(LEAST_SEEDS, -(-EPISODES[split] // scenes)))
@@ -64,12 +54,7 @@ def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
 
 
 def count_scenes(names: Sequence[str], settings: Sequence[str], option: str) -> int:
-    """Returns the number of scenes that the suites, scenarios and files `names` contain, each counted with one seed.
-
-    settings: "key=value" overrides of every scene. option: the option that the error messages name. Raises InputError
-    if a name is a recording or stored data, is unknown, or contains no scene, if a file is unreadable, and if a setting
-    does not fit.
-    """
+    """Returns the number of scenes that the suites, scenarios and files `names` contain, each counted with one seed."""
     for name in names:
         if not name.endswith(".toml") and not _is_known(name) and Path(name).exists():
             raise InputError(
@@ -84,40 +69,22 @@ def count_scenes(names: Sequence[str], settings: Sequence[str], option: str) -> 
 
 
 def episode_sources(names: Sequence[str], seeds: range, settings: Sequence[str]) -> tuple[Source, ...]:
-    """Returns one source for every scene of the suites `names` with every seed: scene by scene, each with its seeds in
-    order.
-
-    settings: "key=value" overrides of the scenes. Raises InputError if a name is unknown, a file is wrong, there is no
-    scene or seed, or a setting does not fit.
-    """
+    """Returns one source for every scene of the suites `names` with every seed."""
     return sources(list(names), seeds, tuple(settings))
 
 
 def default_check_suite(names: Sequence[str]) -> str | None:
-    """Returns the first of friends-meet and crossing that shares no scenario with the suites `names`, None if there is
-    none.
-
-    Raises InputError if a name is unknown or a file unreadable.
-    """
+    """Returns the first of friends-meet and crossing that shares no scenario with `names`, None if there is none."""
     return next((suite for suite in CHECK_SUITES if not shared_scenarios(names, (suite,))), None)
 
 
 def shared_scenarios(names: Sequence[str], others: Sequence[str]) -> list[str]:
-    """Returns the names of the scenarios that both lists of suites, scenarios and files contain, sorted; [] if none.
-
-    Scenarios are equal if they are the same file, links resolved; a copy of a file is another scenario. Raises
-    InputError if a name is unknown or a file unreadable.
-    """
+    """Returns the names of the scenarios that both lists of suites, scenarios and files contain, sorted; [] if none."""
     common = {file for name in names for file in _files(name)} & {file for name in others for file in _files(name)}
     return sorted(Path(file).stem for file in common)
 
 
 def _files(name: str) -> list[str]:
-    """Returns the absolute paths of the scenario files that the name of a suite, a scenario or a *.toml file refers to.
-
-    A suite gives one path per entry. The text "suite:" before a name forces a suite. Raises InputError if the name is
-    unknown or a file is missing or wrong.
-    """
     bare = name.removeprefix("suite:")
     if bare != name or (bare in toml_files.suite_names() and bare not in toml_files.names()) or _is_suite(bare):
         path = suites.find_suite(bare)

@@ -47,16 +47,22 @@ RESULT_MARKS: Rules = {"settings": TABLE, "counts": TABLE, "taken_back": list_of
 
 @documented(TuneOptions, positional=3)
 def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.trials, **options: Any) -> TuningResult:
-    """Returns the parameters that a search found on simulated scenes, and what they gain on other scenes.
+    """Searches parameters on simulated scenes, and measures their gain on other scenes.
 
-    tracker: a name, file.py:Class, module:Class or class, or "grouping". suite: names or TOML files of what to tune on.
-    trials: sets of parameters to play, the defaults included. The tracker plays whole episodes. The same call resumes a
-    search that was interrupted, if `out` or `storage` is given. With `out` the result is written to files. A class as
-    tracker needs workers=1.
+    The same call resumes a search that was interrupted, if `out` or `storage` is given.
 
-    Raises InputError before anything is played if an option is unknown or wrong, if options contradict each other, if a
-    study in the storage is about another search, and if Optuna is not installed. Errors that the tracker raises with
-    the default parameters are raised, WorkError if workers are lost, and OSError if a file cannot be written.
+    Args:
+        tracker: A name, file.py:Class, module:Class, a class (then workers must be 1), or "grouping".
+        suite: Names of suites or scenarios, or TOML files, to tune on.
+        trials: Number of sets of parameters to play, the defaults included.
+
+    Returns:
+        The winner and its comparison with the defaults on the test scenes; with `out` written to files, too.
+
+    Raises:
+        InputError: An option is unknown or wrong, options contradict each other, the study in the storage is about
+            another search, or Optuna is not installed.
+        WorkError: Workers are lost, or the tracker fails with its defaults.
     """
     given = {"tracker": tracker, "suite": suite, "trials": trials, **options}
     return _search(from_keywords(TuneOptions, "tracking.tune", given))
@@ -93,7 +99,6 @@ def _search(options: TuneOptions) -> TuningResult:
 
 
 def _unfulfilled(source: Source) -> str:
-    """Returns why the script of a scene does not come true, "" if it does."""
     try:
         _ = source.open().truth
     except OrderError as error:
@@ -104,8 +109,8 @@ def _unfulfilled(source: Source) -> str:
 class PlayedScenes:
     """Plays episodes and keeps a record of the scenes that are left out, because their script did not come true.
 
-    play: what plays them. State: scenes, all that were counted, by key of their source; left_out, a line for
-    each that was left out."""
+    State: scenes, all that were counted, by key of their source; left_out, a line for each that was left out.
+    """
 
     def __init__(self, play: PlayEpisodes) -> None:
         self.play = play
@@ -139,7 +144,6 @@ class PlayedScenes:
 
 
 def _check_optuna() -> None:
-    """Raises InputError if the package optuna is not installed."""
     try:
         import optuna  # noqa: F401
     except ImportError:
@@ -148,11 +152,6 @@ def _check_optuna() -> None:
 
 
 def _checked_target(out: Path) -> Path:
-    """Returns `out`, the file for the result.
-
-    Raises InputError if its name does not end in .toml or it is a folder, or if the file of all figures beside it
-    (.json) is not ours.
-    """
     if out.suffix != ".toml" or out.is_dir():
         remedy = "choose a name that ends in .toml"
         raise InputError(file=out, place="--out", got=out.name, expected="a file, *.toml", remedy=remedy)
@@ -161,15 +160,6 @@ def _checked_target(out: Path) -> Path:
 
 
 def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report: Callable[[str], None]) -> TuningResult:
-    """Returns the result of a finished study: the winner is chosen and simplified on validation scenes, then compared
-    on test scenes.
-
-    With one goal the winner is the candidate of best value among those surely better than the defaults (the 95 %
-    interval of the gain excludes 0), else the defaults. With several goals it is the one of the Pareto front that is
-    best in the first goal, not simplified; the defaults if no candidate has a value of every goal. If the defaults win,
-    nothing is compared and a note says why. play: plays episodes. report: called with a text before each set of scenes.
-    Errors of the defaults and of the workers are raised.
-    """
     evaluator = HeldOutEvaluator(plan, play, report)
     candidates = evaluator.validated(_candidates(plan, study))
     importance = study.importance()
@@ -196,11 +186,6 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report:
 
 
 def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
-    """Returns a list of one line that says why the defaults are the result.
-
-    candidates: the defaults first, then the others with their gains on the validation scenes, of which the greatest is
-    named. goal: the first goal.
-    """
     gains = [c.gain for c in candidates[1:] if c.gain is not None]
     if not gains:
         return ["the defaults stay: no trial was better in training"]
@@ -212,13 +197,6 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
 
 
 def _candidates(plan: SearchPlan, study: SearchStudy) -> list[Candidate]:
-    """Returns the defaults first, then the best unpruned trials in training, at most `finalists` of them, best first
-    goal first; no config twice.
-
-    Impossible trials are left out. With several goals the trials come from the Pareto front of training, spread over
-    it. The defaults must be finished, else StopIteration is raised. Raises InputError if the config refuses a trial's
-    parameters.
-    """
     played = [t for t in study.records() if not t.pruned and not t.error]
     defaults, goal = next(t for t in played if t.params == plan.defaults), plan.goals[0]
     if len(plan.goals) > 1:
@@ -236,10 +214,6 @@ def _candidates(plan: SearchPlan, study: SearchStudy) -> list[Candidate]:
 
 
 def _spread(ranked: list[TrialRecord], count: int) -> list[TrialRecord]:
-    """Returns `count` of the ranked trials at even distances from the first to the last, in the same order.
-
-    All are returned if there are no more than `count`, only the first if `count` is 1.
-    """
     if len(ranked) <= count:
         return ranked
     return [ranked[round(k * (len(ranked) - 1) / max(count - 1, 1))] for k in range(count)]

@@ -34,42 +34,28 @@ from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
 @dataclass(frozen=True)
 class SearchSeeds:
-    """The seeds that every scene is played with, as ranges with the end excluded.
-
-    training, validation, test: of the suite that is tuned on. check: test seeds of the second suite, unused without
-    one.
-    """
+    """The seeds that every scene is played with."""
 
     training: range
     validation: range
     test: range
-    check: range
+    check: range  # test seeds of the second suite
 
 
 @dataclass(frozen=True)
 class SearchPlan:
-    """A search whose options fit together.
-
-    - options: as given.
-    - tracker: what is tuned; base: its config with the values that the option `set` fixed; space: the parameters to
-      search.
-    - suite: names of what is tuned on; check: a second suite to test on, or None.
-    - seeds: of training, validation and tests.
-    - goals: scores to improve, at least one; the first decides.
-    - detections: the tracker's input, "image", "file" or "truth".
-    - scene_settings: "key=value" overrides of the scenes.
-    """
+    """A search whose options fit together."""
 
     options: TuneOptions
     tracker: TunedTracker
-    base: Config
-    space: tuple[Param, ...]
-    suite: tuple[str, ...]
-    check: str | None
+    base: Config  # its config with the values that the option `set` fixed
+    space: tuple[Param, ...]  # the parameters to search
+    suite: tuple[str, ...]  # names of what is tuned on
+    check: str | None  # second suite to test on
     seeds: SearchSeeds
-    goals: tuple[Goal, ...]
+    goals: tuple[Goal, ...]  # at least one; the first decides
     detections: DetectionMode
-    scene_settings: tuple[str, ...]
+    scene_settings: tuple[str, ...]  # "key=value" overrides of the scenes
 
     @property
     def tracker_name(self) -> str:
@@ -83,57 +69,37 @@ class SearchPlan:
 
     @property
     def check_name(self) -> str | None:
-        """The name of the second suite without its folder; with " (--check)" if the first has the same. None without
-        one."""
+        """The name of the second suite without its folder; with " (--check)" if the first has the same."""
         name = None if self.check is None else _without_folder(self.check)
         return f"{name} (--check)" if name == self.suite_name else name
 
     @property
     def defaults(self) -> dict[str, Value]:
-        """The values of the searched parameters in the first trial, a dict by parameter name: those of `base`, the
-        tracker's defaults.
-        """
+        """The values of the searched parameters in the first trial, a dict by parameter name."""
         return {p.name: getattr(self.base, p.name) for p in self.space}
 
     @property
     def needs_every_score(self) -> bool:
-        """True if some goal is other than objective, HOTA, group_F1 and frames/s: all scores must then be
-        computed.
-        """
+        """True if some goal is other than objective, HOTA, group_F1 and frames/s: all scores must then be computed."""
         return any(goal.key not in (*FAST_KEYS, SPEED) for goal in self.goals)
 
     def config(self, values: dict[str, Any]) -> Config:
-        """Returns the base config with these values (by parameter name).
-
-        Raises InputError if a name is unknown or the config refuses the values, alone or together.
-        """
+        """Returns the base config with these values (by parameter name)."""
         return type(self.base).from_dict({**self.base.as_dict(), **values})
 
     @cached_property
     def training(self) -> tuple[Source, ...]:
-        """The sources of the training episodes of each trial: every scene of the suite with every training seed.
-
-        Raises InputError at first use if a scene cannot be read.
-        """
+        """The sources of the training episodes of each trial: every scene of the suite with every training seed."""
         return episode_sources(self.suite, self.seeds.training, self.scene_settings)
 
     @cached_property
     def validation(self) -> tuple[Source, ...]:
-        """The sources of the episodes that choose among the best trials: every scene of the suite with every validation
-        seed.
-
-        Raises InputError at first use if a scene cannot be read.
-        """
+        """The sources of the episodes that choose among the best trials."""
         return episode_sources(self.suite, self.seeds.validation, self.scene_settings)
 
     @cached_property
     def tests(self) -> dict[str, tuple[Source, ...]]:
-        """The sources (scene and seed) of the episodes that measure the gain, a dict by `suite_name` and `check_name`.
-
-        It has the suite that is tuned on and, if there is one, the second suite. The second suite keeps its own scenes;
-        only settings that begin with "sensor." apply to it. Raises InputError if a setting does not fit the second
-        suite, or a scene cannot be read.
-        """
+        """The sources of the test episodes, by `suite_name` and `check_name`."""
         found = {self.suite_name: episode_sources(self.suite, self.seeds.test, self.scene_settings)}
         if self.check is not None and self.check_name is not None:
             sensor = [setting for setting in self.scene_settings if setting.startswith("sensor.")]
@@ -141,13 +107,7 @@ class SearchPlan:
         return found
 
     def identity(self) -> dict[str, Any]:
-        """Returns a dict of everything that the value of a trial depends on; a study is resumed only if it is the same.
-
-        Keys: tracker, code, versions, suite, seeds, motions, detections, similarity, objective, searched, ranges,
-        fixed, prune, seed. Long lists are given as hashes. Validation and test seeds, and the number of trials, are not
-        part of it.
-        Raises InputError if a training scene cannot be read.
-        """
+        """Returns a dict of everything that the value of a trial depends on."""
         return {
             "tracker": self.tracker_name,
             "code": self.tracker.code,
@@ -167,13 +127,7 @@ class SearchPlan:
 
 
 def search_plan(options: TuneOptions) -> SearchPlan:
-    """Returns the plan that follows from the options, with defaults for everything that the options leave open.
-
-    Raises InputError if the tracker, a parameter, a suite, a seed or a score is unknown or not allowed, if a file is
-    wrong, if the options contradict each other (such as sensor settings without detections from files), if the second
-    suite shares a scenario with the first, if no parameter is left to search, and if the tracker cannot work with the
-    detections.
-    """
+    """Returns the plan that follows from the options, with defaults for everything that the options leave open."""
     tracker = tuned_tracker(options.tracker, options.step_timeout)
     fixed, scene_settings = _split_settings(options.set)
     suite = suite_names(options.suite)
@@ -206,12 +160,6 @@ def seeds_text(seeds: range) -> str:
 
 
 def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]]:
-    """Returns the "key=value" settings of the tracker (a list), and those of the scenes (a tuple), both in the order
-    given.
-
-    Scenes have keys that begin with "scenario." (removed in the result) or "sensor." (kept); all others are the
-    tracker's, and keep a "tracker." before the key. Nothing is checked.
-    """
     tracker, scenes = [], []
     for setting in settings:
         key, _, value = setting.partition("=")
@@ -223,11 +171,6 @@ def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]
 
 
 def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
-    """Returns the number of scenes of the second suite `check`, 1 if it is None.
-
-    suite: names of what is tuned on. Raises InputError if `check` shares a scenario with them, is unknown or
-    unreadable, or holds no scenes to simulate.
-    """
     if check is None:
         return 1
     count = count_scenes((check,), (), "--check")
@@ -240,13 +183,6 @@ def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
 
 
 def _space(base: Config, settings: Sequence[str], only: tuple[str, ...], mode: DetectionMode) -> tuple[Param, ...]:
-    """Returns the parameters to search: tunable, not fixed, with an effect on this input, and in `only` unless it is
-    empty.
-
-    base: config of the tracker, which declares them. settings: "name=value" texts of fixed parameters. only: names of
-    parameters. mode: the tracker's input; "image" leaves out parameters about points, other modes those about pixels.
-    Raises InputError if a name in `only` is unknown or no such parameter, or if no parameter is left.
-    """
     fixed = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in settings}
     unused = "points" if mode == "image" else "pixels"
     for name in only:

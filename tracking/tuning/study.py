@@ -33,9 +33,7 @@ FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 class SearchStudy:
     """An open study of a search (Optuna's record of its trials), which several processes can share.
 
-    A new study gets the defaults as its first trial. plan: the search; study (kept as `optuna`): Optuna's study; locks:
-    locks by which processes share its journal file, None without them; storage: names it in errors. Raises InputError
-    if the study is about another search.
+    A new study gets the defaults as its first trial. Without a journal file, `locks` is None.
     """
 
     def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
@@ -49,25 +47,15 @@ class SearchStudy:
                 study.enqueue_trial(dict(plan.defaults))
 
     def trials(self) -> list[FrozenTrial]:
-        """Returns all of Optuna's trials in the order of their numbers; running, waiting, failed and abandoned ones are
-        included. They are not copies: do not change them.
-        """
+        """Returns all of Optuna's trials in the order of their numbers."""
         return self.optuna.get_trials(deepcopy=False)
 
     def finished(self) -> list[FrozenTrial]:
-        """Returns the finished trials by number: complete, stopped early, or with impossible parameters.
-
-        The state of the first two is COMPLETE, that of the last PRUNED.
-        """
+        """Returns the finished trials by number: complete, stopped early, or with impossible parameters."""
         return [t for t in self.trials() if t.state in FINISHED]
 
     def ask(self, retry_unfinished: bool = False) -> optuna.Trial | None:
-        """Returns the next trial to play, locked for this process; None if as many as planned are finished or running.
-
-        With locks, an abandoned trial (running, but its process is gone) is repeated first. Without locks it is not
-        known which trials are abandoned: running ones count as played by others, or, with `retry_unfinished`, as
-        abandoned (which has no effect with locks). Abandoned trials are marked as failed.
-        """
+        """Returns the next trial to play, locked for this process."""
         with self._choosing():
             for t in self.trials():
                 if t.state == TrialState.RUNNING and (
@@ -83,30 +71,19 @@ class SearchStudy:
             return trial
 
     def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
-        """Stores the values of a trial, one per goal, and releases its lock; None means that its parameters are
-        impossible (state PRUNED).
-
-        A trial that is finished already keeps its values. Raises ValueError if the number of values differs from that
-        of the goals or a value is nan.
-        """
+        """Stores the values of a trial, one per goal, and releases its lock."""
         state = TrialState.PRUNED if values is None else TrialState.COMPLETE
         self.optuna.tell(trial, values, state, skip_if_finished=True)
         if self._locks is not None:
             self._locks.release_trial(trial.number)
 
     def place(self, trial: optuna.Trial) -> int:
-        """Returns the place of a trial in the search, 0 for the defaults.
-
-        A repeated trial has the place of its first try.
-        """
+        """Returns the place of a trial in the search, 0 for the defaults."""
         trials = self.trials()
         return place_in_search(trials, trials[trial.number])
 
     def records(self) -> list[TrialRecord]:
-        """Returns the finished trials in the order of the search, numbered by their place in it, 0 for the defaults.
-
-        A repeated trial has the place of its first try. Pruned and impossible trials are included.
-        """
+        """Returns the finished trials in the order of the search, numbered by their place in it, 0 for the defaults."""
         trials = self.trials()
         return sorted((self._record(t, place_in_search(trials, t)) for t in self.finished()), key=lambda r: r.number)
 
@@ -117,22 +94,12 @@ class SearchStudy:
         return TrialRecord(place, tuple(t.values or ()), dict(t.params), episodes, PRUNED in t.user_attrs)
 
     def best(self) -> set[int]:
-        """Returns the places in the search of the best trial, or, with several goals, of the trials of the Pareto
-        front.
-
-        Estimates of pruned trials take part. Of one goal, all trials with the best value are returned. Empty if no
-        trial is complete.
-        """
+        """Returns the places in the search of the best trials, or of the Pareto front, pruned ones included."""
         trials = self.trials()
         return {place_in_search(trials, t) for t in self.optuna.best_trials}
 
     def importance(self) -> dict[str, float]:
-        """Returns the share (0 to 1) of each parameter in the first goal's training values (PED-ANOVA), a dict by name,
-        greatest first.
-
-        Estimates of pruned trials take part. All shares are 0 if fewer than two trials have values, or all values are
-        equal.
-        """
+        """Returns the share (0 to 1) of each parameter in the first goal's training values (PED-ANOVA)."""
         from optuna.importance import get_param_importances
 
         names = [p.name for p in self.plan.space]
@@ -146,19 +113,13 @@ class SearchStudy:
 
     @property
     def knows_running_trials(self) -> bool:
-        """True if it is known which running trials other processes still play.
-
-        This is so with a journal file on a system with fcntl.
-        """
+        """True if it is known which running trials other processes still play."""
         return self._locks is not None
 
     def _choosing(self) -> AbstractContextManager[None]:
         return nullcontext() if self._locks is None else self._locks.choosing()
 
     def _repeat(self, abandoned: FrozenTrial) -> None:
-        """Marks an abandoned trial as failed and queues its parameters again under its place; only marks it if that was
-        done before.
-        """
         number = abandoned.user_attrs.get(AGAIN, abandoned.number)
         repeated = any(t.user_attrs.get(AGAIN) == number and t.number > abandoned.number for t in self.trials())
         if not repeated:
@@ -169,13 +130,7 @@ class SearchStudy:
 
 @contextmanager
 def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
-    """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`; then releases
-    its locks.
-
-    plan: the search. storage: a journal file, the URL of an Optuna storage, or None for memory. The folder and the lock
-    file of a journal are created. Optuna's messages are silenced meanwhile. Raises InputError if the storage cannot be
-    used, or holds a study of this name that is about another search; OSError if a file cannot be opened.
-    """
+    """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`."""
     with _quiet_optuna():
         place = storage if storage is None or "://" in str(storage) else Path(storage)
         locks = _trial_locks(place) if isinstance(place, Path) else None
@@ -188,10 +143,6 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
 
 
 def _create(plan: SearchPlan, place: str | Path | None, storage: BaseStorage | str | None, name: str) -> optuna.Study:
-    """Creates the study `name` in Optuna's storage, or loads it; InputError if what is stored there is damaged.
-
-    place: of the storage, for the message.
-    """
     try:
         return optuna.create_study(
             storage=storage, study_name=name, load_if_exists=True, sampler=HillClimbingSampler(plan),
@@ -216,11 +167,6 @@ def _pruner(plan: SearchPlan) -> optuna.pruners.BasePruner:
 
 
 def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
-    """Raises InputError if the study was begun with other settings than the plan's; a study without trials and settings
-    fits every plan.
-
-    storage: names the study's place in the error.
-    """
     mine, stored = plan.identity(), study.user_attrs.get(SETTINGS)
     if stored is None and not study.get_trials(deepcopy=False):
         return
@@ -236,10 +182,6 @@ def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> N
 
 
 def _trial_locks(journal: Path) -> TrialLocks | None:
-    """Returns the locks of a journal file, None if the system has no fcntl. Creates the folder and the lock file.
-
-    Raises OSError if these cannot be created.
-    """
     try:
         import fcntl  # noqa: F401
     except ImportError:
@@ -249,11 +191,6 @@ def _trial_locks(journal: Path) -> TrialLocks | None:
 
 
 def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseStorage | str | None:
-    """Returns Optuna's storage for `place`: a journal file (Path), a URL (str) or memory (None, which is returned).
-
-    locks: under which the journal is written, None for Optuna's own lock file. Raises InputError if Optuna cannot open
-    it, OSError if a file cannot be opened.
-    """
     from optuna.storages import GrpcStorageProxy, JournalStorage
     from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalRedisBackend
 
@@ -279,7 +216,6 @@ def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseS
 
 @contextmanager
 def _quiet_optuna() -> Iterator[None]:
-    """Silences Optuna's messages and its warnings about experimental features, for the time of the context."""
     level = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     try:

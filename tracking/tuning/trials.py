@@ -8,7 +8,6 @@ an estimate of its value.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from contextlib import closing, suppress
 
 import numpy as np
@@ -18,6 +17,7 @@ from optuna.exceptions import UpdateFinishedTrialError
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
 from tracking.tuning.goals import Goal, finite_mean
+from tracking.tuning.options import Progress
 from tracking.tuning.parallel_episodes import PlayEpisodes
 from tracking.tuning.sampler import ERROR, PRUNED
 from tracking.tuning.search_plan import SearchPlan
@@ -29,17 +29,9 @@ PAUSE = 0.5
 LEAST_LOSS = 1e-12
 """Least difference between the best value and the estimate of a pruned trial."""
 
-Progress = Callable[[int, int, str], None]
-
 
 def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> None:
-    """Plays trials until the study has as many finished ones as planned, by this process or by others, for which it
-    waits.
-
-    play: plays episodes. progress: called before each trial, and while waiting, as progress(finished, planned, text).
-    Raises the error of the defaults if they cannot be played, InputError if no training scene has a score for a goal
-    with them, and every error of the workers.
-    """
+    """Plays trials until the study has as many finished ones as planned, by this process or by others."""
     retry_unfinished, planned = False, study.plan.options.trials
     while True:
         progress(len(study.finished()), planned, _best_so_far(study))
@@ -55,21 +47,11 @@ def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> No
 
 
 def _best_so_far(study: SearchStudy) -> str:
-    """Returns the best training value of the study as a text for the progress bar, "(best in training 0.8123)".
-
-    "" if no trial has a value or there are several goals.
-    """
     known = len(study.plan.goals) == 1 and any(t.value is not None for t in study.finished())
     return f"(best in training {study.optuna.best_value:.4f})" if known else ""
 
 
 def _play_trial(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> None:
-    """Plays one trial and stores its values in the study; an error means impossible parameters, and is raised for the
-    defaults.
-
-    play: plays episodes. An error that it raises comes from the workers. It is raised, and leaves the trial unfinished.
-    If another process has finished the trial in the meantime, its values stay.
-    """
     with suppress(UpdateFinishedTrialError):
         values = _trial_values(study, trial, play)
         if isinstance(values, FlockscopeError):
@@ -80,12 +62,6 @@ def _play_trial(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> 
 
 
 def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> list[float] | FlockscopeError:
-    """Returns the value of a trial by each goal, an estimate if it is pruned; or the FlockscopeError of its parameters.
-
-    An InputError is also returned if a goal's score is unknown in every training scene. Scenes are played with `play`
-    in an order of the trial's own. With one goal its score in each scene is stored in the trial of the study, and so is
-    the number of episodes before pruning. Errors of the workers are raised.
-    """
     plan, played = study.plan, dict[int, Episode]()
     try:
         config = plan.config(trial.params).as_dict()
@@ -110,11 +86,6 @@ def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -
 
 
 def _should_prune(trial: optuna.Trial, scene: int, episode: Episode, plan: SearchPlan) -> bool:
-    """Reports the first goal's score in one episode to the pruner; True if the trial is to be stopped.
-
-    scene: number, from 0, of the scene among the training sources; plan: gives the goals. False, without a report, if
-    there are several goals or the score is unknown.
-    """
     value = plan.goals[0].of(episode)
     if len(plan.goals) > 1 or value != value:
         return False
@@ -123,13 +94,6 @@ def _should_prune(trial: optuna.Trial, scene: int, episode: Episode, plan: Searc
 
 
 def _estimate(best: optuna.trial.FrozenTrial, goal: Goal, played: dict[int, Episode]) -> float:
-    """Returns an estimate of a pruned trial's value by `goal`: the best trial's value, worsened by the mean loss to it
-    on common scenes.
-
-    best: the best trial, which must have a value (else an assertion fails). played: the pruned trial's episode by scene
-    number. The estimate is always worse than the best value, by 1e-12 at least. The mean of a few scenes depends much
-    on which scenes came first; the paired loss does not.
-    """
     assert best.value is not None
     pairs = [(goal.of(e), best.intermediate_values[k]) for k, e in played.items() if k in best.intermediate_values]
     gain = finite_mean(goal.gain(theirs, own) for own, theirs in pairs)

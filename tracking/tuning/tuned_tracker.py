@@ -10,56 +10,39 @@ from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source, SourceCache, play, streams_for
 from tracking.grouping.link_rule import LinkRule
+from tracking.running.time_limit import TimeLimited
 from tracking.scoring.people_comparison import Similarity
-from tracking.time_limit import TimeLimited
 
 RULE = LinkRule.tracker
 
 
 @dataclass(frozen=True)
 class TunedTracker:
-    """A tracker with parameters, or the baseline rule of groups, as a search tunes it.
+    """A tracker with parameters, or the baseline rule of groups, as a search tunes it."""
 
-    - tracker: as `tracking.track` takes it: name, file.py:Class, module:Class or class; "grouping" for the rule.
-    - name: for messages and files.
-    - config_class: declares its parameters.
-    - needs: inputs of which it can use any one: "pixels", "stereo", "boxes", "points".
-    - code: hash of the file that defines the tracker, "" if there is none.
-    - limited: the tracker in a process of its own, with a limit of time for each step; None without a limit, and always
-      for a class and the rule.
-    """
-
-    tracker: str | type[Tracker]
+    tracker: str | type[Tracker]  # as `tracking.track` takes it, or "grouping" for the rule
     name: str
     config_class: type[Config]
     needs: tuple[str, ...]
-    code: str = ""
+    code: str = ""  # hash of the file that defines the tracker, "" if there is none
+    # in a process of its own, with a limit of time for each step; never for a class and the rule
     limited: TimeLimited | None = None
 
     @property
     def objective(self) -> str:
-        """Key of the score that it is tuned for by default: "pairwise_F1" for the baseline rule of groups, else
-        "objective".
-        """
+        """Key of the score that it is tuned for by default."""
         return "pairwise_F1" if self.name == RULE else "objective"
 
     @property
     def detections(self) -> DetectionMode:
-        """The tracker's input by default: "truth" for the rule of groups, "file" if it takes boxes or points, else
-        "image".
-        """
+        """The tracker's input by default."""
         if self.name == RULE:
             return "truth"
         return "file" if {"boxes", "points"} & {*self.needs} else "image"
 
     def check_input(self, source: Source, detections: DetectionMode, similarity: Similarity | None) -> None:
-        """Raises InputError if the tracker cannot work on this source with these detections, if there is no such
-        similarity, or if the source cannot be opened.
-
-        detections: "image", "file" or "truth". The baseline rule of groups works with "truth" and without a chosen
-        similarity only; its source is not opened. Otherwise returns None.
-        """
-        from tracking.detection_mode import choose_mode
+        """Raises InputError if the tracker cannot work on this source with these detections and this similarity."""
+        from tracking.running.detection_mode import choose_mode
 
         known = get_args(Similarity)
         if similarity not in (None, *known):
@@ -83,14 +66,7 @@ class TunedTracker:
         every_score: bool,
         similarity: Similarity | None = None,
     ) -> Episode:
-        """Returns one episode with the parameters `values` (by name, defaults for others), from the first frame to the
-        last.
-
-        The tracker's own seed is the seed of the source. detections: the tracker's input. cache: keeps the opened
-        source. every_score: compute the whole catalogue of scores. similarity: how people are compared. The baseline
-        rule ignores these three. Raises InputError if the parameters are refused, tracker and source do not fit, the
-        source has no labels, or the tracks lack the boxes or positions to compare; WorkError if the tracker fails.
-        """
+        """Returns one whole episode with these parameters; the tracker's seed is that of the source."""
         if self.name == RULE:
             from tracking.tuning.grouping_episodes import play_rule
 
@@ -102,14 +78,8 @@ class TunedTracker:
 
 
 def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = None) -> TunedTracker:
-    """Returns what is to be tuned: `grouping` is the baseline rule of groups, else a tracker by name, file.py:Class,
-    module:Class or class.
-
-    step_timeout: seconds that each `reset` and `step` may take, None for no limit. Raises InputError if the tracker is
-    unknown or cannot be imported, is no tracker, or declares no parameters; also if the limit is not above 0 or given
-    for a class or the rule.
-    """
-    from tracking.tracker_registry import checked, code_hash, config_class, find, located
+    """Returns what is to be tuned; `grouping` is the baseline rule of groups."""
+    from tracking.running.tracker_registry import checked, code_hash, config_class, find, located
 
     if tracker == RULE:
         if step_timeout is not None:

@@ -210,7 +210,7 @@ def length(name: str, place: Place) -> int:
     return LENGTHS[name]
 
 
-# Python drops a KeyboardInterrupt raised in a destructor and reports it; `tracking.interrupts` raises it again.
+# Python drops a KeyboardInterrupt raised in a destructor and reports it; `tracking.running.interrupts` raises it again.
 LOST = pytest.mark.filterwarnings("ignore:(?s).*KeyboardInterrupt:pytest.PytestUnraisableExceptionWarning")
 
 

@@ -17,9 +17,10 @@ from scenarios.loading.validation import validate
 from scenarios.schema.scenario import Scenario
 from sim.io.store.sequence_folder import sequence_files
 from sim.io.store.track_files import tracks_files
-from tracking import track, tracker_registry
+from tracking import track
 from tracking.app.cli import app, run
-from tracking.app.commands.scenario_keys import list_keys
+from tracking.app.commands.scenarios import list_keys
+from tracking.running import tracker_registry
 
 pytestmark = pytest.mark.slow
 
@@ -553,7 +554,7 @@ ELSEWHERE = {
     ("generate", "sensor"),  # tests/tracking/app/test_fit.py
     ("track", "sensor"),
     ("track", "grouping"),  # tests/tracking/tuning/test_rule.py
-    ("track", "step_timeout"),  # tests/tracking/test_time_limit.py
+    ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("generate", "stride"),  # tests/sim/test_stride.py
     ("coco", "min_visibility"),  # tests/sim/io/export/test_coco.py
     *((command, "person_class") for command in ("coco", "score", "track")),  # tests/sim/io/formats/test_mot_people.py

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from scenarios.loading.resolve import load, names, resolve, suite_names
 from scenarios.loading.suites import about, find_suite
-from tracking.app.commands.scenario_keys import list_keys
+from tracking.app.commands.scenarios import list_keys
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 DOC = (DOCS / "reference" / "scenario-files.md").read_text(encoding="utf-8")

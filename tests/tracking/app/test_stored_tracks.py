@@ -20,7 +20,7 @@ from sim.io.store.validate import validate
 from tests.refusals import refused
 from tests.sealing import seal_again
 from tracking.app.cli import run
-from tracking.run import track
+from tracking.running.run import track
 
 SCENE = """
 schema = 1

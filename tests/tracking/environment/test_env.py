@@ -24,8 +24,8 @@ from tracking.config import Config, param
 from tracking.environment.env import OBSERVATIONS, TuningEnv
 from tracking.environment.observation import NAMES
 from tracking.parameter_space import decode, encode
-from tracking.run import TrackingRun
-from tracking.tracker_registry import names
+from tracking.running.run import TrackingRun
+from tracking.running.tracker_registry import names
 
 ID = "flockscope/Tuning-v0"
 SHORT = ["camera.fps=5", "duration=6"]

@@ -11,7 +11,7 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tracking.environment.episodes import Rollout, SourceCache, play, sources, streams_for
-from tracking.tracker_registry import names
+from tracking.running.tracker_registry import names
 
 SHORT = ["camera.fps=5", "duration=8"]
 CROSS = sources("cross", [3], SHORT)[0]

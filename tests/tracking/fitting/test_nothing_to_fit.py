@@ -10,8 +10,7 @@ from sim.dataset import generate
 from sim.geometry.polygons import iou_matrix, pack
 from sim.types import Detections, Sequence, Truth
 from sim.workers.start import WorkerOptions
-from tracking.app.pictures.contact_sheet import sheet_picture
-from tracking.app.pictures.frame_choice import choose_frames
+from tracking.app.pictures.contact_sheet import choose_frames, sheet_picture
 from tracking.app.pictures.overlay import write_overlay
 from tracking.fitting.detection_matching import match_detections
 from tracking.fitting.error_statistics import error_statistics

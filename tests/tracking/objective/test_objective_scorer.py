@@ -28,7 +28,7 @@ def same(found, expected):
 
 def raw(name, sequence, **options):
     """Answers without derived groups, and the scale."""
-    from tracking.prepare import prepare
+    from tracking.running.prepare import prepare
 
     ready = prepare(name, sequence, **options)
     ready.reset(0)

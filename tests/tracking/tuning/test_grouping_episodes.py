@@ -14,7 +14,7 @@ from tracking.environment.episodes import SourceCache, sources
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.grouping_choice import default_grouping
 from tracking.grouping.link_rule import LinkRule
-from tracking.run import track
+from tracking.running.run import track
 from tracking.scoring import evaluate
 from tracking.tuning import tune
 from tracking.tuning.grouping_episodes import (

@@ -1,26 +1,19 @@
-"""`flockscope generate`, `validate` and `export`: make, check and convert datasets."""
+"""`flockscope generate`, `replay`, `validate` and `export`: make, check and convert datasets."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from scenarios.errors import InputError
 from scenarios.printable import counted
 from tracking.app import option_parsing
-from tracking.app.command_options import CocoOptions, GenerateOptions, WebdatasetOptions
+from tracking.app.command_options import CocoOptions, GenerateOptions, ReplayCommandOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 
 
 def generate(options: GenerateOptions) -> CommandResult:
-    """Stores one sequence for every named scenario or suite entry and every seed, all seeds of an entry together.
-
-    The result's data: "sequences", the folders, "folder", their parent, and "left_out", name and reason of each
-    sequence whose script did not come true (at most 5 %). Stored sequences that are intact are kept.
-
-    Raises InputError before anything is simulated for wrong options or scenarios, or a folder with another sequence. If
-    sequences fail, the others are made first; then InputError is raised if all failures are wrong input, else
-    WorkError. A full disk ends the work at once with WorkError.
-    """
+    """Stores one sequence for every named scenario or suite entry and every seed, all seeds of an entry together."""
     from sim.dataset.generate import generate as make
     from sim.workers.start import WorkerOptions
 
@@ -42,13 +35,7 @@ def generate(options: GenerateOptions) -> CommandResult:
 
 
 def validate(folder: Path) -> CommandResult:
-    """Checks a generated sequence or dataset, or stored tracks, at the path `folder`; changes nothing.
-
-    Without problems the result's data are "problems" ([]) and "content_hash" (64 hex digits, None for tracks), else
-    "problems" (a dictionary each: file, place, got, expected, remedy) and "error" (the first of them). Then the exit
-    code is 1 and the text has a line for each problem. Raises InputError if the folder does not exist or holds neither
-    a sequence nor tracks.
-    """
+    """Checks a generated sequence or dataset, or stored tracks, at the path `folder`; changes nothing."""
     from sim.io.store.validate import content_hash, holds_sequences
     from sim.io.store.validate import validate as check
 
@@ -63,12 +50,7 @@ def validate(folder: Path) -> CommandResult:
 
 
 def export_coco(options: CocoOptions) -> CommandResult:
-    """Writes COCO files, one per split, of all sequences with labelled boxes at the path of the options.
-
-    The result's data: "files", their paths, "file", the only path, None if there are several, and "root", the folder
-    from which the names of pictures lead. Existing files are replaced. Raises InputError if the source cannot be
-    opened, no sequence has labelled boxes, or a file cannot be written; WorkError if the disk is full.
-    """
+    """Writes COCO files, one per split, of all sequences with labelled boxes at the path of the options."""
     from sim.io.export.coco import coco
 
     paths = coco(options.folder, options.out, options.min_visibility, person_class=options.person_class)
@@ -78,11 +60,7 @@ def export_coco(options: CocoOptions) -> CommandResult:
 
 
 def export_kitti(source: Path, out: Path) -> CommandResult:
-    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder `out`.
-
-    The result's data: "folders", one per sequence. Files of an earlier export are replaced. Raises InputError if --out
-    is wrong, the source is no intact generated dataset, or a sequence has no pairs; WorkError if the disk is full.
-    """
+    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder `out`."""
     from sim.io.export.kitti import kitti
 
     folders = kitti(source, option_parsing.output_folder(out))
@@ -90,12 +68,7 @@ def export_kitti(source: Path, out: Path) -> CommandResult:
 
 
 def export_webdataset(options: WebdatasetOptions) -> CommandResult:
-    """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json.
-
-    The result's data: "shards", their paths, "bytes", their total, and "content_hash". Complete shards of an earlier
-    run are kept. Raises InputError if --out or --shard-size is wrong, the source is no intact generated dataset, or the
-    folder holds shards of another export; WorkError if the disk is full.
-    """
+    """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json."""
     from sim.io.export.webdataset import size_of, webdataset
 
     out = option_parsing.output_folder(options.out)
@@ -108,3 +81,25 @@ def export_webdataset(options: WebdatasetOptions) -> CommandResult:
     text = f"{packed}, {total / 1e6:.1f} MB; content {index['content_hash'][:16]}"
     files = [out / s["name"] for s in shards]
     return CommandResult({"shards": files, "bytes": total, "content_hash": index["content_hash"]}, text)
+
+
+def replay(options: ReplayCommandOptions) -> CommandResult:
+    """Stores one sequence for every recording of the source and every seed, all seeds of a recording together."""
+    from scenarios.loading.resolve import load_observation
+    from sim.dataset.generate import ReplayOptions, store_replays
+    from sim.dataset.replay import Cut
+    from sim.io.source import open_source
+
+    option_parsing.output_folder(options.out)
+    seeds = option_parsing.seeds(options.seeds)
+    streams, images = option_parsing.pictures(options.streams, options.images)
+    if options.duration is not None and options.duration <= 0:
+        raise InputError(place="--duration", got=options.duration, expected="seconds above 0", remedy="correct it")
+    settings = option_parsing.scenario_settings(options.settings)
+    view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *settings])
+    recordings = open_source(options.source, fps=options.fps, images=False)
+    replays = ReplayOptions(view, Cut(options.start, options.duration), options.calibration, streams, images)
+    with ProgressMeter("replay") as meter:
+        folders = store_replays(recordings, replays, seeds, options.out, meter.update)
+    text = f"{counted(len(folders), 'sequence')} in {folders[0].parent}"
+    return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)

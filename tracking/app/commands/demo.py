@@ -11,7 +11,6 @@ from pathlib import Path
 from scenarios.printable import printable
 from sim.io.files.output_paths import output_path
 from sim.types import Sequence
-from tracking import tracker_registry
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.demo_page import PixelScene, RankingTable, ResultSection, demo_page
@@ -22,7 +21,8 @@ from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.replay_page.video import PageVideo
 from tracking.comparison import compare
-from tracking.run import TrackingRun
+from tracking.running import tracker_registry
+from tracking.running.run import TrackingRun
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
 SEEDS = range(40_000, 40_003)
@@ -35,15 +35,7 @@ QUICK_PIXEL_SETTINGS = ("camera.fps=5",)
 
 
 def demo(out: Path, *, quick: bool) -> CommandResult:
-    """Writes simulated scenes, tracks and pages into the folder `out`; scenes that are already there are kept.
-
-    quick: one short scene and one seed, else eight scenes and three seeds. One scene more is rendered and tracked from
-    its pictures. The result's data: "sequences" (number, without the rendered one), "scores" (mean scores with
-    intervals, by tracker and input) and "page", the path of the page to open.
-
-    Raises InputError if `out` is a file, cannot be written or holds sequences of other scenarios or files of others
-    that would be replaced; WorkError if the disk is full.
-    """
+    """Writes simulated scenes, tracks and pages into the folder `out`; scenes that are already there are kept."""
     from sim.dataset.generate import generate
     from sim.io.files.atomic import write_file
     from sim.io.files.own_files import refuse_foreign_file
@@ -85,11 +77,6 @@ def _table(word: str, sequences: list[Sequence], runs: Mapping[str, list[Trackin
 
 
 def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
-    """Tracks one sequence from its pictures with every tracker that takes them; returns scores, pages and videos.
-
-    Tracks, replay pages and overlay videos are written into `out`. All replays share one video file. Raises InputError
-    if a file cannot be read or written, WorkError if the disk is full.
-    """
     from tracking.app.pictures.overlay import write_overlay
     from tracking.app.replay_page.video import page_video
 
@@ -110,12 +97,10 @@ def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
 
 
 def _input_word(tracker: str) -> str:
-    """Returns what of stored detections the tracker takes: "boxes" or "points". InputError if it is unknown."""
     return "boxes" if "boxes" in tracker_registry.find(tracker).needs else "points"
 
 
 def _tracked(tracker: str, sequences: list[Sequence], out: Path, meter: ProgressMeter) -> list[TrackingRun]:
-    """Tracks all sequences from their stored detections, and stores the tracks. meter: advanced by each sequence."""
     runs = []
     for sequence in sequences:
         run = TrackerSetup(tracker, detections="file").run(sequence)
@@ -128,7 +113,6 @@ def _tracked(tracker: str, sequences: list[Sequence], out: Path, meter: Progress
 def _section(
     tracker: str, table: RankingTable, sequences: list[Sequence], runs: Mapping[str, list[TrackingRun]], out: Path
 ) -> ResultSection:
-    """Writes the replay pages of one tracker, and returns them with their scores."""
     section = ResultSection(f"{tracker}, from {_input_word(tracker)}")
     for sequence, run, scores in zip(sequences, runs[tracker], table.compared.scores[tracker], strict=True):
         row, page = SequenceScores(sequence.name, scores), output_path(out / "pages" / tracker, sequence.name, ".html")
@@ -146,8 +130,6 @@ def _write_page(
 
 
 def _line(title: str, rows: list[SequenceScores]) -> str:
-    """Returns "title: " and the means over `rows` of the SHOWN scores that are known, in one line. rows: at
-    least one."""
     means = summary(rows)
     return f"{printable(title)}: " + ", ".join(
         f"{key} {number(key, means[key]['mean'], mean=True)}" for key in SHOWN if math.isfinite(means[key]["mean"])

@@ -51,16 +51,12 @@ WITHOUT_PEOPLE = "<p>This tracker reports groups without people, so people canno
 
 @dataclass(frozen=True)
 class ResultSection:
-    """The scores under one heading; three lists of equal length that `add` extends.
-
-    title: the heading. rows: the scores of one sequence each. pages: the replay page of each row. names: the text that
-    links to it.
-    """
+    """The scores under one heading; three lists of equal length that `add` extends."""
 
     title: str
-    rows: list[SequenceScores] = field(default_factory=list)
-    pages: list[Path] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
+    rows: list[SequenceScores] = field(default_factory=list)  # of one sequence each
+    pages: list[Path] = field(default_factory=list)  # the replay page of each row
+    names: list[str] = field(default_factory=list)  # texts that link to the pages
 
     def add(self, row: SequenceScores, page: Path, name: str) -> None:
         """Appends one row of scores with its page and name."""
@@ -71,16 +67,12 @@ class ResultSection:
 
 @dataclass(frozen=True)
 class PixelScene:
-    """The scene that was tracked from its pictures.
+    """The scene that was tracked from its pictures."""
 
-    section: its scores, one row for each tracker and input; its `names` begin with the tracker's name. videos: path of
-    the overlay video by the tracker's name. frames: number of frames. seconds: duration of the scene.
-    """
-
-    section: ResultSection
-    videos: dict[str, Path]
+    section: ResultSection  # one row for each tracker and input; its names begin with the tracker's name
+    videos: dict[str, Path]  # overlay videos by the tracker's name
     frames: int
-    seconds: float
+    seconds: float  # duration of the scene
 
 
 @dataclass(frozen=True)
@@ -93,11 +85,7 @@ class RankingTable:
 
 
 def demo_page(root: Path, scene: PixelScene, tables: list[RankingTable], sections: list[ResultSection]) -> str:
-    """Returns the page as HTML: rankings, videos and scores of the scene with pictures, then, folded, each section.
-
-    root: the folder that will hold the page and holds everything it links to; links are relative to it. Raises
-    ValueError for a page or video outside it.
-    """
+    """Returns the page as HTML: rankings, videos and scores of the scene with pictures, then, folded, each section."""
     generator = f'<meta charset="utf-8"><meta name="generator" content="{GENERATOR}">'
     head = f'<!doctype html><html lang="en">{generator}<title>flockscope demo</title><style>{STYLE}</style>'
     first = "\n".join(_ranking(table, sections, root) for table in tables)
@@ -107,7 +95,6 @@ def demo_page(root: Path, scene: PixelScene, tables: list[RankingTable], section
 
 
 def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> str:
-    """Returns a ranking as HTML, the oracle first, with links to the best and worst scene of the best tracker."""
     entries = table.compared.to_arrow(table.key).to_pylist()
     keys = shown_columns(entries, table.key)
     rows = []
@@ -129,7 +116,6 @@ def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> 
 
 
 def _extremes(table: RankingTable, run: str, sections: list[ResultSection], root: Path) -> str:
-    """Returns a line with links to the replays of the best and the worst scene of one run."""
     section = next(s for s in sections if s.title.startswith(f"{run},"))
     known = [k for k, row in enumerate(section.rows) if math.isfinite(row.scores[table.key])]
     if len(known) < 2:
@@ -145,11 +131,6 @@ def _extremes(table: RankingTable, run: str, sections: list[ResultSection], root
 
 
 def _videos(root: Path, scene: PixelScene) -> str:
-    """Returns the videos side by side as HTML, each beginning at 40 % of the scene, with a caption.
-
-    root: the folder that links are relative to; ValueError for a video outside it. The caption says whether the tracker
-    tracks people or only groups.
-    """
     section = scene.section
     with_people = {name.split()[0] for name, row in zip(section.names, section.rows, strict=True) if _has_people(row)}
     shown = []
@@ -165,7 +146,6 @@ def _section(section: ResultSection, root: Path) -> str:
 
 
 def _has_people(row: SequenceScores) -> bool:
-    """Returns True if people are scored (HOTA is known), False if only groups are. row: the scores of one sequence."""
     return math.isfinite(row.scores["HOTA"])
 
 
@@ -174,11 +154,6 @@ def _link(path: Path, root: Path) -> str:
 
 
 def _table(section: ResultSection, root: Path) -> str:
-    """Returns an HTML table of the SHOWN scores that some row has; for several sequences, their mean with its interval
-    below.
-
-    Each row's name links to its page, relative to `root`; ValueError for a page outside it.
-    """
     keys = [key for key in SHOWN if any(math.isfinite(row.scores[key]) for row in section.rows)]
     rows = []
     for row, page, name in zip(section.rows, section.pages, section.names, strict=True):
@@ -195,10 +170,6 @@ def _table(section: ResultSection, root: Path) -> str:
 
 
 def _heading(key: str) -> str:
-    """Returns a column's heading as HTML, the key with its unit; its meaning is shown when the mouse rests on it.
-
-    Units "1" and "count" are left out. Raises KeyError for a key that is not in the catalogue.
-    """
     score = CATALOGUE[key]
     unit = f" [{score.unit}]" if score.unit not in ("1", "count") else ""
     return f'<th title="{escape(score.meaning)}">{escape(arrow(key))}{unit}</th>'

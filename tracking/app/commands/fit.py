@@ -1,18 +1,20 @@
-"""`flockscope fit`: measures the errors of a detector on recordings, or fits the belief of who belongs together."""
+"""`flockscope fit`: the errors of a detector, from recordings; and from simulated truth the belief of who belongs
+together, the events of `joint`, and the speed table and relations of `relational`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from scenarios.printable import printable
 from sim.types import Sequence as Recording
+from sim.types import Truth
 from tracking.app import option_parsing
+from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.fitted_scores import fit_and_check_seeds, score_lines
-from tracking.app.fit_options import FitGroupingOptions, FitSensorOptions
 
 CHECK_SEEDS = range(30_000, 30_008)
 """Seeds of the simulated detections whose statistics are shown beside the measured ones."""
@@ -25,15 +27,7 @@ SHOWN = (
 
 
 def fit_sensor(options: FitSensorOptions) -> CommandResult:
-    """Writes the profile of the detector behind the recordings, pooled over all of them, as a TOML file.
-
-    The result's data: "file", "sensor" (the profile's keys), "measured" and "drawn", each a dictionary of statistics by
-    name. "drawn" are means over 8 seeds of detections simulated with the profile; nan where nothing was observed.
-
-    Raises InputError if --out is no .toml file or cannot be written, or if a source is missing or has no labels,
-    detections or boxes of both. Also for fewer than 50 labelled people (rows of all frames), or fewer than 25 of them
-    detected. Raises WorkError if the disk is full.
-    """
+    """Writes the profile of the detector behind the recordings, pooled over all of them, as a TOML file."""
     from scenarios.loading.resolve import dump_sensor
     from sim.io.files.atomic import write_file
     from tracking.fitting.detection_matching import match_sequence
@@ -66,32 +60,88 @@ def _open(sources: Sequence[Path], fps: float | None) -> list[Recording]:
 
 
 def _mean(values: list[float]) -> float:
-    """Returns the mean of the finite values, nan if there is none."""
     known = [v for v in values if np.isfinite(v)]
     return float(np.mean(known)) if known else float("nan")
 
 
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:
-    """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments.
-
-    The result's data: "file", "fitted" and, with --check, "checked", each a dictionary of scores
-    (tracking.fitting.belief_scores).
-
-    Raises InputError if --out is no .toml file or cannot be written, a name, a file or seeds are wrong, or no two
-    people come near each other. Raises WorkError if a script cannot be fulfilled or the disk is full.
-    """
+    """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments."""
     from sim.io.files.atomic import write_file
     from tracking.fitting.belief import fit_belief, sample_of
     from tracking.fitting.belief_scores import belief_scores
     from tracking.fitting.grouping_scenes import pair_scenes
 
     out = option_parsing.output_file(options.out, ".toml")
-    seeds = fit_and_check_seeds(options.seeds, options.check)
+    seeds = _fit_and_check_seeds(options.seeds, options.check)
     samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
     belief = fit_belief(samples["fitted"])
     scores = {key: belief_scores(sample, belief.log_odds(sample.values)) for key, sample in samples.items()}
     words = " ".join(["flockscope fit grouping", *options.names, f"--seeds {options.seeds}"])
-    lines = score_lines(seeds, scores)
+    lines = _score_lines(seeds, scores)
     write_file(out, belief.toml_text("\n".join([words, *lines])).encode())
     text = "\n".join([*lines, f"→ {out}: use it as --grouping {out}"])
     return CommandResult({"file": out, **scores}, text)
+
+
+def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]]:
+    from scenarios.loading.resolve import resolve
+    from tracking.fitting.grouping_scenes import simulated
+
+    entries = [entry for name in names for entry in resolve(name)]
+    return ((seed, simulated(entry, seed)) for entry in entries for seed in seeds)
+
+
+def _fit_and_check_seeds(fitted: str, checked: str | None) -> dict[str, range]:
+    """Returns the seeds of --seeds under "fitted" and, if given, those of --check under "checked"."""
+    asked = {"fitted": ("--seeds", fitted), "checked": ("--check", checked)}
+    return {key: option_parsing.seeds(text, option) for key, (option, text) in asked.items() if text is not None}
+
+
+def _score_lines(seeds: Mapping[str, range], scores: Mapping[str, Mapping[str, float]]) -> list[str]:
+    return [
+        f"{key}, seeds {numbers.start}:{numbers.stop}: "
+        + ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
+        for key, numbers in seeds.items()
+    ]
+
+
+def fit_joint(options: FitJointOptions) -> CommandResult:
+    """Writes the fitted weights of the event classifier as a TOML file, with command and scores as comments."""
+    from sim.io.files.atomic import write_file
+    from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
+    from tracking.papers.joint.config import JointConfig
+
+    out = option_parsing.output_file(options.out, ".toml")
+    seeds, lag = _fit_and_check_seeds(options.seeds, options.check), JointConfig().lag
+    rows = {
+        key: EventRows.joined(event_rows(truth, lag, seed) for seed, truth in _simulated(options.names, numbers))
+        for key, numbers in seeds.items()
+    }
+    params = fit_events(rows["fitted"])
+    scores = {key: event_scores(part, params) for key, part in rows.items()}
+    words = " ".join(["flockscope fit joint", *options.names, f"--seeds {options.seeds}"])
+    lines = _score_lines(seeds, scores)
+    body = [f"{name} = {value}" for name, value in params.items()]
+    text = "\n".join([*(f"# {line}" for line in (words, *lines)), 'tracker = "joint"', "", "[params]", *body, ""])
+    write_file(out, text.encode())
+    result = "\n".join([*lines, "", *body, "", f"→ {out}: use it as --params {out}"])
+    return CommandResult({"file": out, "params": params, **scores}, result)
+
+
+def fit_relational(options: FitRelationalOptions) -> CommandResult:
+    """Writes the fitted parameters of `relational` as a TOML file."""
+    from sim.io.files.atomic import write_file
+    from tracking.fitting.relational import fit_relational as fit
+    from tracking.papers.relational.config import RelationalConfig
+
+    out = option_parsing.output_file(options.out, ".toml")
+    scenes = _simulated(options.names, option_parsing.seeds(options.seeds))
+    params = fit((truth for _, truth in scenes), RelationalConfig().speed_ends)
+    config = RelationalConfig.from_dict(dict(params), out)
+    write_file(out, config.to_toml().encode())
+    width, body = max(map(len, params)), config.as_dict()
+    lines = [
+        f"{name:<{width}}  {np.round(np.array(body[name]), 4)}  {RelationalConfig.known(name).unit}" for name in params
+    ]
+    lines += ["", f"→ {out}: use it as --params {out}"]
+    return CommandResult({"file": out, "params": params}, "\n".join(lines))

@@ -10,34 +10,24 @@ from sim.io.formats.mot_folder import frame_rate
 from sim.io.source import RecordingOptions, holds_sequences, open_source
 from sim.io.store.run_seal import WHOLE, reject_foreign, run_folder
 from sim.types import Sequence
-from tracking import run as runs
 from tracking.app import option_parsing
 from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.group_tables import group_row, group_tables
 from tracking.app.progress import ProgressMeter
-from tracking.app.run_folders import run_folders
-from tracking.app.stored_tracks import StoredTracks, find_tracks
+from tracking.app.stored_tracks import StoredTracks, find_tracks, run_folders
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.grouping.pair_probabilities import pair_probabilities
-from tracking.run import TrackingRun
+from tracking.running import run as runs
+from tracking.running.run import TrackingRun
 
 TEXT = "mot text"
 """Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence."""
 
 
 def group(options: GroupOptions) -> CommandResult:
-    """Groups the people of every sequence, or of every stored run, and stores each as a run; returns tables of groups
-    and events.
-
-    The run of a single sequence goes to --out, those of several to --out/<sequence name>. The result's data: "runs", a
-    dictionary for each (tracking.app.commands.group_tables.group_row) and "pairs", the number of stored pairs or None.
-
-    Raises InputError if an option is wrong or has no effect, the source or the tracks cannot be read, there are no
-    people with ids, people lie in the image and its scale is unknown, or a folder is the source itself or holds files
-    of another program with names of a run. Raises WorkError if the disk is full. Runs stored before an error stay.
-    """
+    """Groups the people of every sequence or stored run, stores each as a run, and returns tables of groups."""
     option_parsing.output_folder(options.out)
     grouping = None if options.grouping is None else grouping_of(options.grouping)
     belief = _belief(grouping or default_grouping()) if options.probabilities else None
@@ -58,10 +48,7 @@ def group(options: GroupOptions) -> CommandResult:
 
 
 def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | None]]:
-    """Returns the sequences of the source, and for each its run if the source is stored tracks of ours, else None.
-
-    Raises InputError if there are neither sequences nor tracks, one cannot be read, or an option has no effect.
-    """
+    """Returns the sequences of the source, and for each its run if the source is stored tracks of ours, else None."""
     path = options.source
     own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
     if not own and (not path.is_dir() or holds_sequences(path)):
@@ -91,11 +78,6 @@ def _open(path: Path, options: GroupOptions) -> list[Sequence]:
 
 
 def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
-    """Returns a run's sequence without frames: its name, frame rate, length and image scale, and the hash of what was
-    tracked.
-
-    Raises InputError if the run is not whole, or for an option that has no effect on it.
-    """
     tracks.check()
     info, folder = tracks.info, tracks.path if tracks.path.is_dir() else tracks.path.parent
     o = options
@@ -113,7 +95,6 @@ def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
 
 
 def _belief(grouping: Grouping) -> Belief:
-    """Returns the grouping if it is one that has probabilities. Raises InputError for the rule."""
     if isinstance(grouping, Belief):
         return grouping
     raise InputError(
@@ -123,13 +104,10 @@ def _belief(grouping: Grouping) -> Belief:
 
 
 def _scale(run: TrackingRun) -> float:
-    """Returns the image scale of a run, px per m; 1 if it is unknown, as on the ground and without anybody."""
     return run.info["px_per_m"] or 1.0
 
 
 def _refuse(folder: Path, tracks: StoredTracks | None) -> None:
-    """Raises InputError if the folder is that of the tracks to be grouped, or holds files of another program with names
-    of a run; else returns nothing."""
     if tracks is not None and folder.resolve() in (tracks.path.resolve(), tracks.path.resolve().parent):
         raise InputError(
             file=folder, place="--out", got="the folder of the tracks themselves", expected="another folder",

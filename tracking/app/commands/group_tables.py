@@ -13,7 +13,7 @@ from scenarios.printable import counted, printable, shortened
 from sim.types import EVENT_KINDS
 from tracking.app.commands.score_tables import empty_table, with_title
 from tracking.grouping.plausibility import median_speed
-from tracking.run import TrackingRun
+from tracking.running.run import TrackingRun
 
 LISTED = 20
 """Most groups that are listed one by one."""
@@ -25,13 +25,7 @@ Row = dict[str, Any]
 
 
 def group_row(run: TrackingRun, folder: Path) -> Row:
-    """Returns what the command tells of one run, as a dictionary.
-
-    Keys: sequence, plane, px_per_m (None if unknown), px_per_m_frames, fps, frames; median_speed (m/s, None if
-    unknown); people (number of ids), people_in_groups (number of those ever in a group); groups, a list in order of
-    first frames of "id", "members" (all ids ever in it), "size" (most people at a time), "start", "end" (frames, from
-    1), "seconds" (from the start of the first to the end of the last frame); events, the number of each kind; folder.
-    """
+    """Returns what the command tells of one run, as a dictionary."""
     count = [len(t.id) for t in run]
     frame = np.repeat(np.array([t.index for t in run], np.int64), count)
     id, group = (np.concatenate([np.zeros(0, np.int64), *(getattr(t, name) for t in run)]) for name in ("id", "group"))
@@ -56,10 +50,7 @@ def group_row(run: TrackingRun, folder: Path) -> Row:
 
 
 def group_tables(rows: Sequence[Row]) -> Any:
-    """Returns something rich can print: a table of groups and one of events, with a line for each run and their sum.
-
-    rows: as `group_row` makes them, at least one. Of a single run the groups that last longest are listed, too.
-    """
+    """Returns something rich can print: a table of groups and one of events, with a line for each run and their sum."""
     from rich.console import Group
 
     counts = _table("groups", rows, _group_counts)
@@ -70,7 +61,6 @@ def group_tables(rows: Sequence[Row]) -> Any:
 
 
 def _table(title: str, rows: Sequence[Row], cells: Callable[[Sequence[Row]], dict[str, object]]) -> Any:
-    """Returns a table of `cells`, values by column, of each row alone and, of several rows, of all together."""
     table = empty_table()
     table.add_column("sequence", overflow="fold")
     for name in cells(rows):
@@ -83,7 +73,6 @@ def _table(title: str, rows: Sequence[Row], cells: Callable[[Sequence[Row]], dic
 
 
 def _group_counts(rows: Sequence[Row]) -> dict[str, object]:
-    """Returns the cells of the table of groups for these runs together, by column."""
     groups = [g for row in rows for g in row["groups"]]
     sizes, seconds = Counter(min(g["size"], 4) for g in groups), [g["seconds"] for g in groups]
     return {
@@ -99,8 +88,6 @@ def _group_counts(rows: Sequence[Row]) -> dict[str, object]:
 
 
 def _longest(row: Row) -> list[Any]:
-    """Returns in a list the table of the groups of a run that last longest, at most 20, in order of their first frames;
-    [] without groups."""
     kept = sorted(row["groups"], key=lambda g: -g["seconds"])[:LISTED]
     table = empty_table()
     for name in ("group", "from, s", "to, s", "most at a time"):
@@ -116,7 +103,6 @@ def _longest(row: Row) -> list[Any]:
 
 
 def _place(row: Row) -> str:
-    """Returns a line that says where the positions of a run are, and of the image its scale and where it comes from."""
     if row["plane"] != "image":
         speed = row["median_speed"]
         return "positions in metres" + (

@@ -27,11 +27,7 @@ SHOWN = 3
 
 
 def run_differences(infos: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
-    """Returns in what runs differ: for each fact "what" and "runs", by run the values on the sequences, each once.
-
-    infos: by run, the content of run.json of each sequence; runs with a sequence without it are left out. Parameters of
-    different trackers are not compared, nor a grouping with none.
-    """
+    """Returns in what runs differ: for each fact "what" and "runs", by run the values on the sequences, each once."""
     told = {name: rows for name, rows in infos.items() if all(rows)}
     every = [info for rows in told.values() for info in rows]
     tables = ["config"] if len({info.get("tracker") for info in every}) < 2 else []

@@ -1,28 +1,27 @@
-"""`flockscope scenarios`: lists scenarios and suites, or explains one in words with a drawing of its script."""
+"""`flockscope scenarios`: lists scenarios, suites or the keys of a scenario file; explains one in words."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.loading import suites as suite
 from scenarios.loading import toml_files
 from scenarios.loading.resolve import Entry, dump, load, names, resolve, suite_names
+from scenarios.schema.scenario import Scenario
 from tracking.app.command_options import ScenariosOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.option_parsing import output_file, scenario_settings
 
-if TYPE_CHECKING:
-    from scenarios.schema.scenario import Scenario
+Node = dict[str, Any]
+"""A part of a JSON schema."""
 
 
 def scenarios(options: ScenariosOptions) -> CommandResult:
-    """Explains the named scenario or suite; without a name lists all, or with --schema the keys of a scenario file.
-
-    Raises InputError if NAME, --out or --set is given together with --schema, or --out or --set without NAME; also if
-    the name, a setting or the drawing's file is wrong.
-    """
+    """Explains the named scenario or suite; without a name lists all, or with --schema the keys of a scenario file."""
     if options.name is not None and not options.schema:
         return explain(options.name, options.settings, options.out)
     unused = {"NAME": options.name, "--out": options.out, "--set": options.settings}
@@ -31,18 +30,12 @@ def scenarios(options: ScenariosOptions) -> CommandResult:
             got, remedy = f"{option} without a scenario to explain", "name a scenario, and leave --schema out"
             raise InputError(place=option, got=got, expected="NAME", remedy=remedy)
     if options.schema:
-        from tracking.app.commands.scenario_keys import list_keys
-
         return list_keys()
     return catalogue()
 
 
 def catalogue() -> CommandResult:
-    """Returns every scenario and suite of the catalogue with its line of description, sorted by name.
-
-    The result's data: "scenarios" and "suites", each a dictionary from name to description. Raises InputError if a file
-    of the catalogue is wrong.
-    """
+    """Returns every scenario and suite of the catalogue with its line of description, sorted by name."""
     scenarios = {name: load(name).about for name in names()}
     suites = {name: suite.about(suite.find_suite(name)) for name in suite_names()}
     text = ["Scenarios", *_rows(scenarios), "", "Suites", *_rows(suites)]
@@ -50,15 +43,7 @@ def catalogue() -> CommandResult:
 
 
 def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResult:
-    """Returns a scenario in words with a text drawing of its plan, or the entries of a suite with their descriptions.
-
-    settings: texts "key=value". drawing: the SVG file to write, None for none. Data of a scenario: "name", "about"
-    (description), "text", "toml", and "drawing" if written. Data of a suite: "name" and "entries", a dictionary from
-    name to description.
-
-    Raises InputError for a name or setting that is wrong, for a drawing of a suite, and for a `drawing` that does not
-    end in .svg or cannot be written; WorkError if the disk is full.
-    """
+    """Returns a scenario in words with its plan, which it writes to `drawing` (SVG), or a suite's entries."""
     entries = resolve(name, scenario_settings(settings))
     if not _is_suite(name):
         return _explain_scenario(entries[0].scenario, drawing)
@@ -70,10 +55,6 @@ def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResu
 
 
 def _is_suite(name: str) -> bool:
-    """Returns True for a suite's TOML file, for "suite:NAME", and for every name that is no scenario in the catalogue.
-
-    Raises InputError if a name ends in .toml and there is no such file, or it is no TOML.
-    """
     if name.endswith(".toml"):
         return not name.startswith("suite:") and "entry" in toml_files.parse(toml_files.find(name))
     return name.startswith("suite:") or name not in names()
@@ -99,9 +80,58 @@ def _list_entries(name: str, entries: list[Entry]) -> CommandResult:
 
 
 def _rows(about: dict[str, str]) -> list[str]:
-    """Returns one indented line for each name with its description, the descriptions aligned; one line "none" for {}.
-
-    about: description by name.
-    """
     width = max(map(len, about), default=0)
     return [f"  {name:<{width}}  {words}".rstrip() for name, words in about.items()] or ["  none"]
+
+
+def list_keys() -> CommandResult:
+    """Returns every key of a scenario file with its type, default and meaning, a line each."""
+    schema = Scenario.model_json_schema(by_alias=True)
+    rows = list(_keys(schema, schema["$defs"], ""))
+    width = max(len(row["key"]) for row in rows)
+    text = "\n".join(f"{row['key']:<{width}}  {row['type']}; {row['default']}; {row['meaning']}" for row in rows)
+    return CommandResult({"keys": rows}, text)
+
+
+def _keys(table: Node, known: Node, prefix: str) -> Iterator[dict[str, str]]:
+    required = table.get("required", [])
+    for name, node in table["properties"].items():
+        many = "[]" if any("items" in each for each in (node, *node.get("anyOf", ()))) else ""
+        tables = list(_tables(node, known))
+        for inner in tables:
+            which = f"({inner['properties']['type']['const']})" if len(tables) > 1 else ""
+            yield from _keys(inner, known, f"{prefix}{name}{many}{which}.")
+        if not tables:
+            default = "required" if name in required else _default(node)
+            yield {
+                "key": prefix + name, "type": _type(node), "default": default, "meaning": node.get("description", "")
+            }  # fmt: skip
+
+
+def _tables(node: Node, known: Node) -> Iterator[Node]:
+    ref = node.get("$ref", "").rpartition("/")[2]
+    if ref and ref != "Distribution":
+        yield known[ref]
+    for inner in [node.get("items", {}), *node.get("anyOf", ()), *node.get("oneOf", ())]:
+        if inner:
+            yield from _tables(inner, known)
+
+
+def _type(node: Node) -> str:
+    if "$ref" in node:
+        return str(node["$ref"]).rpartition("/")[2].lower()
+    for choices in (node.get("enum"), [node["const"]] if "const" in node else None):
+        if choices:
+            return " | ".join(map(json.dumps, choices))
+    if "anyOf" in node:
+        return " or ".join(_type(inner) for inner in node["anyOf"] if inner.get("type") != "null")
+    if "prefixItems" in node:
+        return f"[{', '.join(map(_type, node['prefixItems']))}]"
+    return f"[{_type(node['items'])}, …]" if "items" in node else str(node.get("type", "value"))
+
+
+def _default(node: Node) -> str:
+    value = node.get("default")
+    if isinstance(value, dict):
+        value = {key: v for key, v in value.items() if v is not None}
+    return "absent" if value is None else f"default {json.dumps(value)}"

@@ -14,9 +14,8 @@ from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_ranking import is_class, ranking, short_notes, sparse_notes
 from tracking.app.commands.score_tables import Means, SequenceScores, tables
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
-from tracking.app.progress import ProgressMeter
-from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequences
+from tracking.app.sequence_workers import OpenedAs
 from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.comparison import check_blocks
 from tracking.scoring.catalogue import ALL, CATALOGUE
@@ -24,15 +23,7 @@ from tracking.stats import mean_interval
 
 
 def score(options: ScoreOptions) -> CommandResult:
-    """Scores every sequence of the truth with its tracks. Several tracks, or a tracker class, are ranked
-    (`score_ranking.ranking`).
-
-    The result's data: "sequences" (scores of each); "means" (of each set of equal detections: "given", "sequences",
-    "mean"); "mean" (the only one of them, else None); "notes".
-
-    Raises InputError if a file is wrong, if a sequence has no tracks or no labels, if truth and tracks cannot be
-    compared as asked, or if --blocks is given for several sequences.
-    """
+    """Scores every sequence of the truth with its tracks."""
     source = OpenedAs(
         options.truth, options.fps, options.px_per_m, images=False, person_class=options.person_class
     )  # fmt: skip
@@ -52,11 +43,6 @@ def score(options: ScoreOptions) -> CommandResult:
 
 
 def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) -> list[ScoredSequence]:
-    """Returns the only run of each sequence, in order, scored. Shows progress on stderr.
-
-    Raises InputError if a sequence has no tracks or no labels, a file is wrong, or the tracks cannot be compared as
-    asked.
-    """
     matched = match_tracks(sequences, find_tracks(Path(options.tracks[0])))
     box_scale = None if options.box_scale is None else parse_box_scale(options.box_scale)
     if box_scale is not None and all(stored.info for _, stored in matched):
@@ -66,16 +52,10 @@ def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence
         )  # fmt: skip
     how = (options.similarity, options.group_match, options.blocks)
     jobs = [ScoringJob((stored,), *how, box_scale=box_scale) for _, stored in matched]
-    found: list[ScoredSequence] = []
-    with ProgressMeter("score", len(sequences)) as meter:
-        for one in over_sequences(score_sequence, sequences, jobs, source, options.workers):
-            meter.step(sequences[len(found)].name)
-            found.append(one)
-    return found
+    return score_sequences(sequences, jobs, source, options.workers)
 
 
 def _block_means(scored: ScoredSequence) -> Means:
-    """Returns the scores of the only run of a recording by key, with their intervals by blocks of frames."""
     assert scored.compared.blocks is not None
     return {
         key: {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
@@ -84,25 +64,14 @@ def _block_means(scored: ScoredSequence) -> Means:
 
 
 def _by_detections(rows: list[SequenceScores]) -> list[list[SequenceScores]]:
-    """Returns the rows, each the scores of one sequence, in lists of equal detections given to the tracker.
-
-    Lists are in order of first appearance. Scores from different detections share no mean.
-    """
     return [[row for row in rows if row.given == given] for given in _givens(rows)]
 
 
 def _givens(rows: list[SequenceScores]) -> list[str]:
-    """Returns the different texts on the detections that trackers got, in order of first appearance; "" if unknown."""
     return list(dict.fromkeys(row.given for row in rows))
 
 
 def _result(parts: list[tuple[list[SequenceScores], Means]], notes: list[str] | None = None) -> CommandResult:
-    """Returns tables and JSON data of all parts, each a pair (rows, means) of the same detections.
-
-    Rows are scores of one sequence each; means are by key. notes: lines below each table; None: none. Data:
-    "sequences", "mean" (None if there are several parts), "means" (of each part: "given", "sequences", "mean"),
-    "notes".
-    """
     from rich.console import Group
 
     notes = notes or []
@@ -124,10 +93,7 @@ def _row_data(row: SequenceScores) -> dict[str, Any]:
 
 
 def summary(rows: list[SequenceScores]) -> Means:
-    """Returns the mean over sequences of each score by key, with its 95 % interval, within the score's range.
-
-    rows: at least one. nan values are left out; the ends are nan for fewer than two numbers, the mean without any.
-    """
+    """Returns the mean over sequences of each score by key, with its 95 % interval, within the score's range."""
     mean, low, high = mean_interval(_values(rows))
     least, most = (np.array([getattr(score, end) for score in ALL]) for end in ("low", "high"))
     return _by_key((mean, np.maximum(low, least), np.minimum(high, most)))
@@ -139,9 +105,5 @@ def _values(rows: list[SequenceScores]) -> Array:
 
 
 def _by_key(ends: tuple[Array, Array, Array]) -> Means:
-    """Returns, by key, "mean", "low" and "high" of the arrays (mean, low, high), each (K,) in the catalogue's order.
-
-    Raises ValueError for another length.
-    """
     columns = zip(CATALOGUE, *(end.tolist() for end in ends), strict=True)
     return {key: {"mean": mean, "low": low, "high": high} for key, mean, low, high in columns}

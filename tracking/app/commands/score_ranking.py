@@ -31,9 +31,8 @@ from tracking.app.commands.score_tables import (
     number,
     with_title,
 )
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
-from tracking.app.progress import ProgressMeter
-from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.commands.scored_sequence import ScoringJob, score_sequences
+from tracking.app.sequence_workers import OpenedAs
 from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.comparison import ComparedRuns, joined
 from tracking.ranking import Ranking, rank
@@ -51,34 +50,20 @@ LONGEST_INPUT = 40
 
 @dataclass(frozen=True)
 class RankedRuns:
-    """A comparison of runs by one score, and what is shown of it, each computed once.
-
-    key: the score. ranking: by it. table: rows of `ComparedRuns.to_arrow`, the oracles first. pairs: the difference of
-    each pair of runs, the better one first. scenarios: for each name of a scenario the indices of its sequences.
-    settings: in what the runs differ. notes: further lines.
-    """
+    """A comparison of runs by one score, and what is shown of it."""
 
     comparison: ComparedRuns
-    key: str
+    key: str  # the score
     ranking: Ranking
-    table: list[dict[str, Any]]
-    pairs: list[dict[str, Any]]
-    scenarios: Mapping[str, list[int]]
-    settings: list[dict[str, Any]]
+    table: list[dict[str, Any]]  # rows of `ComparedRuns.to_arrow`, the oracles first
+    pairs: list[dict[str, Any]]  # the difference of each pair of runs, the better one first
+    scenarios: Mapping[str, list[int]]  # indices of its sequences by scenario
+    settings: list[dict[str, Any]]  # in what the runs differ
     notes: list[str]
 
 
 def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) -> CommandResult:
-    """Scores several runs on all sequences, and ranks them.
-
-    source: how the sequences were opened. The result's data: "by" (the score that ranks), "similarity", "sequences"
-    (names), "ranking" (a dictionary for each oracle, then for each run, best first: "run", "input", "first", "last",
-    "mean", "low", "high", "scores": means of all scores), "differences" (of each pair of runs: "run", "minus", "mean",
-    "low", "high", "sure", and "scores": "mean", "low", "high", "sure" of each score), "settings" (in what the runs
-    differ), "scenarios" (means by scenario and run), "scores" (by run and sequence), "notes".
-
-    Raises InputError as `score`.
-    """
+    """Scores several runs on all sequences, and ranks them."""
     if options.box_scale:
         raise InputError(
             place="--box-scale", got=counted(len(options.tracks), "run"), expected="one text", remedy="leave it out"
@@ -92,11 +77,7 @@ def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) 
     runs = [[text] * len(sequences) if is_class(text) else _stored(text, sequences) for text in names.values()]
     how = (options.similarity, options.group_match, options.blocks)
     jobs = [ScoringJob(sources, *how, oracles=True) for sources in zip(*runs, strict=True)]
-    found: list[ScoredSequence] = []
-    with ProgressMeter("score", len(sequences)) as meter:
-        for one in over_sequences(score_sequence, sequences, jobs, source, options.workers):
-            meter.step(sequences[len(found)].name)
-            found.append(one)
+    found = score_sequences(sequences, jobs, source, options.workers)
     comparison = joined(list(names), [s.name for s in sequences], [one.compared for one in found])
     notes = [*sparse_notes([one.scores[0] for one in found]), *dict.fromkeys(one.note for one in found if one.note)]
     if options.blocks:
@@ -112,9 +93,7 @@ def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) 
 
 
 def short_notes(sequence: Sequence, scores: Scores) -> list[str]:
-    """Returns a list with one note if the recording lasts less than 60 s, so that its intervals are only indicative;
-    else [].
-    """
+    """Returns a list with one note if the recording lasts less than 60 s, so that its intervals are only indicative."""
     seconds = scores.length / sequence.fps
     return [INDICATIVE.format(seconds=seconds)] if seconds < SURE else []
 
@@ -137,9 +116,6 @@ def usual_key(comparison: ComparedRuns) -> str:
 
 
 def _names(texts: list[str]) -> dict[str, str]:
-    """Returns the texts on the command line by a short name: of the class, folder or file; the whole text if two share
-    it. Raises InputError if a text is given twice.
-    """
     short = [text.rpartition(":")[2] if is_class(text) else Path(text).name for text in texts]
     if len(set(texts)) < len(texts):
         twice = next(text for text in texts if texts.count(text) > 1)
@@ -157,7 +133,6 @@ def _stored(text: str, sequences: list[Sequence]) -> list[Any]:
 
 
 def _scenario(sequence: Sequence) -> str:
-    """Returns the name of a sequence without its seed: the scenario, or the name of a recording."""
     name, dash, seed = sequence.name.rpartition("-s")
     return name if dash and set(seed) <= set("0123456789-r") else sequence.name
 
@@ -179,7 +154,6 @@ def _ranked(
 
 
 def _pairs(comparison: ComparedRuns, ranking: Ranking) -> list[tuple[str, str]]:
-    """Returns the names of each pair of runs, the better one first."""
     return list(combinations((comparison.runs[k] for k in ranking.order.tolist()), 2))
 
 
@@ -320,7 +294,6 @@ def _sequence_table(c: ComparedRuns) -> Any:
 
 
 def _score_differences(every: RankedRuns) -> Any:
-    """Returns a table of the differences of all scores of the only pair of runs."""
     (pair,) = every.pairs
     known = [key for keys in TABLES.values() for key in keys if math.isfinite(pair["scores"][key]["mean"])]
     keys = [key for key in known if key != "objective" or usual_key(every.comparison) == key]
@@ -335,7 +308,6 @@ def _can_be_sure(comparison: ComparedRuns, ranking: Ranking) -> bool:
 
 
 def _pair_differences(every: RankedRuns) -> Any:
-    """Returns a table of the differences of each pair of runs in the score that ranks."""
     rows = {printable(f"{pair['run']} minus {pair['minus']}"): (every.key, pair) for pair in every.pairs}
     return with_title(f"differences, {arrow(every.key)}", _difference_table("runs", rows))
 
@@ -378,7 +350,6 @@ def verdict(comparison: ComparedRuns, key: str) -> list[str]:
 
 
 def _write_csv(path: Path, c: ComparedRuns) -> None:
-    """Writes one row per sequence and run (oracles, too) with every score of the catalogue."""
     from sim.io.files.atomic import write_file
 
     text = io.StringIO()

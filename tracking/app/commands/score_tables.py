@@ -52,22 +52,15 @@ Means = dict[str, dict[str, float]]
 
 @dataclass(frozen=True)
 class SequenceScores:
-    """The scores of one sequence. sequence: its name. scores: by key, nan where unknown. given: what detections the
-    tracker got, in words; "" if there is no run.json."""
+    """The scores of one sequence."""
 
     sequence: str
-    scores: Scores
-    given: str = ""
+    scores: Scores  # by key, nan where unknown
+    given: str = ""  # what detections the tracker got, in words; "" without run.json
 
 
 def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> Any:
-    """Returns something rich can print: one table per family of scores that has a known mean, then how people and
-    groups were compared.
-
-    rows: at least one sequence, all trackers given the same detections. means: by key, with interval. total: the number
-    of all scored sequences; if it is larger than the number of rows, a heading says which detections these rows belong
-    to. notes: further lines below.
-    """
+    """Returns, for rich to print, a table for each family of scores with a known mean, and how all was compared."""
     from rich.console import Group
 
     detections = f"detections {printable(rows[0].given) or 'unknown (no run.json)'}"
@@ -102,9 +95,6 @@ def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means:
 
 
 def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
-    """Returns the key as the heading of a column; with its unit if that depends on where people are compared, and with
-    an arrow if lower is better.
-    """
     unit = "/".join(dict.fromkeys("m" if row.scores.surface == "ground" else "px" for row in rows))
     short = key.removeprefix("group_").removesuffix("_core")
     named = f"{short} ({unit})" if CATALOGUE[key].unit == "m | px" else short
@@ -119,8 +109,7 @@ def empty_table() -> Any:
 
 
 def with_title(title: str, table: Any, foot: str = "") -> Any:
-    """Returns, for rich to print, the title above the table, not wrapped to the table's width, and below it the foot,
-    if any, and an empty line."""
+    """Returns, for rich to print, the title, not wrapped to the table's width, the table and the foot."""
     from rich.console import Group
     from rich.text import Text
 
@@ -128,12 +117,6 @@ def with_title(title: str, table: Any, foot: str = "") -> Any:
 
 
 def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) -> list[str]:
-    """Returns two lines: what people and groups were compared by, or that they are not tracked or not labelled.
-
-    people, groups: whether any score of these is known. Different ways in `rows` are all named, in order of first
-    appearance.
-    """
-
     def each(words: dict[str, str], name: str) -> str:
         return ", ".join(words[kind] for kind in dict.fromkeys(getattr(row.scores, name) for row in rows))
 
@@ -154,11 +137,7 @@ def chance(count: int, what: str) -> str:
 
 
 def number(key: str, value: float, *, mean: bool = False) -> str:
-    """Returns a score as text: three decimals, none for a count, one for the mean of a count; a dash for nan and
-    infinity.
-
-    key: of the catalogue, KeyError for another. mean: True for a mean over sequences.
-    """
+    """Returns a score as text: three decimals, none for a count; a dash if it is unknown."""
     if not math.isfinite(value):
         return "–"
     return f"{value:.3f}" if CATALOGUE[key].unit != "count" else f"{value:.{int(mean)}f}"

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
 from typing import Any
 
 from sim.io.formats.box_columns import BoxScale
 from sim.types import Sequence
 from tracking.app.commands.track import TrackerSetup
+from tracking.app.progress import ProgressMeter
+from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import StoredTracks
 from tracking.comparison import ComparedSequence, compare_one
-from tracking.run import TrackingRun
-from tracking.run_info import input_summary
+from tracking.running.run import TrackingRun
+from tracking.running.run_info import input_summary
 from tracking.scoring.evaluation import Scores
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.misreading import likely_misreading
@@ -25,29 +28,23 @@ SURFACE_WORDS = {"ground": "on the ground, boxes by their foot points", "image":
 
 @dataclass(frozen=True)
 class ScoringJob:
-    """What to score on a sequence, and how.
+    """What to score on a sequence, and how; similarity, group_match and blocks as of `compare`."""
 
-    sources: of each run, its stored tracks or the text that names a tracker class. similarity, group_match, blocks: as
-    of `compare`. oracles: score those, too. box_scale: factors of x and y of the boxes of texts; None: 1.
-    """
-
-    sources: tuple[StoredTracks | str, ...]
+    sources: tuple[StoredTracks | str, ...]  # of each run, its stored tracks or the text that names a tracker class
     similarity: Similarity | None = None
     group_match: GroupMatch = "hull"
     blocks: int = 0
-    oracles: bool = False
-    box_scale: BoxScale | None = None
+    oracles: bool = False  # score those, too
+    box_scale: BoxScale | None = None  # factors of x and y of the boxes of texts
 
 
 @dataclass(frozen=True)
 class ScoredSequence:
-    """The scores of runs of one sequence. infos: the content of run.json of each, {} without. note: what was done to
-    compare them, "" if nothing.
-    """
+    """The scores of runs of one sequence."""
 
     compared: ComparedSequence
-    infos: list[Mapping[str, Any]]
-    note: str = ""
+    infos: list[Mapping[str, Any]]  # content of run.json of each run, {} without
+    note: str = ""  # what was done to compare them
 
     @property
     def scores(self) -> list[Scores]:
@@ -60,12 +57,20 @@ class ScoredSequence:
         return [input_summary(info) for info in self.infos]
 
 
-def score_sequence(sequence: Sequence, job: ScoringJob) -> ScoredSequence:
-    """Returns the scores of all runs of one sequence, compared alike.
+def score_sequences(
+    sequences: SequenceOf[Sequence], jobs: SequenceOf[ScoringJob], source: OpenedAs, workers: int
+) -> list[ScoredSequence]:
+    """Returns the scores of each sequence with its job, and shows the progress."""
+    found: list[ScoredSequence] = []
+    with ProgressMeter("score", len(sequences)) as meter:
+        for one in over_sequences(score_sequence, sequences, jobs, source, workers):
+            meter.step(sequences[len(found)].name)
+            found.append(one)
+    return found
 
-    Warns about tracks that hardly match any label. Raises InputError if a file is wrong, the sequence has no labels, or
-    the tracks cannot be compared as asked; WorkError if a tracker fails.
-    """
+
+def score_sequence(sequence: Sequence, job: ScoringJob) -> ScoredSequence:
+    """Returns the scores of all runs of one sequence, compared alike."""
     runs = [_tracks(source, sequence, job.box_scale) for source in job.sources]
     for run in runs:
         if sequence.truth is not None:

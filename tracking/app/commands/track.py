@@ -16,14 +16,14 @@ from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.progress import ProgressMeter
-from tracking.app.run_folders import run_folders
+from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
-from tracking.run import TrackingRun
-from tracking.run_info import input_summary
-from tracking.time_limit import TimeLimited
+from tracking.running.run import TrackingRun
+from tracking.running.run_info import input_summary
+from tracking.running.time_limit import TimeLimited
 
 ROW_KEYS = (
     "sequence", "detections", "input", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames",
@@ -34,13 +34,7 @@ ROW_KEYS = (
 
 @dataclass(frozen=True)
 class TrackerSetup:
-    """A tracker with its parameters and inputs, as `tracking.track` takes them.
-
-    tracker: name, "file.py:Class" or "module:Class". config: its parameters; None for its own defaults. detections:
-    "image", "file" or "truth"; None for the first of these that works. sensor: settings that degrade detections of mode
-    "truth", {} for none. seed: of the tracker's and the sensor's random numbers. grouping: for trackers that
-    report no groups; None for the default. limited: the tracker with a limit of time for each step; None without.
-    """
+    """A tracker with its parameters and inputs, as `tracking.track` takes them."""
 
     tracker: str
     config: Config | None = None
@@ -48,16 +42,11 @@ class TrackerSetup:
     sensor: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
     grouping: Grouping | None = None
-    limited: TimeLimited | None = None
+    limited: TimeLimited | None = None  # the tracker with a limit of time for each step
 
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
-        """Tracks the sequence and returns its tracks, with groups and events. Nothing is written.
-
-        progress: called with each frame's number, from 1, when that frame is done; None: not called. Raises InputError
-        if tracker, parameters, settings and sequence do not fit, or a picture or detection cannot be used; WorkError if
-        the tracker fails.
-        """
-        from tracking.run import track
+        """Tracks the sequence and returns its tracks, with groups and events. Nothing is written."""
+        from tracking.running.run import track
 
         return track(
             self.limited or self.tracker, sequence, params=self.config, detections=self.detections,
@@ -66,22 +55,10 @@ class TrackerSetup:
 
 
 def track(options: TrackOptions) -> CommandResult:
-    """Tracks every sequence of the source and stores the tracks; returns a line for each run. The tracks are the same
-    for any number of workers.
-
-    The tracks of a source that is one sequence go to --out, those of a dataset's sequences to --out/<sequence name>.
-    The result's data: "tracker", and "runs", a dictionary for each with keys of its run.json, "tracks" (number of ids)
-    and "folder".
-
-    Raises InputError before the first frame if an option is wrong, the source cannot be opened, the tracker cannot work
-    on one of the sequences, two sequences would share a folder, a folder is a stored sequence or holds files of another
-    program with names of ours, or another run writes to --out; later if a picture, a detection or labels cannot be read
-    or a folder cannot be written. Raises WorkError if the tracker fails or the disk is full. Tracks stored before an
-    error stay.
-    """
+    """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
     from sim.io.files.atomic import lock_folder
     from sim.io.store.run_seal import reject_foreign
-    from tracking.tracker_registry import find
+    from tracking.running.tracker_registry import find
 
     setup = _setup(options)
     option_parsing.output_folder(options.out)
@@ -98,7 +75,7 @@ def track(options: TrackOptions) -> CommandResult:
         for folder in folders:
             reject_foreign(folder)
         _check_modes(setup, needs, sequences, options.background)
-        with setup.limited or nullcontext(), ProgressMeter("track", _total_frames(sequences)) as meter:
+        with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
             if min(options.workers, len(sequences)) == 1:
                 for sequence, folder in zip(sequences, folders, strict=True):
                     step = partial(_step, meter, sequence.name)
@@ -137,11 +114,6 @@ def _unpickled_setup(options: bytes) -> TrackerSetup:
 
 
 def _setup(options: TrackOptions) -> TrackerSetup:
-    """Returns the tracker with the parameters, detections, sensor settings and grouping that the options name.
-
-    Raises InputError if the tracker is unknown or a file is wrong, or for a setting that is wrong or belongs to a
-    scenario. Values of the sensor are checked later.
-    """
     found = [
         *option_parsing.settings(option_parsing.sensor_settings(options.sensor), "tracker", ("sensor",)),
         *option_parsing.settings(options.settings, "tracker", ("tracker", "sensor")),
@@ -155,13 +127,7 @@ def _setup(options: TrackOptions) -> TrackerSetup:
 
 
 def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:
-    """Returns the tracker's config with `params` (the name of a preset or a TOML file) and then `settings`
-    ("name=value") applied; None for a tracker without parameters.
-
-    Raises InputError if the tracker is unknown, if the file or a setting is wrong, or if either is given for a tracker
-    without parameters.
-    """
-    from tracking.tracker_registry import find
+    from tracking.running.tracker_registry import find
 
     kind: type[Config] | None = getattr(find(tracker), "config_class", None)
     if kind is not None:
@@ -180,25 +146,12 @@ def _config(tracker: str, params: str | None, settings: list[str]) -> Config | N
 def _check_modes(
     setup: TrackerSetup, needs: tuple[str, ...], sequences: list[Sequence], background: str | None
 ) -> None:
-    """Raises InputError if the tracker cannot work on one of the sequences, or if `background` would have no effect;
-    else returns nothing.
-
-    needs: what the tracker can work with. background: the text of --background; it has no effect if no sequence is
-    tracked from its pictures. None: not given.
-    """
-    from tracking.detection_mode import choose_mode
+    from tracking.running.detection_mode import choose_mode
 
     modes = [choose_mode(needs, sequence, setup.detections) for sequence in sequences]
     if background is not None and "image" not in modes:
         got, expected = f"--detections {modes[0]}", "a tracker that works on pictures"
         raise InputError(place="--background", got=got, expected=expected, remedy="leave --background out")
-
-
-def _total_frames(sequences: list[Sequence]) -> int | None:
-    """Returns the number of frames of all sequences together, None if one of them does not know its length;
-    0 for none."""
-    lengths = [sequence.length for sequence in sequences]
-    return None if None in lengths else sum(length or 0 for length in lengths)
 
 
 def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:

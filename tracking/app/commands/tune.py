@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 import typer
 
 from tracking.app import option_parsing
+from tracking.app.command_options import Cluster, Detector, Set, StepTimeout, Workers
 from tracking.app.command_result import CommandResult
 from tracking.app.options_from_dataclass import options_from
 from tracking.app.progress import ProgressMeter
-from tracking.app.shared_options import Cluster, Detector, Set, StepTimeout, Workers
 from tracking.tuning.options import TuneOptions
 
 SHARED = {"set": Set, "workers": Workers, "cluster": Cluster, "step_timeout": StepTimeout}
@@ -33,11 +33,6 @@ NO_CHECK = "none"
 
 
 def _command_field(option: Field[Any]) -> tuple[str, Any, Any]:
-    """Returns (name, annotation, dataclass field) of a field of TuneOptions on the command line, for `make_dataclass`.
-
-    The dataclass field holds the default: none for a required option, an empty list for one that may be repeated, None
-    for one that is text (also a comma-separated list) or absent, else the default in TuneOptions.
-    """
     default = MISSING if option.name in REQUIRED else option.default
     text = default is None or default == "" or option.name in COMMA_SEPARATED
     several = isinstance(default, tuple) and not text
@@ -55,10 +50,7 @@ def _command_field(option: Field[Any]) -> tuple[str, Any, Any]:
 
 
 def _command_fields() -> list[tuple[str, Any, Any]]:
-    """Returns (name, annotation, dataclass field) of each option of the command line, for `make_dataclass`.
-
-    They are the fields of TuneOptions in order, without "progress", and "sensor" after "set".
-    """
+    """Returns (name, annotation, dataclass field) of each option of the command line, for `make_dataclass`."""
     found = [_command_field(option) for option in fields(TuneOptions) if option.name != "progress"]
     after = [name for name, *_ in found].index("set") + 1
     return [*found[:after], ("sensor", Detector, field(default=None)), *found[after:]]
@@ -93,5 +85,4 @@ def tune(options: Any) -> CommandResult:
 
 
 def _short(value: Any) -> str:
-    """Returns the value as text, a float with four significant digits; the file that tune writes has all digits."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

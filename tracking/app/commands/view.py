@@ -13,9 +13,9 @@ from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.progress import ProgressMeter
+from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.stored_tracks import find_tracks, match_tracks
-from tracking.run import TrackingRun
+from tracking.running.run import TrackingRun
 
 Step = Callable[[str], None]
 """Reports that one picture of the named sequence is done."""
@@ -25,13 +25,7 @@ Write = Callable[[Sequence, Path, Step], None]
 
 
 def view(options: ViewOptions) -> CommandResult:
-    """Writes a replay page for each sequence, with its tracks if they are given. The result's data: "files", their
-    paths.
-
-    A video of the pictures lies in the page or beside it. Raises InputError if a source, --out or the tracks are wrong,
-    a sequence has no tracks though TRACKS is given, or a file would replace the source; WorkError if the disk is full.
-    Pages written before an error stay.
-    """
+    """Writes a replay page for each sequence, with its tracks if they are given."""
     from tracking.app.replay_page.page import write_page
     from tracking.app.replay_page.video import page_video
 
@@ -47,11 +41,7 @@ def view(options: ViewOptions) -> CommandResult:
 
 
 def sheet(options: SheetOptions) -> CommandResult:
-    """Writes a contact sheet, several frames in one PNG, for each sequence. The result's data: "files", their paths.
-
-    Raises InputError if the source or --out is wrong, or a sequence has neither pictures nor labelled people; WorkError
-    if the disk is full.
-    """
+    """Writes a contact sheet, several frames in one PNG, for each sequence. The result's data: "files", their paths."""
     from tracking.app.pictures.contact_sheet import write_sheet
 
     def write(sequence: Sequence, path: Path, _: Step) -> None:
@@ -62,11 +52,7 @@ def sheet(options: SheetOptions) -> CommandResult:
 
 
 def overlay(options: OverlayOptions) -> CommandResult:
-    """Writes a video for each sequence with tracks, truth or both drawn over its pictures. Data: "files", their paths.
-
-    Raises InputError if a source, --out or the tracks are wrong, a sequence has no pictures, or no labels where the
-    truth is to be drawn, or a file would replace the source; WorkError if the disk is full.
-    """
+    """Writes a video for each sequence with tracks, truth or both drawn over its pictures."""
     from tracking.app.pictures.overlay import write_overlay
 
     sequences = _open(options)
@@ -85,11 +71,6 @@ def _open(options: ViewOptions | OverlayOptions) -> list[Sequence]:
 
 
 def _tracks_reader(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], TrackingRun | None]:
-    """Returns a function that reads the stored tracks of one of the sequences; it returns None if `tracks` is None.
-
-    tracks: path at or below which they are stored. Raises InputError at once if a sequence has no tracks there or a run
-    is not whole; the function raises it for a damaged file, another frame rate or other labels.
-    """
     stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
 
     def read(sequence: Sequence) -> TrackingRun | None:
@@ -100,22 +81,12 @@ def _tracks_reader(sequences: list[Sequence], tracks: Path | None) -> Callable[[
 
 
 def _picture_count(sequences: list[Sequence]) -> int | None:
-    """Returns the number of frames of all sequences that have pictures, None if one of these does not know
-    its length."""
-    lengths = [sequence.length for sequence in sequences if sequence.has_images]
-    return None if None in lengths else sum(length or 0 for length in lengths)
+    return total_frames(sequence for sequence in sequences if sequence.has_images)
 
 
 def _write_each(
     what: str, sequences: list[Sequence], out: Path, suffix: str, write: Write, pictures: int | None
 ) -> CommandResult:
-    """Writes one file for each sequence: `out` itself for a single sequence, else out/<sequence name><suffix>.
-
-    Returns their paths as "files". what: name of the work for the progress meter. write: called with sequence, path and
-    `step`, a function to call after each picture. pictures: the number of calls of `step` over all sequences; None if
-    unknown. 0: progress counts files instead. Raises InputError if `out` is wrong, and what `write` raises; files
-    written before stay.
-    """
     files = _files(sequences, out, suffix)
     with ProgressMeter(what, len(files) if pictures == 0 else pictures) as meter:
         for sequence, path in zip(sequences, files, strict=True):
@@ -126,12 +97,6 @@ def _write_each(
 
 
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
-    """Returns the file for each sequence, in order: `out` itself for a single one, else out/<sequence name><suffix>.
-
-    The sequence name becomes a file name. Raises InputError if `out` ends in `suffix` and there are several sequences,
-    two of them would share a file, or a file exists that flockscope did not write; for a single one if `out` ends
-    otherwise or is a folder.
-    """
     if len(sequences) == 1:
         return [option_parsing.output_file(out, suffix)]
     if out.suffix.lower() == suffix:

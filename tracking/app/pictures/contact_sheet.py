@@ -13,7 +13,6 @@ from scenarios.printable import counted
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import marked_png
 from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth
-from tracking.app.pictures.frame_choice import SHOWN_KINDS, choose_frames, is_close
 from tracking.app.pictures.panel_pictures import PanelPictures
 from tracking.drawing.canvas import FLOOR, INK, QUIET, THING, TRAIL_SECONDS, Canvas, colour, text, text_width
 from tracking.drawing.layer_painting import KIND_COLOUR, event_words, kind_colour
@@ -31,17 +30,15 @@ RING_MARGIN = 0.7
 """m between an event's ring and the outermost of its members."""
 
 
+SHOWN_KINDS = {"merge": 0, "split": 0, "cross": 1, "queue": 1, "form": 2, "dissolve": 2}
+"""Kinds of events that are shown, with their rank; events of rank 0 come first. Enter and leave are not shown."""
+
+CLOSE_SECONDS = 1.0
+"""s: events that begin within this time share a picture."""
+
+
 def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
-    """Writes the contact sheet as PNG and returns its path. The file is complete, or is not written at all.
-
-    The sheet has `frames` panels (at least one, at most one per frame of the sequence), four to a row, and a timeline
-    below. A panel has the frame's pictures if the sequence has any, and a plan if people's places on the ground are
-    labelled; without pictures, boxes are drawn in place of the plan.
-
-    Raises InputError if there is no frame, if there are neither pictures nor labelled people, if truth or a picture
-    cannot be read, or the file cannot be written. Raises WorkError if the disk is full, or an order of a simulated
-    script was not fulfilled.
-    """
+    """Writes the contact sheet as PNG and returns its path. The file is complete, or is not written at all."""
     truth = sequence.truth
     if (truth is None or not len(truth.frame)) and not sequence.has_images:
         raise InputError(
@@ -57,10 +54,7 @@ def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
 
 
 def empty_truth(sequence: Sequence) -> Truth:
-    """Returns a truth without people, of the sequence's length, for a sequence without labels.
-
-    The frames are read and counted if the length is unknown. Positions are None and boxes (0, 4).
-    """
+    """Returns a truth without people, of the sequence's length, for a sequence without labels."""
     length = sequence.length or sum(1 for _ in sequence.without_pictures())
     none, nan = np.zeros(0, np.int64), float("nan")
     return Truth(sequence.name, sequence.fps, length, nan, none, none, none, None, None, np.zeros((0, 4)), np.zeros(0))
@@ -68,14 +62,10 @@ def empty_truth(sequence: Sequence) -> Truth:
 
 @dataclass(frozen=True)
 class PanelLayout:
-    """What a panel of a contact sheet has below its title.
-
-    picture, small, plan: heights in px of the large picture, the row of small pictures and the plan; 0 for what is
-    absent.
-    """
+    """Heights in px of what a panel has below its title; 0 for what is absent."""
 
     picture: int
-    small: int
+    small: int  # row of small pictures
     plan: int
 
     @property
@@ -85,12 +75,7 @@ class PanelLayout:
 
 
 def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
-    """Returns the contact sheet as an (H, W, 3) BGR uint8 picture; its size follows from the panels.
-
-    truth: may be without people. frames: number of panels, at least 1 and at most one per frame (other numbers
-    are brought there); their frames are chosen by `choose_frames`. Raises InputError if there is no frame, or a
-    picture cannot be read.
-    """
+    """Returns the contact sheet as an (H, W, 3) BGR uint8 picture; its size follows from the panels."""
     chosen = choose_frames(truth, frames)
     if not chosen:
         raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
@@ -119,11 +104,7 @@ def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
 
 
 def _places(truth: Truth) -> Array:
-    """Returns (R, 2) where people are drawn, by row of the truth: on the ground, m, else the centres of their boxes,
-    px.
-
-    AssertionError if it has neither positions nor boxes.
-    """
+    """Returns (R, 2) where people are drawn, by row of the truth."""
     if truth.pos is not None:
         return truth.pos
     assert truth.box is not None, "labels have positions or boxes"
@@ -131,13 +112,7 @@ def _places(truth: Truth) -> Array:
 
 
 def sheet_area(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
-    """Returns the smallest and the largest x and y, (2,) each, of a panel's plan: m on the ground, px if only boxes are
-    labelled.
-
-    With positions it is the area of `plan_area`, with its margin. Without them it is the whole image, or, if the image
-    size is unknown, the least rectangle that holds all boxes, y downwards. It is (0, 0) and (1, 1) if no place is
-    known. AssertionError if positions, image size and boxes are all missing.
-    """
+    """Returns the smallest and the largest x and y, (2,) each, of a panel's plan."""
     if truth.pos is None and sequence.image_size is not None:
         return np.zeros(2), np.array(sequence.image_size, float)
     if truth.pos is not None:
@@ -149,11 +124,6 @@ def sheet_area(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
 
 
 def _draw_plan(canvas: Canvas, sequence: Sequence, truth: Truth, index: int) -> None:
-    """Draws people of frame `index` (from 1) from above with rings round the members of events, on the canvas in place.
-
-    With no ground (y downwards on the canvas) boxes are drawn, without rings and scene. Ids are left out with more than
-    40 people. Also drawn are trails and the hulls of groups.
-    """
     on_ground = canvas.upwards
     places, boxes = _places(truth), None if on_ground else truth.box
     canvas.image[:] = FLOOR
@@ -169,11 +139,6 @@ def _draw_plan(canvas: Canvas, sequence: Sequence, truth: Truth, index: int) -> 
 
 
 def _draw_title(area: Image, truth: Truth, index: int) -> None:
-    """Draws the time and the events near it into the panel `area`, in place; and a border round the part below them.
-
-    index: frame from 1. The words are cut after 62 characters. Words and border have the colour of the first event,
-    grey without one.
-    """
     events = _events_near(truth, index)
     words = f"{(index - 1) / truth.fps:.1f} s" + "".join(f"   {event_words(event)}" for event in events)
     ink = kind_colour(events[0].kind) if events else QUIET
@@ -183,21 +148,12 @@ def _draw_title(area: Image, truth: Truth, index: int) -> None:
 
 
 def _events_near(truth: Truth, index: int) -> list[GroupEvent]:
-    """Returns events that begin at most a second from frame `index` (from 1); no enter or leave. [] if events are
-    unknown.
-
-    Order: merges and splits, crossings and queues, then form and dissolve; within each of these as in the truth.
-    """
     near = [event for event in truth.events or () if is_close(event.start, index, truth.fps)]
     return sorted((event for event in near if event.kind in SHOWN_KINDS), key=lambda event: SHOWN_KINDS[event.kind])
 
 
 def event_ring(event: GroupEvent, ids: Ints, places: Array) -> tuple[Array, float]:
-    """Returns centre (2,) and radius (m) of a ring round the event's members, with 0.7 m to spare.
-
-    Its centre is the mean of the members in the frame; others do not count. If none is there, it is round the event's
-    place (nan if unknown) with a radius of 1 m. ids: (N,) and places: (N, 2), m, of the people in the frame.
-    """
+    """Returns centre (2,) and radius (m) of a ring round the event's members, with 0.7 m to spare."""
     members = places[np.isin(ids, event.members)]
     if not len(members):
         return np.array(event.pos), MARGIN
@@ -206,11 +162,6 @@ def event_ring(event: GroupEvent, ids: Ints, places: Array) -> tuple[Array, floa
 
 
 def _draw_head(sheet: Image, sequence: Sequence, truth: Truth) -> None:
-    """Draws the sequence's name, number of people and frames, frame rate, and size of the world, image or plan on the
-    sheet, in place.
-
-    Without people their number is left out.
-    """
     text(sheet, sequence.name, (GAP, 48), 1.3, INK, 3)
     width = text_width(sequence.name, 1.3, 3)
     unit = "m" if truth.pos is not None else "px"
@@ -224,11 +175,6 @@ def _draw_head(sheet: Image, sequence: Sequence, truth: Truth) -> None:
 
 
 def _draw_foot(area: Image, truth: Truth, chosen: list[int]) -> None:
-    """Draws a timeline with a tick for each chosen frame and a dot for each event into `area`, in place.
-
-    chosen: frames from 1. Dots are at the events' first frames, of every kind; events that begin outside the sequence
-    are left out. Below are the colours of the events' kinds.
-    """
     width, line = area.shape[1], 34
     left, right = GAP + 10, width - GAP - 60
     last = max(truth.length - 1, 1)
@@ -249,3 +195,49 @@ def _draw_foot(area: Image, truth: Truth, chosen: list[int]) -> None:
         text(area, kind, (x + 26, line + 49), 0.7, INK)
         x += 50 + text_width(kind, 0.7)
     text(area, "ticks: the pictures above", (x + 10, line + 49), 0.7, QUIET)
+
+
+def is_close(frame: int, other: int, fps: float) -> bool:
+    """Returns True if two frames, given by number, are at most one second apart. fps: frames per second."""
+    return abs(frame - other) <= CLOSE_SECONDS * fps
+
+
+def choose_frames(truth: Truth, count: int) -> list[int]:
+    """Returns the numbers, from 1, of `count` frames in ascending order."""
+    count = min(max(1, count), truth.length)
+    chosen: list[int] = []
+    events = [event for event in truth.events or () if 1 <= event.start <= truth.length and event.kind in SHOWN_KINDS]
+    for rank in sorted(set(SHOWN_KINDS.values())):
+        starts = _apart({event.start for event in events if SHOWN_KINDS[event.kind] == rank}, chosen, truth.fps)
+        room = count - len(chosen)
+        chosen += starts if len(starts) <= room else [starts[k] for k in _evenly(len(starts), room)]
+    people = np.bincount(truth.frame, minlength=truth.length + 1)[1 : truth.length + 1]
+    while len(chosen) < count:
+        chosen.append(_in_widest_gap(chosen, people))
+    return sorted(chosen)
+
+
+def _apart(starts: set[int], chosen: list[int], fps: float) -> list[int]:
+    kept: list[int] = []
+    for start in sorted(starts):
+        if not any(is_close(start, other, fps) for other in (*chosen, *kept)):
+            kept.append(start)
+    return kept
+
+
+def _evenly(n: int, k: int) -> list[int]:
+    return [round(place) for place in np.linspace(0, n - 1, k)] if k > 1 else [0][:k]
+
+
+def _in_widest_gap(chosen: list[int], people: Ints) -> int:
+    length = len(people)
+    # The ends count as an eighth of the length further out, so that frames near them are chosen, too.
+    marks = np.array([1 - length // 8, *sorted(chosen), length + length // 8])
+    for k in np.argsort(-np.diff(marks), kind="stable"):
+        low, high = marks[k], marks[k + 1]
+        quarter = (high - low) // 4
+        inner = np.arange(max(low + quarter, low + 1, 1), min(high - quarter, high - 1, length) + 1)
+        if len(inner):
+            order = np.lexsort((np.abs(inner - (low + high) / 2), -people[inner - 1]))
+            return int(inner[order[0]])
+    return next(index for index in range(1, length + 1) if index not in chosen)

@@ -26,7 +26,7 @@ from tracking.drawing.layer_painting import (
     paint_layer,
 )
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
-from tracking.run import grouped
+from tracking.running.run import grouped
 
 TruthPlacement = Literal["beside", "over", "only"]
 Panel = list[tuple[Layer, LayerStyle]]
@@ -47,18 +47,7 @@ def write_overlay(
     truth: TruthPlacement | None = None,
     step: Callable[[str], None] = lambda _: None,
 ) -> Path:
-    """Writes the MP4 and returns its path. The file is complete, or is not written at all.
-
-    tracks: one tracker's `Tracks`, one per frame; None to draw the truth alone, whatever `truth` says. Groups and
-    events that the tracker did not report are derived. truth: draw the truth in a second picture `beside` the tracks,
-    as thin white boxes `over` the same picture, or draw `only` the truth; None: tracks only. step: called with the
-    sequence's name after each frame.
-
-    Raises InputError if the sequence has no frame or no pictures, if one cannot be read, or if the truth is wanted and
-    is missing or cannot be read. Also if groups must be derived in the image and the scale is not above 0, or if `out`
-    cannot be written or is the file that the sequence is read from. Raises WorkError if the disk is full, or an order
-    of a simulated script was not fulfilled.
-    """
+    """Writes the MP4 and returns its path. The file is complete, or is not written at all."""
     if not sequence.has_images:
         raise InputError(
             file=sequence.name, got="a sequence without pictures", expected="one with pictures",
@@ -73,12 +62,6 @@ def write_overlay(
 
 
 def _panels(sequence: Sequence, tracks: SequenceOf[Tracks] | None, placement: TruthPlacement | None) -> list[Panel]:
-    """Returns the panels from left to right, each a list of layers with their styles, the lowest layer first.
-
-    placement None: one panel of tracks. "beside": truth, then tracks. "over": one panel, plain truth below tracks.
-    "only", or tracks None: one panel of truth. Raises InputError if truth is needed and nothing is labelled or it
-    cannot be read, or if groups must be derived and the scale in px per m is 0 or below.
-    """
     if tracks is None or placement is not None:
         if sequence.truth is None:
             got = "a sequence without labels" if tracks is not None else "neither tracks nor labels"
@@ -109,13 +92,7 @@ def _write(path: Path, sequence: Sequence, panels: list[Panel], step: Callable[[
 
 
 def overlay_pictures(sequence: Sequence, panels: list[Panel]) -> Iterator[Image]:
-    """Yields the video's pictures, BGR uint8, one per frame, of even width and height: a banner above the panels side
-    by side.
-
-    A frame without a picture shows the last picture before it, or grey if there is none. Pictures less than 400 px high
-    are shown at twice their size; the banner is 32 px high. While iterating raises InputError if a picture cannot be
-    read, AssertionError if the image size is unknown.
-    """
+    """Yields the video's pictures, BGR uint8, one per frame, of even width and height."""
     last: Image | None = None
     for frame in sequence:
         if frame.image is not None:
@@ -144,8 +121,7 @@ def _draw_panel(picture: Image | None, sequence: Sequence, index: int, panel: Pa
 
 
 def banner_words(sequence: Sequence, frame: Frame, panels: list[Panel]) -> str:
-    """Returns the banner's text: sequence, frame (from 1) and number of frames if known, time in s, and how many people
-    or groups each layer ("true", "tracked") has in this frame."""
+    """Returns the banner's text: sequence, frame, time in s, and how many people or groups each layer has."""
     of = "" if sequence.length is None else f" of {sequence.length}"
     marks = {layer.name: layer.at(frame.index) for panel in panels for layer, _ in panel}
     count = "".join(f"   {name} {len(m.id)}{' groups' * m.whole_groups}" for name, m in marks.items())
@@ -153,8 +129,6 @@ def banner_words(sequence: Sequence, frame: Frame, panels: list[Panel]) -> str:
 
 
 def _warnings(sequence: Sequence, frame: Frame) -> list[str]:
-    """Returns what the frame lacks, in words: "lost frame" without a picture, "no detections" in a sequence that has
-    some; [] if nothing."""
     lost = ["lost frame"] if frame.image is None else []
     empty = frame.detections is None or not len(frame.detections.pos)
     return lost + (["no detections"] if sequence.has_detections and empty else [])

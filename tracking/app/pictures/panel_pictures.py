@@ -24,13 +24,7 @@ QUANTILE = 0.99
 
 
 class PanelPictures:
-    """Draws the pictures of chosen frames for a contact sheet's panels. They are read at construction (InputError if
-    one cannot be).
-
-    size: (width, height) of the sequence's pictures, px, or None. fps: frames per second. frames: the chosen frames by
-    number from 1; {} without pictures or size. pixels: the truth of their pixels by number, {} if unknown. layer: the
-    truth to draw over them, empty without frames.
-    """
+    """Draws the pictures of chosen frames for a contact sheet's panels; they are read at construction."""
 
     def __init__(self, sequence: Sequence, truth: Truth, chosen: Iterable[int]) -> None:
         self.size, self.fps = sequence.image_size, truth.fps
@@ -40,10 +34,7 @@ class PanelPictures:
         self.layer = layer_of_truth(truth) if self.frames else Layer("true", "G", {})
 
     def kinds(self) -> tuple[str, ...]:
-        """Returns the small pictures that can be drawn, of "right", "ids", "disparity", in this order.
-
-        If only one can, "left" is put before it; () if none can.
-        """
+        """Returns the small pictures that can be drawn, of "right", "ids", "disparity", in this order."""
         some = next(iter(self.pixels.values()), None)
         available = {
             "right": any(frame.right is not None for frame in self.frames.values()),
@@ -54,8 +45,7 @@ class PanelPictures:
         return ("left", *kinds) if len(kinds) == 1 else kinds
 
     def heights(self, width: int) -> tuple[int, int]:
-        """Returns the heights in px of the large picture and of the row of small pictures, at this panel width in px; 0
-        if absent."""
+        """Returns the heights in px of the large picture and of the row of small ones at this width; 0 if absent."""
         if self.size is None or not self.frames:
             return 0, 0
         aspect = self.size[1] / self.size[0]
@@ -63,11 +53,7 @@ class PanelPictures:
         return round(width * aspect), round(width * aspect / len(kinds)) if kinds else 0
 
     def draw_large(self, area: Image, index: int) -> None:
-        """Fills `area` in place with the left picture of frame `index` (from 1) and draws the truth over it.
-
-        The picture is resized; it is grey if the frame has none or was not chosen. AssertionError if the image size is
-        unknown.
-        """
+        """Fills `area` in place with the left picture of frame `index` (from 1) and draws the truth over it."""
         assert self.size is not None
         picture = self.frames[index].image if index in self.frames else None
         _fill(area, picture)
@@ -75,10 +61,7 @@ class PanelPictures:
         paint_layer(canvas, self.layer, index, self.fps, LayerStyle(rim=False))
 
     def draw_small(self, area: Image, index: int) -> None:
-        """Fills `area` in place with the small pictures of frame `index` (from 1) side by side, each with its name.
-
-        A picture that is missing is grey. ZeroDivisionError if no small picture can be drawn.
-        """
+        """Fills `area` in place with the small pictures of frame `index` (from 1) side by side, each with its name."""
         kinds = self.kinds()
         width = area.shape[1] // len(kinds)
         for k, kind in enumerate(kinds):
@@ -88,11 +71,7 @@ class PanelPictures:
 
 
 def _frames(sequence: Sequence, chosen: set[int]) -> dict[int, Frame]:
-    """Returns the chosen frames by number from 1; reading stops after the last of them. Frames that do not exist are
-    left out.
-
-    Raises InputError if a picture cannot be read.
-    """
+    """Returns the chosen frames by number from 1; reading stops after the last of them."""
     found = {}
     for frame in sequence:
         if frame.index in chosen:
@@ -103,12 +82,6 @@ def _frames(sequence: Sequence, chosen: set[int]) -> dict[int, Frame]:
 
 
 def _draw(area: Image, kind: str, frame: Frame | None, pixels: PixelTruth | None) -> str:
-    """Fills `area` in place with one small picture, resized (its shape becomes that of the area), and returns its
-    caption. A picture that is missing is grey.
-
-    kind: "left", "right", "ids" or "disparity". Disparity (px) is coloured from its 1 % to its 99 % quantile in this
-    frame, which the caption names; 0 to 1 if none is known.
-    """
     if kind in ("left", "right") or pixels is None:
         _fill(area, None if frame is None else frame.right if kind == "right" else frame.image)
         return kind
@@ -123,14 +96,11 @@ def _draw(area: Image, kind: str, frame: Frame | None, pixels: PixelTruth | None
 
 
 def _fill(area: Image, picture: Image | None, interpolation: int = cv2.INTER_AREA) -> None:
-    """Fills `area` in place with the picture resized to it, or with grey if it is None. interpolation: a constant of
-    cv2."""
     area[:] = GREY if picture is None else cv2.resize(picture, area.shape[1::-1], interpolation=interpolation)
 
 
 def coloured_ids(ids: Ints) -> Image:
-    """Returns an (H, W, 3) BGR picture of ids (H, W): people (above 0) in the colours of their ids, walls and pillars
-    (below 0) dark, ground (0) light."""
+    """Returns a BGR picture of ids (H, W): people above 0, walls and pillars below 0 dark, ground 0 light."""
     out = np.full((*ids.shape, 3), FLOOR, np.uint8)
     out[ids < 0] = OBJECTS
     for identity in np.unique(ids[ids > 0]).tolist():
@@ -139,11 +109,7 @@ def coloured_ids(ids: Ints) -> Image:
 
 
 def coloured_disparity(disparity: Array, low: float, high: float) -> Image:
-    """Returns an (H, W, 3) BGR picture of disparities (H, W) px: `low` (far) is dark, `high` (near) is light, nan is
-    grey.
-
-    Values outside are clipped to `low` or `high`, px; infinity is grey, too.
-    """
+    """Returns an (H, W, 3) BGR picture of disparities (H, W) px."""
     share = np.clip((np.nan_to_num(disparity, nan=low) - low) / max(high - low, 1e-9), 0, 1)
     out = np.asarray(cv2.applyColorMap((share * 255).astype(np.uint8), cv2.COLORMAP_VIRIDIS), np.uint8)
     out[~np.isfinite(disparity)] = GRID

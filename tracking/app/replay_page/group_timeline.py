@@ -12,40 +12,26 @@ from sim.types import Array, GroupEvent, Ints
 
 @dataclass(frozen=True)
 class Bar:
-    """One unbroken life of a group id, a bar of the timeline.
-
-    start, end: frames from 1, both inclusive. lane: line of the timeline, from 0. size: most people in it in one of its
-    frames, rounded.
-    """
+    """One unbroken life of a group id, a bar of the timeline."""
 
     id: int
-    start: int
-    end: int
-    lane: int
-    size: int
+    start: int  # frame, from 1
+    end: int  # frame, inclusive
+    lane: int  # line of the timeline, from 0
+    size: int  # most people in one of its frames, rounded
 
 
 @dataclass(frozen=True)
 class Link:
-    """Group `a` becomes or joins group `b`, a link between their bars; both are ids.
+    """Group `a` becomes or joins group `b`, a link between their bars; both are ids."""
 
-    frame: from 1, when a tracker reported it; for truth the event's first frame.
-    """
-
-    frame: int
+    frame: int  # when a tracker reported it; of truth the event's first frame
     a: int
     b: int
 
 
 def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array | None = None) -> list[Bar]:
-    """Returns the bars, unbroken lives, of the groups in rows of (frame, group), (R,) each, sorted by first frame.
-
-    Rows may have any order; those with group -1 are left out. [] if none remain. least: a group with fewer people in a
-    frame is absent from it. gap: consecutive frames of a bar differ by at most this; 1 ends it at any missing frame. An
-    id that comes back later has another bar. people: (R,), how many people each row stands for; None: one. A bar takes
-    the lane of the last bar of its id if that is free, else the lowest free lane. A lane is free for a bar that starts
-    at least two frames after the end of its last bar.
-    """
+    """Returns the bars, unbroken lives, of the groups in rows of (frame, group), (R,) each, sorted by first frame."""
     rows = group >= 0
     pairs, place = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_inverse=True)
     count = np.bincount(place.ravel(), None if people is None else people[rows], len(pairs))
@@ -59,11 +45,6 @@ def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array |
 
 
 def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
-    """Returns Bars of (start, end, id, size), in the given order, which must be by start; start and end are frames.
-
-    A bar takes the lane of the last bar of its id if that is free, else the lowest free lane. A lane is free for a bar
-    that starts at least two frames after the end of its last bar.
-    """
     free_from: list[int] = []
     last: dict[int, int] = {}
     made = []
@@ -72,19 +53,14 @@ def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
         lane = last[name] if last.get(name, -1) in free else (free[0] if free else len(free_from))
         if lane == len(free_from):
             free_from.append(0)
-        free_from[lane] = end + 1
+        free_from[lane] = end + 1  # one frame stays empty between two bars of a lane
         last[name] = lane
         made.append(Bar(name, start, end, lane, size))
     return made
 
 
 def links(events: Iterable[GroupEvent]) -> list[Link]:
-    """Returns a link for each pair of different groups before and after a merge or split; other kinds of events have
-    none.
-
-    `a` is the id before, `b` the id after. Links have the order of the events, then of a, then of b. People alone (-1)
-    have none.
-    """
+    """Returns a link for each pair of different groups before and after a merge or split."""
     return [
         Link(event.start if event.emitted is None else event.emitted, a, b)
         for event in events

@@ -1,22 +1,38 @@
 """Writes the replay page: one HTML file with data, style and scripts, and at most a video beside it.
 
-The page loads nothing from the network.
+The page loads nothing from the network. Its data is one JSON object: sequence, scene, camera, truth, tracks, detections
+and scores. Rows of people are encoded column by column (`page_rows`); decode.js decodes them.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from collections.abc import Sequence as SequenceOf
 from html import escape
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from sim.io.files.atomic import write_file
-from sim.types import Sequence, Tracks
-from tracking.app.replay_page.page_data import page_data
+from sim.types import Array, Camera, Scene, Sequence, Tracks, Truth
+from tracking.app.replay_page.page_rows import (
+    SCALE,
+    Json,
+    PageRows,
+    deltas,
+    encode_rows,
+    rows_of_tracks,
+    rows_of_truth,
+)
 from tracking.app.replay_page.video import PageVideo
+from tracking.drawing.plan_area import plan_area
+from tracking.running.run import grouped
 
 HERE = Path(__file__).parent
+
 SCRIPTS = (
     "decode.js", "draw.js", "whole_groups.js", "plan.js", "camera_view.js", "image.js", "timeline.js", "video.js",
     "page.js",
@@ -32,16 +48,7 @@ def write_page(
     title: str | None = None,
     video: PageVideo | None = None,
 ) -> Path:
-    """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all.
-
-    tracks: one tracker's `Tracks`, one per frame; None for the truth alone. Groups and events that the tracker did not
-    report are derived. scores: by key; nan and infinite ones are not shown, None: none. title: None for the sequence's
-    name. video: the pictures, drawn below the boxes; None: none. An existing file is replaced.
-
-    Raises InputError if the truth or detections cannot be read, groups must be derived in the image and the scale is
-    not above 0, or the file cannot be written; WorkError if the disk is full or an order of a simulated script was not
-    fulfilled.
-    """
+    """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all."""
     shown = page_data(sequence, tracks, scores) | {"video": None if video is None else video.facts()}
     data = json.dumps(shown, separators=(",", ":"), allow_nan=False)
     page = (HERE / "page.html").read_text(encoding="utf-8")
@@ -57,3 +64,152 @@ def write_page(
     path = Path(out)
     write_file(path, text.encode("utf-8", "replace"))  # a title from a file's name may hold lone surrogates
     return path
+
+
+def page_data(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Mapping[str, float] | None = None) -> Json:
+    """Returns all that the page shows except the video, as a JSON object."""
+    truth = sequence.truth
+    complete = None if tracks is None else grouped(tracks, sequence)
+    true = None if truth is None else rows_of_truth(truth)
+    tracked = None if complete is None else rows_of_tracks(complete)
+    detections = _detections(sequence)
+    both = [rows for rows in (true, tracked) if rows is not None]
+    return {
+        "name": sequence.name,
+        "tracker": _tracker(tracks),
+        "fps": sequence.fps,
+        "length": _length(sequence, both, detections),
+        "image": sequence.image_size or _image_size(both),
+        "bounds": _bounds(sequence, both),
+        "scene": scene_json(sequence.scene),
+        "camera": camera_json(sequence.camera),
+        "truth": None if true is None or truth is None else encode_rows(true, truth.events or ()),
+        "tracks": None
+        if tracked is None or complete is None
+        else encode_rows(tracked, [e for t in complete for e in t.events]),
+        "detections": detections,
+        "unlabelled": _unlabelled(truth),
+        "near": _near_strangers(truth),
+        "scores": _scores(scores or {}),
+    }
+
+
+def _scores(scores: Mapping[str, float]) -> list[list[str]]:
+    """Returns [key, value, meaning, family], all texts, of each known (finite) score in the catalogue's order."""
+    from tracking.app.commands.score_tables import SHOWN, number
+    from tracking.scoring.catalogue import CATALOGUE
+
+    known = {key: number(key, scores[key]) for key in CATALOGUE if math.isfinite(scores.get(key, math.nan))}
+    few = [[key, known[key], CATALOGUE[key].meaning, ""] for key in SHOWN if key in known]
+    return few + [[key, text, CATALOGUE[key].meaning, CATALOGUE[key].family] for key, text in known.items()]
+
+
+def _tracker(tracks: SequenceOf[Tracks] | None) -> str:
+    info: Mapping[str, Any] = getattr(tracks, "info", {})
+    return str(info.get("tracker", "the tracker"))
+
+
+def _length(sequence: Sequence, both: list[PageRows], detections: Json | None) -> int:
+    if sequence.length is not None:
+        return max(sequence.length, 1)
+    last = [int(rows.frame.max()) for rows in both if len(rows.frame)]
+    detected = [int(detections["frames"][-1][0])] if detections else []
+    return max([1, *last, *detected])
+
+
+def _image_size(both: list[PageRows]) -> list[int] | None:
+    corners = [rows.box[:, :2] + rows.box[:, 2:] for rows in both]
+    corners += [points for rows in both if rows.plane == "image" for points in _points(rows)]
+    known = np.concatenate([np.zeros((0, 2)), *corners])
+    known = known[np.isfinite(known).all(axis=1)]
+    if not len(known):
+        return None
+    width, height = known.max(axis=0)
+    return [max(math.ceil(width), 16), max(math.ceil(height), 16)]
+
+
+def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
+    points = [part for rows in both if rows.plane == "ground" for part in _points(rows)]
+    area = plan_area(sequence.scene, np.concatenate([np.zeros((0, 2)), *points]))
+    return None if area is None else [round(float(v), 2) for corner in area for v in corner]
+
+
+def _points(rows: PageRows) -> list[Array]:
+    return [rows.pos, *(rows.groups.hull if rows.groups is not None else ())]
+
+
+def _unlabelled(truth: Truth | None) -> list[list[int]]:
+    """Returns [first, last], frames from 1 and both inclusive, of each stretch of frames without group labels."""
+    if truth is None or truth.labelled is None or truth.labelled.all():
+        return []
+    edge = np.flatnonzero(np.diff(np.r_[True, truth.labelled, True].astype(int)))
+    return [[int(a) + 1, int(b)] for a, b in edge.reshape(-1, 2)]
+
+
+def _near_strangers(truth: Truth | None) -> list[list[int]]:
+    """Returns [first frame, last frame, id, id] of each two strangers who walk as if they were in one group."""
+    if truth is None or truth.near is None:
+        return []
+    near = truth.near
+    listed: list[list[int]] = np.stack([near.start, near.end, near.a, near.b], axis=1).tolist()
+    return listed
+
+
+def _detections(sequence: Sequence) -> Json | None:
+    if not sequence.has_detections:
+        return None
+    found = [
+        (f.index, f.detections)
+        for f in sequence.without_pictures()
+        if f.detections is not None and len(f.detections.pos)
+    ]
+    if not found:
+        return None
+    plane = found[0][1].plane
+    pos = np.concatenate([d.pos[:, :2] for _, d in found]) * SCALE[plane]
+    boxes = [d.box for _, d in found if d.box is not None]
+    box = np.concatenate(boxes) if len(boxes) == len(found) else None
+    return {
+        "plane": plane,
+        "scale": SCALE[plane],
+        "frames": [[index, len(d.pos)] for index, d in found],
+        "x": deltas(pos[:, 0]),
+        "y": deltas(pos[:, 1]),
+        "box": [] if box is None else [deltas(box[:, k]) for k in range(4)],
+    }
+
+
+def scene_json(scene: Scene | None) -> Json | None:
+    """Returns the scene for the page, in m, as a JSON object; None without a scene."""
+    if scene is None:
+        return None
+    return {
+        "size": _round(scene.size),
+        "walls": _round(scene.walls.reshape(-1, 4)),
+        "pillars": _round(scene.pillars),
+        "doors": _round(scene.doors.reshape(-1, 4)),
+        "service": _round(scene.service),
+        "stairs": [[*_round(s.foot), *_round(s.head), s.width, s.rise, s.steps, s.landing] for s in scene.stairs],
+        "wallHeight": scene.wall_height,
+        "pillarHeight": scene.pillar_height,
+    }
+
+
+def camera_json(camera: Camera | None) -> Json | None:
+    """Returns the camera for the page, which projects ground and walls with it, as a JSON object."""
+    if camera is None:
+        return None
+    return {
+        "kind": camera.kind,
+        "f": _round(camera.focal_px),
+        "c": _round(camera.centre_px),
+        "C": _round(camera.position, 4),
+        "R": _round(camera.rotation, 6),
+        "scale": None if math.isnan(camera.px_per_m) else camera.px_per_m,
+        "k": camera.radial,
+    }
+
+
+def _round(values: Any, digits: int = 3) -> list[Any]:
+    listed: list[Any] = np.round(np.asarray(values, float), digits).tolist()
+    return listed

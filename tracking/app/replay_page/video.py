@@ -29,35 +29,22 @@ GREY = 128
 
 @dataclass(frozen=True)
 class PageVideo:
-    """A video with one picture per frame.
+    """A video with one picture per frame."""
 
-    address: relative to the page, "" if the video is inside it. content: the video's bytes in base64 if it is inside
-    the page, else "". fps: frames per second. lost: frames (from 1) without a picture, which show the picture before.
-    """
-
-    address: str
-    content: str
+    address: str  # relative to the page, "" if the video is inside it
+    content: str  # the bytes in base64 if inside, else ""
     fps: float
-    lost: tuple[int, ...] = ()
+    lost: tuple[int, ...] = ()  # frames (from 1) without a picture, which show the picture before
 
     def facts(self) -> dict[str, Any]:
-        """Returns the video's entry in the page's data: "src" (address, "" if inside), "fps" and "lost" (frames from 1
-        without a picture). The content is not in it."""
+        """Returns the video's entry in the page's data."""
         return {"src": self.address, "fps": self.fps, "lost": self.lost}
 
 
 def page_video(
     sequence: Sequence, page: Path, placement: VideoPlacement = "auto", step: Callable[[str], None] = lambda _: None
 ) -> PageVideo | None:
-    """Makes the video for the page FILE.html and returns it; a video beside the page is written as FILE.view.mp4.
-
-    placement: "inside" the page, "beside" it, "none", or "auto": beside if the video has 12,000,000 bytes or more.
-    Returns None if it is "none" or the sequence has no pictures. An existing FILE.view.mp4 is replaced by a video
-    beside the page, else left. step: called with the sequence's name after each frame.
-
-    Raises InputError if FILE.view.mp4 is the file that the sequence is read from or one that flockscope did not write,
-    a picture cannot be read or the folder cannot be written; WorkError if the disk is full.
-    """
+    """Makes the video for the page FILE.html and returns it; a video beside the page is written as FILE.view.mp4."""
     if placement == "none" or not sequence.has_images:
         return None
     beside = page.with_suffix(".view.mp4")  # FILE.mp4 may be an overlay, or the source itself
@@ -73,22 +60,14 @@ def page_video(
 
 
 def refuse_source(sequence: Sequence, path: Path) -> None:
-    """Raises InputError if `path` is the existing file that the sequence is read from; else returns nothing.
-
-    A sequence without a path in its `source` passes.
-    """
+    """Raises InputError if `path` is the existing file that the sequence is read from; else returns nothing."""
     source = sequence.source.get("path")
     if source is not None and path.exists() and path.samefile(source):
         raise InputError(file=path, place="--out", got="the source itself", expected="another file", remedy="rename it")
 
 
 def _encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tuple[int, ...]:
-    """Writes the pictures as MP4 at `path` and returns the frames (from 1) without a picture; they show the one before,
-    or grey.
-
-    Odd widths and heights are made even. step: called with the sequence's name after each frame. Raises InputError if a
-    picture cannot be read, OSError if `path` cannot be written.
-    """
+    """Writes the pictures as MP4 at `path` and returns the frames (from 1) without a picture."""
     assert sequence.image_size is not None, "pictures have a size"
     width, height = sequence.image_size
     last: Image = np.full((height, width, 3), GREY, np.uint8)
@@ -105,9 +84,6 @@ def _encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tupl
 
 
 def even_size(picture: Image) -> Image:
-    """Returns the picture (H, W, 3) with its last row or column repeated where H or W is odd: H.264 needs even sizes.
-
-    A picture of even size is returned itself.
-    """
+    """Returns the picture (H, W, 3) with its last row or column repeated where H or W is odd."""
     odd = [(0, picture.shape[axis] % 2) for axis in (0, 1)]
     return np.pad(picture, (*odd, (0, 0)), mode="edge") if any(more for _, more in odd) else picture

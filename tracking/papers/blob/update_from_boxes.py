@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Detections, Frame, Ints
-from tracking import image_scale
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.track_management import TrackedPeople
+from tracking.running import image_scale
 
 INSIDE = 0.8  # share of a box that must lie in a larger predicted box to be a piece of that track's person
 

@@ -23,7 +23,6 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Ints
-from tracking import image_scale
 from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground
 from tracking.detect.person_size import PersonSize
@@ -32,6 +31,7 @@ from tracking.papers.blob import blob_pieces, box_geometry, new_people
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
+from tracking.running import image_scale
 
 EVIDENCE = 10.0  # nats, log-likelihood of a template with full support; d^2 / 2 of its place is subtracted
 TRACK_SUPPORT = 0.3  # least foreground share in the part of a confirmed track's template that no other covers

@@ -12,8 +12,8 @@ from sim.types import Array, Bools, Camera, Context, Image
 from tracking.detect.foreground import Foreground, convex_areas
 from tracking.detect.person_size import PersonSize
 from tracking.detect.typical_person import DEPTH, SHOULDERS
-from tracking.image_scale import required
 from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.running.image_scale import required
 
 WIDTH_PER_HEIGHT = 0.3
 """Width over height of a person in the image if there is no camera."""

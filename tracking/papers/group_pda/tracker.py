@@ -32,7 +32,6 @@ import numpy as np
 from sim.geometry.footprints import FOOTPRINT
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent
-from tracking.image_scale import required
 from tracking.papers.group_pda.association import (
     PointClaims,
     associate,
@@ -52,6 +51,7 @@ from tracking.papers.group_pda.missed_members import remember, with_missed_membe
 from tracking.papers.group_pda.report import ReportFrame, report_tracks
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.papers.group_pda.splitting import split
+from tracking.running.image_scale import required
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 

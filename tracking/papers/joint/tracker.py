@@ -32,7 +32,6 @@ from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping import reported_groups
 from tracking.grouping.belief import default_belief
 from tracking.grouping.pair_belief import PairBelief
-from tracking.image_scale import required
 from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
 from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SPEED_PRIOR, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
@@ -42,6 +41,7 @@ from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
 from tracking.papers.joint.reported_events import OWN_EVENTS, ReportedEvents
+from tracking.running.image_scale import required
 
 
 class Joint:

@@ -25,7 +25,6 @@ from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tra
 from tracking.detect.foreground_blobs import ForegroundBlobs
 from tracking.detect.point_detections import boxes_at, followed_sizes, ordered_points
 from tracking.filters.person_streams import Keys, PersonStreams, birth_keys
-from tracking.image_scale import required
 from tracking.papers.relational import sensor, transition_kernels
 from tracking.papers.relational.config import (
     BIRTH_DOUBT,
@@ -37,6 +36,7 @@ from tracking.papers.relational.config import (
 )
 from tracking.papers.relational.occluders import covered_by_people, hidden_share
 from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
+from tracking.running.image_scale import required
 
 MOTION, BIRTHS, RESAMPLING, SPREAD, RELATIONS, JOINING, COUPLING = range(7)
 """What random numbers are drawn for. Relations have streams of their own, so that they change no other draw."""

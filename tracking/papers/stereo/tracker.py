@@ -28,7 +28,6 @@ from sim.geometry.footprints import FOOTPRINT
 from sim.types import Context, Detections, Frame, Plane, Tracks
 from tracking.detect.features import SpacePoints
 from tracking.grouping.whole_groups import GroupIds
-from tracking.image_scale import required
 from tracking.papers.stereo.association import associated
 from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost, sphere_groups
 from tracking.papers.stereo.config import StereoConfig
@@ -39,6 +38,7 @@ from tracking.papers.stereo.point_links import PointLinks
 from tracking.papers.stereo.report import ShownFrame, space_tracks
 from tracking.papers.stereo.space_group import SpaceGroup, measure, motion_model, predict
 from tracking.papers.stereo.splitting import split
+from tracking.running.image_scale import required
 
 LEAST_GROUP = 5
 """From pixels: least number of linked features that form a group."""

@@ -10,7 +10,7 @@ from scenarios.errors import InputError
 from sim.io.formats.calibration import read_calibration
 from sim.io.source import open_source
 from tests.sim.scene.test_stereo import rig
-from tracking.run import track
+from tracking.running.run import track
 
 SIZE = (48, 64)
 

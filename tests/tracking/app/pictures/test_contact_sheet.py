@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from scenarios.errors import InputError
 from sim.types import GroupEvent, Sequence, Truth
-from tracking.app.pictures.contact_sheet import write_sheet
-from tracking.app.pictures.frame_choice import choose_frames
+from tracking.app.pictures.contact_sheet import choose_frames, write_sheet
 from tracking.drawing.canvas import FLOOR, Canvas, colour
 from tracking.drawing.plan_view import draw_ids
 

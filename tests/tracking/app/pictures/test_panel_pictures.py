@@ -12,8 +12,15 @@ import pytest
 from scenarios.errors import InputError
 from sim.types import PixelTruth, Sequence, Truth
 from tests.coded_pictures import SIZE, number, sequence
-from tracking.app.pictures.contact_sheet import HEAD, TITLE, WIDTH, empty_truth, sheet_picture, write_sheet
-from tracking.app.pictures.frame_choice import choose_frames
+from tracking.app.pictures.contact_sheet import (
+    HEAD,
+    TITLE,
+    WIDTH,
+    choose_frames,
+    empty_truth,
+    sheet_picture,
+    write_sheet,
+)
 from tracking.app.pictures.panel_pictures import OBJECTS, PanelPictures, coloured_disparity, coloured_ids
 from tracking.drawing.canvas import FLOOR, GRID, colour
 

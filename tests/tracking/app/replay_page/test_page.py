@@ -11,11 +11,10 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.types import Groups, Sequence, Tracks, Truth
-from tracking.app.replay_page import column_encoding
-from tracking.app.replay_page.page import write_page
-from tracking.app.replay_page.page_data import page_data
+from tracking.app.replay_page import page_rows
+from tracking.app.replay_page.page import page_data, write_page
 
-NIL = column_encoding.NIL
+NIL = page_rows.NIL
 
 
 def data_of(page: str) -> dict:
@@ -81,8 +80,8 @@ def test_tracks_come_back(sequence: Sequence, tracks: list[Tracks]) -> None:
 
 def test_whoever_leaves_and_returns_has_two_stints() -> None:
     frame, ids = np.array([1, 2, 4, 5, 2, 3]), np.array([7, 7, 7, 7, 8, 8])
-    assert column_encoding.stints(ids, frame) == [[7, 1, 2], [7, 4, 2], [8, 2, 2]]
-    assert column_encoding.stints(ids[:0], frame[:0]) == []
+    assert page_rows.stints(ids, frame) == [[7, 1, 2], [7, 4, 2], [8, 2, 2]]
+    assert page_rows.stints(ids[:0], frame[:0]) == []
 
 
 def test_detections_come_back(sequence: Sequence) -> None:

@@ -13,8 +13,8 @@ from tracking.papers.joint.individuals import process_noise
 from tracking.papers.joint.partition_kernels import canonical, pair_sums
 from tracking.papers.joint.people import People
 from tracking.papers.joint.tracker import Joint
-from tracking.prepare import prepare
-from tracking.run import track
+from tracking.running.prepare import prepare
+from tracking.running.run import track
 from tracking.stats import paired
 
 FPS = 10.0

@@ -22,7 +22,7 @@ from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.relations import Relational
 from tracking.papers.relational.tracker import Particle
-from tracking.prepare import prepare
+from tracking.running.prepare import prepare
 
 ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
 """The paper's rule: partners count fully."""

@@ -1,0 +1,150 @@
+"""The replay page of a tracker that follows groups as wholes: hulls, ellipses, sizes and speeds come back; lineage."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.geometry.footprints import footprint_hull, footprint_hulls
+from sim.geometry.polygons import area, convex_hull
+from sim.types import Groups, Sequence, Tracks
+from tests.groups_as_wholes import wholes
+from tracking.app.replay_page import page_rows
+from tracking.app.replay_page.page import page_data, write_page
+from tracking.app.replay_page.page_rows import NIL
+
+
+def column(values: list[int]) -> np.ndarray:
+    whole = np.cumsum(values).astype(float)
+    whole[whole == NIL] = np.nan
+    return whole
+
+
+def rows_of(side: dict) -> dict[str, np.ndarray]:
+    """What decode.js does with the columns of groups."""
+    table, scale = np.array(side["stints"]).reshape(-1, 3), side["scale"]
+    own = side["wholes"]
+    return {
+        "id": np.repeat(table[:, 0], table[:, 2]),
+        "frame": np.concatenate([np.arange(a, a + n) for _, a, n in table]),
+        "size": column(own["size"]) / 10,
+        "speed": column(own["speed"]) / (1 if side["plane"] == "image" else 10),
+        "axes": np.stack([column(c) for c in own["ellipse"]], axis=1) / [scale, scale, 180 / np.pi],
+        "hull": [np.cumsum(np.reshape(steps, (-1, 2)), axis=0) / scale for steps in own["hull"]],
+    }
+
+
+@pytest.mark.parametrize("plane", ["ground", "image"])
+def test_groups_come_back(sequence: Sequence, plane: str) -> None:
+    answers = wholes(sequence, plane)
+    side = json.loads(json.dumps(page_data(sequence, answers)))["tracks"]
+    rows, unit = rows_of(side), 1 / side["scale"]
+    assert side["plane"] == plane
+    for t in (answers[0], answers[70], answers[-1]):
+        now = np.flatnonzero(rows["frame"] == t.index)
+        order = np.argsort(t.id)
+        groups = t.groups
+        np.testing.assert_array_equal(rows["id"][now], t.id[order])
+        np.testing.assert_allclose(rows["size"][now], groups.size[order], atol=0.051)
+        np.testing.assert_allclose(
+            rows["speed"][now], np.hypot(*t.vel[order].T), atol=0.51 if plane == "image" else 0.051
+        )
+        for k, row in zip(order, now, strict=True):
+            long, wide, turn = rows["axes"][row]
+            spin = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+            values = np.linalg.eigvalsh(groups.extent[k])[::-1]
+            np.testing.assert_allclose([long, wide], np.sqrt(values), atol=0.51 * unit)
+            made = spin @ np.diag([long**2, wide**2]) @ spin.T
+            np.testing.assert_allclose(made, groups.extent[k], atol=3 * unit * np.sqrt(values[0]))
+            assert area(rows["hull"][row]) == pytest.approx(area(groups.hull[k]), rel=0.05)
+
+
+def test_bars_and_links_of_groups(sequence: Sequence) -> None:
+    """Their sizes are those estimated; what merges and splits joins bars of both sides."""
+    data = page_data(sequence, wholes(sequence, "ground"))
+    assert {bar[0]: (*bar[1:3], bar[4]) for bar in data["tracks"]["bars"]} == {
+        1: (1, 160, 5), 2: (1, 53, 2), 3: (114, 160, 2),
+    }  # fmt: skip
+    assert data["tracks"]["links"] == [[54, 2, 1], [114, 1, 3]]
+    assert data["truth"]["links"] == [[50, 2, 1], [110, 1, 3]]
+
+
+def test_what_a_tracker_of_groups_leaves_out(sequence: Sequence) -> None:
+    """No groups, no hulls, or nan: the rows are there, what is unknown is NIL; one without a row is of groups too."""
+    answers = wholes(sequence, "ground")
+    bare = [
+        answers[0].replace(groups=None),
+        answers[1].replace(groups=answers[1].groups.replace(hull=())),
+        answers[2].replace(
+            groups=answers[2].groups.replace(size=np.full(2, np.nan), extent=np.full((2, 2, 2), np.nan))
+        ),
+    ]
+    rows = rows_of(page_data(sequence, bare)["tracks"])
+    np.testing.assert_array_equal(np.isnan(rows["size"]), rows["frame"] != 2)
+    np.testing.assert_array_equal(np.isnan(rows["axes"][:, 0]), rows["frame"] != 2)
+    assert [len(h) > 0 for h in rows["hull"]] == (rows["frame"] == 3).tolist()
+    two, none = np.zeros((0, 2)), np.zeros(0, np.int64)
+    empty = [Tracks(1, 0.0, "image", "group", none, none, two, two, np.zeros((0, 4, 4)), groups=Groups.none())]
+    side = page_data(sequence, empty)["tracks"]
+    assert (side["plane"], side["wholes"]["size"], side["bars"]) == ("image", [], [])
+
+
+def test_the_page_shows_all_of_their_hulls(sequence: Sequence) -> None:
+    """The sizes of plan and image follow from the tracks alone."""
+    alone = Sequence("alone", 10.0, 160, lambda: iter(()))
+    corners = np.concatenate([h for t in wholes(sequence, "ground") for h in t.groups.hull])
+    x0, y0, x1, y1 = page_data(alone, wholes(sequence, "ground"))["bounds"]
+    assert (corners >= [x0, y0]).all()
+    assert (corners <= [x1, y1]).all()
+    data = page_data(alone, wholes(sequence, "image"))
+    corners = np.concatenate([h for t in wholes(sequence, "image") for h in t.groups.hull])
+    assert data["bounds"] is None
+    np.testing.assert_allclose(data["image"], np.ceil(corners.max(axis=0)))
+
+
+@given(st.lists(st.tuples(st.floats(0, 8), st.floats(0, 8)), min_size=1, max_size=9))
+def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) -> None:
+    """Never outside, no more than two steps of tolerance inside, in their order."""
+    hull = footprint_hull(np.array(places))
+    less = page_rows.simplified(hull, 0.02)
+    assert len(less) <= page_rows.MAX_CORNERS
+    assert {tuple(p) for p in less} <= {tuple(p) for p in hull}
+    np.testing.assert_allclose(area(less), area(convex_hull(less)), rtol=1e-9)
+    edge = np.roll(less, -1, axis=0) - less
+    normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.hypot(*edge.T)[:, None]
+    beyond = ((hull[:, None] - less[None]) * normal[None]).sum(axis=2).max(axis=1)
+    assert beyond.max() <= 0.0401
+
+
+def test_a_hull_of_few_corners_stays() -> None:
+    for n in range(4):
+        corners = np.array([[0, 0], [1e-4, 0], [0, 1e-4]])[:n]
+        np.testing.assert_array_equal(page_rows.simplified(corners, 1.0), corners)
+
+
+def test_a_long_recording_of_groups_stays_small(tmp_path) -> None:
+    """1000 frames with ten groups, in bytes for each row."""
+    rng, names = np.random.default_rng(0), np.arange(1, 11)
+    place = rng.uniform(0, 20, (10, 1, 2)) + rng.normal(0, 0.6, (10, 4, 2))
+    cov = np.tile(np.eye(4), (10, 1, 1))
+    answers = []
+    for k in range(1, 1001):
+        place = place + rng.normal(0, 0.03, place.shape)
+        off = place - place.mean(axis=1, keepdims=True)
+        extent = np.einsum("gmi,gmj->gij", off, off) / 4
+        hull = tuple(footprint_hulls(place.reshape(-1, 2), np.full(10, 4)))
+        groups = Groups(names, (), place.mean(axis=1), rng.normal(size=(10, 2)), extent, rng.normal(4, 0.2, 10), hull)
+        answers.append(Tracks(k, k / 10, "ground", "group", names, names, groups.pos, groups.vel, cov, groups=groups))
+    alone = Sequence("alone", 10.0, 1000, lambda: iter(()))
+    assert write_page(alone, answers, tmp_path / "page.html").stat().st_size < 1.1e6
+
+
+def test_events_of_groups_are_told(sequence: Sequence) -> None:
+    events = page_data(sequence, wholes(sequence, "ground"))["tracks"]["events"]
+    assert [(e[0], list(e[4]), list(e[5]), e[6]) for e in events] == [
+        ("merge", [1, 2], [1], ()), ("split", [1], [1, 3], ()),
+    ]  # fmt: skip

@@ -1,0 +1,387 @@
+"""`track`: modes, what a tracker may know, strangers, and that truth is not looked at."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError, WorkError
+from scenarios.loading.resolve import load
+from sim.io.store.track_files import write_tracks
+from sim.sequence import simulate
+from sim.types import Context, Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
+from tracking.grouping.link_rule import LinkRule
+from tracking.papers.blob.config import BlobConfig
+from tracking.papers.blob.tracker import Blob
+from tracking.running.prepare import prepare
+from tracking.running.run import TrackingRun, track
+
+FPS, LENGTH = 10.0, 30
+
+
+def poisoned() -> Truth:
+    raise AssertionError("a tracker looked at the truth")
+
+
+def boxes_at(k):
+    return np.array([[100 + 4.0 * k, 200, 28, 68], [600 - 4.0 * k, 300, 28, 68]])
+
+
+def frames():
+    for k in range(LENGTH):
+        box = boxes_at(k)
+        box.flags.writeable = False
+        found = Detections(k + 1, k / FPS, "image", box[:, :2] + box[:, 2:] / 2, None, box, np.ones(2))
+        yield Frame(k + 1, k / FPS, detections=found)
+
+
+def truth():
+    frame, id = np.repeat(np.arange(1, LENGTH + 1), 2), np.tile([4, 9], LENGTH)
+    box = np.concatenate([boxes_at(k) for k in range(LENGTH)])
+    alone, ones = np.full(2 * LENGTH, -1), np.ones(2 * LENGTH)
+    return Truth("made", FPS, LENGTH, 40.0, frame, id, alone, None, None, box, ones)
+
+
+def source(**changes):
+    given = {"has_detections": True, "load_truth": poisoned, "image_size": (1000, 600), **changes}
+    return Sequence("made", FPS, LENGTH, frames, **given)
+
+
+class Stranger:
+    """Reports every detection under its row number."""
+
+    needs = ("boxes", "points")
+
+    def reset(self, context: Context, seed: int) -> None:
+        self.context = context
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        n = len(detections.pos)
+        vel, cov, alone = np.zeros((n, 2)), np.tile(np.eye(4), (n, 1, 1)), np.full(n, -1)
+        groups = Groups.none()
+        plane, id = detections.plane, np.arange(n)
+        return Tracks(frame.index, frame.t, plane, "person", id, alone, detections.pos, vel, cov, groups=groups)
+
+
+class Wrong(Stranger):
+    """Forgets the velocities in frame 3."""
+
+    def step(self, frame, detections):
+        made = super().step(frame, detections)
+        return made if frame.index < 3 else made.replace(vel=np.zeros((1, 2)))
+
+
+def test_file_mode_never_looks_at_the_truth():
+    run = track("blob", source())
+    assert isinstance(run, TrackingRun)
+    assert len(run) == LENGTH
+    assert [t.index for t in run] == list(range(1, LENGTH + 1))
+    assert run.info["detections"] == "file"
+    assert run.info["px_per_m"] == pytest.approx(68 / 1.7)
+    assert run.info["boxes"] == "measured"
+    assert run.info["plane"] == "image"
+    assert run.info["config"] == BlobConfig().as_dict()
+    assert len({int(i) for t in run for i in t.id}) == 2
+
+
+def test_truth_mode_takes_the_labels():
+    run = track("blob", source(load_truth=truth), detections="truth")
+    assert run.info["detections"] == "truth"
+    assert len({int(i) for t in run for i in t.id}) == 2
+    first = run[-1].pos[run[-1].pos[:, 0].argmin()]
+    assert first == pytest.approx(boxes_at(LENGTH - 1)[0, :2] + [14, 34], abs=1.0)
+
+
+def test_sensor_overrides_degrade_the_labels():
+    made = [track("blob", source(load_truth=truth), detections="truth", sensor={"detect_prob": p}) for p in (1.0, 0.0)]
+    assert [sum(len(t.id) for t in run) > 0 for run in made] == [True, False]
+    assert made[1].info["sensor"] == {"detect_prob": 0.0}
+    with pytest.raises(InputError, match=r"sensor\.detect_prob"):
+        track("blob", source(load_truth=truth), detections="truth", sensor={"detect_prob": 2.0})
+
+
+def test_hiding_a_group_by_its_name(tmp_path):
+    """Simulated and stored alike: the script's own groups, and those that its orders made."""
+    import sim
+    from scenarios import load
+    from scenarios.loading.toml_files import dump
+    from sim.io.store.sequence_folder import open_sequence, write_sequence
+
+    scenario = load("merge")
+    live = sim.simulate(scenario, seed=3, streams=())
+    write_sequence(tmp_path / "m", live, scenario=dump(scenario), seed=3)
+    stored, people = open_sequence(tmp_path / "m"), live.load_people()
+    assert stored.load_people() == people
+    assert set(people["ab"]) == set(people["a"]) | set(people["b"])
+    for sequence in (live, stored):
+        feed = prepare(
+            "blob", sequence, detections="truth", sensor={"hide": [{"start": 1.0, "end": 2.0, "group": "a"}]}
+        ).frames()
+        for frame in feed:
+            there = set(live.truth.at(frame.index).id) - (set(people["a"]) if 1.0 <= frame.t < 2.0 else set())
+            assert len(frame.detections.pos) == len(there)
+    with pytest.raises(InputError, match=r"sensor\.hide\.0\.group: got 'x'; expected a group of the script \(a, "):
+        prepare("blob", live, detections="truth", sensor={"hide": [{"start": 1, "end": 2, "group": "x"}]})
+    with pytest.raises(InputError, match="none is known here"):
+        prepare(
+            "blob",
+            source(load_truth=truth),
+            detections="truth",
+            sensor={"hide": [{"start": 1, "end": 2, "group": "a"}]},
+        )
+
+
+def test_default_is_truth_where_there_is_nothing_else():
+    assert prepare("blob", source(has_detections=False, load_truth=truth)).mode == "truth"
+
+
+def test_image_mode_hides_the_files_detections():
+    class Eyes(Stranger):
+        needs = ("pixels", "boxes")
+
+        def step(self, frame, detections):
+            assert detections is None
+            none = Detections(frame.index, frame.t, "image", np.zeros((0, 2)))
+            return super().step(frame, none)
+
+    run = track(Eyes, source(has_images=True))
+    assert run.info["detections"] == "image"
+
+
+@pytest.mark.parametrize("wrong", ["data", load("cross")])
+def test_what_is_no_sequence_is_told_how_to_open_one(wrong):
+    with pytest.raises(InputError, match="expected a Sequence; open it"):
+        track("blob", wrong)
+
+
+def test_params_by_config_values_and_file(tmp_path):
+    path = tmp_path / "p.toml"
+    path.write_text("[params]\ngate = 0.95\n")
+    runs = [track("blob", source(), params=p) for p in (BlobConfig(gate=0.95), {"gate": 0.95}, path, str(path))]
+    assert all(r.info["config"]["gate"] == 0.95 for r in runs)
+    with pytest.raises(InputError, match="did you mean gate"):
+        track("blob", source(), params={"gat": 0.9})
+    with pytest.raises(InputError, match="a tracker with parameters"):
+        track(Stranger, source(), params={"gate": 0.9})
+
+
+def test_strangers_by_class_and_instance():
+    for stranger in (Stranger, Stranger()):
+        run = track(stranger, source())
+        assert run.info["tracker"] == "Stranger"
+        assert run[0].score.tolist() == [1.0, 1.0]
+    assert track(Blob(BlobConfig(gate=0.9)), source()).info["config"]["gate"] == 0.9
+
+
+def test_a_strangers_wrong_answer_is_named():
+    with pytest.raises(WorkError, match="Wrong: frame 3: got vel of shape"):
+        track(Wrong, source())
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        ("__init__", r"Raises: before the first frame: got ValueError: boo; .*__init__\(\)"),
+        ("reset", r"Raises: made: got ValueError: boo; .*reset\(\)"),
+        ("step", r"Raises: made, frame 1: got ValueError: boo; .*step\(\)"),
+    ],
+)
+def test_a_stranger_that_raises_is_named_in_one_line(method, words):
+    def boo(self, *given):
+        raise ValueError("boo\nand more")
+
+    with pytest.raises(WorkError, match=words) as caught:
+        track(type("Raises", (Stranger,), {method: boo}), source())
+    assert "\n" not in str(caught.value)
+
+
+def test_a_class_that_is_no_tracker_is_refused():
+    with pytest.raises(InputError, match="no needs, reset, step"):
+        track(dict, source())
+
+
+def test_combinations_that_cannot_work():
+    with pytest.raises(InputError, match="needs pixels or boxes, and made with detections, truth"):
+        track("blob", source(), detections="image")
+    with pytest.raises(InputError, match="sensor"):
+        track("blob", source(), sensor={"detect_prob": 0.5})
+
+
+def test_nan_is_named():
+    def bad():
+        for frame in frames():
+            box = frame.detections.box.copy()
+            if frame.index == 5:
+                box[1, 0] = np.nan
+            yield frame.replace(detections=frame.detections.replace(box=box))
+
+    with pytest.raises(InputError, match="frame 5: detection 2"):
+        track("blob", Sequence("bad", FPS, LENGTH, bad, has_detections=True))
+
+
+def test_empty_sequences():
+    assert len(track("blob", Sequence("none", FPS, 0, lambda: iter(()), has_detections=True))) == 0
+    bare = Sequence("bare", FPS, 3, lambda: (Frame(k, k / FPS) for k in (1, 2, 3)), has_detections=True)
+    assert [len(t.id) for t in track("blob", bare)] == [0, 0, 0]
+
+
+def test_slices_and_repetition():
+    run, again = track("blob", source()), track("blob", source())
+    assert len(run[3:7]) == 4
+    assert all(a.pos.tobytes() == b.pos.tobytes() for a, b in zip(run, again, strict=True))
+
+
+class Placed(Stranger):
+    """Knows places on the ground, or in the image, and no boxes."""
+
+    plane = "image"
+
+    def step(self, frame, detections):
+        return super().step(frame, detections).replace(plane=self.plane, box=None)
+
+
+class Grounded(Placed):
+    plane = "ground"
+
+
+class OfGroups(Grounded):
+    """Its rows are groups, which are no upright people."""
+
+    def step(self, frame, detections):
+        made = super().step(frame, detections)
+        return made.replace(unit="group", group=made.id.copy(), groups=None, events=())
+
+
+@pytest.mark.parametrize(
+    ("tracker", "seen", "expected"),
+    [
+        (Placed, True, "none"), (Grounded, True, "projected"), (Grounded, False, "none"), (OfGroups, True, "none"),
+        ("blob", True, "measured"),
+    ],
+)  # fmt: skip
+def test_the_run_and_its_files_agree_on_where_boxes_come_from(tmp_path, tracker, seen, expected):
+    camera = simulate(load("merge"), seed=3).camera if seen else None
+    run = track(tracker, source(camera=camera))
+    write_tracks(tmp_path, run, fps=FPS, camera=camera, info=run.info)
+    assert run.info["boxes"] == json.loads((tmp_path / "run.json").read_text())["boxes"] == expected
+
+
+def test_one_plane_in_a_run_and_again_in_the_next():
+    class Turncoat(Stranger):
+        def step(self, frame, detections):
+            made = super().step(frame, detections)
+            return made.replace(plane="ground") if frame.index == self.turn else made
+
+    tracker = Turncoat()
+    tracker.turn = 4
+    with pytest.raises(WorkError, match="Turncoat: frame 4: got plane 'ground'"):
+        track(tracker, source())
+    ready = prepare(Turncoat(), source())
+    for turn in (1, 0):  # after a reset it may be another one
+        ready.reset(0)
+        ready.tracker.turn = turn
+        ready.step(next(ready.frames()))
+
+
+def test_a_rule_of_groups_that_has_no_effect_is_said_to_have_none(recwarn):
+    made = simulate(load("merge", ["duration=4"]), 0, streams=())
+    track("blob", made, detections="file", grouping=LinkRule(near=1.0))
+    assert not [w for w in recwarn if "--grouping" in str(w.message)]
+    with pytest.warns(UserWarning, match="group-pda names groups itself: --grouping has no effect"):
+        track("group-pda", made, detections="file", grouping=LinkRule(near=1.0))
+
+
+class Naming(Stranger):
+    """Two people who stand side by side, whose tracker names them a group and says that they merged from frame 60 on.
+
+    first: the frame from which on groups are named, empty ones where there is none.
+    """
+
+    needs = ("points",)
+    first = 60
+    own_events = ()
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        id, late = np.array([1, 2]), frame.index >= 60
+        group, cov = np.full(2, 7 if late else -1), np.zeros((2, 4, 4))
+        groups = Groups.none() if self.first <= frame.index < 60 else None
+        merge = GroupEvent("merge", frame.index, None, None, (-1, -1), (7,), (1, 2), (0.0, 0.0))
+        events = (merge,) if frame.index == 60 else ()
+        pos = np.array([[1.0 + 0.1 * frame.index, 1.0], [1.0 + 0.1 * frame.index, 1.7]])
+        vel = np.full((2, 2), np.nan)
+        return Tracks(
+            frame.index, frame.t, "ground", "person", id, group, pos, vel, cov, None, np.ones(2), groups, events,
+            own_events=self.own_events,
+        )  # fmt: skip
+
+
+class NamingAlways(Naming):
+    first = 1
+
+
+class NamingDeclared(NamingAlways):
+    own_events = ("merge", "split")
+
+
+def standing(length):
+    """Frames with two detections, which `Naming` does not look at."""
+
+    def made():
+        for k in range(length):
+            yield Frame(k + 1, k / FPS, detections=Detections(k + 1, k / FPS, "ground", np.zeros((2, 2)), None))
+
+    return Sequence("standing", FPS, length, made, has_detections=True)
+
+
+@pytest.mark.filterwarnings("ignore:Naming")
+@pytest.mark.parametrize("tracker", [Naming, NamingAlways, NamingDeclared])
+@pytest.mark.parametrize("length", [30, 59, 61, 70])
+def test_what_a_tracker_reports_late_changes_no_earlier_frame(tracker, length):
+    whole, short = track(tracker, standing(90)), track(tracker, standing(length))
+    for a, b in zip(short, whole, strict=False):
+        assert a.group.tolist() == b.group.tolist()
+        assert a.groups.id.tolist() == b.groups.id.tolist()
+        assert [repr(e) for e in a.events] == [repr(e) for e in b.events]
+
+
+def test_groups_named_late_are_replaced_with_a_warning():
+    with pytest.warns(UserWarning, match=r"Naming: names groups from frame 60 on.*Groups\.none\(\)"):
+        run = track(Naming, standing(90))
+    assert run[40].group.tolist() == run[80].group.tolist() == [1, 1]
+    assert "grouping" in run.info
+
+
+def test_groups_named_from_the_first_frame_are_kept(recwarn):
+    run = track(NamingAlways, standing(90))
+    assert run[40].group.tolist() == [-1, -1]
+    assert run[80].group.tolist() == [7, 7]
+    assert not recwarn.list
+
+
+def test_events_of_declared_kinds_are_not_derived():
+    assert [(e.kind, e.emitted) for t in track(NamingDeclared, standing(90)) for e in t.events] == [("merge", 60)]
+
+
+def scored(score):
+    """The source with detections of this score."""
+
+    def weak():
+        for frame in frames():
+            yield frame.replace(detections=frame.detections.replace(score=np.full(2, score)))
+
+    return Sequence("made", FPS, LENGTH, weak, has_detections=True, image_size=(1000, 600))
+
+
+def test_detections_that_start_no_track() -> None:
+    with pytest.warns(UserWarning, match="60 of 60 detections score below score_start = 0.5") as told:
+        assert not any(len(t.id) for t in track("blob", scored(0.2)))
+    assert "--set score_start=0.2" in str(told[0].message)
+    assert any(len(t.id) for t in track("blob", scored(0.2), params={"score_start": 0.2}))
+
+
+@pytest.mark.parametrize("tracker", ["blob", "group-pda"])
+def test_detections_that_start_tracks(tracker) -> None:
+    """Also of a tracker that does not use scores."""
+    track(tracker, scored(0.2 if tracker == "group-pda" else 0.5))

@@ -1,0 +1,192 @@
+"""Finding trackers by name, file and module, and refusing classes that are none."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import pytest
+
+from scenarios.errors import InputError
+from tracking.running import tracker_registry
+
+STRANGER = """
+from dataclasses import dataclass
+
+@dataclass
+class Mark:
+    x: int = 0
+
+class Mine:
+    needs = ("points",)
+    def reset(self, context, seed): ...
+    def step(self, frame, detections): ...
+
+class NoNeeds:
+    needs = "points"
+    def reset(self, context, seed): ...
+    def step(self, frame, detections): ...
+
+class Nothing: ...
+
+class Number(Mine):
+    needs = 5
+
+class Listed(Mine):
+    needs = (["boxes"],)
+
+class Unknown(Mine):
+    needs = ("boxes", "sound")
+
+class Short(Mine):
+    def step(self, frame): ...
+
+class Blind(Mine):
+    def reset(self): ...
+
+class Demanding(Mine):
+    def __init__(self, x): ...
+
+class Unset(Mine):
+    step = None
+
+class Wild(Mine):
+    config_class = dict
+
+class Static(Mine):
+    @staticmethod
+    def step(frame, detections): ...
+
+class Loose(Mine):
+    def __init__(self, *args): ...
+    def step(self, *args, **more): ...
+
+def function(): ...
+"""
+
+
+def test_registered_and_by_module():
+    assert tracker_registry.find("blob") is tracker_registry.find("tracking.papers.blob.tracker:Blob")
+
+
+def test_a_file_is_loaded_anew_where_it_has_changed(tmp_path):
+    path = tmp_path / "mine.py"
+    text = "class Mine:\n  needs = ('points',)\n  def reset(self, c, s): pass\n  def step(self, f, d): pass\n"
+    path.write_text(text)
+    first = tracker_registry.find(f"{path}:Mine")
+    assert tracker_registry.find(f"{path}:Mine") is first
+    path.write_text(text.replace("points", "boxes"))
+    assert tracker_registry.find(f"{path}:Mine").needs == ("boxes",)
+
+
+def test_from_file_under_a_private_name(tmp_path):
+    path = tmp_path / "numpy.py"
+    path.write_text(STRANGER)
+    found = tracker_registry.find(f"{path}:Mine")
+    assert found.__module__.startswith("_flockscope_numpy_")
+    assert tracker_registry.find(f"{path}:Mine").needs == ("points",)
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("blop", "did you mean blob"),
+        ("{file}:None_", "a class of this module"),
+        ("{file}:NoNeeds", "needs = 'points'"),
+        ("{file}:Nothing", "no needs, reset, step"),
+        ("{file}:Number", "needs = 5"),
+        ("{file}:Listed", "needs = "),
+        ("{file}:Unknown", "sound"),
+        ("{file}:Short", r"step\(self, frame\); expected a class"),
+        ("{file}:Blind", r"reset\(self\); expected a class"),
+        ("{file}:Demanding", r"__init__\(x\), called with nothing"),
+        ("{file}:Unset", "step = None"),
+        ("{file}:Wild", "config_class = "),
+        ("{file}:function", "got a function; expected a class"),
+        ("{file}:", "a class of this module"),
+        ("{leaves}:Mine", "SystemExit: 3"),
+        (":Mine", "Empty module name"),
+        ("{missing}:Mine", "no such file"),
+        ("{broken}:Mine", "ZeroDivisionError"),
+        ("no.such.module:Mine", "ModuleNotFoundError"),
+    ],
+)
+def test_wrong_trackers_are_one_line(tmp_path, spec, words):
+    (tmp_path / "mine.py").write_text(STRANGER)
+    (tmp_path / "broken.py").write_text("1 / 0")
+    (tmp_path / "leaves.py").write_text("raise SystemExit(3)")
+    paths = {name: tmp_path / f"{name}.py" for name in ("mine", "missing", "broken", "leaves")}
+    paths["file"] = paths["mine"]
+    with pytest.raises(InputError, match=words) as caught:
+        tracker_registry.find(spec.format(**paths))
+    assert "\n" not in str(caught.value)
+
+
+def test_signatures_that_can_be_called_pass(tmp_path):
+    (tmp_path / "mine.py").write_text(STRANGER)
+    assert [tracker_registry.find(f"{tmp_path}/mine.py:{name}").__name__ for name in ("Static", "Loose")] == [
+        "Static",
+        "Loose",
+    ]
+
+
+NEIGHBOUR = """
+from dataclasses import dataclass
+from wE_neighbour import REACH
+class Mine:
+    needs, reach = ("points",), REACH
+    def reset(self, context, seed): ...
+    def step(self, frame, detections):
+        import wE_later
+        return wE_later.answer
+"""
+
+
+def test_a_file_imports_the_files_beside_it(tmp_path, monkeypatch):
+    """As a script does, at once and later."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    (tmp_path / "wE_neighbour.py").write_text("REACH = 3")
+    (tmp_path / "wE_later.py").write_text("answer = 4")
+    (tmp_path / "mine.py").write_text(NEIGHBOUR)
+    found = tracker_registry.find(f"{tmp_path}/mine.py:Mine")
+    assert (found.reach, found().step(None, None)) == (3, 4)
+    assert sys.path[-1] == str(tmp_path)
+    tracker_registry.find(f"{tmp_path}/mine.py:Mine")
+    assert sys.path.count(str(tmp_path)) == 1
+
+
+def test_a_missing_neighbour_is_named(tmp_path):
+    (tmp_path / "mine.py").write_text("import wE_missing")
+    with pytest.raises(InputError, match=r"No module named 'wE_missing'; .*put its file beside the tracker's"):
+        tracker_registry.find(f"{tmp_path}/mine.py:Mine")
+
+
+def test_workers_in_another_folder_find_the_file(tmp_path, monkeypatch):
+    """`tune FILE.py:Class --cluster` with a relative path was looked for in the folder of each worker."""
+    from tracking.tuning.tuned_tracker import tuned_tracker
+
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "toy.py").write_text(TUNABLE)
+    monkeypatch.chdir(tmp_path)
+    tracker = tuned_tracker("own/toy.py:Mine")
+    assert (tracker.tracker, tracker.name) == (f"{tmp_path.resolve()}/own/toy.py:Mine", "own/toy.py:Mine")
+    monkeypatch.chdir(os.sep)
+    assert tuned_tracker(tracker.tracker).code == tracker.code
+    assert tracker_registry.located("blob") == "blob"
+    assert tracker_registry.located("package.module:Class") == "package.module:Class"
+
+
+TUNABLE = """
+from dataclasses import dataclass
+from tracking.config import Config, param
+
+@dataclass(frozen=True)
+class MineConfig(Config):
+    reach: float = param(1.0, (0.1, 5.0), "m", "reach", "log")
+
+class Mine:
+    needs, config_class = ("points",), MineConfig
+    def __init__(self, config): ...
+    def reset(self, context, seed): ...
+    def step(self, frame, detections): ...
+"""

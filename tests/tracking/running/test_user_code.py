@@ -1,0 +1,272 @@
+"""A tracker's own code cannot end a command as if all were well: sys.exit, KeyboardInterrupt, GeneratorExit."""
+
+from __future__ import annotations
+
+import pickle
+import signal
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from scenarios.errors import FlockscopeError, InputError, WorkError
+from sim.types import Detections, Frame, Sequence
+from sim.workers.pool import run_pickled
+from tracking.app.cli import run
+from tracking.config import Config, param
+from tracking.running.interrupts import is_interruption, recorded_interrupts
+from tracking.running.run import track
+from tracking.running.tracker_registry import find
+from tracking.running.user_code import user_code
+
+ABRUPT = [SystemExit(0), SystemExit("done"), GeneratorExit(), BaseException("what"), StopIteration(), ValueError("no")]
+
+TRACKER = """
+import signal, sys
+import numpy as np
+from dataclasses import dataclass
+from typing import ClassVar
+from sim.types import Tracks
+from tracking.config import Config, param
+
+def fail(part):
+    if part == "{part}":
+        {statement}
+
+fail("import")
+
+@dataclass(frozen=True)
+class Settings(Config):
+    tracker: ClassVar[str] = "mine"
+    reach: float = param(1.0, (0.5, 2.0), "m", "no effect")
+    def check(self):
+        fail("check" if self.reach == 1.0 else "check of others")
+
+class Tracker:
+    config_class = Settings
+    needs = ("points", "boxes")
+    fail("class body")
+    def __init__(self, config):
+        self.config = config
+        fail("__init__")
+    def reset(self, context, seed):
+        fail("reset")
+    def step(self, frame, detections):
+        if frame.index == 3:
+            fail("step" if self.config.reach == 1.0 else "step of others")
+        none, ids = np.zeros((0, 2)), np.zeros(0, int)
+        return Tracks(frame.index, frame.t, detections.plane, "person", ids, ids, none, none, np.zeros((0, 4, 4)))
+"""
+STATEMENTS = ["sys.exit(0)", "raise KeyboardInterrupt", "raise GeneratorExit"]
+
+
+def command(tmp_path, part, statement):
+    tmp_path.joinpath("mine.py").write_text(TRACKER.format(part=part, statement=statement))
+    tmp_path.joinpath("gt.txt").write_text("".join(f"{k},1,10,10,20,50,1,1,1\n" for k in range(1, 9)))
+    return [
+        "track",
+        f"{tmp_path}/mine.py:Tracker",
+        str(tmp_path / "gt.txt"),
+        "--fps",
+        "10",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+
+
+@pytest.mark.parametrize("statement", STATEMENTS)
+@pytest.mark.parametrize("part", ["import", "class body", "check", "__init__", "reset", "step"])
+def test_track_fails_with_one_line(tmp_path, capsys, part, statement):
+    code = run(command(tmp_path, part, statement))
+    printed = capsys.readouterr()
+    assert code == (2 if part in ("import", "class body") else 1)
+    assert not tmp_path.joinpath("out").exists()
+    lines = printed.err.strip().splitlines()
+    assert len(lines) == 1
+    kind = {"s": "SystemExit: 0", "K": "KeyboardInterrupt", "G": "GeneratorExit"}[statement.removeprefix("raise ")[0]]
+    assert kind in lines[0]
+    assert "mine" in lines[0]
+    assert "bug" not in lines[0]
+    if part == "step":
+        assert "gt, frame 3" in lines[0]
+
+
+def test_ctrl_c_stays_an_interruption_whatever_the_tracker_makes_of_it(tmp_path, capsys):
+    swallowed = """
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise SystemExit(0)"""
+    for statement in ("signal.raise_signal(signal.SIGINT)", swallowed):
+        assert run(command(tmp_path, "step", statement)) == 130
+        assert "interrupted" in capsys.readouterr().err
+
+
+class Abrupt:
+    needs = ("points",)
+
+    def reset(self, context, seed):
+        pass
+
+    def step(self, frame, detections):
+        raise self.error
+
+
+def nobody() -> Sequence:
+    frames = [Frame(1, 0.0, detections=Detections(1, 0.0, "ground", np.zeros((0, 2))))]
+    return Sequence("s", 10.0, 1, lambda: iter(frames), has_detections=True)
+
+
+@pytest.mark.parametrize("error", ABRUPT, ids=repr)
+def test_in_python_everything_that_is_raised_is_a_work_error(error):
+    tracker = Abrupt()
+    tracker.error = error
+    with pytest.raises(WorkError, match=f"s, frame 1: got {type(error).__name__}") as caught:
+        track(tracker, nobody())
+    assert caught.value.__cause__ is error
+
+
+def test_in_python_a_keyboard_interrupt_passes_where_it_may_be_ctrl_c():
+    tracker = Abrupt()
+    tracker.error = KeyboardInterrupt()
+    with pytest.raises(KeyboardInterrupt):
+        track(tracker, nobody())
+    with recorded_interrupts(), pytest.raises(WorkError, match="KeyboardInterrupt"):
+        track(tracker, nobody())
+
+
+def test_whose_interrupt():
+    raised = KeyboardInterrupt()
+    assert is_interruption(raised)
+    assert not is_interruption(SystemExit())
+    with recorded_interrupts():
+        assert not is_interruption(raised)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        assert is_interruption(raised)
+        assert is_interruption(SystemExit())
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        assert not is_interruption(raised)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_errors_of_ours_pass_unchanged():
+    ours = InputError(place="here", got="this", expected="that", remedy="change it")
+    with pytest.raises(InputError) as caught, user_code(lambda error: WorkError(got="x", expected="y", remedy="z")):
+        raise ours
+    assert caught.value is ours
+    with user_code(lambda error: ours):
+        pass
+
+
+def test_no_exit_from_within_ends_a_command_as_if_all_were_well(tmp_path, capsys, monkeypatch):
+    """Whatever code of a user is reached by another way, as a property that a command reads."""
+
+    def leave(options):
+        raise SystemExit(0)
+
+    monkeypatch.setattr("tracking.app.commands.track.track", leave)
+    assert run(command(tmp_path, "", "pass")) == 1
+    assert "SystemExit: 0" in capsys.readouterr().err
+
+
+@dataclass(frozen=True)
+class Exiting(Config):
+    tracker: ClassVar[str] = "exiting"
+    reach: float = param(1.0, (0.5, 2.0), "m", "no effect")
+
+    def check(self):
+        raise SystemExit(0)
+
+
+def test_the_check_of_a_config():
+    with pytest.raises(WorkError, match="exiting: its parameters: got SystemExit: 0"):
+        Exiting()
+
+
+def test_a_module_whose_names_cannot_be_read(tmp_path):
+    file = tmp_path / "odd.py"
+    file.write_text("def __getattr__(name):\n    raise SystemExit(0)\n")
+    with pytest.raises(FlockscopeError, match=r"odd\.py"):
+        find(f"{file}:Tracker")
+
+
+def search(tmp_path, statement, part, *options):
+    tmp_path.joinpath("mine.py").write_text(TRACKER.format(part=part, statement=statement))
+    line = [
+        "tune",
+        f"{tmp_path}/mine.py:Tracker",
+        "--suite",
+        "merge",
+        "--set",
+        "scenario.camera.fps=2",
+        "--trials",
+        "3",
+    ]
+    line += ["--seeds", "0:2", "--validation", "10000:10001", "--test", "20000:20001", "--check", "none", *options]
+    return run([*line, "--out", str(tmp_path / "best.toml"), "--json"])
+
+
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
+def test_in_a_search_the_trial_fails_and_the_search_goes_on(tmp_path, capsys, workers):
+    assert search(tmp_path, "sys.exit(0)", "step of others", "--workers", workers) == 0
+    assert '"impossible": 2' in capsys.readouterr().out
+
+
+def test_a_search_whose_configs_exit_ends_with_an_error(tmp_path, capsys):
+    assert search(tmp_path, "sys.exit(0)", "check of others") == 1
+    assert '"got": "SystemExit: 0"' in capsys.readouterr().out
+
+
+class Unreadable(Exception):
+    def __str__(self):
+        raise ValueError("no text")
+
+
+class UnreadableExit(Unreadable, SystemExit):
+    pass
+
+
+@pytest.mark.parametrize("error", [Unreadable(), UnreadableExit()], ids=["Exception", "SystemExit"])
+def test_an_exception_whose_text_cannot_be_read(error):
+    tracker = Abrupt()
+    tracker.error = error
+    with pytest.raises(WorkError, match=f"got {type(error).__name__}: a message that cannot be read") as caught:
+        track(tracker, nobody())
+    assert caught.value.__cause__ is error
+
+
+def fails_unreadably(item):
+    class Local(Unreadable):
+        """It cannot be pickled either."""
+
+    raise Local()
+
+
+def test_an_unreadable_exception_passes_through_a_worker():
+    result = pickle.loads(run_pickled(pickle.dumps((fails_unreadably, 1))))
+    assert str(result.error) == "Local"
+
+
+def test_an_interrupt_that_a_tracker_makes_is_its_own(tmp_path, capsys):
+    """_thread.interrupt_main() runs the handler of Ctrl-C without a signal."""
+    assert run(command(tmp_path, "step", "__import__('_thread').interrupt_main()")) == 1
+    assert "gt, frame 3: got KeyboardInterrupt" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("seed", [2**63, 10**30, -1, 1.5, True])
+def test_a_wrong_seed_is_found_before_the_tracker_is_made(seed):
+    class Never(Abrupt):
+        def __init__(self):
+            raise AssertionError("made")
+
+    with pytest.raises(InputError, match=r"--seed: got .* expected a whole number from 0 to 9223372036854775807"):
+        track(Never, nobody(), seed=seed)
+
+
+def test_the_largest_seed():
+    for name in ("particle", "joint"):
+        assert len(track(name, nobody(), seed=2**63 - 1)) == 1

@@ -1,0 +1,231 @@
+"""The rows of truth or tracks on the replay page (one per person or group and frame), and their encoding as columns.
+
+Encoded rows are sorted by id and frame. Numbers are whole: cm on the ground, half px in the image, degrees; each column
+holds differences from row to row. Groups and visibility are run lengths.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from collections.abc import Sequence as SequenceOf
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
+from tracking.app.replay_page.group_timeline import Bar, bars, links
+
+SCALE = {"ground": 100, "space": 100, "image": 2}
+"""Encoded steps per m or px of a position, by plane."""
+
+MOVING = 0.1
+"""People slower than this (m/s on the ground, px/s in the image) have no direction."""
+
+
+MAX_CORNERS = 24
+"""Corners of an encoded hull at most."""
+
+LEAST_CORNER = {"ground": 0.02, "image": 1.0}
+"""m, px: corners of a hull that stand out by less are left out."""
+
+SPEED_SCALE = {"ground": 10, "image": 1}
+"""Encoded steps per m/s and px/s."""
+
+NIL = -99_999
+"""Stands for an unknown number (nan) in a column."""
+
+Json = dict[str, Any]
+"""An object that `json` can write."""
+
+
+@dataclass(frozen=True, eq=False)
+class PageGroupRows:
+    """What a tracker of whole groups says of R groups, one per row, in m or px; nan where unknown."""
+
+    hull: tuple[Array, ...]  # R polygons (V, 2) x, y, without vertices where unknown
+    extent: Array  # (R, 2, 2) covariance of where the group's people are, m² or px²
+    size: Array  # (R,) estimated number of people
+    speed: Array  # (R,) m/s or px/s
+
+
+@dataclass(frozen=True, eq=False)
+class PageRows:
+    """Truth or one tracker's tracks as R rows in any order, one per person or group and frame; nan where unknown."""
+
+    plane: str  # "ground" (m) or "image" (px)
+    frame: Ints  # (R,) from 1
+    id: Ints
+    group: Ints  # (R,) id of the group, -1 for alone
+    pos: Array  # (R, 2) x, y
+    angle: Array  # (R,) rad, direction of view or movement, from +x towards +y, which in the image is downwards
+    box: Array  # (R, 4) left, top, width, height, px
+    visibility: Array  # (R,) 0 to 1
+    groups: PageGroupRows | None = None  # of rows that are groups
+
+
+def rows_of_truth(truth: Truth) -> PageRows:
+    """Returns the truth's rows: on the ground if positions are labelled, else centres of boxes in the image."""
+    n = len(truth.frame)
+    pos = truth.pos if truth.pos is not None else _centres(truth.box, n)
+    angle = truth.heading if truth.heading is not None else _directions(truth.vel, n)
+    box = truth.box if truth.box is not None else np.full((n, 4), np.nan)
+    plane = "ground" if truth.pos is not None else "image"
+    return PageRows(plane, truth.frame, truth.id, truth.group, pos, angle, box, truth.visibility)
+
+
+def rows_of_tracks(tracks: SequenceOf[Tracks]) -> PageRows:
+    """Returns a tracker's rows, in the order of `tracks`."""
+    count = np.array([len(t.id) for t in tracks], np.int64)
+    box = [t.box if t.box is not None else np.full((len(t.id), 4), np.nan) for t in tracks]
+    vel = np.concatenate([np.zeros((0, 2)), *(t.vel[:, :2] for t in tracks)])
+    no_id = np.zeros(0, np.int64)
+    return PageRows(
+        "image" if any(t.plane == "image" for t in tracks) else "ground",
+        np.repeat(np.array([t.index for t in tracks], np.int64), count),
+        np.concatenate([no_id, *(t.id for t in tracks)]),
+        np.concatenate([no_id, *(t.group for t in tracks)]),
+        np.concatenate([np.zeros((0, 2)), *(t.pos[:, :2] for t in tracks)]),
+        _directions(vel, len(vel)),
+        np.concatenate([np.zeros((0, 4)), *box]),
+        np.ones(len(vel)),
+        rows_of_groups(tracks) if any(t.unit == "group" for t in tracks) else None,
+    )
+
+
+def _centres(box: Array | None, n: int) -> Array:
+    return np.full((n, 2), np.nan) if box is None else box[:, :2] + box[:, 2:] / 2
+
+
+def _directions(vel: Array | None, n: int) -> Array:
+    """Returns the direction (n,) rad of each velocity (n, 2), m/s or px/s; nan where unknown or not faster than 0.1."""
+    if vel is None:
+        return np.full(n, np.nan)
+    moving = np.hypot(vel[:, 0], vel[:, 1]) > MOVING
+    return np.where(moving, np.arctan2(vel[:, 1], vel[:, 0]), np.nan)
+
+
+def encode_rows(rows: PageRows, events: Iterable[GroupEvent]) -> Json:
+    """Returns the rows as encoded columns, sorted by id and frame, with events and the group timeline."""
+    events = list(events)
+    order = np.lexsort((rows.frame, rows.id))
+    frame, ids, group = rows.frame[order], rows.id[order], rows.group[order]
+    scale = SCALE[rows.plane]
+    pos, box = rows.pos[order] * scale, rows.box[order] * 2
+    return {
+        "plane": rows.plane,
+        "scale": scale,
+        "stints": stints(ids, frame),
+        "x": deltas(pos[:, 0]),
+        "y": deltas(pos[:, 1]),
+        "a": deltas(np.degrees(rows.angle[order])),
+        "box": [] if np.isnan(box).all() else [deltas(box[:, k]) for k in range(4)],
+        "group": run_lengths(group),
+        "vis": run_lengths(np.nan_to_num(rows.visibility[order] * 10, nan=10).round().astype(np.int64)),
+        "wholes": None if rows.groups is None else encode_groups(rows.groups, order, rows.plane, scale),
+        "events": [_event(e) for e in events if e.start >= 1],
+        "bars": [list(asdict(bar).values()) for bar in _bars(rows)],
+        "links": [list(asdict(link).values()) for link in links(events)],
+    }
+
+
+def _bars(rows: PageRows) -> list[Bar]:
+    if rows.groups is None:
+        return bars(rows.frame, rows.group)
+    return bars(rows.frame, rows.group, least=0, people=np.nan_to_num(rows.groups.size))
+
+
+def _event(event: GroupEvent) -> list[Any]:
+    """Returns [kind, start, end, emitted, before, after, members, [x, y]] of an event."""
+    pos = [round(v, 2) if math.isfinite(v) else None for v in event.pos]
+    return [event.kind, event.start, event.end, event.emitted, event.before, event.after, event.members, pos]
+
+
+def rows_of_groups(tracks: SequenceOf[Tracks]) -> PageGroupRows:
+    """Returns the groups of all rows of `tracks` (one `Tracks` per frame), in their order."""
+    rows = [row for t in tracks for row in _groups_of(t)]
+    speed = [np.hypot(t.vel[:, 0], t.vel[:, 1]) for t in tracks]
+    extent, size = [row[1] for row in rows], [row[2] for row in rows]
+    return PageGroupRows(
+        tuple(row[0] for row in rows),
+        np.array(extent).reshape(-1, 2, 2),
+        np.array(size, float),
+        np.concatenate([np.zeros(0), *speed]),
+    )
+
+
+def _groups_of(tracks: Tracks) -> list[tuple[Array, Array, float]]:
+    """Returns (hull (V, 2), extent (2, 2), size) of each row of one frame."""
+    groups, no_hull = tracks.groups or Groups.none(), np.zeros((0, 2))
+    hulls = groups.hull or (no_hull,) * len(groups.id)
+    known = dict(zip(groups.id.tolist(), zip(hulls, groups.extent, groups.size, strict=True), strict=True))
+    return [known.get(name, (no_hull, np.full((2, 2), np.nan), math.nan)) for name in tracks.id.tolist()]
+
+
+def encode_groups(rows: PageGroupRows, order: Ints, plane: str, scale: int) -> dict[str, Any]:
+    """Returns the rows in the order `order` as encoded columns."""
+    axes = ellipses(rows.extent[order])
+    hulls = [simplified(rows.hull[k], LEAST_CORNER[plane]) for k in order]
+    return {
+        "size": deltas(rows.size[order] * 10),
+        "speed": deltas(rows.speed[order] * SPEED_SCALE[plane]),
+        "ellipse": [deltas(axes[:, 0] * scale), deltas(axes[:, 1] * scale), deltas(np.degrees(axes[:, 2]))],
+        "hull": [_steps(np.rint(hull * scale).astype(np.int64)) for hull in hulls],
+    }
+
+
+def ellipses(extent: Array) -> Array:
+    """Returns (R, 3) of covariances (R, 2, 2): long and short standard deviation, direction of the long axis, rad."""
+    known: Bools = np.asarray(np.isfinite(extent).all(axis=(1, 2)))
+    values, vectors = np.linalg.eigh(np.where(known[:, None, None], extent, np.eye(2)))
+    sigma = np.sqrt(np.maximum(values, 0.0))
+    angle = np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]) % np.pi
+    return np.where(known[:, None], np.stack([sigma[:, 1], sigma[:, 0], angle], axis=1), np.nan)
+
+
+def simplified(hull: Array, least: float) -> Array:
+    """Returns a convex polygon (V, 2) without the corners nearer than `least` to the line through their neighbours."""
+    for odd in (1, 0):  # every other corner at a time, so that no two neighbours go at once
+        n = len(hull)
+        if n > 3:
+            before, after = np.roll(hull, 1, axis=0), np.roll(hull, -1, axis=0)
+            along, out = after - before, hull - before
+            area = np.abs(along[:, 0] * out[:, 1] - along[:, 1] * out[:, 0])
+            flat = area < least * np.hypot(along[:, 0], along[:, 1])
+            candidates = np.arange(n) % 2 == odd
+            candidates[-1] &= n % 2 == 0  # with an odd number of corners the last is a neighbour of the first
+            hull = hull[~(flat & candidates)]
+    return hull if len(hull) <= MAX_CORNERS else hull[:: math.ceil(len(hull) / MAX_CORNERS)]
+
+
+def _steps(corners: Ints) -> list[int]:
+    listed: list[int] = np.diff(corners, axis=0, prepend=np.zeros((1, 2), np.int64)).ravel().tolist()
+    return listed
+
+
+def deltas(column: NDArray[np.float64]) -> list[int]:
+    """Returns the rounded column (N,) as its first value and the steps; nan and infinity are -99999."""
+    whole = np.where(np.isfinite(column), np.rint(column), NIL).astype(np.int64)
+    listed: list[int] = np.diff(whole, prepend=0).tolist()
+    return listed
+
+
+def run_lengths(column: Ints) -> list[int]:
+    """Returns the column (N,) as value, count, value, count, … of its runs of equal values; [] for an empty column."""
+    if not len(column):
+        return []
+    first = np.flatnonzero(np.r_[True, np.diff(column) != 0])
+    listed: list[int] = np.stack([column[first], np.diff(np.r_[first, len(column)])], axis=1).ravel().tolist()
+    return listed
+
+
+def stints(ids: Ints, frame: Ints) -> list[list[int]]:
+    """Returns [id, first frame, number of frames] of each stint: one id in consecutive frames. [] without rows."""
+    if not len(ids):
+        return []
+    first = np.flatnonzero(np.r_[True, (np.diff(ids) != 0) | (np.diff(frame) != 1)])
+    length = np.diff(np.r_[first, len(ids)])
+    table: list[list[int]] = np.stack([ids[first], frame[first], length], axis=1).tolist()
+    return table

@@ -1,0 +1,166 @@
+"""Before the first frame: a tracker instance with its config, its detections and its context, ready for one sequence.
+
+`prepare(tracker, sequence)` returns a `PreparedTracker`, whose `reset` and `step` check what goes in and what comes
+out. `tracking.running.run.track` is the loop over it. The environment drives a `PreparedTracker` itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from collections.abc import Sequence as SequenceOf
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from scenarios.errors import FlockscopeError, InputError
+from scenarios.limits import INTEGER
+from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
+from tracking.config import Config
+from tracking.running import image_scale, tracker_registry
+from tracking.running.detection_mode import check_detections, choose_mode, frames_with_detections
+from tracking.running.image_scale import ImageScale
+from tracking.running.time_limit import TimeLimited
+from tracking.running.tracks_check import ReportHistory, check_tracks
+from tracking.running.user_code import tracker_failed, user_code
+
+Params = Config | Mapping[str, Any] | str | Path | None
+"""A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults."""
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedTracker:
+    """A tracker instance and everything that it is given for one sequence. Call `reset` before the first `step`."""
+
+    name: str  # as the user gave it, or of the class
+    tracker: Tracker
+    config: Config | None  # None if the tracker has no parameters
+    context: Context
+    mode: DetectionMode
+    sequence: Sequence
+    # with detections and without pictures; None: the sequence's own frames (mode "image")
+    frames_given: tuple[Frame, ...] | None
+    scale_frames: int = 0  # as of ImageScale
+    history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
+
+    def frames(self) -> Iterator[Frame]:
+        """Returns a new iterator over the frames as the tracker gets them, in order; may be called again."""
+        if self.frames_given is not None:
+            return iter(self.frames_given)
+        return (replace(f, detections=None) for f in self.sequence)
+
+    def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
+        """Returns the image scale for deriving groups from these tracks, from the first frame on; nan if unknown."""
+        with self._naming("px_per_m", self.sequence.name):
+            learned = image_scale.learned_by(self.tracker)
+        return image_scale.from_tracks(ImageScale(self.context.px_per_m, self.scale_frames), learned, tracks)
+
+    def px_per_m(self, tracks: SequenceOf[Tracks]) -> float:
+        """Returns the image scale of `scale`, px per m; nan if unknown."""
+        return self.scale(tracks).px_per_m
+
+    def reset(self, seed: int) -> None:
+        """Resets the tracker for this sequence and forgets what it has reported."""
+        self.history.clear()
+        with self._naming("reset()", self.sequence.name):
+            self.tracker.reset(self.context, seed)
+
+    def step(self, frame: Frame) -> Tracks:
+        """Returns the tracker's checked tracks of the next frame; frames come in order, from `frames`."""
+        detections = frame.detections
+        if detections is not None:
+            check_detections(detections, self.tracker.needs)
+        with self._naming("step()", f"{self.sequence.name}, frame {frame.index}"):
+            tracks = self.tracker.step(frame, detections)
+        return check_tracks(tracks, frame.index, self.name, self.history)
+
+    @contextmanager
+    def _naming(self, part: str, place: str) -> Iterator[None]:
+        try:
+            with user_code(lambda error: tracker_failed(self.name, part, place, error)):
+                yield
+        except FlockscopeError as error:
+            raise _with_file(error, self.sequence) from error.__cause__
+
+
+def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
+    path = sequence.source.get("path", sequence.name)
+    return error if error.file else type(error)(**{**error.as_dict(), "file": path})
+
+
+def prepare(
+    tracker: str | type[Tracker] | Tracker | TimeLimited,
+    sequence: Sequence,
+    *,
+    params: Params = None,
+    detections: DetectionMode | None = None,
+    sensor: Mapping[str, Any] | None = None,
+    seed: int = 0,
+) -> PreparedTracker:
+    """Returns the tracker ready to be reset for the sequence."""
+    if not isinstance(sequence, Sequence):
+        remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
+        raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
+    if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or not 0 <= seed <= INTEGER:
+        expected, remedy = f"a whole number from 0 to {INTEGER}", "give a smaller one, such as 0"
+        raise InputError(place="--seed", got=repr(seed), expected=expected, remedy=remedy)
+    name, instance, config = _make(tracker, params)
+    mode = choose_mode(instance.needs, sequence, detections)
+    if sensor and mode != "truth":
+        remedy = "add --detections truth, or leave out the sensor settings"
+        raise InputError(
+            place="--sensor, --set sensor", got=f"--detections {mode}", expected="--detections truth", remedy=remedy
+        )
+    frames = frames_with_detections(instance.needs, mode, sequence, sensor or {}, seed)
+    scale = image_scale.of_sequence(sequence, mode, frames)
+    context = Context(
+        fps=sequence.fps,
+        px_per_m=scale.px_per_m,
+        camera=sequence.camera,
+        scene=sequence.scene,
+        image_size=sequence.image_size,
+        background=sequence.background() if mode == "image" else None,
+    )
+    return PreparedTracker(name, instance, config, context, mode, sequence, frames, scale.frames)
+
+
+def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:
+    limited = tracker if isinstance(tracker, TimeLimited) else None
+    tracker = tracker.tracker if isinstance(tracker, TimeLimited) else tracker
+    if not isinstance(tracker, str | type):
+        if params is not None:
+            got = f"an instance of {type(tracker).__name__}"
+            raise InputError(place="params", got=got, expected="a class or a name", remedy="configure the instance")
+        return type(tracker).__name__, tracker, getattr(tracker, "config", None)
+    name = tracker if isinstance(tracker, str) else tracker.__name__
+    found = tracker_registry.find(tracker) if isinstance(tracker, str) else tracker_registry.checked(tracker, name)
+    kind: type[Config] | None = getattr(found, "config_class", None)
+    if kind is None:
+        if params is not None:
+            remedy = "leave the parameters out, or give the class a config_class (docs/guides/your-own-tracker.md)"
+            raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
+        return name, _instance(name, found if limited is None else partial(limited.make, None)), None
+    config = config_of(kind, params)
+    return name, _instance(name, found if limited is None else limited.make, config), config
+
+
+def _instance(name: str, tracker_class: Any, *arguments: Any) -> Tracker:
+    with user_code(lambda error: tracker_failed(name, "__init__()", "before the first frame", error)):
+        return cast(Tracker, tracker_class(*arguments))
+
+
+def config_of(kind: type[Config], params: Params) -> Config:
+    """Returns `params` as a config of the class `kind`; the default config if `params` is None."""
+    if params is None:
+        return kind()
+    if isinstance(params, str | Path):
+        return kind.load(params)
+    if isinstance(params, Mapping):
+        return kind.from_dict(params)
+    if not isinstance(params, kind):
+        remedy = "give the config of this very tracker"
+        raise InputError(place="params", got=type(params).__name__, expected=kind.__name__, remedy=remedy)
+    return params

@@ -1,0 +1,220 @@
+"""Runs a tracker over a whole sequence: `track` returns its tracks of every frame and what run.json holds.
+
+Input: a tracker (name, class or instance) and a sequence. Output: a `TrackingRun`.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Callable, Mapping
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.types import DetectionMode, Sequence, Tracker, Tracks
+from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
+from tracking.running import image_scale
+from tracking.running.prepare import Params, PreparedTracker, prepare
+from tracking.running.run_info import Speed, known_people_info, run_info
+from tracking.running.time_limit import TimeLimited
+
+if TYPE_CHECKING:
+    from tracking.grouping.pair_probabilities import PairProbabilities
+
+OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "frames")
+"""Keys of run.json that follow from tracks and sequence, whoever made the tracks."""
+
+
+MOST = 0.5
+"""Share of weak detections from which on a warning is given."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingRun(SequenceOf[Tracks]):
+    """The tracks of one run; as a sequence, one `Tracks` per frame in order: item 0 is frame 1.
+
+    Attributes:
+        tracks: The `Tracks` of every frame.
+        info: What run.json tells of the run (tracker, config, seed, detections, speed); `write` adds labels and files.
+    """
+
+    tracks: tuple[Tracks, ...]
+    info: dict[str, Any] = field(default_factory=dict)
+
+    @overload
+    def __getitem__(self, index: int) -> Tracks: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Tracks, ...]: ...
+    def __getitem__(self, index: int | slice) -> Tracks | tuple[Tracks, ...]:
+        return self.tracks[index]
+
+    def __len__(self) -> int:
+        return len(self.tracks)
+
+    def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
+        """Store the tracks in the folder as `flockscope track` does, and return the folder."""
+        from sim.io.store.run_seal import tracked_hash
+        from sim.io.store.track_files import write_tracks
+        from sim.io.store.track_tables import pair_table
+
+        info = {**self.info, "truth_hash": tracked_hash(sequence)}
+        table = None if pairs is None else pair_table(pairs.frame, pairs.a, pairs.b, pairs.probability)
+        camera, scene = sequence.camera, sequence.scene
+        return write_tracks(folder, self, fps=sequence.fps, camera=camera, scene=scene, info=info, pairs=table)
+
+
+def track(
+    tracker: str | type[Tracker] | Tracker | TimeLimited,
+    sequence: Sequence,
+    *,
+    params: Params = None,
+    detections: DetectionMode | None = None,
+    sensor: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    grouping: Grouping | str | Path | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> TrackingRun:
+    """Tracks every frame of a sequence, and derives groups and events if the tracker names none.
+
+    A UserWarning says that `grouping` has no effect, that the tracker's velocities are too far from its motion to
+    derive groups, that most detections score too low to start a track, or that groups which the tracker began to name
+    only later were replaced by derived ones.
+
+    Args:
+        tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
+            (tracking.running.time_limit), which stops a step that hangs.
+        sequence: As `sim.simulate` or `sim.io.source.open_sequence` return it.
+        params: A config, values by name, the name of a preset, or a TOML file; None for the tracker's defaults.
+        detections: "image", "file" or "truth"; None for the first of them that can work.
+        sensor: Settings as in a scenario's [sensor] that degrade "truth"; None: perfect.
+        seed: Of the tracker's and the sensor's random numbers.
+        grouping: "belief", "rule", a TOML file of either, or the grouping itself; None: the belief.
+        progress: Called with each frame's number, from 1, when the frame is done.
+
+    Raises:
+        InputError: The arguments are wrong, tracker and sequence do not fit, a picture cannot be read, detections are
+            not finite, or tracks in the image have a scale of 0 or below.
+        WorkError: The tracker raises an exception or returns wrong tracks, or an order of a simulated script was not
+            fulfilled (mode "truth").
+    """
+    from tracking.grouping.foot_points import can_stand, completed
+    from tracking.grouping.grouped_tracks import late_groups, names_groups
+    from tracking.grouping.velocity_check import velocity_warning
+
+    chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
+    rule = chosen or default_grouping()
+    prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
+    weak = _weak_detections(prepared)
+    if weak is not None:
+        warnings.warn(weak, UserWarning, stacklevel=2)
+    prepared.reset(seed)
+    reported, spent, begun = [], 0.0, time.perf_counter()
+    for frame in prepared.frames():
+        start = time.perf_counter()
+        reported.append(prepared.step(frame))
+        spent += time.perf_counter() - start
+        if progress is not None:
+            progress(frame.index)
+    whole = time.perf_counter() - begun
+    scale, pixels = prepared.scale(reported), prepared.mode == "image"
+    camera, scene = prepared.context.camera, prepared.context.scene
+    tracks = completed(reported, sequence.fps, scale.px_per_m, rule, camera=camera, scene=scene, pixels=pixels)
+    named = names_groups(reported)
+    if named and chosen is not None:
+        warnings.warn(f"{prepared.name} names groups itself: --grouping has no effect", UserWarning, stacklevel=2)
+    elif not named:
+        late = late_groups(reported)
+        if late is not None:
+            warnings.warn(
+                f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
+                "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group",
+                UserWarning,
+                stacklevel=2,
+            )
+        fault = velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule)
+        if fault is not None and not can_stand(reported, camera, pixels):  # on the ground no velocity is reported
+            warnings.warn(fault, UserWarning, stacklevel=2)
+    speed = Speed(len(reported) / spent, len(reported) / whole) if reported else Speed()
+    info = run_info(prepared, tracks, seed, sensor or {}, scale, speed)
+    return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
+
+
+def _weak_detections(prepared: PreparedTracker) -> str | None:
+    # A detector whose scores lie below score_start makes a run without tracks, though nothing is wrong.
+    least = getattr(prepared.config, "score_start", None)
+    found = [f.detections.score for f in prepared.frames_given or () if f.detections is not None]
+    score = np.concatenate([np.zeros(0), *found])
+    if least is None or not len(score):
+        return None
+    weak = int((score < least).sum())
+    if weak <= MOST * len(score):
+        return None
+    low, quarter, half, high = np.quantile(score, (0, 0.25, 0.5, 1))
+    return (
+        f"{prepared.sequence.name}: {weak} of {len(score)} detections score below score_start = {least:g}, so that "
+        f"they start no track. Scores are {low:.3g} to {high:.3g}, with median {half:.3g}, after any map named above. "
+        f"Lower it, as with --set score_start={math.floor(100 * quarter) / 100:g}, or give other scores"
+    )
+
+
+def group(
+    sequence: Sequence, run: TrackingRun | None = None, *, grouping: Grouping | str | Path | None = None
+) -> TrackingRun:
+    """Finds the groups and events of people whose ids are known, from their motion.
+
+    Args:
+        sequence: Labelled people, if `run` is None; their group labels are not used.
+        run: Tracks of people; groups and events in them are replaced.
+        grouping: As of `track`.
+
+    Raises:
+        InputError: There are no people with ids, the tracks are of whole groups, people lie in the image and its scale
+            is unknown or not above 0, or labels or the file of the grouping cannot be read.
+        WorkError: An order of a simulated script was not fulfilled.
+    """
+    from tracking.grouping.foot_points import can_stand, completed
+    from tracking.grouping.grouped_tracks import without_groups
+    from tracking.grouping.known_people import known_people
+    from tracking.grouping.plausibility import implausible
+    from tracking.grouping.velocity_check import velocity_warning
+
+    rule = (grouping_of(grouping) if isinstance(grouping, str | Path) else grouping) or default_grouping()
+    people = known_people(sequence) if run is None else without_groups(run)
+    file = sequence.source.get("path", sequence.name)
+    if any(t.unit == "group" for t in people):
+        got, remedy = "tracks of whole groups", "track with a tracker of people (blob), or give labelled people"
+        raise InputError(file=file, got=got, expected="people with ids", remedy=remedy)
+    learned = None if run is None else run.info.get("px_per_m")
+    scale = image_scale.from_tracks(image_scale.before_frames(sequence), learned or float("nan"), people)
+    if any(t.plane == "image" and len(t.id) for t in people) and not np.isfinite(scale.px_per_m):
+        got, remedy = "people in the image, without its scale", "give --px-per-m, pixels per metre"
+        raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
+    camera, pixels = sequence.camera, run is not None and run.info.get("detections") == "image"
+    tracks = completed(people, sequence.fps, scale.px_per_m, rule, camera=camera, scene=sequence.scene, pixels=pixels)
+    stands = can_stand(people, camera, pixels)  # then no velocity is used
+    fault = None if stands else velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule)
+    odd = implausible(sequence.name, people, sequence.fps, scale.px_per_m)
+    for text in (*odd, *([] if fault is None else [fault])):
+        warnings.warn(text, UserWarning, stacklevel=2)
+    info = known_people_info(sequence, tracks, scale)
+    if run is not None:
+        info = {**run.info, **{key: info[key] for key in OF_TRACKS}}
+    return TrackingRun(tracks, {**info, "grouping": rule.as_dict()})
+
+
+def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
+    """Returns stored tracks of a sequence with groups and events filled in where they are empty."""
+    from tracking.grouping.foot_points import completed
+
+    known = image_scale.before_frames(sequence)
+    # Labels of all frames tell the scale better than boxes of the first frames.
+    truth = sequence.truth if known.frames or not np.isfinite(known.px_per_m) else None
+    px_per_m = known.px_per_m if truth is None else truth.px_per_m
+    pixels = getattr(tracks, "info", {}).get("detections") == "image"
+    return completed(tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene, pixels=pixels)

@@ -1,0 +1,150 @@
+"""Runs a tracker in a process of its own, so that a step that hangs, or ends the process, is an error and no more.
+
+Neither a signal nor a thread can stop a call in this process that hangs in compiled code. A process can be ended from
+outside. Contexts, frames and tracks pass through a pipe as pickles.
+"""
+
+from __future__ import annotations
+
+import itertools
+import signal
+from dataclasses import fields
+from typing import Any, Self
+
+from scenarios.errors import InputError
+from scenarios.limits import is_number
+from sim.arrays import Frozen
+from sim.types import Context, Detections, Frame, Tracker, Tracks
+from sim.workers.pool import RemoteTraceback, WorkerProcess
+from tracking.config import Config
+from tracking.running import tracker_registry
+from tracking.running.image_scale import learned_by
+
+GRACE = 5.0
+"""s after the limit at which a process ends itself, should its parent be gone."""
+
+LONGEST = 1_000_000
+"""s: greatest limit, 11 days. The timer of a pipe counts milliseconds in 32 bits, some 2.1 million s."""
+
+
+class TimeLimited:
+    """A tracker whose every `reset` and `step` must end within `seconds`, for `tracking.track`. A context manager.
+
+    State: the process, which runs one tracker at a time; started with the first tracker that is made, and again after
+    its end.
+
+    Args:
+        tracker: A registered name, "file.py:Class" or "module:Class".
+        seconds: Up to 1,000,000.
+
+    Raises:
+        InputError: The tracker is not given by name, or the limit is out of range.
+    """
+
+    def __init__(self, tracker: str, seconds: float) -> None:
+        if not isinstance(tracker, str):
+            expected, remedy = "a name that another process can look up", "give file.py:Class or module:Class"
+            raise InputError(place="--step-timeout", got="no name of a tracker", expected=expected, remedy=remedy)
+        if not (is_number(seconds, 0.0, LONGEST) and seconds > 0):
+            expected, remedy = f"seconds, above 0, at most {LONGEST:,}", "correct it, or leave it out"
+            raise InputError(place="--step-timeout", got=seconds, expected=expected, remedy=remedy)
+        self.tracker, self.seconds = tracker, seconds
+        self._process = WorkerProcess()
+        self._numbers = itertools.count()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The inputs that the tracker can work with, as its class states them."""
+        return tuple(tracker_registry.find(self.tracker).needs)
+
+    def close(self) -> None:
+        """Ends the process; a tracker that is made later starts another."""
+        self._process.terminate()
+        self._process.join()
+
+    def make(self, config: Config | None) -> RemoteTracker:
+        """Returns a tracker made in the process, with this config; None for a tracker without parameters."""
+        made = RemoteTracker(self, next(self._numbers), config)
+        self.call("create", made.made_from, None)
+        return made
+
+    def call(self, method: str, *arguments: Any) -> Any:
+        """Returns what the call ("create", "reset" or "step") returns in the process; "create" has no time limit."""
+        pipe = self._process.send(_call, (method, arguments, self.seconds + GRACE))
+        if method != "create" and not pipe.poll(self.seconds):
+            self.close()
+            raise TimeoutError(f"no answer within {self.seconds:g} s (--step-timeout)")
+        result = self._process.receive()
+        if result is None:
+            raise ChildProcessError(f"its process ended with {self._process.ended}")
+        if isinstance(result.error, KeyboardInterrupt):  # the process ignores Ctrl-C: it is the tracker's own
+            raise RuntimeError("KeyboardInterrupt") from RemoteTraceback(result.trace)
+        return result.result()
+
+
+class RemoteTracker:
+    """A tracker that works in the process of a TimeLimited, with the attributes of the tracker itself."""
+
+    def __init__(self, host: TimeLimited, number: int, config: Config | None) -> None:
+        self.needs, self.config = host.needs, config
+        self.px_per_m = float("nan")
+        self.made_from = (number, host.tracker, None if config is None else config.as_dict())
+        self._host = host
+
+    def reset(self, context: Context, seed: int) -> None:
+        """Resets the tracker; one whose process has ended is made again."""
+        self.px_per_m = self._host.call("reset", self.made_from, (context, seed))
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        """Returns the tracker's tracks of the frame, which holds the detections."""
+        tracks, self.px_per_m = self._host.call("step", self.made_from, frame)
+        return tracks  # type: ignore[no-any-return]
+
+
+_made: dict[int, Tracker] = {}
+"""In the process: the tracker by its number; at most one."""
+
+
+def _call(request: tuple[str, tuple[Any, ...], float]) -> Any:
+    method, (made_from, given), limit = request
+    if method == "create":
+        return _create(*made_from)
+    signal.setitimer(signal.ITIMER_REAL, limit)  # without a handler this ends the process, also in compiled code
+    try:
+        return _reset(made_from, *given) if method == "reset" else _step(made_from[0], given)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def _create(number: int, spec: str, values: dict[str, Any] | None) -> None:
+    found: Any = tracker_registry.find(spec)
+    made = found() if values is None else found(found.config_class.from_dict(values))
+    _made.clear()
+    _made[number] = made
+
+
+def _reset(made_from: tuple[int, str, dict[str, Any] | None], context: Context, seed: int) -> float:
+    if made_from[0] not in _made:
+        _create(*made_from)
+    tracker = _made[made_from[0]]
+    tracker.reset(_frozen(context), seed)
+    return learned_by(tracker)
+
+
+def _step(number: int, frame: Frame) -> tuple[Tracks, float]:
+    if number not in _made:
+        raise RuntimeError("the process of this tracker was started again since its reset")
+    frame, tracker = _frozen(frame), _made[number]
+    return tracker.step(frame, frame.detections), learned_by(tracker)
+
+
+def _frozen(value: Any) -> Any:
+    # Arrays that were pickled can be written again.
+    changes = {f.name: _frozen(part) for f in fields(value) if isinstance(part := getattr(value, f.name), Frozen)}
+    return value.replace(**changes)

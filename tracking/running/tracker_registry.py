@@ -1,0 +1,154 @@
+"""Trackers by name: the registered ones, and classes from "path/to/file.py:Class" or "package.module:Class".
+
+`find` returns the tracker class and refuses a class that is no tracker. Worker processes get the string and find the
+class themselves.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import inspect
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any, cast
+
+from scenarios.errors import InputError
+from scenarios.loading.toml_files import closest
+from sim.types import Tracker
+from tracking.config import Config
+from tracking.running.user_code import tracker_failed, user_code, what_was_raised
+
+REGISTRY = {
+    "blob": "tracking.papers.blob.tracker:Blob",
+    "group-pda": "tracking.papers.group_pda.tracker:GroupPda",
+    "relational": "tracking.papers.relational.relations:Relational",
+    "particle": "tracking.papers.relational.tracker:Particle",
+    "joint": "tracking.papers.joint.tracker:Joint",
+    "stereo": "tracking.papers.stereo.tracker:Stereo",
+}
+NEEDS = ("pixels", "stereo", "boxes", "points")
+
+
+def names() -> tuple[str, ...]:
+    """Returns the names of the registered trackers, in fixed order."""
+    return tuple(REGISTRY)
+
+
+def find(spec: str) -> type[Tracker]:
+    """Returns the tracker class that `spec` names: a registered name, "file.py:Class" or "module:Class"."""
+    target = REGISTRY.get(spec, spec)
+    where, colon, class_name = target.rpartition(":")
+    if not colon:
+        remedy = f"did you mean {closest(spec, REGISTRY)}? Your own: file.py:Class or package.module:Class"
+        raise InputError(place="tracker", got=spec, expected="one of " + ", ".join(REGISTRY), remedy=remedy)
+    module = _from_file(Path(where)) if where.endswith(".py") else _from_module(where)
+    with user_code(lambda error: _import_failed(where, error)):  # a module may have a __getattr__
+        found = getattr(module, class_name, None)
+    if found is None:
+        raise InputError(file=where, got=repr(class_name), expected="a class of this module", remedy="check the name")
+    return checked(found, spec)
+
+
+def _from_file(path: Path) -> Any:
+    # The private name hides no other module. An unchanged file is imported once, so that a config keeps fitting its
+    # tracker; a changed file is imported again.
+    if not path.is_file():
+        raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
+    resolved = path.resolve()
+    content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())
+    name = f"_flockscope_{resolved.stem}_{content.hexdigest()[:12]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    if str(resolved.parent) not in sys.path:  # last, so that files beside it hide no installed module
+        sys.path.append(str(resolved.parent))
+    spec = importlib.util.spec_from_file_location(name, resolved)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses of the file look their module up
+    try:
+        with user_code(lambda error: _import_failed(path, error), passing=()):
+            spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _from_module(name: str) -> Any:
+    with user_code(lambda error: _import_failed(name, error), passing=()):
+        return importlib.import_module(name)
+
+
+def _import_failed(where: object, error: BaseException) -> InputError:
+    got = what_was_raised(error)
+    lacks = isinstance(error, ModuleNotFoundError)
+    remedy = "install that module, or put its file beside the tracker's" if lacks else "correct it"
+    return InputError(file=where or "tracker", got=got, expected="a module that can be imported", remedy=remedy)
+
+
+def located(spec: str) -> str:
+    """Returns `spec` with an absolute path if it is "file.py:Class", for a process in another folder."""
+    where, colon, name = spec.rpartition(":")
+    return f"{Path(where).resolve()}:{name}" if colon and where.endswith(".py") else spec
+
+
+def checked(found: Any, spec: str) -> type[Tracker]:
+    """Returns `found` unchanged if it is a tracker class."""
+    with user_code(lambda error: tracker_failed(spec, "class", "before the first frame", error)):
+        fault = _class_fault(found)
+    if fault:
+        expected = f"a class with reset(context, seed), step(frame, detections) and needs, a tuple out of {NEEDS}"
+        raise InputError(file=spec, got=fault, expected=expected, remedy="see docs/guides/your-own-tracker.md")
+    return found  # type: ignore[no-any-return]
+
+
+def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
+    """Returns the class of the tracker's config, its attribute `config_class`."""
+    kind = getattr(tracker, "config_class", None)
+    if kind is None:
+        remedy = "give the class a config_class that declares them (docs/guides/your-own-tracker.md)"
+        raise InputError(place="tracker", got=spec, expected="a tracker with parameters", remedy=remedy)
+    return cast("type[Config]", kind)
+
+
+@cache
+def code_hash(tracker: type[Tracker]) -> str:
+    """Returns the first 12 hex digits of the SHA-256 of the file that defines the class; "" if there is no file."""
+    file = Path(getattr(sys.modules.get(tracker.__module__), "__file__", None) or "")
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:12] if file.is_file() else ""
+
+
+def _class_fault(found: Any) -> str | None:
+    if not isinstance(found, type):
+        return f"a {type(found).__name__}"
+    missing = [name for name in ("needs", "reset", "step") if not hasattr(found, name)]
+    if missing:
+        return "no " + ", ".join(missing)
+    needs, kind = getattr(found, "needs", ()), getattr(found, "config_class", None)
+    if not isinstance(needs, tuple | list) or not needs or not all(need in NEEDS for need in needs):
+        return f"needs = {needs!r}"
+    if kind is not None and not (isinstance(kind, type) and issubclass(kind, Config)):
+        return f"config_class = {kind!r}, which is no tracking.config.Config"
+    if not _takes(found, 0 if kind is None else 1):
+        return f"__init__{inspect.signature(found)}, called with {'nothing' if kind is None else 'a config'}"
+    for name in ("reset", "step"):
+        method = getattr(found, name)
+        if not callable(method):
+            return f"{name} = {method!r}"
+        if not _takes(method, 2 + inspect.isfunction(inspect.getattr_static(found, name))):  # a function: self too
+            return f"{name}{inspect.signature(method)}"
+    return None
+
+
+def _takes(function: Any, count: int) -> bool:
+    try:
+        inspect.signature(function).bind(*range(count))
+    except TypeError:
+        return False
+    except ValueError:
+        return True
+    return True
