@@ -18,11 +18,8 @@ UNIT_CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f i
 
 
 def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
-    """Returns 32 points (32, 2) of the ellipse at `sigmas` standard deviations round `centre` (2,), in the unit of
-    `centre`.
-
-    cov: (2, 2) covariance matrix; negative eigenvalues count as 0. Returns (0, 2) if an entry of `cov` is not finite; a
-    nan in `centre` gives nan."""
+    """Returns 32 points (32, 2) of the ellipse at `sigmas` standard deviations round `centre`, none if `cov` is not
+    finite."""
     if not np.isfinite(cov).all():
         return np.zeros((0, 2))
     values, vectors = np.linalg.eigh(cov)

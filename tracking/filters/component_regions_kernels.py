@@ -25,8 +25,7 @@ SLACK, ROUNDING = 1 + 1e-6, 1e-15
 
 @njit(cache=True)
 def pool(into: Array, other: Array) -> None:
-    """Change the moments `into` (6,) of a set of points to those of its union with another set, `other` (6,) (3.1).
-    Columns: weight N, mean x, y, and N times the covariance (with 1/N) xx, xy, yy. N of the union must be above 0."""
+    """Changes the moments `into` (6,) of a set of points to those of its union with another set (3.1)."""
     n = into[WEIGHT] + other[WEIGHT]
     share = other[WEIGHT] / n
     dx, dy = other[X] - into[X], other[Y] - into[Y]
@@ -41,10 +40,7 @@ def pool(into: Array, other: Array) -> None:
 
 @njit(cache=True)
 def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -> None:
-    """Write a component's search region, an ellipse, into `shape` (5,): mean x, y, entries xx, xy, yy of its matrix A.
-    The region is (y - mean)' A^-1 (y - mean) <= 1. sums (6,): weight N, mean x, y, N S as xx, xy, yy. A is `gate`
-    (squared radius) times the shrunk covariance (N S + n0 S0) / (N + n0), S the covariance with 1/N, S0 the `prior`
-    (3,) xx, xy, yy, n0 the `strength`. Returns nothing."""
+    """Writes a component's search region into `shape` (5,): `gate` times its covariance, shrunk to `prior` (3,)."""
     shape[MEAN_X], shape[MEAN_Y] = sums[X], sums[Y]
     scale = gate / (sums[WEIGHT] + strength)
     shape[A_XX] = scale * (sums[XX] + strength * prior[0])
@@ -56,6 +52,7 @@ def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -
 def meet(a: Array, b: Array) -> bool:
     """Returns True if two search regions overlap; a, b (5,): written by `fit`."""
     dx, dy = b[MEAN_X] - a[MEAN_X], b[MEAN_Y] - a[MEAN_Y]
+    # A cheap test of the bounding boxes first: most pairs are far apart.
     far = 2 * SLACK  # (p + q)^2 <= 2 p^2 + 2 q^2 of the half widths p, q
     if dx * dx > far * (a[A_XX] + b[A_XX]) or dy * dy > far * (a[A_YY] + b[A_YY]):
         return False
@@ -64,13 +61,7 @@ def meet(a: Array, b: Array) -> bool:
 
 @njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[Ints, int]:
-    """Returns for each of K components the index of the first component it is joined with, or its own, (K,) (G_x, 3.1),
-    and the number of pairs compared.
-
-    sums (K, 6): weight N, mean x, y, N times the covariance xx, xy, yy; not changed. Components whose search regions
-    overlap, also through others, are joined; then the joined ones are compared, until no two overlap: a joined region
-    may overlap one that none of its parts did. gate: squared Mahalanobis radius of a region. prior (3,), strength:
-    covariance xx, xy, yy to which a component's own is shrunk, and its weight."""
+    """Returns the first component that each of K is joined with (K,) (G_x, 3.1), and the number of pairs compared."""
     k, compared = len(sums), 0
     label, alive, tree = np.arange(k), np.arange(k), np.arange(k)
     pooled, shape, box = sums.copy(), np.empty((k, 5)), np.empty((2, k))
@@ -85,6 +76,7 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[In
                 wide[i] = SLACK * np.sqrt(shape[i, A_XX]) + ROUNDING * abs(shape[i, MEAN_X])
                 left[i] = shape[i, MEAN_X] - wide[i]
         many = len(alive) > FEW
+        # Few are compared in all pairs; of many only those whose boxes overlap along x.
         order = alive[np.argsort(left[alive])] if many else alive
         for n in range(len(order)):
             for later in range(n + 1, len(order)):
@@ -94,7 +86,9 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[In
                 compared += 1
                 if (
                     (fresh[p] or fresh[q])
+                    # pairs that are joined already need no test
                     and find_root(tree, p) != find_root(tree, q)
+                    # in one order of arguments, so that rounding does not depend on who is first
                     and meet(shape[max(p, q)], shape[min(p, q)])
                 ):
                     i, j = find_root(tree, p), find_root(tree, q)
@@ -110,6 +104,7 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[In
             else:
                 pool(pooled[top], pooled[i])
                 fresh[top] = True
+        # A joined region may overlap one that none of its parts did: repeat until nothing changes.
         changed = 1 < kept < len(alive)
         alive = alive[:kept]
     for i in range(k):

@@ -27,12 +27,12 @@ FAR = 2.0**40
 
 @njit(cache=True)
 def cells(points: Array, link: float) -> tuple[Ints, Ints]:
-    """Returns the cell of each point (M,), 0, 1, …, and the 20 cells around each cell (C, 20), -1 for an empty one.
-    points (M, 2), M at least 1. A cell's diagonal is `link`, in the points' unit, above 0. Cells are numbered
-    in the order of their first points; points 2^40 cells or more from the first count as at that distance."""
+    """Returns the cell of each point (M,), numbered by first points, and the 20 cells around each (C, 20), -1 empty."""
     m = len(points)
+    # slightly less than link / sqrt 2, so that rounding never puts two points farther apart into one cell
     side = link / np.sqrt(2.0) * (1 - 1e-12)
     place = np.empty((m, 2), np.int64)
+    # at most half full, so that searches are short
     table = np.full(1 << int(np.ceil(np.log2(2 * m))), -1)
     cell, first = np.empty(m, np.int64), np.empty(m, np.int64)
     count = 0
@@ -50,6 +50,7 @@ def cells(points: Array, link: float) -> tuple[Ints, Ints]:
         n = 0
         for dx in range(-2, 3):
             for dy in range(-2, 3):
+                # the corners of the 5 x 5 cells are farther away than `link`
                 if (dx != 0 or dy != 0) and abs(dx) + abs(dy) < 4:
                     around[c, n] = table[_slot(table, place, first, x + dx, y + dy)]
                     n += 1
@@ -58,12 +59,9 @@ def cells(points: Array, link: float) -> tuple[Ints, Ints]:
 
 @njit(cache=True)
 def _slot(table: Ints, place: Ints, first: Ints, x: int, y: int) -> int:
-    """Returns the slot of the hash table that holds the number of the cell in column x and row y of the grid, or the
-    free slot, -1, where it belongs.
-
-    table (T,): T a power of two, at least one slot free; place (M, 2): grid column and row of each point; first (C,): a
-    point of each cell. Slots are tried one after the other."""
+    """Returns the slot of the hash table that holds the cell in column x and row y, or the free slot for it."""
     last = len(table) - 1
+    # primes and a shift spread neighbouring cells over the table
     mixed = (x * 73_856_093) ^ (y * 19_349_663)
     slot = (mixed ^ (mixed >> 15)) & last
     while table[slot] >= 0 and (place[first[table[slot]], 0] != x or place[first[table[slot]], 1] != y):
@@ -76,12 +74,11 @@ def insert(
     k: int, points: Array, weight: float, link: float, cell: Ints, around: Ints,
     parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, work: Ints,
 ) -> None:  # fmt: skip
-    """Add point k to the components (sets of linked points) of the points before it, in place. Returns nothing (4.2.1).
-    points (M, 2): x, y; weight: of point k; link: largest distance of linked points; cell (M,): cell of each point;
-    around (C, 20): cells round each cell, -1 if empty. Changed: parent (M,), union-find forest of the points; head
-    (C,), after (M,), the last added point of each cell and the one before it of each point, -1 at the end; box (C, 4),
-    bounds of each cell's points: least x, y, largest x, y; sums (M, 6), a component's weight, mean x, y, weight times
-    covariance xx, xy, yy, at its root; work (2,): comparisons, number of components."""
+    """Adds point k to the components of the points before it, in place (4.2.1).
+
+    head (C,), after (M,): the last added point of each cell, and the one before each point. box (C, 4): bounds of each
+    cell's points. parent (M,), sums (M, 6): forest of the points, and moments at the roots.
+    """
     c = cell[k]
     x, y = points[k, 0], points[k, 1]
     parent[k] = k
@@ -99,6 +96,7 @@ def insert(
     top = find_root(parent, k)
     for n in range(AROUND):
         other = around[c, n]
+        # everything is one component: nothing more can be joined
         if work[COMPONENTS] == 1:
             break
         if other < 0 or head[other] < 0:
@@ -106,6 +104,7 @@ def insert(
         work[VISITS] += 1
         if find_root(parent, head[other]) == top:
             continue
+        # the bounding box of the cell's points rules most cells out without a look at its points
         gap_x = max(box[other, LOW_X] - x, x - box[other, HIGH_X], 0.0)
         gap_y = max(box[other, LOW_Y] - y, y - box[other, HIGH_Y], 0.0)
         if gap_x * gap_x + gap_y * gap_y > link * link:
@@ -122,12 +121,11 @@ def insert(
 
 @njit(cache=True)
 def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
-    """Join the components of points a and b under the older root, so that roots depend only on the order of points.
-    Changed: parent (M,), union-find forest; sums (M, 6), moments at the roots; work (2,), whose second number, the
-    components, falls by 1. Nothing changes if the points are in one component already."""
+    """Joins the components of points a and b under the older root, so that roots depend only on the order of points."""
     a, b = find_root(parent, a), find_root(parent, b)
     if a == b:
         return
+    # the older root wins: roots depend on the order of points only, not on that of joins
     low, high = min(a, b), max(a, b)
     parent[high] = low
     pool(sums[low], sums[high])
@@ -136,11 +134,7 @@ def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
 
 @njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
-    """Returns the component of each point (M,), numbered in the order of first points, and the moments (K, 6) of K
-    components.
-
-    Points (M, 2) at most `link` (above 0) apart, also through others, are one component (3.3). weights (M,): of the
-    points. Moments: weight N, mean x, y, N times the covariance xx, xy, yy. No points give no components."""
+    """Returns the component of each point (M,), numbered by first points, and the moments (K, 6) of the components."""
     m = len(points)
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     label, count = np.empty(m, np.int64), 0
@@ -166,12 +160,7 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
 def prefixes(
     points: Array, weights: Array, start: int, link: float, gate: float, prior: Array, strength: float, least: float
 ) -> tuple[Bools, int]:
-    """Returns flags (M - start + 1,), True if the first start, start + 1, … M points are one group, and the comparisons
-    made.
-
-    points (M, 2), weights (M,). Points at most `link` apart are components, and those lighter than `least` are left
-    out. The others are joined by `closure` with gate (squared radius), prior (3,), strength; one must be left. False
-    for no point and if all are left out. start: 0 to M."""
+    """Returns whether the first start, … M points are one group, (M - start + 1,), and the comparisons made."""
     m = len(points)
     one = np.zeros(m - start + 1, np.bool_)
     if m == 0:
@@ -189,6 +178,7 @@ def prefixes(
         if k + 1 < start:
             continue
         top, now = find_root(parent, k), k + 1 - start
+        # all components once; later only that of the new point changes
         if k + 1 == max(start, 1):
             heavy = _heavy(np.arange(k + 1), parent, sums, least)
             for n in range(len(heavy)):
@@ -221,7 +211,6 @@ def prefixes(
 
 @njit(cache=True)
 def _heavy(points: Ints, parent: Ints, sums: Array, least: float) -> Ints:
-    """Returns those of the points (K,) that are roots of components of at least the weight `least`, in their order.
-    parent (M,): union-find forest; sums (M, 6): moments at the roots."""
+    """Returns those of the points (K,) that are roots of components of at least the weight `least`."""
     kept = (parent[points] == points) & (sums[points, WEIGHT] >= least)
     return np.asarray(points[kept])

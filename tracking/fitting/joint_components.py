@@ -29,14 +29,14 @@ START = (0.01, 5.0, 0.5, 0.5)
 
 @dataclass(frozen=True)
 class TruePartition:
-    """The people of a frame: state (K, 4): x, y, m, vx, vy, m/s, with errors; label (K,): as partition_kernels."""
+    """The people of a frame: state (K, 4): x, y, m, vx, vy, m/s, with errors;"""
 
     state: Array
-    label: Ints
+    label: Ints  # (K,): as partition_kernels
 
 
 def true_partitions(truth: Truth, seed: int) -> list[TruePartition]:
-    """Return the true partitions of a simulated sequence, every STRIDE, of two people or more; seed: of the errors."""
+    """Returns the true partitions of a simulated sequence, every STRIDE, of two people or more; seed: of the errors."""
     assert truth.pos is not None
     assert truth.vel is not None
     draws, found = rng(seed, "label", 3), []
@@ -52,8 +52,7 @@ def true_partitions(truth: Truth, seed: int) -> list[TruePartition]:
 
 
 def component_scores(parts: Sequence[TruePartition], values: dict[str, float]) -> dict[str, float]:
-    """Return scores of a mixture on true partitions: partitions, people (numbers), log_loss, per person, and right, the
-    share of people whose true label has a probability above 1/2."""
+    """Returns scores of a mixture: partitions, people, log_loss per person, and right, the share with p above 1/2."""
     log_p = _log_probabilities(parts, values)
     return {
         "partitions": float(len(parts)),
@@ -64,7 +63,7 @@ def component_scores(parts: Sequence[TruePartition], values: dict[str, float]) -
 
 
 def fit_components(parts: Sequence[TruePartition]) -> dict[str, float]:
-    """Return the parameters of the mixture by name. Raises InputError if nobody is in a group or everybody in one."""
+    """Returns the parameters of the mixture by name. Raises InputError if nobody is in a group or everybody in one."""
     from scipy.optimize import minimize
 
     together = sum(bool(part.label.any()) for part in parts)
@@ -86,7 +85,6 @@ def fit_components(parts: Sequence[TruePartition]) -> dict[str, float]:
 
 
 def _log_probabilities(parts: Sequence[TruePartition], values: dict[str, float]) -> Array:
-    """Returns the log probability of each person's true label given all others, of all partitions, (R,)."""
     mixture, found = mixture_of(values), []
     for part in parts:
         out = np.empty(len(part.label))

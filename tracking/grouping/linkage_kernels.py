@@ -12,13 +12,13 @@ from sim.types import Array, Ints
 def linked_groups(
     cut: Ints, a: Ints, b: Ints, log_odds: Array, unseen: float, stay: float, come: float, label: Ints
 ) -> None:
-    """Finds the groups of each of S steps by average linkage.
+    """Finds the groups of each of S steps by average linkage, with a memory of the step before.
 
-    cut (S + 1,): where the rows of each step begin in a, b, log_odds (R,): two people and their log-odds. unseen:
-    log-odds of pairs without a row. stay, come: added for pairs that were in one group in the step before, taken from
-    all others. label (S, P): filled with a number of each person's group, its member in the lowest column; -1, as
-    given, where a person is alone.
+    cut (S + 1,): where the rows of each step begin in a, b, log_odds (R,). label (S, P): filled with the lowest member
+    of each person's group; -1, as given, where a person is alone.
     """
+    # Only people whose log-odds are positive with somebody can be in a group: linkage runs in each connected component
+    # of these pairs alone, in a table of the component's size.
     steps, people = label.shape
     root, place, size, start, found, member = np.empty((6, people), np.int64)
     for p in range(people):
@@ -85,8 +85,9 @@ def _memory(before: Ints, p: int, q: int, stay: float, come: float) -> float:
 
 @njit(cache=True)
 def _root(root: Ints, p: int) -> int:
-    """Returns the lowest person of p's component; root (P,): a lower person of the same component, or oneself."""
+    """Returns the lowest person of p's component."""
     while root[p] != p:
+        # path halving
         root[p] = root[root[p]]
         p = root[p]
     return p
@@ -94,11 +95,7 @@ def _root(root: Ints, p: int) -> int:
 
 @njit(cache=True)
 def _average_linkage(x: Array) -> Ints:
-    """Returns the group (M,) of each of M people, its lowest member.
-
-    x (M, M): symmetric log-odds of pairs, changed in place; the diagonal is not read. The two groups with the highest
-    mean are joined while it is above 0. Each group remembers its best partner, so that most joins cost M operations.
-    """
+    """Returns the group (M,) of each person, its lowest member; x (M, M): log-odds of pairs, changed in place."""
     count = len(x)
     size, group, best = np.ones(count), np.arange(count), np.empty(count, np.int64)
     for u in range(count):
@@ -106,6 +103,7 @@ def _average_linkage(x: Array) -> Ints:
     while True:
         u = -1
         for p in range(count):
+            # each group remembers its best partner, so that most joins cost M operations
             if size[p] > 0 and best[p] >= 0 and (u < 0 or x[p, best[p]] > x[u, best[u]]):
                 u = p
         if u < 0 or x[u, best[u]] <= 0:
@@ -127,7 +125,6 @@ def _average_linkage(x: Array) -> Ints:
 
 @njit(cache=True)
 def _best_partner(x: Array, size: Array, u: int) -> int:
-    """Returns the group with the highest mean log-odds with group u, the lowest of equals; -1 if there is none."""
     found = -1
     for q in range(len(x)):
         if q != u and size[q] > 0 and (found < 0 or x[u, q] > x[u, found]):

@@ -19,12 +19,7 @@ TUD-Campus."""
 
 
 def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float) -> Iterator[str]:
-    """Yield a warning for each thing that is hardly right: frames without anybody at a fixed step, and speeds.
-
-    name: of the sequence. people: one `Tracks` per frame. fps: frames per second. px_per_m: px per m, used only if the
-    people are in the image; nan if unknown, then speeds are not checked. Speeds are those of the motion over the last
-    0.5 s.
-    """
+    """Yields a warning for each thing that is hardly right: frames without anybody at a fixed step, and speeds."""
     present = [t for t in people if len(t.id)]
     step = math.gcd(*np.diff([t.index for t in present]).astype(int).tolist())
     if step > 1:
@@ -43,10 +38,7 @@ def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float
 
 
 def median_speed(people: Sequence[Tracks], fps: float, px_per_m: float) -> float:
-    """Return the median speed of the motion over the last 0.5 s, m/s; nan if nobody moves for so long.
-
-    people, fps, px_per_m: as of `implausible`.
-    """
+    """Returns the median speed of the motion over the last 0.5 s, m/s; nan if nobody moves for so long."""
     present = [t for t in people if len(t.id)]
     if not present:
         return math.nan

@@ -24,13 +24,7 @@ MUCH = 1.5
 
 
 def velocity_error(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: LinkRule) -> float:
-    """Return by how much two people of equal motion differ in their reported velocities, m/s; nan if unknown.
-
-    It is the difference that the share `rule.share` of frames does not exceed, estimated as √2 times this quantile of
-    the distance between a reported velocity and the chord of the positions over the last 0.5 s. tracks: one `Tracks`
-    per frame, at least one, of people. fps: frames per second. px_per_m: px per m, used only in the image. Known
-    velocities count only where there is a chord; fewer than 50 give nan.
-    """
+    """Returns by how much two people of equal motion differ in their reported velocities, m/s; nan if unknown."""
     table = tabulate(tracks, fps, px_per_m, rule.smooth)
     chord = chords(table.frame, table.id, table.pos, fps)
     apart = np.hypot(*(table.vel - chord).T)
@@ -41,11 +35,7 @@ def velocity_error(tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: 
 def velocity_warning(
     name: str, tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None
 ) -> str | None:
-    """Return a warning if groups cannot be derived from the velocities of these tracks, else None.
-
-    name: of the tracker. The other arguments are those of `velocity_error`; None stands for the default grouping. There
-    is no warning if the grouping does not use the velocities, for tracks of groups, and in the image without a scale.
-    """
+    """Returns a warning if groups cannot be derived from the velocities of these tracks, else None."""
     rule = rule or default_grouping()
     if not tracks or not isinstance(rule, LinkRule) or tracks[0].unit == "group" or rule.smooth > 0:
         return None

@@ -145,7 +145,6 @@ GROUPS = in_family(
 
 
 def _groups_right(name: str, right: str) -> tuple[Score, ...]:
-    """Returns F1, precision and recall of groups, without family and source; right: when a true group is right."""
     p, r = f"{name}_precision", f"{name}_recall"
     return (
         share(f"{name}_F1", f"2 P R / (P + R) of P = {p} and R = {r}"),
@@ -182,11 +181,6 @@ LINEAGE = (
 
 
 def _of_events(name: str, what: str) -> Iterable[Score]:
-    """Yields the scores of one kind of event: F1, precision, recall, TP, FP, FN, latency (in s, -1 or more).
-
-    name: the kind, which begins the keys ("merge" gives merge_F1); "event" yields no TP, FP and FN. what: the events as
-    a plural noun for the meanings. The scores have no family yet.
-    """
     yield share(f"{name}_F1", f"2 matched / (true + reported) {what}")
     yield share(f"{name}_precision", f"matched / reported {what}")
     yield share(f"{name}_recall", f"matched / true {what}")
@@ -199,9 +193,6 @@ def _of_events(name: str, what: str) -> Iterable[Score]:
 
 
 def _headline(score: Score) -> Score:
-    """Returns an `event_…` score with a new meaning: the mean of the same score of merge and of split, or the known one
-    of the two. `event_latency` keeps its meaning.
-    """
     if score.key == "event_latency":
         return replace(score, meaning="mean time from the true start to the report, of matched merges and splits")
     name = score.key.removeprefix("event_")
@@ -243,11 +234,7 @@ CATALOGUE = MappingProxyType({score.key: score for score in ALL})
 
 
 def table() -> str:
-    """Returns the catalogue as a Markdown table with the columns key, unit, range, better, meaning, source, one line
-    per score.
-
-    Core scores, whose keys end in `_core`, are left out.
-    """
+    """Returns the catalogue as a Markdown table, one line per score, without core scores."""
     lines = ["| key | unit | range | better | meaning | source |", "| --- | --- | --- | --- | --- | --- |"]
     for score in ALL:
         if score.family != CORE:

@@ -11,33 +11,23 @@ Better = Literal["higher", "lower", "neither"]
 
 @dataclass(frozen=True)
 class Score:
-    """One score of the catalogue.
+    """One score of the catalogue."""
 
-    - key: its name in the results, such as "HOTA".
-    - family: name of the group of scores that are shown together, such as "people".
-    - unit: "1" for a share; "m | px" for a length in m on the ground or in px in the image ("m² | px²" squared); "m/s",
-      "count", "s", "people".
-    - low, high: range of possible values; may be infinite.
-    - better: whether "higher" or "lower" values are better, or "neither".
-    - meaning: definition in words.
-    - source: the paper that defines it, "" if flockscope does.
-    """
-
-    key: str
-    family: str
+    key: str  # its name in the results, such as "HOTA"
+    family: str  # name of the group of scores that are shown together, such as "people"
+    # "1" for a share; "m | px" for a length in m on the ground or in px in the image ("m² | px²" squared); "m/s",
+    # "count", "s", "people"
     unit: str
+    # low, high: range of possible values; may be infinite
     low: float
     high: float
-    better: Better
-    meaning: str
-    source: str = ""
+    better: Better  # whether "higher" or "lower" values are better, or "neither"
+    meaning: str  # definition in words
+    source: str = ""  # the paper that defines it, "" if flockscope does
 
     @property
     def best(self) -> float:
-        """The value of a perfect tracker: `high` if higher is better, 0 if lower is better.
-
-        nan if the range has no upper end (numbers of hits) or if neither direction is better.
-        """
+        """The value of a perfect tracker: `high` if higher is better, 0 if lower is better."""
         value = {"higher": self.high, "lower": 0.0, "neither": inf}[self.better]
         return value if value < inf else float("nan")
 

@@ -27,17 +27,12 @@ MOSTLY, LOST = 0.8, 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClearMatches:
-    """The matches of CLEAR: `found`, the matched pairs of similarity 0.5 or more.
-
-    - switched: frame number of each identity switch, the frame of the later match.
-    - resumed: frame number of each match that follows a pause of its true id.
-    - share (N,): matched frames / frames of each of the N true ids, in the order of `Pairs.true_ids[0]`.
-    """
+    """The matches of CLEAR: `found`, the matched pairs of similarity 0.5 or more."""
 
     found: Pairs
-    switched: Ints
-    resumed: Ints
-    share: Array
+    switched: Ints  # frame number of each identity switch, the frame of the later match
+    resumed: Ints  # frame number of each match that follows a pause of its true id
+    share: Array  # (N,): matched frames / frames of each of the N true ids, in the order of `Pairs.true_ids[0]`.
 
 
 def clear_matches(pairs: Pairs) -> ClearMatches:
@@ -56,17 +51,7 @@ def clear_matches(pairs: Pairs) -> ClearMatches:
 
 
 def clear(pairs: Pairs) -> dict[str, float]:
-    """Returns a dict of the CLEAR scores: MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag; all values are floats.
-
-    pairs: candidate pairs of people (or groups) of any similarity; a row is one of them in one frame, no id twice in a
-    frame. Pairs of similarity 0.5 or more are matched one to one in each frame; a match of the previous frame is kept.
-    TP, FN, FP count matches, true rows without one and estimated rows without one. IDSW counts how often a true id is
-    matched to another estimated id than in its previous match. Frag counts how often a true id's matches resume after a
-    pause. MT, PT, ML count true ids matched in more than 80 %, in 20 to 80 %, in less than 20 % of their frames.
-
-    MOTA = 1 - (FN + FP + IDSW) / true rows, or 0 if either side has no rows. MOTP is the mean similarity of the
-    matches, 0 without matches. The counts are 0 where there is nothing to count.
-    """
+    """Returns the CLEAR scores by key: MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag; 0 where nothing is to count."""
     matches = clear_matches(pairs)
     n, m, hits = len(pairs.true), len(pairs.est), len(matches.found.s)
     switches, share = len(matches.switched), matches.share
@@ -86,25 +71,14 @@ def clear(pairs: Pairs) -> dict[str, float]:
 
 
 def turns(pairs: Pairs) -> Ints:
-    """Returns for each frame number 0 … last how many frames up to and including it have rows on both sides, (last +
-    1,).
-
-    pairs: candidate pairs with all true and estimated rows. last: the last frame with a row on either side; 0 if there
-    is none.
-    """
+    """Returns for each frame number 0 … last how many frames up to it have rows on both sides, (last + 1,)."""
     end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
     true, est = (np.bincount(rows.frame, minlength=end) > 0 for rows in (pairs.true, pairs.est))
     return np.cumsum(true & est)
 
 
 def follow(near: Pairs, turn: Ints) -> Bools:
-    """Returns which of the K pairs of `near` are matched, (K,) bool, where matches of the previous frame are kept.
-
-    In each frame the matching is one to one: first all pairs whose two ids were matched in the previous frame, then the
-    greatest total similarity. The previous frame is the last one with rows on both sides. near: the candidate pairs of
-    similarity 0.5 or more. turn: from `turns`, for each frame number the number of frames up to it with rows on both
-    sides.
-    """
+    """Returns which of the K pairs of `near` are matched, (K,) bool, where matches of the previous frame are kept."""
     i, j, frame = near.i, near.j, near.frame
     before = _before(near.links[2], turn[frame])
     chosen = np.zeros(len(i) + 1, bool)  # the last element stands for "no previous pair"
@@ -128,11 +102,7 @@ def follow(near: Pairs, turn: Ints) -> Bools:
 
 
 def _before(link: Ints, turn: Ints) -> Ints:
-    """Returns for each of K pairs the index of the pair of the same two ids one turn earlier, K if there is none: (K,).
-
-    link (K,): number of the pair's combination of true and estimated id; turn (K,): number of frames with people on
-    both sides up to the pair's frame.
-    """
+    """Returns for each of K pairs the index of the pair of the same two ids one turn earlier, K if there is none."""
     order = np.argsort(link, kind="stable")
     follows = (np.diff(link[order]) == 0) & (np.diff(turn[order]) == 1)
     before = np.full(len(link), len(link))

@@ -23,13 +23,10 @@ POWER = 2.0
 
 
 def gospa(pairs: Pairs, cutoff: float, frames: int, power: float = POWER) -> dict[str, float]:
-    """Returns a dict of GOSPA, GOSPA_localisation, GOSPA_missed and GOSPA_false over a sequence, in the unit of
-    `cutoff`.
+    """Returns GOSPA and its parts by key, in the unit of `cutoff`: p-th roots of means over `frames` frames, nan
+    without.
 
-    pairs: true and estimated people of the scored frames, from `point_pairs` with reach = cutoff. cutoff: distance (m
-    or px) from which a pair counts as one missed person and one false track. frames: number of scored frames, empty
-    ones included. power: the exponent p. Each value is the p-th root of a mean over frames, 0 for a perfect tracker. So
-    GOSPA^p = localisation^p + missed^p + false^p, and p = 2 gives root mean squares. All values are nan if frames = 0.
+    pairs: from `point_pairs` with reach = cutoff.
     """
     if frames == 0:
         return dict.fromkeys(("GOSPA", "GOSPA_localisation", "GOSPA_missed", "GOSPA_false"), float("nan"))
@@ -39,13 +36,7 @@ def gospa(pairs: Pairs, cutoff: float, frames: int, power: float = POWER) -> dic
 
 
 def gospa_parts(pairs: Pairs, cutoff: float, power: float = POWER) -> Array:
-    """Returns the three parts of GOSPA's d^p for each frame number 0 … last, (last + 1, 3): localisation, missed,
-    false.
-
-    They are the sum of distance^p over matched pairs, and cutoff^p / 2 per missed person and per false track. pairs:
-    from `point_pairs` with reach = cutoff; power: the exponent p. last: the last frame with a row on either side; shape
-    (0, 3) without rows. A frame without rows has zeros.
-    """
+    """Returns localisation, missed and false parts of d^p for each frame number 0 … last, (last + 1, 3)."""
     end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=-1)
     cost = (cutoff * (1 - pairs.s)) ** power
     frame = pairs.frame

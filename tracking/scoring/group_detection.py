@@ -31,12 +31,7 @@ TOLERANCES = {"right_groups": (2, 3), "exact_groups": (1, 1)}
 def weighted_detection(
     sides: ComparedSides, true: GroupRows, tracked: TrackedGroups, shared: SharedMembers
 ) -> list[WeightedScores]:
-    """Returns functions from weights (D, size) by frame number to F1, precision and recall of G-MITRE ("GMITRE_F1" …)
-    and of the groups right at T = 2/3 ("right_groups_F1" …) and T = 1 ("exact_groups_F1" …), (D,) by key.
-
-    sides: both sides' people in the scored frames; true, tracked: their groups of two or more in labelled frames;
-    shared: numbers of common people, from `shared_members`. G-MITRE is missing if the tracker names no members.
-    """
+    """Returns the weighted F1, precision and recall of G-MITRE, and of the groups right at T = 2/3 and T = 1."""
     size, est = len(sides.frames), tracked.counted
     n, m = (np.bincount(groups.rows.frame, minlength=size) for groups in (true, est))
     parts = []
@@ -49,16 +44,7 @@ def weighted_detection(
 
 
 def link_counts(sides: ComparedSides, true: GroupRows, est: GroupRows) -> Array:
-    """Returns the links of G-MITRE by frame number, (3, size): true, estimated, right ones. The numbers of unlabelled
-    frames have no meaning.
-
-    sides: both sides' people, mapped. true, est: groups of two or more in labelled frames, members being rows of
-    sides.true and of sides.est. Everybody in no group is alone. A person in several groups is in the last of them, but
-    counts as a member of each.
-
-    Right links are the same seen from either side: in each pair of a true and an estimated group the common people less
-    one, and each person who is alone on both sides.
-    """
+    """Returns the links of G-MITRE by frame number, (3, size): true, estimated, right ones."""
     size = len(sides.frames)
     group, found = (group_of_person(g, len(p.rows))[:-1] for g, p in ((true, sides.true), (est, sides.est)))
     mapped = np.flatnonzero(sides.mapping >= 0)
@@ -70,20 +56,12 @@ def link_counts(sides: ComparedSides, true: GroupRows, est: GroupRows) -> Array:
 
 
 def _links(groups: GroupRows, people: PersonRows, group: Ints, size: int) -> Array:
-    """Returns the number of links of one side by frame number, (size,): members - 1 of each group, and 1 of each of the
-    R people who is in none. group (R,): the group of each, -1 none.
-    """
     inside = np.bincount(groups.rows.frame, groups.count - 1, minlength=size)
     return np.asarray(inside + np.bincount(people.rows.frame[group < 0], minlength=size), float)
 
 
 def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, tolerance: tuple[int, int]) -> Bools:
-    """Returns which true groups are right, (G,): an estimated group holds at least ceil(T n) of the n members and at
-    most ceil((1 - T) n) others.
-
-    shared: numbers of common people of `true` and `est`, which have two or more members. tolerance: numerator and
-    denominator of T, 2/3 or more: then no estimated group fits two true ones, and the pairs are one to one.
-    """
+    """Returns which true groups are right, (G,): some estimated group holds T of the members, and few others."""
     part, whole = tolerance
     i, j = np.divmod(shared.key, max(shared.width, 1))
     n = true.count[i]
@@ -95,12 +73,6 @@ def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, toleran
 
 
 def _means_over_frames(name: str, frames: Bools, counts: Array, f1_of_means: bool) -> WeightedScores:
-    """Returns a function from weights (D, size) to F1, precision and recall, (D,) by key, which begins with `name`.
-
-    Precision and recall are means over the frames f where frames[f] is true. counts (3, size): true, estimated and
-    right items by frame number. F1 is the harmonic mean of the two means (0 if both are 0), or else a mean over frames,
-    too.
-    """
     n, m, hits = counts
     sums, every = FrameSums(len(frames)), np.flatnonzero(frames)
     for key, part, whole in (("F1", 2 * hits, n + m), ("precision", hits, m), ("recall", hits, n)):

@@ -25,26 +25,19 @@ LEAST = 1e-10  # keeps LocA at 1 where nothing is matched
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HotaMatches:
-    """The K matches of HOTA, and the U links, a link being a combination of a true and an estimated id.
+    """The K matches of HOTA, and the U links, a link being a combination of a true and an estimated id."""
 
-    - true_id, est_id (U,): the ids of each link, as indices into `Pairs.true_ids[0]` and `Pairs.est_ids[0]`.
-    - link (K,): link of each match; frame (K,): its frame number; s (K,): its similarity.
-    - level (K,): number of thresholds at which the match counts, 0 to 19; these are the lowest ones.
-    """
-
+    # true_id, est_id (U,): the ids of each link, as indices into `Pairs.true_ids[0]` and `Pairs.est_ids[0]`.
     true_id: Ints
     est_id: Ints
-    link: Ints
-    frame: Ints
-    s: Array
-    level: Ints
+    link: Ints  # (K,): link of each match
+    frame: Ints  # (K,): its frame number
+    s: Array  # (K,): its similarity
+    level: Ints  # (K,): number of thresholds at which the match counts, 0 to 19; these are the lowest ones
 
 
 def hota_matches(pairs: Pairs) -> HotaMatches:
-    """Returns the matches that serve all thresholds: in each frame the greatest sum of A(i, j) s(i, j).
-
-    pairs: candidate pairs of any similarity above 0, no id twice in a frame.
-    """
+    """Returns the matches that serve all thresholds: in each frame the greatest sum of A(i, j) s(i, j)."""
     true_id, est_id, link = pairs.links
     n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
     m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
@@ -55,23 +48,12 @@ def hota_matches(pairs: Pairs) -> HotaMatches:
 
 
 def hota(pairs: Pairs) -> dict[str, float]:
-    """Returns a dict of HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each the mean over the 19 similarity
-    thresholds `ALPHAS` = 0.05, 0.10 … 0.95.
-
-    Det: detection, Ass: association, Loc: localisation; A: accuracy, Re: recall, Pr: precision; all between 0 and 1.
-    pairs: candidate pairs of true and estimated rows of any similarity above 0, no id twice in a frame (not checked).
-    At a threshold without matches LocA is 1 and all others are 0; so all are 0 and LocA is 1 if a side is empty.
-    """
+    """Returns HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA by key, each the mean over `ALPHAS`."""
     return {name: float(curve.mean()) for name, curve in curves(pairs).items()}
 
 
 def curves(pairs: Pairs) -> dict[str, Array]:
-    """Returns a dict of HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each an array (19,) over the similarity
-    thresholds `ALPHAS` = 0.05, 0.10 … 0.95.
-
-    Det: detection, Ass: association, Loc: localisation; A: accuracy, Re: recall, Pr: precision. pairs: candidate pairs
-    of any similarity above 0, no id twice in a frame. At a threshold without matches LocA is 1 and all others are 0.
-    """
+    """Returns the eight scores of `hota` by key, (19,) each, over the similarity thresholds `ALPHAS`."""
     matches = hota_matches(pairs)
     n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[matches.true_id]  # n_i of each link
     m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[matches.est_id]
@@ -101,13 +83,8 @@ def curves(pairs: Pairs) -> dict[str, Array]:
 
 
 def alignment(pairs: Pairs, frames: Ints) -> Array:
-    """Returns the alignment A in [0, 1] of each of the U links, a link being a combination of a true and an estimated
-    id, (U,).
-
-    pairs: the candidate pairs; links are ordered as in `Pairs.links`. frames (U,): number of rows of the true id plus
-    that of the estimated id. A = C / (frames - C). C is the sum over common frames of s(i, j) / (sum of row i + sum of
-    column j - s(i, j)), where the sums run over all similarities of that frame.
-    """
+    """Returns the alignment A in [0, 1] of each of U links (U,); frames (U,): rows of the true id plus those of the
+    other."""
     i, j, s = pairs.i, pairs.j, pairs.s
     of_i = np.bincount(i, weights=s, minlength=len(pairs.true))
     of_j = np.bincount(j, weights=s, minlength=len(pairs.est))

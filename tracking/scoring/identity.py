@@ -14,13 +14,7 @@ from tracking.scoring.matching import match
 
 
 def identity(pairs: Pairs) -> dict[str, float]:
-    """Returns a dict of IDF1, IDP, IDR and IDTP.
-
-    pairs: candidate pairs of true and estimated rows, one row per person and frame. Ids are assigned one to one over
-    the whole sequence, so that assigned ids share as many frames as possible with a similarity of 0.5 or more. IDTP is
-    the number of shared frames, summed over assigned ids. IDP = IDTP / estimated rows, IDR = IDTP / true rows, and IDF1
-    = 2 IDTP / (true rows + estimated rows). A score with a denominator of 0 is 0.
-    """
+    """Returns a dict of IDF1, IDP, IDR and IDTP."""
     true_id, est_id, link = pairs.links
     frames = np.bincount(link[pairs.s >= FOUND], minlength=len(true_id)).astype(float)
     some = frames > 0

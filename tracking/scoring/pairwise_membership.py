@@ -15,16 +15,10 @@ from tracking.scoring.rows import FrameRows
 
 
 def pair_counts(true: GroupRows, est: GroupRows, person: Ints) -> Ints:
-    """Returns for each frame number 0 … last how many pairs of people are in one group, (last + 1, 3): true pairs,
-    estimated pairs, right pairs.
+    """Returns how many pairs of people are in one group in each frame, (last + 1, 3): true, estimated, right pairs.
 
-    true, est: true and estimated groups in frames; true.member holds row indices of the true people. person (K,): row
-    of the true person that each membership of `est` is mapped to, -1 none. last: the last frame with a group on either
-    side; shape (0, 3) without groups.
-
-    An estimated pair is right if both persons are in one true group. An estimated pair with an unmapped member, or with
-    both members mapped to one person, is false. A true pair with a person whom no track is mapped to is missed. A pair
-    inside several estimated groups counts once.
+    person (K,): row of the true person of each membership of `est`, -1 none. An estimated pair is right if both are in
+    one true group; a pair inside several estimated groups counts once.
     """
     group = group_of_person(true, int(max(true.member.max(initial=-1), person.max(initial=-1))) + 1)
     order = np.argsort(est.of, kind="stable")
@@ -47,7 +41,6 @@ def pair_counts(true: GroupRows, est: GroupRows, person: Ints) -> Ints:
 
 
 def _pairs_in(groups: GroupRows, size: int) -> Ints:
-    """Returns the number of unordered pairs of members, n (n - 1) / 2 per group of n, of each frame number: (size,)."""
     pairs = np.zeros(size, np.int64)
     np.add.at(pairs, groups.rows.frame, groups.count * (groups.count - 1) // 2)
     return pairs

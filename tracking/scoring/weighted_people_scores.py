@@ -21,11 +21,7 @@ CELLS = 2_000_000  # numbers of matches held at once
 
 
 def weighted_people(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns a function from weights (D, size) by frame number to the scores of HOTA, CLEAR and Identity, (D,) by key.
-
-    pairs: all people of both sides and their candidate pairs. Raises ValueError if an id occurs twice in one frame on a
-    side.
-    """
+    """Returns the weighted scores of HOTA, CLEAR and Identity. Raises ValueError if an id is twice in a frame."""
     pairs.true.require_unique_ids("truth")
     pairs.est.require_unique_ids("tracks")
     parts = weighted_hota(pairs, size), weighted_clear(pairs, size), weighted_identity(pairs, size)
@@ -33,7 +29,7 @@ def weighted_people(pairs: Pairs, size: int) -> WeightedScores:
 
 
 def weighted_hota(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns a function from weights (D, size) to the eight scores of `hota`, (D,) by key, with its matches kept."""
+    """Returns the eight weighted scores of `hota`, with its matches kept."""
     matches, bins = hota_matches(pairs), len(ALPHAS) + 1
     used, link = np.unique(matches.link, return_inverse=True)
     true_id, est_id = matches.true_id[used], matches.est_id[used]
@@ -75,11 +71,7 @@ def weighted_hota(pairs: Pairs, size: int) -> WeightedScores:
 
 
 def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns a function from weights (D, size) to the ten scores of `clear`, (D,) by key, with its matches kept.
-
-    A switch and a resumed match have the weight of the later match. MT, PT and ML sum up the mean weights of their
-    people's frames.
-    """
+    """Returns the ten weighted scores of `clear`, with its matches kept."""
     matches, sums = clear_matches(pairs), FrameSums(size)
     sums.add("true", pairs.true.frame)
     sums.add("est", pairs.est.frame)
@@ -107,11 +99,7 @@ def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
 
 
 def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns a function from weights (D, size) to IDF1, IDP, IDR and IDTP, (D,) by key; ids are assigned for each
-    draw.
-
-    Of the weighted frames in which two ids are similar by 0.5 or more, the assignment takes the greatest sum.
-    """
+    """Returns the weighted IDF1, IDP, IDR and IDTP; ids are assigned anew for each draw."""
     near = pairs.s >= FOUND
     true_id, est_id, link = pairs.links
     common = BinSums(pairs.frame[near], link[near], len(true_id), size)
@@ -136,11 +124,7 @@ def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
 
 
 def weighted_positions(sides: ComparedSides) -> WeightedScores:
-    """Returns a function from weights (D, size) to RMSE_pos, RMSE_vel, GOSPA and its parts, (D,) by key.
-
-    sides: both sides, people mapped. The function returns {} if a side has no positions on the surface, or if the scale
-    is not finite and above 0.
-    """
+    """Returns the weighted RMSE_pos, RMSE_vel, GOSPA and its parts; {} without positions on the surface."""
     true, est = sides.true, sides.est
     compared = compared_positions(true, est, sides.surface, sides.plane, sides.scale)
     if compared is None:

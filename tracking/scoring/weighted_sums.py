@@ -21,13 +21,9 @@ def unweighted(scores: WeightedScores, size: int) -> dict[str, float]:
 
 
 class FrameSums:
-    """Named sums that are linear in the weights of the frames: counts, and sums of errors.
-
-    State: table (size, columns), the part of each frame in each sum; names of the columns.
-    """
+    """Named sums that are linear in the weights of the frames; State: by name, the part of each frame (size,)."""
 
     def __init__(self, size: int) -> None:
-        """Starts without sums; size: number of frame numbers, from 0."""
         self._size = size
         self._columns: dict[str, Array] = {}
 
@@ -63,13 +59,9 @@ def mean_of_known(values: Array) -> Array:
 
 
 class BinSums:
-    """Numbers of items by bin (for example by id), weighted by their frames.
-
-    State: a sparse matrix (bins, size): how many items of each frame are in each bin.
-    """
+    """Numbers of items by bin (for example by id), weighted by their frames."""
 
     def __init__(self, frame: Ints, bin: Ints, bins: int, size: int) -> None:
-        """Counts K items; frame, bin (K,): their frame numbers and bins from 0; bins, size: number of both."""
         from scipy.sparse import csr_array
 
         self._counts = csr_array((np.ones(len(frame)), (bin, frame)), shape=(bins, size))
