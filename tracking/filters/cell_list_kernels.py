@@ -29,17 +29,17 @@ MOST_RINGS = 8
 def grid_of(places: Array, count: int) -> tuple[float, float, float, int, int]:
     """Returns the grid of `count` places (N, 2 or more), with about one place in a cell."""
     # mean deviations instead of bounds, so that one far place does not make all cells large
-    mean, spread = np.zeros(2), np.zeros(2)
-    for d in range(2):
-        for k in range(count):
-            mean[d] += places[k, d] / count
-        for k in range(count):
-            spread[d] += abs(places[k, d] - mean[d]) / count
+    x, y, wide, high = 0.0, 0.0, 0.0, 0.0
+    for k in range(count):
+        x += places[k, 0] / count
+        y += places[k, 1] / count
+    for k in range(count):
+        wide += abs(places[k, 0] - x) / count
+        high += abs(places[k, 1] - y) / count
     # the two other terms bound the number of cells where the places lie on a line, or on one point
-    size = max(4 * math.sqrt(spread[0] * spread[1] / count), 4 * max(spread[0], spread[1]) / count, 1e-3)
-    corner = mean - COVERED * spread
-    sides = (2 * COVERED * spread / size).astype(np.int64) + 1
-    return corner[0], corner[1], size, sides[0], sides[1]
+    size = max(4 * math.sqrt(wide * high / count), 4 * max(wide, high) / count, 1e-3)
+    columns, rows = int(2 * COVERED * wide / size) + 1, int(2 * COVERED * high / size) + 1
+    return x - COVERED * wide, y - COVERED * high, size, columns, rows
 
 
 @njit(cache=True)
@@ -55,7 +55,12 @@ def _row(y: float, grid: Any) -> int:
 @njit(cache=True)
 def empty_list(count: int, grid: Any) -> Any:
     """Returns a list without places, with room for `count` of them."""
-    return np.full(grid[3] * grid[4], -1), np.full(count, -1), grid
+    first, after = np.empty(grid[3] * grid[4], np.int64), np.empty(count, np.int64)
+    for c in range(len(first)):
+        first[c] = -1
+    for k in range(count):
+        after[k] = -1
+    return first, after, grid
 
 
 @njit(cache=True)
@@ -138,7 +143,9 @@ def cell_list(places: Array, count: int) -> Any:
         start[cell[k] + 1] += 1
     for c in range(1, len(start)):
         start[c] += start[c - 1]
-    end = start[:-1].copy()
+    end = np.empty(len(start), np.int64)
+    for c in range(len(start)):
+        end[c] = start[c]
     for k in range(count):
         order[end[cell[k]]] = k
         end[cell[k]] += 1

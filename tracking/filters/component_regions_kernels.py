@@ -2,14 +2,16 @@
 
 A component's moments are a row of `sums` (K, 6): weight N, mean x, y, and N times the covariance xx, xy, yy. Its region
 is a row of `shape` (K, 5), an ellipse. Moments are joined without raw sums, in which precision would cancel. Slow
-twins: tests/reference_components.py."""
+twins: tests/reference_components.py. Loops stand in place of np.full, np.argsort and copies of slices, which take
+seconds to compile.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sim.compiler import njit
-from sim.elementary_kernels import find_root
+from sim.elementary_kernels import find_root, sort_by
 from sim.types import Array, Ints
 from tracking.filters.ellipse_overlap_kernels import overlap
 
@@ -60,26 +62,48 @@ def meet(a: Array, b: Array) -> bool:
 
 
 @njit(cache=True)
+def unset(count: int) -> Ints:
+    """Returns -1, `count` times."""
+    out = np.empty(count, np.int64)
+    for k in range(count):
+        out[k] = -1
+    return out
+
+
+@njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[Ints, int]:
     """Returns the first component that each of K is joined with (K,) (G_x, 3.1), and the number of pairs compared."""
     k, compared = len(sums), 0
-    label, alive, tree = np.arange(k), np.arange(k), np.arange(k)
-    pooled, shape, box = sums.copy(), np.empty((k, 5)), np.empty((2, k))
-    left, wide = box[0], box[1]  # of a region: least x, half of its width
-    fresh = np.ones(k, np.bool_)  # only pairs with a changed component are compared again
+    label, alive, order, tree = (
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+    )
+    pooled, shape = np.empty((k, 6)), np.empty((k, 5))
+    left, wide = np.empty(k), np.empty(k)  # of a region: least x, half of its width
+    fresh = np.empty(k, np.bool_)  # only pairs with a changed component are compared again
+    for i in range(k):
+        alive[i] = tree[i] = i
+        fresh[i] = True
+        for c in range(6):
+            pooled[i, c] = sums[i, c]
+    count = k
     changed = k > 1
     while changed:
-        for n in range(len(alive)):
+        for n in range(count):
+            order[n] = alive[n]
             i = alive[n]
             if fresh[i]:
                 fit(pooled[i], gate, prior, strength, shape[i])
                 wide[i] = SLACK * np.sqrt(shape[i, A_XX]) + ROUNDING * abs(shape[i, MEAN_X])
                 left[i] = shape[i, MEAN_X] - wide[i]
-        many = len(alive) > FEW
         # Few are compared in all pairs; of many only those whose boxes overlap along x.
-        order = alive[np.argsort(left[alive])] if many else alive
-        for n in range(len(order)):
-            for later in range(n + 1, len(order)):
+        many = count > FEW
+        if many:
+            sort_by(left, order[:count])
+        for n in range(count):
+            for later in range(n + 1, count):
                 p, q = order[n], order[later]
                 if many and left[q] > left[p] + 2 * wide[p]:
                     break
@@ -93,9 +117,10 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[In
                 ):
                     i, j = find_root(tree, p), find_root(tree, q)
                     tree[max(i, j)] = min(i, j)
-        fresh[:] = False
         kept = 0
-        for n in range(len(alive)):
+        for n in range(count):
+            fresh[alive[n]] = False
+        for n in range(count):
             i = alive[n]
             top = find_root(tree, i)
             if top == i:
@@ -105,8 +130,8 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[In
                 pool(pooled[top], pooled[i])
                 fresh[top] = True
         # A joined region may overlap one that none of its parts did: repeat until nothing changes.
-        changed = 1 < kept < len(alive)
-        alive = alive[:kept]
+        changed = 1 < kept < count
+        count = kept
     for i in range(k):
         label[i] = find_root(tree, i)
     return label, compared

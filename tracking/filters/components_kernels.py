@@ -13,7 +13,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import find_root
 from sim.types import Array, Bools, Ints
-from tracking.filters.component_regions_kernels import WEIGHT, XX, XY, YY, X, Y, closure, fit, meet, pool
+from tracking.filters.component_regions_kernels import WEIGHT, XX, XY, YY, X, Y, closure, fit, meet, pool, unset
 
 AROUND = 20
 """Cells round a cell from which points can be linked with its points."""
@@ -32,8 +32,10 @@ def cells(points: Array, link: float) -> tuple[Ints, Ints]:
     # slightly less than link / sqrt 2, so that rounding never puts two points farther apart into one cell
     side = link / np.sqrt(2.0) * (1 - 1e-12)
     place = np.empty((m, 2), np.int64)
-    # at most half full, so that searches are short
-    table = np.full(1 << int(np.ceil(np.log2(2 * m))), -1)
+    slots = 1
+    while slots < 2 * m:  # at most half full, so that searches are short
+        slots *= 2
+    table = unset(slots)
     cell, first = np.empty(m, np.int64), np.empty(m, np.int64)
     count = 0
     for k in range(m):
@@ -44,7 +46,7 @@ def cells(points: Array, link: float) -> tuple[Ints, Ints]:
             table[slot], first[count] = count, k
             count += 1
         cell[k] = table[slot]
-    around = np.full((count, AROUND), -1)
+    around = np.empty((count, AROUND), np.int64)
     for c in range(count):
         x, y = place[first[c], 0], place[first[c], 1]
         n = 0
@@ -141,7 +143,7 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
     if m == 0:
         return label, sums
     cell, around = cells(points, link)
-    head, after, box = np.full(len(around), -1), np.full(m, -1), np.empty((len(around), 4))
+    head, after, box = unset(len(around)), unset(m), np.empty((len(around), 4))
     work = np.zeros(2, np.int64)
     for k in range(m):
         insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
@@ -149,7 +151,8 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
         top = find_root(parent, k)
         if top == k:
             label[k] = count
-            sums[count] = sums[k]
+            for c in range(6):
+                sums[count, c] = sums[k, c]
             count += 1
         else:
             label[k] = label[top]
@@ -167,50 +170,66 @@ def prefixes(
         return one, 0
     cell, around = cells(points, link)
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
-    head, after, box = np.full(len(around), -1), np.full(m, -1), np.empty((len(around), 4))
+    head, after, box = unset(len(around)), unset(m), np.empty((len(around), 4))
     work = np.zeros(2, np.int64)
-    heavy = np.empty(0, np.int64)  # roots of the components that are not left out, from the first prefix asked for
-    shape = np.empty((m, 5))  # their regions
+    # Roots of the components that are not left out, ascending, from the first prefix on; their moments and regions.
+    heavy, count, moments, shape = np.empty(m, np.int64), 0, np.empty((m, 6)), np.empty((m, 5))
     apart = False  # True if no two of the regions overlap
     for k in range(m):
-        before = work[COMPONENTS]
         insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
         if k + 1 < start:
             continue
         top, now = find_root(parent, k), k + 1 - start
         # all components once; later only that of the new point changes
         if k + 1 == max(start, 1):
-            heavy = _heavy(np.arange(k + 1), parent, sums, least)
-            for n in range(len(heavy)):
-                top = heavy[n]
-                fit(sums[top], gate, prior, strength, shape[top])
+            for p in range(k + 1):
+                if parent[p] == p and sums[p, WEIGHT] >= least:
+                    top = heavy[count] = p
+                    count += 1
+                    fit(sums[top], gate, prior, strength, shape[top])
         elif sums[top, WEIGHT] < least:  # the others are as before
             one[now] = one[now - 1]
             continue
-        elif work[COMPONENTS] != before or not (heavy == top).any():
-            heavy = _heavy(np.unique(np.append(heavy, top)), parent, sums, least)
+        else:
+            count = _with_root(top, heavy, count, parent, sums, least)
         fit(sums[top], gate, prior, strength, shape[top])
-        if len(heavy) < 2:
-            one[now], apart = len(heavy) == 1, True
+        if count < 2:
+            one[now], apart = count == 1, True
             continue
-        if apart or len(heavy) == 2:  # no region has changed but that of the last point's component
+        if apart or count == 2:  # no region has changed but that of the last point's component
             apart = True
-            for n in range(len(heavy)):
+            for n in range(count):
                 other = heavy[n]
                 work[VISITS] += 1
                 if other != top and meet(shape[max(top, other)], shape[min(top, other)]):
                     apart = False
                     break
-            one[now] = len(heavy) == 2 and not apart
-        if not apart and len(heavy) > 2:
-            label, compared = closure(sums[heavy], gate, prior, strength)
-            one[now], apart = label.max() == 0, bool((label == np.arange(len(heavy))).all())
-            work[VISITS] += len(heavy) + compared
+            one[now] = count == 2 and not apart
+        if not apart and count > 2:
+            for n in range(count):
+                for c in range(6):
+                    moments[n, c] = sums[heavy[n], c]
+            label, compared = closure(moments[:count], gate, prior, strength)
+            one[now] = apart = True
+            for n in range(count):
+                one[now] = one[now] and label[n] == 0
+                apart = apart and label[n] == n
+            work[VISITS] += count + compared
     return one, work[VISITS]
 
 
 @njit(cache=True)
-def _heavy(points: Ints, parent: Ints, sums: Array, least: float) -> Ints:
-    """Returns those of the points (K,) that are roots of components of at least the weight `least`."""
-    kept = (parent[points] == points) & (sums[points, WEIGHT] >= least)
-    return np.asarray(points[kept])
+def _with_root(top: int, heavy: Ints, count: int, parent: Ints, sums: Array, least: float) -> int:
+    """Adds a root to the ascending list heavy[:count], takes out those that are no roots now, and returns the count."""
+    kept = 0
+    for n in range(count):
+        p = heavy[n]
+        if p != top and parent[p] == p and sums[p, WEIGHT] >= least:
+            heavy[kept] = p
+            kept += 1
+    at = kept
+    while at > 0 and heavy[at - 1] > top:
+        heavy[at] = heavy[at - 1]
+        at -= 1
+    heavy[at] = top
+    return kept + 1

@@ -16,8 +16,8 @@ def table_sums(values: Array, mix: Array, bias: float, column: Ints, cut: Ints, 
     heights (M, N).
     """
     out = np.empty(len(values))
-    out[:] = bias
     for r in range(len(values)):
+        out[r] = bias
         for t in range(len(column)):
             x = values[r, column[t]]
             if not np.isnan(x):

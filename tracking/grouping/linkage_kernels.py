@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
+from sim.elementary_kernels import find_root
 from sim.types import Array, Ints
 
 
@@ -20,7 +21,8 @@ def linked_groups(
     # Only people whose log-odds are positive with somebody can be in a group: linkage runs in each connected component
     # of these pairs alone, in a table of the component's size.
     steps, people = label.shape
-    root, place, size, start, found, member = np.empty((6, people), np.int64)
+    root, place, size = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
+    start, node, member = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
     for p in range(people):
         root[p], place[p] = p, -1
     for s in range(steps):
@@ -29,43 +31,48 @@ def linked_groups(
         for r in rows:
             if log_odds[r] + _memory(before, a[r], b[r], stay, come) > 0:
                 place[a[r]] = place[b[r]] = 0
-                i, j = _root(root, a[r]), _root(root, b[r])
+                i, j = find_root(root, a[r]), find_root(root, b[r])
                 root[max(i, j)] = min(i, j)
         count = 0
         for p in range(people):
             if place[p] == 0:
-                found[count] = p
+                node[count] = p
                 count += 1
-        node = found[:count]
-        for p in node:
+        for n in range(count):
+            p = node[n]
             size[p], start[p] = 0, -1
         total = 0
-        for p in node:
-            i = _root(root, p)
+        for n in range(count):
+            p = node[n]
+            i = find_root(root, p)
             place[p] = size[i]
             size[i] += 1
-        for p in node:
+        for n in range(count):
+            p = node[n]
             if root[p] == p:
                 start[p] = total
-                total += size[p] ** 2
+                total += size[p] * size[p]
         table = np.empty(total)
-        table[:] = unseen
+        for n in range(total):
+            table[n] = unseen
         for r in rows:
-            i = _root(root, a[r])
-            if place[a[r]] >= 0 and i == _root(root, b[r]):
+            i = find_root(root, a[r])
+            if place[a[r]] >= 0 and i == find_root(root, b[r]):
                 table[start[i] + place[a[r]] * size[i] + place[b[r]]] = log_odds[r]
                 table[start[i] + place[b[r]] * size[i] + place[a[r]]] = log_odds[r]
-        for i in node:
+        for k in range(count):
+            i = node[k]
             if root[i] == i:
                 m = 0
-                for p in node:
-                    if _root(root, p) == i:
+                for n in range(count):
+                    p = node[n]
+                    if find_root(root, p) == i:
                         member[m] = p
                         m += 1
-                x = table[start[i] : start[i] + m * m].reshape(m, m)
+                x = np.empty((m, m))
                 for u in range(m):
                     for v in range(m):
-                        x[u, v] += _memory(before, member[u], member[v], stay, come)
+                        x[u, v] = table[start[i] + u * m + v] + _memory(before, member[u], member[v], stay, come)
                 group = _average_linkage(x)
                 for u in range(m):
                     alone = True
@@ -73,7 +80,8 @@ def linked_groups(
                         alone &= v == u or group[v] != group[u]
                     if not alone:
                         label[s, member[u]] = member[group[u]]
-        for p in node:
+        for n in range(count):
+            p = node[n]
             root[p], place[p] = p, -1
 
 
@@ -84,20 +92,12 @@ def _memory(before: Ints, p: int, q: int, stay: float, come: float) -> float:
 
 
 @njit(cache=True)
-def _root(root: Ints, p: int) -> int:
-    """Returns the lowest person of p's component."""
-    while root[p] != p:
-        # path halving
-        root[p] = root[root[p]]
-        p = root[p]
-    return p
-
-
-@njit(cache=True)
 def _average_linkage(x: Array) -> Ints:
     """Returns the group (M,) of each person, its lowest member; x (M, M): log-odds of pairs, changed in place."""
     count = len(x)
-    size, group, best = np.ones(count), np.arange(count), np.empty(count, np.int64)
+    size, group, best = np.empty(count), np.empty(count, np.int64), np.empty(count, np.int64)
+    for u in range(count):
+        size[u], group[u] = 1.0, u
     for u in range(count):
         best[u] = _best_partner(x, size, u)
     while True:

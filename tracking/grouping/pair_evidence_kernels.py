@@ -43,14 +43,17 @@ def common_neighbours(i: Ints, j: Ints, linked: Bools, rows: int) -> Array:
             start[j[r] + 1] += 1
     for r in range(rows):
         start[r + 1] += start[r]
-    neighbour, end = np.empty(start[-1], np.int64), start[:-1].copy()
+    neighbour, end = np.empty(start[rows], np.int64), np.empty(rows, np.int64)
+    for r in range(rows):
+        end[r] = start[r]
     for r in range(len(i)):
         if linked[r]:
             neighbour[end[i[r]]], neighbour[end[j[r]]] = j[r], i[r]
             end[i[r]] += 1
             end[j[r]] += 1
     out, marked = np.zeros(len(i)), np.empty(rows, np.int64)
-    marked[:] = -1
+    for r in range(rows):
+        marked[r] = -1
     for r in range(len(i)):
         if start[i[r]] < end[i[r]] and start[j[r]] < end[j[r]]:
             for n in range(start[i[r]], end[i[r]]):

@@ -15,9 +15,10 @@ def connected_people(frame, column, length, people, memory, when, a, b, on):  # 
     frames still connects others. The groups are those of group_labels.label_people, without its ids.
     """
     linked = np.zeros((people, people), np.bool_)
-    seen = np.full(people, -memory - 2)
-    label, stack, size = np.empty(people, np.int64), np.empty(people, np.int64), np.zeros(people, np.int64)
-    out = np.full(len(frame), -1)
+    seen, label, stack, size = np.empty((4, people), np.int64)
+    out = np.empty(len(frame), np.int64)
+    for p in range(people):
+        seen[p] = -memory - 2
     # rows and switches are sorted by frame: one pass over both
     row, link = 0, 0
     for t in range(length):
@@ -28,16 +29,15 @@ def connected_people(frame, column, length, people, memory, when, a, b, on):  # 
         while link < len(when) and when[link] == t:
             linked[a[link], b[link]] = linked[b[link], a[link]] = on[link]
             link += 1
-        label[:] = -1
-        size[:] = 0
+        for p in range(people):
+            label[p], size[p] = -1, 0
         for k in range(first, row):
             p = column[k]
             if label[p] < 0:
                 _spread(p, linked, seen, t - memory, label, stack)
             size[label[p]] += 1
         for k in range(first, row):
-            if size[label[column[k]]] > 1:
-                out[k] = label[column[k]]
+            out[k] = label[column[k]] if size[label[column[k]]] > 1 else -1
     return out
 
 
