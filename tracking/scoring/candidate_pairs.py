@@ -49,6 +49,11 @@ class Pairs:
         """Returns the pairs where the bool mask (K,) is true."""
         return Pairs(self.true, self.est, self.i[mask], self.j[mask], self.s[mask])
 
+    def require_unique_ids(self) -> None:
+        """Raises ValueError if an id occurs twice in one frame on a side."""
+        self.true.require_unique_ids("truth")
+        self.est.require_unique_ids("tracks")
+
     @cached_property
     def true_ids(self) -> tuple[Ints, Ints]:
         """Returns the N distinct true ids, ascending (N,), and the index of each true row's id among them (R,)."""

@@ -19,6 +19,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
 from tracking.scoring.matching import solve_frame
+from tracking.scoring.weighted_sums import FrameSums, WeightedScores, ratio
 
 BONUS = 1000.0  # added to the weight of a pair that was matched in the previous frame
 MOSTLY, LOST = 0.8, 0.2
@@ -50,24 +51,36 @@ def clear_matches(pairs: Pairs) -> ClearMatches:
     return ClearMatches(near, frame[1:][switched], frame[1:][resumed], share)
 
 
-def clear(pairs: Pairs) -> dict[str, float]:
-    """Returns the CLEAR scores by key: MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag; 0 where nothing is to count."""
-    matches = clear_matches(pairs)
-    n, m, hits = len(pairs.true), len(pairs.est), len(matches.found.s)
-    switches, share = len(matches.switched), matches.share
-    mostly, tracked = int((share > MOSTLY).sum()), int((share >= LOST).sum())
-    return {
-        "MOTA": (hits - (m - hits) - switches) / n if n and m else 0.0,
-        "MOTP": float(matches.found.s.sum()) / max(1, hits),
-        "TP": float(hits),
-        "FN": float(n - hits),
-        "FP": float(m - hits),
-        "IDSW": float(switches),
-        "MT": float(mostly),
-        "PT": float(tracked - mostly),
-        "ML": float(len(share) - tracked),
-        "Frag": float(len(matches.resumed)),
-    }
+def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
+    """Returns the weighted MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag, with the matches kept.
+
+    A switch and a resumed match have the weight of the later match. MT, PT and ML sum up the mean weights of their
+    people's frames.
+    """
+    matches, sums = clear_matches(pairs), FrameSums(size)
+    sums.add("true", pairs.true.frame)
+    sums.add("est", pairs.est.frame)
+    sums.add("TP", matches.found.frame)
+    sums.add("similarity", matches.found.frame, matches.found.s, float(matches.found.s.sum()))
+    sums.add("IDSW", matches.switched)
+    sums.add("Frag", matches.resumed)
+    who, share = pairs.true_ids[1], matches.share
+    part = 1 / np.bincount(who)[who]
+    kinds = {"MT": share > MOSTLY, "PT": (share >= LOST) & (share <= MOSTLY), "ML": share < LOST}
+    for key, inside in kinds.items():
+        sums.add(key, pairs.true.frame, part * inside[who], float(inside.sum()))
+
+    def score(weights: Array) -> dict[str, Array]:
+        s = sums.of(weights)
+        n, m, hits = s["true"], s["est"], s["TP"]
+        quality = ratio(hits - (m - hits) - s["IDSW"], n, 0.0)
+        return {
+            "MOTA": np.where(m > 0, quality, 0.0), "MOTP": ratio(s["similarity"], hits, 0.0),
+            "TP": hits, "FN": n - hits, "FP": m - hits,
+            **{key: s[key] for key in ("IDSW", "MT", "PT", "ML", "Frag")},
+        }  # fmt: skip
+
+    return score
 
 
 def turns(pairs: Pairs) -> Ints:

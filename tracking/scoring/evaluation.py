@@ -18,12 +18,12 @@ from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.annotated_frames import annotated_frames, seen_in
 from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.clear import clear
+from tracking.scoring.clear import weighted_clear
 from tracking.scoring.distractors import without_distractors
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.hota import hota
-from tracking.scoring.identity import identity
+from tracking.scoring.identity import weighted_identity
 from tracking.scoring.matching import mapped_people
 from tracking.scoring.one_plane import from_pixels, grounded, in_one_plane, on_feet
 from tracking.scoring.people_and_groups import (
@@ -40,7 +40,7 @@ from tracking.scoring.people_comparison import (
     people_pairs,
     plane_of,
 )
-from tracking.scoring.position_errors import position_scores
+from tracking.scoring.position_errors import weighted_positions
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
 from tracking.scoring.weighted_sums import unweighted
 
@@ -222,8 +222,7 @@ def _scores(compared: MatchedSides, group_match: GroupMatch, step: int | None) -
     frames_scored = int(sides.inside.sum())
     if compared.people is not None:
         found |= people_scores(compared.people)
-        where = (sides.surface, sides.plane, sides.scale)
-        found |= position_scores(sides.true, sides.est, sides.mapping, *where, frames_scored)
+        found |= unweighted(weighted_positions(sides), len(sides.inside))
     if compared.groups is not None:
         scores = weighted_groups_and_events(sides, compared.groups, group_match)
         found |= unweighted(scores, len(sides.frames))
@@ -258,9 +257,10 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
 
 def people_scores(pairs: Pairs) -> dict[str, float]:
     """Returns the scores of HOTA, CLEAR and Identity by key. Raises ValueError if an id is twice in a frame."""
-    pairs.true.require_unique_ids("truth")
-    pairs.est.require_unique_ids("tracks")
-    return {**hota(pairs), **clear(pairs), **identity(pairs)}
+    pairs.require_unique_ids()
+    size = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
+    counted = (unweighted(scores(pairs, size), size) for scores in (weighted_clear, weighted_identity))
+    return hota(pairs) | {key: value for part in counted for key, value in part.items()}
 
 
 def objective_of(found: Mapping[str, float]) -> float:

@@ -15,11 +15,14 @@ import numpy as np
 
 from sim.types import Array, Tracks, Truth
 from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.clear import weighted_clear
 from tracking.scoring.evaluation import MatchedSides, Scorer
 from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.hota import weighted_hota
+from tracking.scoring.identity import weighted_identity
 from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.position_errors import weighted_positions
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
-from tracking.scoring.weighted_people_scores import weighted_people, weighted_positions
 from tracking.scoring.weighted_sums import WeightedScores, mean_of_known
 
 PORTION = 100
@@ -45,7 +48,9 @@ def weighted_scorers(
 def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Callable[[Array], Array]:
     parts: list[WeightedScores] = []
     if compared.people is not None:
-        parts += [weighted_people(compared.people, size), weighted_positions(compared.sides)]
+        compared.people.require_unique_ids()
+        parts += [scores(compared.people, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]
+        parts.append(weighted_positions(compared.sides))
     if compared.groups is not None:
         parts.append(weighted_groups_and_events(compared.sides, compared.groups, group_match))
     place = {key: k for k, key in enumerate(CATALOGUE)}

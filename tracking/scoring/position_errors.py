@@ -1,32 +1,62 @@
 """Errors of positions, velocities and group extents: RMSE of mapped people, GOSPA, Wasserstein distance of extents.
 
 RMSE, the root mean square error, counts only people of the tracker that are mapped (matched one to one) to true people.
-It rewards a tracker that drops difficult people. So read it together with GOSPA, a distance between sets of positions
-that also counts missed people and false tracks.
+It rewards a tracker that drops difficult people. So read it together with GOSPA.
+
+Rahmathullah, García-Fernández & Svensson (2017), "Generalized optimal sub-pattern assignment metric", definition 1 with
+alpha = 2 in the form of proposition 1. For true positions x and estimated positions y of one frame, minimised over all
+one-to-one assignments theta of some x to some y:
+
+    d(x, y)^p = min over theta of  sum over (i, j) in theta of |x_i - y_j|^p  +  c^p / 2 (|x| + |y| - 2 |theta|)
+
+c is the cut-off distance, p the exponent; |x|, |y| and |theta| are the numbers of positions and of assigned pairs. A
+pair farther apart than c counts as one missed person and one false track. The parts are localisation (the sum over
+pairs), missed (c^p / 2 per missed person) and false (c^p / 2 per false track).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from sim.types import Array, Ints
-from tracking.scoring.candidate_pairs import point_pairs
-from tracking.scoring.gospa import gospa
+from sim.types import Array
+from tracking.scoring.candidate_pairs import Pairs, point_pairs
+from tracking.scoring.group_and_event_scores import ComparedSides
+from tracking.scoring.matching import match
 from tracking.scoring.people_and_groups import PersonRows, Surface
+from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, ratio
 
 REACH = 2.0  # m: distance from which the similarity of two positions is 0; also the cut-off of GOSPA
+POWER = 2.0
+PARTS = ("localisation", "missed", "false")
+"""Parts of GOSPA."""
 
 
-def position_scores(
-    true: PersonRows, est: PersonRows, mapping: Ints, surface: Surface, plane: str, scale: float, frames: int
-) -> dict[str, float]:
-    """Returns RMSE_pos, RMSE_vel, GOSPA and its parts by key; {} without positions or scale on the surface."""
-    compared = compared_positions(true, est, surface, plane, scale)
+def weighted_positions(sides: ComparedSides) -> WeightedScores:
+    """Returns the weighted RMSE_pos, RMSE_vel, GOSPA and its parts; {} without positions or scale on the surface."""
+    true, est = sides.true, sides.est
+    compared = compared_positions(true, est, sides.surface, sides.plane, sides.scale)
     if compared is None:
-        return {}
-    true_pos, est_pos, *vel = compared
-    pairs = point_pairs(true.rows, est.rows, true_pos, est_pos, REACH * scale)
-    return people_errors(mapping, true_pos, est_pos, *vel) | gospa(pairs, REACH * scale, frames)
+        return lambda weights: {}
+    true_pos, est_pos, true_vel, est_vel = compared
+    sums, reach = FrameSums(len(sides.inside)), REACH * sides.scale
+    j = np.flatnonzero(sides.mapping >= 0)
+    i = sides.mapping[j]
+    off = np.full((len(i), 2), np.nan) if true_vel is None or est_vel is None else est_vel[j] - true_vel[i]
+    for key, error in (("RMSE_pos", est_pos[j] - true_pos[i]), ("RMSE_vel", off)):
+        squares = np.square(error).sum(axis=1)
+        sums.add_mean(key, true.rows.frame[i], squares, float(squares[np.isfinite(squares)].sum()))
+    parts = gospa_parts(point_pairs(true.rows, est.rows, true_pos, est_pos, reach), reach)
+    for name, values, total in zip(PARTS, parts.T, parts.sum(axis=0).tolist(), strict=True):
+        sums.add(name, np.arange(len(parts)), values, total)
+    sums.add("frames", np.flatnonzero(sides.inside))
+
+    def score(weights: Array) -> dict[str, Array]:
+        s = sums.of(weights)
+        return {key: np.sqrt(mean(s, key)) for key in ("RMSE_pos", "RMSE_vel")} | gospa_of(s)
+
+    return score
 
 
 def compared_positions(
@@ -39,23 +69,27 @@ def compared_positions(
     return (true_pos, est_pos, true.vel, est.vel) if surface == "ground" else (true_pos, est_pos, None, None)
 
 
-def people_errors(
-    mapping: Ints, true_pos: Array, est_pos: Array, true_vel: Array | None = None, est_vel: Array | None = None
-) -> dict[str, float]:
-    """Returns RMSE_pos and RMSE_vel of mapped people by key; mapping (S,): true row of each estimated one, -1 none."""
-    j = np.flatnonzero(mapping >= 0)
-    i = mapping[j]
-    found = {"RMSE_pos": root_mean_square(est_pos[j] - true_pos[i]), "RMSE_vel": float("nan")}
-    if true_vel is not None and est_vel is not None:
-        found["RMSE_vel"] = root_mean_square(est_vel[j] - true_vel[i])
-    return found
+def gospa_of(sums: Mapping[str, Array], power: float = POWER) -> dict[str, Array]:
+    """Returns GOSPA and its parts by key: roots of means of d^p and of its parts over the frames; nan without frames.
+
+    sums: (D,) each, of `PARTS` and "frames".
+    """
+    means = {f"GOSPA_{name}": ratio(sums[name], sums["frames"]) for name in PARTS}
+    means = {"GOSPA": means["GOSPA_localisation"] + means["GOSPA_missed"] + means["GOSPA_false"], **means}
+    # float by float: numpy takes another root of arrays, which differs in the last bit
+    return {key: np.array([v ** (1 / power) for v in values.tolist()]) for key, values in means.items()}
 
 
-def root_mean_square(errors: Array) -> float:
-    """Returns the root of the mean of |e|^2 over the finite rows e of errors (K, D), nan without any."""
-    squares = np.square(errors).sum(axis=1)
-    squares = squares[np.isfinite(squares)]
-    return float(np.sqrt(squares.mean())) if len(squares) else float("nan")
+def gospa_parts(pairs: Pairs, cutoff: float, power: float = POWER) -> Array:
+    """Returns localisation, missed and false parts of d^p for each frame number 0 … last, (last + 1, 3)."""
+    end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=-1)
+    cost = (cutoff * (1 - pairs.s)) ** power
+    frame = pairs.frame
+    chosen = match(frame, pairs.i, pairs.j, cutoff**power - cost)
+    n, m, hits = (np.bincount(f, minlength=end) for f in (pairs.true.frame, pairs.est.frame, frame[chosen]))
+    near = np.bincount(frame[chosen], weights=cost[chosen], minlength=end)
+    half = cutoff**power / 2
+    return np.column_stack([near, half * (n - hits), half * (m - hits)])
 
 
 def gaussian_wasserstein(pos: Array, extent: Array, other_pos: Array, other_extent: Array) -> Array:

@@ -35,10 +35,10 @@ from tracking.scoring.group_scores import (
     sizes,
     switch_frames,
 )
+from tracking.scoring.hota import weighted_hota
 from tracking.scoring.pairwise_membership import pair_counts
 from tracking.scoring.people_and_groups import GroupRows, TrueGroups
 from tracking.scoring.position_errors import gaussian_wasserstein
-from tracking.scoring.weighted_people_scores import weighted_hota
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, mean_of_known, ratio
 
 
