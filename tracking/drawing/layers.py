@@ -18,7 +18,6 @@ from sim.geometry.polygons import convex_hull
 from sim.io.store.track_files import upright_boxes
 from sim.io.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
-from tracking.drawing.covariance_ellipse import SIGMA_95, SIGMA_99, UNIT_CIRCLE, ellipse
 
 BOX_MARGIN = 5.0
 """px between members' boxes and the outline of their group."""
@@ -29,6 +28,13 @@ HIDDEN = 0.2
 NOT_CAPTIONED = ("enter", "leave")
 """Kinds of events without a caption."""
 
+SIGMA_95 = math.sqrt(5.991)
+"""Standard deviations: the ellipse at this distance holds 95 % of a normal distribution in the plane."""
+
+SIGMA_99 = math.sqrt(9.21)
+"""The same for 99 %: the points d from a group's centre with d' E^-1 d = 9.21 for its extent E."""
+
+UNIT_CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f in (np.cos, np.sin)], axis=1)
 NO_POINTS = np.zeros((0, 2))
 
 
@@ -225,3 +231,12 @@ def _ellipses(t: Tracks, to_drawing: Callable[[Array], Array]) -> Array:
         if len(points):
             found[k] = points
     return found
+
+
+def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
+    """Returns 32 points (32, 2) of the ellipse at `sigmas` standard deviations round `centre`, none if `cov` is not
+    finite."""
+    if not np.isfinite(cov).all():
+        return np.zeros((0, 2))
+    values, vectors = np.linalg.eigh(cov)
+    return np.asarray(centre + sigmas * (UNIT_CIRCLE * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)

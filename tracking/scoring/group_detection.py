@@ -1,4 +1,7 @@
-"""Group detection as papers measure it: G-MITRE, and the groups that are right up to a tolerance T.
+"""Who is in one group: pairwise membership, G-MITRE, and the groups that are right up to a tolerance T.
+
+Pairwise membership: F1 over pairs of people who are in one group, independent of ids and shapes. Estimated pairs are
+pairs of tracked people, mapped to true people; a pair is right if the two are in one true group.
 
 G-MITRE: Solera, Calderara & Cucchiara (2016), "Socially Constrained Structural Learning for Groups Detection in Crowd",
 IEEE TPAMI 38(5). It is the MITRE score of Vilain et al. (1995), "A Model-Theoretic Coreference Scoring Scheme", after
@@ -19,9 +22,11 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Ints
+from tracking.scoring.candidate_pairs import compare
 from tracking.scoring.group_and_event_scores import ComparedSides, TrackedGroups
 from tracking.scoring.group_scores import SharedMembers, group_of_person
 from tracking.scoring.people_and_groups import GroupRows, PersonRows
+from tracking.scoring.rows import FrameRows
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, ratio
 
 TOLERANCES = {"right_groups": (2, 3), "exact_groups": (1, 1)}
@@ -87,3 +92,35 @@ def _means_over_frames(name: str, frames: Bools, counts: Array, f1_of_means: boo
         return found
 
     return score
+
+
+def pair_counts(true: GroupRows, est: GroupRows, person: Ints) -> Ints:
+    """Returns how many pairs of people are in one group in each frame, (last + 1, 3): true, estimated, right pairs.
+
+    person (K,): row of the true person of each membership of `est`, -1 none. An estimated pair is right if both are in
+    one true group; a pair inside several estimated groups counts once.
+    """
+    group = group_of_person(true, int(max(true.member.max(initial=-1), person.max(initial=-1))) + 1)
+    order = np.argsort(est.of, kind="stable")
+    mapped = person[order]
+    inside = FrameRows(est.of[order], order)  # the group takes the place of the frame
+
+    def ordered(a: Ints, b: Ints) -> tuple[Ints, Array]:
+        kept = np.flatnonzero((mapped[a] >= 0) & (mapped[a] < mapped[b]))
+        return kept, np.ones(len(kept))
+
+    both = compare(inside, inside, ordered)
+    frame = est.rows.frame[est.of[order][both.i]]
+    pairs = np.stack([mapped[both.i], mapped[both.j]])
+    (p, q), first = np.unique(pairs, axis=1, return_index=True)  # hulls may overlap: a pair inside two of them is one
+    size = 1 + int(max(true.rows.frame.max(initial=-1), est.rows.frame.max(initial=-1)))
+    distinct = np.bincount(frame[first], minlength=size)
+    repeated = np.bincount(frame, minlength=size) - distinct
+    right = np.bincount(frame[first][(group[p] >= 0) & (group[p] == group[q])], minlength=size)
+    return np.column_stack([_pairs_in(true, size), _pairs_in(est, size) - repeated, right])
+
+
+def _pairs_in(groups: GroupRows, size: int) -> Ints:
+    pairs = np.zeros(size, np.int64)
+    np.add.at(pairs, groups.rows.frame, groups.count * (groups.count - 1) // 2)
+    return pairs

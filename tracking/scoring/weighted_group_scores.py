@@ -1,7 +1,7 @@
 """Scores of groups, pairwise membership, events and lineage, from their matchings, under weights of the frames.
 
 `evaluate` gives every frame the weight 1, intervals by resampling give it others. A score whose denominator is 0 is
-nan. `group_scores.py`, `pairwise_membership.py`, `group_detection.py` and `events.py` match both sides and count.
+nan. `group_scores.py`, `group_detection.py` and `events.py` match both sides and count.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tracking.scoring.group_and_event_scores import (
     tracked_groups,
     unknown_kinds,
 )
-from tracking.scoring.group_detection import weighted_detection
+from tracking.scoring.group_detection import pair_counts, weighted_detection
 from tracking.scoring.group_scores import (
     GroupComparison,
     GroupMatch,
@@ -36,7 +36,6 @@ from tracking.scoring.group_scores import (
     switch_frames,
 )
 from tracking.scoring.hota import weighted_hota
-from tracking.scoring.pairwise_membership import pair_counts
 from tracking.scoring.people_and_groups import GroupRows, TrueGroups
 from tracking.scoring.position_errors import gaussian_wasserstein
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, mean_of_known, ratio
