@@ -72,7 +72,7 @@ def _slot(table: Ints, place: Ints, first: Ints, x: int, y: int) -> int:
 
 
 @njit(cache=True)
-def insert(
+def add_point(
     k: int, points: Array, weight: float, link: float, cell: Ints, around: Ints,
     parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, work: Ints,
 ) -> None:  # fmt: skip
@@ -146,7 +146,7 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
     head, after, box = unset(len(around)), unset(m), np.empty((len(around), 4))
     work = np.zeros(2, np.int64)
     for k in range(m):
-        insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
+        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
     for k in range(m):
         top = find_root(parent, k)
         if top == k:
@@ -176,7 +176,7 @@ def prefixes(
     heavy, count, moments, shape = np.empty(m, np.int64), 0, np.empty((m, 6)), np.empty((m, 5))
     apart = False  # True if no two of the regions overlap
     for k in range(m):
-        insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
+        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
         if k + 1 < start:
             continue
         top, now = find_root(parent, k), k + 1 - start

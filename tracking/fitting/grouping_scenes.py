@@ -60,7 +60,7 @@ def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScen
                 truth = simulated(entry, seed)
                 begin = BEGINS[seed % len(BEGINS)] if truth.length / truth.fps >= LEAST + max(BEGINS) else 0.0
                 for rough in (False, True):
-                    found = rows_of(name, walkers(truth, seed, entry.repeat, rough=rough, begin=begin))
+                    found = pair_scene(name, walkers(truth, seed, entry.repeat, rough=rough, begin=begin))
                     if len(found.pair):
                         yield found
 
@@ -90,7 +90,7 @@ def walkers(truth: Truth, seed: int, repeat: int, *, rough: bool, begin: float =
     return Walkers(frame[kept] // every, column[kept], erring.pos[kept], labels, truth.fps / every)
 
 
-def rows_of(name: str, people: Walkers) -> PairScene:
+def pair_scene(name: str, people: Walkers) -> PairScene:
     """Returns the rows of pairs of people, with the truth of each."""
     size = frames_per_step(people.fps)
     length, count = people.labels.shape

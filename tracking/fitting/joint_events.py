@@ -66,10 +66,10 @@ def event_rows(truth: Truth, lag: float, seed: int, *, wrong: bool = True) -> Ev
         _, i, j = np.intersect1d(truth.id[a], truth.id[b], return_indices=True)
         i, j = i + a.start, j + b.start
         states = [_erring(np.concatenate([truth.pos[r], truth.vel[r]], axis=1), draws) for r in (i, j)]
-        found.append(rows_of(states[0], states[1], truth.group[i], truth.group[j]))
+        found.append(partition_rows(states[0], states[1], truth.group[i], truth.group[j]))
         if wrong and (early - 1) // stride % WRONG == 0 and len(i) > 1:
             copy = wrong_partition(truth.group[i], states[0], draws)
-            found.append(rows_of(states[0], states[1], copy, truth.group[j]))
+            found.append(partition_rows(states[0], states[1], copy, truth.group[j]))
     parts = EventRows.joined(found)
     return EventRows(parts.features, parts.event, parts.possible, truth.length / truth.fps)
 
@@ -100,7 +100,7 @@ def _erring(state: Array, draws: np.random.Generator) -> Array:
     return np.asarray(state + spread * draws.standard_normal(state.shape))
 
 
-def rows_of(early: Array, late: Array, before: Ints, after: Ints) -> EventRows:
+def partition_rows(early: Array, late: Array, before: Ints, after: Ints) -> EventRows:
     """Returns the rows of one partition; early, late (K, 4): states; before, after (K,): groups, -1 for alone."""
     people = len(before)
     label = before + 1

@@ -16,7 +16,7 @@ from tracking.grouping.link_rule import Links
 from tracking.grouping.pair_evidence import frames_per_step, step_positions
 
 
-def partition(
+def groups_of_steps(
     step: Ints, a: Ints, b: Ints, log_odds: Array, unseen: float, stay: float = 0.0, come: float = 0.0
 ) -> tuple[Ints, Ints, Ints]:
     """Returns step, person and group (N,) of all people in groups, sorted by group; people alone are left out.
@@ -50,7 +50,7 @@ def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float,
     step = np.concatenate([found.step, at])
     order = np.argsort(step, kind="stable")
     row, step = row[order], step[order]
-    t, person, group = partition(
+    t, person, group = groups_of_steps(
         step, found.a[row], found.b[row], found.log_odds[row], UNSEEN, belief.stay, belief.come
     )
     i, j = runs(np.arange(len(group)) + 1, np.searchsorted(group, group, side="right"))

@@ -8,7 +8,6 @@ also the truth's merge and split rule come from sim.truth.merge_split_rules.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -113,7 +112,9 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
     within = (distance <= rule.apart) & ~((distance > rule.near) & (differ > rule.diverge))
     found = []
     # in portions, as tables of all frames and pairs would not fit in memory
-    for pairs in _portions(known, max(1, CELLS // max(length, 1))):
+    size = max(1, CELLS // max(length, 1))
+    for low in range(0, len(known), size):
+        pairs = known[low : low + size]
         rows = np.flatnonzero((pair >= pairs[0]) & (pair <= pairs[-1]))
         place = np.searchsorted(pairs, pair[rows])
         kept = pairs[np.minimum(place, len(pairs) - 1)] == pair[rows]
@@ -123,11 +124,6 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
     order = np.lexsort((columns[1], columns[0]))
     t, pair, on = (c[order] for c in columns)
     return Links(t, pair // people, pair % people, on.astype(bool))
-
-
-def _portions(pairs: Ints, size: int) -> Iterator[Ints]:
-    for low in range(0, len(pairs), size):
-        yield pairs[low : low + size]
 
 
 def _switches(

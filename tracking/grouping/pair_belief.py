@@ -19,6 +19,7 @@ from tracking.grouping.pair_evidence import (
     REACH,
     TIMES,
     ExponentialMeans,
+    arrival_gap,
     frames_per_step,
     instant_evidence,
 )
@@ -118,8 +119,7 @@ class PairBelief:
 
     def _judge(self, i: Ints, j: Ints, averaged: Array, distance: Array, came: Array, first: Array) -> None:
         """Sets the log-odds of the pairs i, j (R,); came (K,): step of arrival."""
-        both = np.stack([came[i], came[j]])
-        gap = np.where(both.min(axis=0) > 0, np.abs(both[0] - both[1]) * self.seconds, np.nan)
+        gap = arrival_gap(np.stack([came[i], came[j]]), self.seconds)
         values = np.column_stack([averaged, distance, gap, first])
         self.log_odds[i, j] = self.log_odds[j, i] = default_belief().log_odds(values)
 

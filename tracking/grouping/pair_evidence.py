@@ -110,7 +110,7 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
     came = np.stack([first[column[i]], first[column[j]]])
     late = came.max(axis=0)
     apart = np.hypot(*(pos[late, column[i]] - pos[late, column[j]]).T)
-    gap = np.where(came.min(axis=0) > 0, np.abs(came[0] - came[1]) * seconds, np.nan)
+    gap = arrival_gap(came, seconds)
     apart = np.where(late > 0, apart, np.nan)
     means = ExponentialMeans(count, len(QUANTITIES), seconds)
     for r in _portions(step[i]):
@@ -118,6 +118,11 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
         averaged = means.add(step[i[r]], pair[r], quantities)
         values = np.column_stack([averaged, distance, gap[r], apart[r]])
         yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values)
+
+
+def arrival_gap(came: Array | Ints, seconds: float) -> Array:
+    """Returns the time, s, (R,) between the steps (2, R) in which two were first seen; nan if one was in step 0."""
+    return np.where(came.min(axis=0) > 0, np.abs(came[0] - came[1]) * seconds, np.nan)
 
 
 def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> tuple[Array, Array]:
