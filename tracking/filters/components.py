@@ -12,16 +12,7 @@ Ours: S is shrunk to (N S + n0 S0) / (N + n0), as one or two points have none. N
 covariance with 1/N, S0 a prior covariance and n0 the prior's weight. G_x is repeated until nothing changes, since the
 region of joined components may overlap one that none of them did. Points have weights (the share of a person that a
 pixel is). A component below a least weight is noise.
-
-Two regions overlap by the exact test of Gilitschenski & Hanebeck, "A robust computational test for overlap of two
-arbitrary-dimensional ellipsoids in fault-detection of Kalman filters" (2012); Gennari & Hager do not say how they test.
-
-`prefixes` decides the group constraint for all associations of a group at once. The sets Y_ns (points of the group
-alone) + the first j of the shared points grow by one point each, and G_0 grows with them (4.2.1), with running moments
-of each component. A point is compared with the points of 20 grid cells around it that are not in its component yet.
-While a single component is heavy enough, n points cost O(n). Of more components, only the region of the last point's is
-new; it is compared with the M others if no two of those overlap. Else all regions are sorted along x and joined in
-rounds, which costs each point O(M^1.5) or less on scattered points. The least weight bounds M.
+Gennari & Hager do not say how they test for overlap: see ellipse_overlap_kernels.
 """
 
 from __future__ import annotations

@@ -1,13 +1,7 @@
 """A bank of Kalman filters in arrays: constant velocity in each coordinate, and a random-walk direction.
 
-The model is filterpy's: kinematics of order 1 (`filterpy.common.kinematic_kf`, constant velocity) driven by
-`filterpy.common.Q_discrete_white_noise`, a white acceleration of standard deviation sigma held over a step dt. filterpy
-is imported where a model is made, as its import takes 0.65 s. A bank is equal to as many `filterpy.kalman.KalmanFilter`
-to 1e-9, and faster.
-
 Each of D measured coordinates (for example x, y, h, w) has a filter of its own with state x = (place, rate), A = [[1,
-dt], [0, 1]], C = [1, 0]. As the coordinates are independent, a bank of N filters is one array `state` (5, N, D) with
-rows
+dt], [0, 1]], C = [1, 0] and filterpy's process noise. A bank of N filters is one array `state` (5, N, D) with rows
     PLACE, RATE               the state
     VAR, COV, RATE_VAR        entries 11, 12, 22 of the covariance P
 
@@ -38,6 +32,7 @@ most pi / 2; a uniform distribution has a standard deviation of 52 deg.)"""
 
 def white_acceleration(dt: float, sigma: Array | float) -> Array:
     """Returns entries 11, 12, 22 of the process noise Q of a step, (3, ...) in the shape of `sigma`."""
+    # imported here, as filterpy takes 0.65 s to import; a bank is equal to as many of its filters to 1e-9, and faster
     from filterpy.common import Q_discrete_white_noise
 
     unit = Q_discrete_white_noise(2, dt)

@@ -1,11 +1,9 @@
 """Fill in groups and events of person tracks, for a tracker that reports none or only some of them.
 
 `with_groups` is the entry for runs and scores; `derive` does the work. Both are causal, apart from the last frame:
-- People are linked by the belief or the baseline rule (tracking.grouping.grouping_choice). Linked people form groups
-  with ids (tracking.grouping.group_labels).
-- Merge, split, form, dissolve, enter and leave events follow from changes of the groups
-  (tracking.grouping.merge_split_events).
-- Crossings and queues are measured by sim.truth.crossing_events and sim.truth.queue_detection.
+- People are linked by the belief or the baseline rule (`grouping_choice`). Linked people form groups (`group_labels`).
+- Membership events follow from changes of the groups (`merge_split_events`).
+- Crossings and queues are measured by `sim.truth.crossing_events` and `sim.truth.queue_detection`.
 
 What the tracker reports itself is decided once, so that no later frame changes an earlier one:
 - Groups: by the first frame in which there are people (`names_groups`).

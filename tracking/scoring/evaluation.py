@@ -59,14 +59,18 @@ class MatchedSides:
 
 @dataclass(frozen=True, eq=False)
 class Scores(Mapping[str, float]):
-    """A read-only mapping from key to score (float), with every key of the catalogue in its order; KeyError for others.
+    """A read-only mapping from key to score (float), with every key of the catalogue in its order.
 
-    - by_key: the scores. nan: not labelled, not comparable, or a denominator of 0.
-    - similarity: how people were compared, by "boxes" (IoU) or by positions on the "ground" or in the "image".
-    - surface: where groups were compared, "ground" or "image".
-    - group_match: how groups were matched, by "hull" or by "members".
-    - frames: number of scored frames. length: number of frames of the sequence. step: from one annotated frame to the
-      next, 1 unless the labels are sparse; None if they are not evenly spaced.
+    Printed, it shows one line per score that is not nan.
+
+    Attributes:
+        by_key: the scores. nan: not labelled, not comparable, or a denominator of 0.
+        similarity: how people were compared, by "boxes" (IoU) or by positions on the "ground" or in the "image".
+        surface: where groups were compared, "ground" or "image".
+        group_match: how groups were matched, by "hull" or by "members".
+        frames: number of scored frames.
+        length: number of frames of the sequence.
+        step: frames from one annotated frame to the next, 1 unless the labels are sparse; None if not evenly spaced.
     """
 
     by_key: Mapping[str, float]

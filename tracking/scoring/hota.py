@@ -52,10 +52,13 @@ def hota_matches(pairs: Pairs) -> HotaMatches:
 def hota(pairs: Pairs) -> dict[str, float]:
     """Returns HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA by key, each the mean over `ALPHAS`."""
     matches, bins = hota_matches(pairs), len(ALPHAS) + 1
-    n, m = np.bincount(pairs.true_ids[1])[matches.true_id], np.bincount(pairs.est_ids[1])[matches.est_id]
-    together = np.bincount(matches.link * bins + matches.level, minlength=len(n) * bins).reshape(1, -1, bins)
+    frames_of = (pairs.true_ids[1], matches.true_id), (pairs.est_ids[1], matches.est_id)
+    n, m = (np.bincount(ids).astype(float)[of] for ids, of in frames_of)
+    together = (
+        np.bincount(matches.link * bins + matches.level, minlength=len(n) * bins).astype(float).reshape(1, -1, bins)
+    )
     near = np.bincount(matches.level, weights=matches.s, minlength=bins)[None]
-    rows = np.array([len(pairs.true)]), np.array([len(pairs.est)])
+    rows = np.array([float(len(pairs.true))]), np.array([float(len(pairs.est))])
     return {key: float(value[0]) for key, value in _scores(_reached(together), _reached(near), n, m, *rows).items()}
 
 
