@@ -234,8 +234,7 @@ def _ellipses(t: Tracks, to_drawing: Callable[[Array], Array]) -> Array:
 
 
 def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
-    """Returns 32 points (32, 2) of the ellipse at `sigmas` standard deviations round `centre`, none if `cov` is not
-    finite."""
+    """Returns points (32, 2) of the ellipse at `sigmas` deviations round `centre`, none if `cov` is not finite."""
     if not np.isfinite(cov).all():
         return np.zeros((0, 2))
     values, vectors = np.linalg.eigh(cov)

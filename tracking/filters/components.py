@@ -44,8 +44,7 @@ class Constraint:
 
 
 def linked(points: Array, link: float) -> Ints:
-    """Returns the component of each point (M,), numbered in order of first points: at most `link` apart, also through
-    others."""
+    """Returns the component of each point (M,), by first points: at most `link` apart, also through others."""
     return kernels.components(points, np.ones(len(points)), link)[0]
 
 

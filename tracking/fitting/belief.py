@@ -29,8 +29,7 @@ STEPS = 200
 
 @dataclass(frozen=True)
 class PairSample:
-    """Rows of scenes, one after the other: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all
-    scenes."""
+    """Rows of scenes: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all scenes."""
 
     values: np.ndarray
     together: Bools

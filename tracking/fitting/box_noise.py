@@ -31,8 +31,7 @@ FEW = 20  # with fewer half hidden rows, boxes are taken as amodal and errors as
 
 @dataclass(frozen=True)
 class ErrorSpread:
-    """A model of the four errors of a detected box: mean + sd (1 + occluded (1 - visibility)) n, n random with variance
-    1."""
+    """A model of the errors of a box: mean + sd (1 + occluded (1 - visibility)) n, n random of variance 1."""
 
     # (4,): mean error of middle, foot, top (box heights) and logarithm of the width, the same at any visibility
     mean: Array

@@ -31,8 +31,7 @@ IGNORED = 0.5  # least overlap of an unmatched detection with an unscored box fo
 
 @dataclass(frozen=True)
 class MatchedRecording:
-    """A recording with R labelled rows (people in frames) and M detections, both sorted by frame, matched to each
-    other."""
+    """A recording with R labelled rows and M detections, both sorted by frame, matched to each other."""
 
     truth: Truth  # the labels, with boxes and visibilities (visible shares, 0 to 1)
     size: tuple[int, int]  # image width and height in px

@@ -108,8 +108,7 @@ class Belief:
 
 
 def situations(values: Array) -> Array:
-    """Returns how far each of `SITUATIONS` holds for rows of quantities, (R, 4), of sum 1; unknown speed counts as
-    walking."""
+    """Returns how far each of `SITUATIONS` holds for rows of quantities, (R, 4); unknown speed is walking."""
     speed, others = values[:, SPEED], values[:, OTHERS]
     stand = np.where(np.isnan(speed), 0.0, np.clip((WALKS - speed) / (WALKS - STANDS), 0.0, 1.0))
     many = np.clip((others - FEW) / (MANY - FEW), 0.0, 1.0)

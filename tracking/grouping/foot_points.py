@@ -48,8 +48,7 @@ def completed(
     scene: Scene | None,
     pixels: bool,
 ) -> tuple[Tracks, ...]:
-    """Returns the tracks of a sequence with groups and events, as `with_groups`, or from where boxes stand on the
-    ground."""
+    """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground."""
     if camera is None or not can_stand(tracks, camera, pixels) or all(t.derived for t in tracks):
         return with_groups(tracks, fps, px_per_m, rule)
     grouped = with_groups([standing(t, camera, scene) for t in tracks], fps, 1.0, rule)

@@ -192,8 +192,7 @@ class ExponentialMeans:
         self.weight, self.last = np.zeros_like(self.total), np.zeros(pairs, np.int64)
 
     def add(self, step: Ints, pair: Ints, values: Array) -> Array:
-        """Adds rows, by ascending step, a pair once in a step, and returns their means (R, V * T), times varying
-        fastest."""
+        """Adds rows, steps ascending, and returns the means of their pairs (R, V * T), times varying fastest."""
         from tracking.grouping.pair_evidence_kernels import add_to_means
 
         out = np.empty((*values.shape, len(self.times)))

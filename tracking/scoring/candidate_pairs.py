@@ -125,8 +125,7 @@ def _portions(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
 
 
 def _near(a: FrameRows, b: FrameRows, low: Array, high: Array, at: Array) -> Iterator[tuple[Ints, Ints]]:
-    """Yields row indices i of a and j of b of equal frame with low[i] <= at[j] <= high[i], and a few outside the
-    limits."""
+    """Yields row indices i of a and j of b of equal frame with low[i] <= at[j] <= high[i], and a few others."""
     finite = at[np.isfinite(at)]
     least, most = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     slack = SLACK * (most - least + 1)

@@ -21,8 +21,7 @@ LAGS = 5  # frames
 
 
 def normalised(errors: Array, covariances: Array) -> Array:
-    """Returns L^-1 e (K, n) of errors e (K, n) with covariances (K, n, n) = L L': uncorrelated, variance 1 if
-    consistent."""
+    """Returns L^-1 e (K, n) of errors e (K, n) with covariances (K, n, n) = L L': white if consistent."""
     return np.asarray(np.linalg.solve(np.linalg.cholesky(covariances), errors[..., None])[..., 0])
 
 
@@ -45,8 +44,7 @@ def mean_band(runs: int, dims: int, level: float = LEVEL) -> tuple[float, float]
 
 
 def whiteness(innovations: Array, lags: int = LAGS) -> Array:
-    """Returns the autocorrelation (lags,) of one track's normalised innovations (T, n) at lags 1, 2, …; nan if
-    undefined."""
+    """Returns the autocorrelation (lags,) of one track's normalised innovations (T, n) at lags 1, 2, …"""
     found = np.full(lags, np.nan)
     for lag in range(1, min(lags, len(innovations) - 1) + 1):
         a, b = innovations[:-lag], innovations[lag:]

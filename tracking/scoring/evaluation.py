@@ -196,8 +196,7 @@ class Scorer:
     def compare(
         self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None, frames: int | range | None
     ) -> list[MatchedSides]:
-        """Returns this truth and the tracks of each run with people mapped, ready to be counted; arguments as
-        `evaluate`."""
+        """Returns this truth and the tracks of each run with people mapped; arguments as of `evaluate`."""
         inside = self.scored(frames)
         ordered = [_in_order(run, inside) for run in runs]
         moved, chosen = in_one_plane(self.truth, ordered, [from_pixels(run) for run in runs], similarity)

@@ -46,8 +46,7 @@ class SharedMembers:
 
 
 def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -> SharedMembers:
-    """Returns the numbers of common members of all groups; person (K,): true person of each estimated membership, -1
-    none."""
+    """Returns the numbers of common members; person (K,): true person of each estimated membership, -1 none."""
     i = group_of_person(true, people)[person]  # -1 selects the last element, which is -1
     known = i >= 0
     key, count = np.unique(i[known] * len(est) + est.of[known], return_counts=True)
@@ -58,7 +57,7 @@ def groups_found(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Bool
     """Returns which true groups are found, (G,): the Jaccard index with some estimated group is above 1/2."""
     i, j = np.divmod(shared.key, max(shared.width, 1))
     found = np.zeros(len(true), bool)
-    # Above 1/2 no matching is needed: two true groups share nobody, so that one of them has most of an estimated group.
+    # Above 1/2 no matching is needed: two true groups share nobody, so that at most one has most of an estimated group.
     # At 1/2 a pair would be found in a group of twice its size, and one group of everybody would be right wherever two
     # pairs walk. Integers avoid rounding.
     found[i[3 * shared.count > true.count[i] + est.count[j]]] = True
@@ -105,8 +104,7 @@ def member_pairs(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Pair
 
 
 def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float = 0.0) -> Pairs:
-    """Returns the one-to-one matching of each frame with the greatest total similarity, by centres (G, 2), (H, 2) if
-    equal."""
+    """Returns the one-to-one matching of each frame with the greatest total similarity, then nearest centres."""
     near = pairs.keep(pairs.s >= least - EPS)
     apart = np.hypot(*(true_pos[near.i] - est_pos[near.j]).T)
     closeness = np.nan_to_num(1 / (1 + apart), nan=0.0)

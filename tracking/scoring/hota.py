@@ -118,8 +118,7 @@ def _scores(together: Array, near: Array, n: Array, m: Array, true: Array, est: 
 
 
 def alignment(pairs: Pairs, frames: Ints) -> Array:
-    """Returns the alignment A in [0, 1] of each of U links (U,); frames (U,): rows of the true id plus those of the
-    other."""
+    """Returns the alignment A in [0, 1] of each of U links (U,); frames (U,): rows of its two ids together."""
     i, j, s = pairs.i, pairs.j, pairs.s
     of_i = np.bincount(i, weights=s, minlength=len(pairs.true))
     of_j = np.bincount(j, weights=s, minlength=len(pairs.est))

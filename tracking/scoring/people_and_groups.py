@@ -137,8 +137,7 @@ class TrueGroups:
 
 
 def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surface) -> TrueGroups:
-    """Returns the truth's groups of two or more members in labelled frames; with nan centres if only the other surface
-    has them."""
+    """Returns the truth's groups of two or more; centres are nan if only the other surface has groups."""
     wanted, other = truth.groups, truth.groups_px
     if surface == "image":
         wanted, other = other, wanted

@@ -94,8 +94,7 @@ class RowLookup:
         return self.row[at] if at < high and self.frame[at] - frame <= reach else -1
 
     def nearest(self, id: int, frame: int, reach: int) -> int:
-        """Returns the id's row nearest to `frame`, at most `reach` frames away, the earlier of two; -1 if there is
-        none."""
+        """Returns the id's row nearest to `frame`, at most `reach` away, of two the earlier; -1 if there is none."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)
         if at > low and (at == high or frame - self.frame[at - 1] <= self.frame[at] - frame):
