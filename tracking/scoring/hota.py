@@ -57,7 +57,7 @@ def hota(pairs: Pairs) -> dict[str, float]:
     together = (
         np.bincount(matches.link * bins + matches.level, minlength=len(n) * bins).astype(float).reshape(1, -1, bins)
     )
-    near = np.bincount(matches.level, weights=matches.s, minlength=bins)[None]
+    near: Array = np.bincount(matches.level, weights=matches.s, minlength=bins).astype(float)[None]
     rows = np.array([float(len(pairs.true))]), np.array([float(len(pairs.est))])
     return {key: float(value[0]) for key, value in _scores(_reached(together), _reached(near), n, m, *rows).items()}
 
