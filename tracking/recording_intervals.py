@@ -14,8 +14,7 @@ import numpy as np
 from sim.types import Array, Ints, Truth
 from tracking.ranking import Ranking, ordered
 from tracking.scoring.annotated_frames import annotated_frames
-from tracking.scoring.catalogue import ALL, CATALOGUE
-from tracking.scoring.catalogue_entries import Score
+from tracking.scoring.catalogue import ALL, CATALOGUE, Score
 from tracking.scoring.rows import numbered
 from tracking.stats import DRAWS, LEVEL, Scale, block_intervals, joint_level
 

@@ -15,7 +15,7 @@ from sim.sequence import simulate
 from sim.types import Sequence, Tracks
 from tracking.grouping.grouped_tracks import with_groups, with_velocities
 from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.velocity_check import velocity_error, velocity_warning
+from tracking.grouping.plausibility import velocity_error, velocity_warning
 from tracking.running.run import grouped, track
 from tracking.scoring import evaluate
 

@@ -33,11 +33,7 @@ Colour = tuple[int, int, int]
 
 
 def colour(identity: int) -> Colour:
-    """Returns the BGR colour (blue, green, red, 0 to 255) of an id: one of ten, by the id modulo 10; grey for a
-    negative id.
-
-    It is the same as on the replay page. identity: of a person or group.
-    """
+    """Returns the BGR colour of an id, the same as on the replay page; grey for a negative id."""
     if identity < 0:
         return THING
     text = PALETTE[identity % len(PALETTE)]
@@ -46,27 +42,18 @@ def colour(identity: int) -> Colour:
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """A picture with a mapping from drawing coordinates to its pixels.
+    """A picture with a mapping from drawing coordinates to its pixels."""
 
-    image: (H, W, 3) uint8 BGR, drawn on in place. scale: px per drawing unit (m on a plan, px over a picture). low,
-    high: (2,) drawing coordinates, x and y, of the image's edges: the smallest and the largest. upwards: True if y
-    grows upwards, as on a plan; else downwards, as in a picture.
-    """
-
-    image: Image
-    scale: float
+    image: Image  # (H, W, 3) uint8 BGR, drawn on in place
+    scale: float  # px per drawing unit: m on a plan, px over a picture
+    # low, high (2,): drawing coordinates, x and y, of the image's edges: the smallest and the largest
     low: Array
     high: Array
-    upwards: bool
+    upwards: bool  # True if y grows upwards, as on a plan; else downwards, as in a picture
 
     @classmethod
     def fit(cls, image: Image, low: Array, high: Array, upwards: bool) -> Canvas:
-        """Returns a canvas that draws on `image` and shows a rectangle, centred, at the largest scale at which it fits.
-
-        image: (H, W, 3) uint8 BGR. low, high: (2,) the rectangle's smallest and largest x and y in drawing coordinates
-        (m on a plan, px over a picture); both sides must be longer than 0. upwards: True if y grows upwards. The
-        canvas's own low and high reach beyond the rectangle where the image has spare room.
-        """
+        """Returns a canvas that shows the rectangle low … high (2,), centred, as large as it fits on the image."""
         height, width = image.shape[:2]
         span = high - low
         scale = min(width / span[0], height / span[1])
@@ -74,40 +61,22 @@ class Canvas:
         return cls(image, float(scale), low - spare, high + spare, upwards)
 
     def map(self, points: Array) -> Array:
-        """Returns pixel coordinates (N, 2), x and y from the image's upper left corner, of points in drawing
-        coordinates.
-
-        points: (N, 2) x, y, or one point (2,); drawing units are m on a plan, px over a picture. nan stays nan; points
-        outside the image are not clipped.
-        """
+        """Returns pixel coordinates (N, 2) of points in drawing coordinates, (N, 2) or (2,); nan stays nan."""
         points = np.asarray(points, float).reshape(-1, 2)
         y = self.high[1] - points[:, 1] if self.upwards else points[:, 1] - self.low[1]
         return np.stack([points[:, 0] - self.low[0], y], axis=1) * self.scale
 
     def line(self, points: Array, ink: Colour, width: int, closed: bool = False) -> None:
-        """Draws a polyline in place. points: (N, 2) in drawing coordinates (m on a plan, px over a picture); ink: BGR;
-        width: px.
-
-        closed: join the last point to the first. Points must not be nan; N at least 1. Parts outside the image are left
-        out.
-        """
+        """Draws a polyline through points (N, 2), not nan, in place; width: px."""
         cv2.polylines(self.image, [fixed_point(self.map(points))], closed, ink, width, cv2.LINE_AA, SHIFT)
 
     def disc(self, at: Array, radius: float, ink: Colour, width: int = -1) -> None:
-        """Draws a disc, or with `width` > 0 a ring, in place.
-
-        at: (2,) its centre in drawing coordinates (m on a plan, px over a picture), not nan. radius: px. ink: BGR.
-        width: of the ring's line in px; -1 (default): a filled disc.
-        """
+        """Draws a disc round a point (2,), or with `width` > 0 a ring, in place; radius, width: px."""
         x, y = fixed_point(self.map(at))[0]
         cv2.circle(self.image, (int(x), int(y)), round(radius * 2**SHIFT), ink, width, cv2.LINE_AA, SHIFT)
 
     def arrow(self, ends: Array, ink: Colour, width: int) -> None:
-        """Draws an arrow in place. ends: (2, 2), start and tip in drawing coordinates (m on a plan, px over a picture),
-        not nan.
-
-        ink: BGR. width: of its line in px. The head is 7 px long, or half the arrow if that is less.
-        """
+        """Draws an arrow in place; ends (2, 2): start and tip."""
         a, b = self.map(ends)
         far = float(np.hypot(*(b - a)))
         tip = min(7.0, far / 2) / far if far > 0 else 0.0
@@ -115,11 +84,8 @@ class Canvas:
         cv2.arrowedLine(self.image, start, end, ink, width, cv2.LINE_AA, SHIFT, tip)
 
     def fill(self, polygon: Array, ink: Colour, opacity: float) -> None:
-        """Fills a polygon in place. polygon: (V, 2) x, y in pixel coordinates of the image, not in drawing coordinates;
-        V >= 1.
-
-        ink: BGR. opacity: 0 (invisible) to 1. What lies outside the image is not drawn. nan is not allowed.
-        """
+        """Fills a polygon (V, 2), in pixel coordinates, in place."""
+        # blend the polygon's own rectangle only, not the whole image
         low = np.maximum(np.floor(polygon.min(axis=0)).astype(int) - 1, 0)
         high = np.ceil(polygon.max(axis=0)).astype(int) + 2
         patch = self.image[low[1] : high[1], low[0] : high[0]]
@@ -131,45 +97,32 @@ class Canvas:
 
 
 def fixed_point(points: Array) -> np.ndarray:
-    """Returns pixel coordinates (N, 2) as int32 with 4 fractional bits (16 = 1 px), as cv2's drawing functions take
-    them.
-
-    points: px from the image's corner. 0.5 px are subtracted, because cv2's whole coordinates are pixel centres. The
-    result is limited to ±30,000 px. nan is not allowed.
-    """
+    """Returns pixel coordinates (N, 2) as int32 with 4 fractional bits, as cv2's drawing functions take them."""
+    # cv2's whole coordinates are pixel centres
     limited = np.clip(points - 0.5, -30_000, 30_000)
     return np.asarray(np.rint(limited * 2**SHIFT), np.int32)
 
 
 def box_corners(box: Array) -> Array:
-    """The corners (4, 2), x and y, of a box (4,): left, top, width, height; results are in its unit.
-
-    Order: upper left, upper right, lower right, lower left, where y grows downwards.
-    """
+    """Returns the corners (4, 2) of a box (4,), clockwise from the upper left one where y grows downwards."""
     x, y, w, h = box
     return np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
 
 
 def ascii_only(words: str) -> str:
-    """The text with a question mark for each character outside ASCII.
-
-    cv2 cannot draw such a character, and a lone surrogate ends the process.
-    """
+    """Returns the text with a question mark for each character outside ASCII."""
+    # cv2 cannot draw such a character, and a lone surrogate ends the process
     return words.encode("ascii", "replace").decode()
 
 
 def text_width(words: str, size: float, bold: int = 1) -> int:
-    """The width in px of words that `text` draws with this font scale and these strokes."""
+    """Returns the width in px of words that `text` draws with this font scale and these strokes."""
     (width, _), _ = cv2.getTextSize(ascii_only(words), cv2.FONT_HERSHEY_SIMPLEX, size, bold)
     return int(width)
 
 
 def text(image: Image, words: str, at: tuple[float, float], size: float, ink: Colour = INK, bold: int = 1) -> None:
-    """Writes words with a light rim into `image` in place.
-
-    at: lower left corner of the first letter, x and y in px. size: cv2's font scale. ink: BGR, dark by default. bold:
-    width of the strokes in px. Characters outside ASCII become question marks.
-    """
+    """Writes words with a light rim in place; at: lower left corner of the first letter, px; size: cv2's font scale."""
     place = (round(at[0]), round(at[1]))
     words = ascii_only(words)
     cv2.putText(image, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, FLOOR, bold + 4, cv2.LINE_AA)

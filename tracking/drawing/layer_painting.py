@@ -39,28 +39,21 @@ KIND_COLOUR = {"merge": 0, "split": 1, "cross": 3, "queue": 2, "form": 4, "disso
 
 @dataclass(frozen=True)
 class LayerStyle:
-    """How a layer is drawn.
+    """How a layer is drawn."""
 
-    plain: thin white boxes (and rings for people without a box) only, no trails, ellipses, ids or groups; for the truth
-    under tracks. rim: boxes have a light edge; without effect on plain and dashed boxes.
-    """
-
+    # thin white boxes (and rings for people without a box) only, no trails, ellipses, ids or groups; for the truth
+    # under tracks
     plain: bool = False
-    rim: bool = True
+    rim: bool = True  # boxes have a light edge; without effect on plain and dashed boxes
 
 
 def kind_colour(kind: str) -> Colour:
-    """Returns the BGR colour of a kind of event, as "merge" or "split"; red for an unknown kind."""
+    """Returns the BGR colour of a kind of event; red for an unknown kind."""
     return colour(KIND_COLOUR.get(kind, ALARM))
 
 
 def event_words(event: GroupEvent, prefix: str = "G") -> str:
-    """Returns an event of groups in words, as "merge G1+G2 -> G1": its kind, the group ids before it and after it.
-
-    If the ids are the same before and after, they stand once and without arrow. prefix: written before each group id,
-    "G" by default. Negative ids are people who are alone; they are only counted, in front: "alone", "2 alone". A side
-    without ids is empty text.
-    """
+    """Returns an event in words, as "merge G1+G2 -> G1"; people alone (negative ids) are only counted."""
 
     def listed(ids: tuple[int, ...]) -> str:
         alone = sum(i < 0 for i in ids)
@@ -73,13 +66,7 @@ def event_words(event: GroupEvent, prefix: str = "G") -> str:
 
 
 def paint_layer(canvas: Canvas, layer: Layer, index: int, fps: float, style: LayerStyle = LayerStyle()) -> None:
-    """Draws one frame of a layer (truth or one tracker's output) on a canvas, in place.
-
-    index: frame number, counted from 1; a frame without marks draws nothing. fps: frames per second; trails reach back
-    3 s. Order: groups, trails, ellipses and boxes (a ring for people without a box; dashed boxes for hidden people),
-    ids of people, ids of groups. With more than 60 people their ids are left out; only the first 60 groups are named.
-    style.plain: only thin white boxes and rings. Unknown (nan) boxes, points and ellipses are skipped.
-    """
+    """Draws frame `index` (from 1) of a layer on a canvas, in place; unknown (nan) marks are skipped."""
     marks = layer.at(index)
     groups = () if style.plain else marks.groups
     for group in groups:
@@ -102,11 +89,6 @@ def paint_layer(canvas: Canvas, layer: Layer, index: int, fps: float, style: Lay
 
 
 def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
-    """Draws one group in place: its hull (outline polygon) filled, its extent dotted, an arrow from its centre to where
-    it is in 1 s.
-
-    ink: BGR. The points must not be nan. Whichever of the three has no points is left out; so is an arrow without tip.
-    """
     if len(group.hull):
         canvas.fill(canvas.map(group.hull), ink, 0.18)
         canvas.line(group.hull, ink, 2, closed=True)
@@ -118,11 +100,7 @@ def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
 
 
 def _paint_dots(canvas: Canvas, ring: Array, ink: Colour) -> None:
-    """Draws a closed line of dots some 7 px apart, at least 8, each with a light rim, in place.
-
-    ring: (V, 2) in drawing coordinates, V >= 1. ink: BGR. Nothing is drawn if the ring is as wide or high as the image,
-    or more.
-    """
+    # a ring as large as the image says that the place is as good as unknown
     ends = np.concatenate([ring, ring[:1]])
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(ends, axis=0).T))]
     if not _fits(canvas, ring):
@@ -135,10 +113,6 @@ def _paint_dots(canvas: Canvas, ring: Array, ink: Colour) -> None:
 
 
 def _fits(canvas: Canvas, ring: Array) -> bool:
-    """True if the points `ring` (V, 2), V >= 1, in drawing coordinates span less than the image in both directions.
-
-    They may lie outside the image. False if a point is nan.
-    """
     return bool((np.ptp(ring, axis=0) * canvas.scale < canvas.image.shape[1::-1]).all())
 
 
@@ -154,8 +128,6 @@ def _paint_box(canvas: Canvas, box: Array, ink: Colour, style: LayerStyle, dashe
 
 
 def _paint_dashes(canvas: Canvas, a: Array, b: Array, ink: Colour) -> None:
-    """Draws a line of dashes, about 4 px long and 4 px apart, from a to b, (2,) each in drawing coordinates, in place.
-    ink: BGR."""
     count = max(int(np.hypot(*(b - a)) * canvas.scale / 8), 1)
     for k in range(count):
         ends = a + (b - a) * np.array([[k / count], [(k + 0.5) / count]])
@@ -163,21 +135,11 @@ def _paint_dashes(canvas: Canvas, a: Array, b: Array, ink: Colour) -> None:
 
 
 def _paint_ellipse(canvas: Canvas, ring: Array, ink: Colour) -> None:
-    """Draws a closed thin line through the points `ring` (V, 2) of an ellipse, in drawing coordinates, in place. ink:
-    BGR.
-
-    Nothing is drawn if it is as large as the image, because the position is then as good as unknown.
-    """
     if _fits(canvas, ring):
         canvas.line(ring, ink, 1, closed=True)
 
 
 def _paint_ids(canvas: Canvas, layer: Layer, index: int) -> None:
-    """Draws people's ids at the upper left corners of their boxes, or at their points without a box, in place.
-
-    index: frame, from 1. People with neither box nor point get none. Nothing is drawn with more than 60 people in the
-    frame, or if the layer's rows are whole groups.
-    """
     marks = layer.at(index)
     if len(marks.id) > MANY or marks.whole_groups:
         return
@@ -189,12 +151,6 @@ def _paint_ids(canvas: Canvas, layer: Layer, index: int) -> None:
 
 
 def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark) -> None:
-    """Draws a group's id, with its estimated size if known, below the lowest point of its hull, extent or arrow, in
-    place.
-
-    prefix: letter before the id. The first of the three that has points counts; without any the place is (0, 0) in
-    drawing coordinates.
-    """
     points = canvas.map(
         next(points for points in (group.hull, group.extent, group.motion, np.zeros((1, 2))) if len(points))
     )
@@ -205,17 +161,12 @@ def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark) -> None:
 
 
 def letter_size(canvas: Canvas) -> float:
-    """Returns cv2's font scale that suits the canvas: the image's height in px / 1200, limited to 0.42 … 0.9."""
+    """Returns cv2's font scale that suits the canvas."""
     return float(np.clip(canvas.image.shape[0] / 1200, 0.42, 0.9))
 
 
 def draw_label(image: Image, words: str, at: tuple[float, float], size: float, ink: Colour) -> int:
-    """Writes light words on a rectangle of colour `ink` (BGR) into `image` in place, and returns the rectangle's height
-    in px.
-
-    at: its lower left corner, x and y in px, not nan; moved so that the rectangle lies inside the image. size: cv2's
-    font scale. Characters outside ASCII become question marks.
-    """
+    """Writes light words on a rectangle, kept inside the image, in place, and returns its height in px."""
     words = ascii_only(words)
     (width, height), baseline = cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
     x = int(np.clip(at[0], 0, max(image.shape[1] - width - 5, 0)))
@@ -226,24 +177,14 @@ def draw_label(image: Image, words: str, at: tuple[float, float], size: float, i
 
 
 def draw_captions(image: Image, layer: Layer, index: int, fps: float, size: float) -> None:
-    """Writes the captions of recent events into `image` in place, upwards from the lower left corner, the newest
-    lowest.
-
-    Shown are at most 6 events of the layer, the newest, that became known in frame `index` (counted from 1) or less
-    than 2.5 s before it; kinds enter and leave have no caption. fps: frames per second. size: cv2's font scale, of
-    which 1.25 times is used. No events draw nothing.
-    """
+    """Writes the captions of recent events in place, upwards from the lower left corner, the newest lowest."""
     y = float(image.shape[0] - 6)
     for event in layer.recent_events(index, CAPTION_SECONDS * fps)[:CAPTIONS]:
         y -= draw_label(image, event_words(event, layer.prefix), (6, y), size * 1.25, kind_colour(event.kind)) + 3
 
 
 def draw_banner(image: Image, words: str, warnings: list[str], size: float) -> None:
-    """Fills the whole `image` with a light colour, in place, and writes a line of text on it.
-
-    words: at its left. warnings: on red rectangles at its right, the first rightmost; may be empty. size: cv2's
-    font scale.
-    """
+    """Fills the whole image and writes a line of text on it, warnings on red at its right."""
     image[:] = FLOOR
     y = image.shape[0] * 0.5 + 9 * size
     cv2.putText(image, ascii_only(words), (6, round(y)), cv2.FONT_HERSHEY_SIMPLEX, size, INK, 1, cv2.LINE_AA)

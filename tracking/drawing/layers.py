@@ -18,7 +18,6 @@ from sim.geometry.polygons import convex_hull
 from sim.io.store.track_files import upright_boxes
 from sim.io.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
-from tracking.drawing.covariance_ellipse import SIGMA_95, SIGMA_99, UNIT_CIRCLE, ellipse
 
 BOX_MARGIN = 5.0
 """px between members' boxes and the outline of their group."""
@@ -29,6 +28,13 @@ HIDDEN = 0.2
 NOT_CAPTIONED = ("enter", "leave")
 """Kinds of events without a caption."""
 
+SIGMA_95 = math.sqrt(5.991)
+"""Standard deviations: the ellipse at this distance holds 95 % of a normal distribution in the plane."""
+
+SIGMA_99 = math.sqrt(9.21)
+"""The same for 99 %: the points d from a group's centre with d' E^-1 d = 9.21 for its extent E."""
+
+UNIT_CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f in (np.cos, np.sin)], axis=1)
 NO_POINTS = np.zeros((0, 2))
 
 
@@ -39,7 +45,8 @@ class GroupMark:
     id: of the group. hull: (V, 2) polygon round the members. The other fields are known only of a group that is tracked
     as a whole. extent: (32, 2), points of the ellipse that holds 99 % of the group by the covariance of its members.
     motion: its centre now and, if its velocity is known, in 1 s, (2, 2) or (1, 2). size: number of people, estimated.
-    Unknown or unseen arrays have no rows; an unknown size is nan."""
+    Unknown or unseen arrays have no rows; an unknown size is nan.
+    """
 
     id: int
     hull: Array
@@ -56,7 +63,8 @@ class FrameMarks:
     id: (N,) of people or groups. box: (N, 4) left, top, width, height. at: (N, 2) x, y, the point that trails follow.
     ellipse: (N, 32, 2), points of the ellipse that holds the position with 95 % probability. Rows of these three are
     nan where unknown. hidden: (N,) True for true people of whom less than 20 % is visible, never for tracks. groups:
-    marks of the groups in the frame. whole_groups: True if the tracker tracks groups, not people."""
+    marks of the groups in the frame. whole_groups: True if the tracker tracks groups, not people.
+    """
 
     id: Ints
     box: Array
@@ -88,17 +96,11 @@ class Layer:
     events: tuple[tuple[int, GroupEvent], ...] = field(default=())
 
     def at(self, index: int) -> FrameMarks:
-        """Returns the marks of frame `index`, counted from 1; marks without people and groups if the layer has no such
-        frame."""
+        """Returns the marks of frame `index`, from 1; none if the layer has no such frame."""
         return self.frames.get(index, FrameMarks.none())
 
     def trails(self, index: int, past: int) -> Iterator[tuple[int, Array]]:
-        """Returns an iterator of (id, points) of each trail that ends in frame `index`, counted from 1; points (K, 2)
-        in drawing coordinates.
-
-        The newest point is first, K >= 2; shorter trails are left out. past: number of earlier frames that a trail
-        reaches back at most. A trail begins after the last frame that lacks the id or in which its point is nan. Ids
-        come in no particular order."""
+        """Returns (id, points (K, 2)) of each unbroken trail that ends in frame `index`, the newest point first."""
         trails: dict[int, list[Array]] = {}
         unbroken = set(self.at(index).id.tolist())
         for k in range(index, max(index - past, 1) - 1, -1):
@@ -110,22 +112,13 @@ class Layer:
         return ((i, np.array(points)) for i, points in trails.items() if len(points) > 1)
 
     def recent_events(self, index: int, frames: float) -> list[GroupEvent]:
-        """Returns the events that became known in frame `index` (from 1) or less than `frames` frames before it, newest
-        first.
-
-        Kinds "enter" and "leave" are left out. Events of one frame keep their order in the layer."""
+        """Returns the events known in frame `index` or less than `frames` frames before it, newest first."""
         recent = [(known, e) for known, e in self.events if 0 <= index - known < frames and e.kind not in NOT_CAPTIONED]
         return [event for _, event in sorted(recent, key=lambda pair: -pair[0])]
 
 
 def layer_of_truth(truth: Truth) -> Layer:
-    """Returns the layer of the truth over pictures, in px: boxes, the middles of their lower edges, hulls of groups,
-    events.
-
-    A frame without people, and every frame of a truth without boxes, has no marks. Ellipses are nan. Boxes of people of
-    whom less than 20 % is visible are marked hidden. A group's hull holds its members' boxes and 5 px round them;
-    groups with fewer than two boxes have no mark. Unknown (nan) visibility hides nobody. A truth whose events are None
-    gives none."""
+    """Returns the layer of the truth over pictures, in px."""
     frames = {}
     for index in range(1, truth.length + 1):
         now = truth.at(index)
@@ -138,41 +131,21 @@ def layer_of_truth(truth: Truth) -> Layer:
 
 
 def layer_of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Scene | None) -> Layer:
-    """Returns the layer of one tracker's output over pictures, in px: boxes, trail points, 95 % ellipses, groups,
-    events.
-
-    tracks: one Tracks per frame. Positions on the ground are projected through `camera`; people of a Tracks without
-    boxes get the box of an upright person. Groups of people are those of `group`, drawn round two or more boxes.
-    Without a camera, tracks on the ground show only their own boxes and the groups round these. Tracks whose rows are
-    groups give marks of groups only. What the camera cannot see is left out (nan, or no points). scene: gives the
-    ground's height; None: 0."""
+    """Returns the layer of one tracker's output over pictures, in px; positions on the ground are projected."""
     frames = {t.index: _marks_in_picture(t, camera, scene) for t in tracks}
     return Layer("tracked", "T", frames, _emitted(tracks))
 
 
 def plan_layer_of_tracks(tracks: SequenceOf[Tracks]) -> Layer:
-    """Returns the layer of one tracker's output on a plan, in m: positions, 95 % ellipses, hulls of groups, events;
-    boxes are nan.
-
-    tracks: one Tracks per frame, with positions on the ground; this is not checked. Groups are those of a Tracks'
-    `groups`; None gives none. An ellipse is nan if its covariance is not finite."""
+    """Returns the layer of one tracker's output on a plan, in m; boxes are nan."""
     return Layer("tracked", "T", {t.index: _marks_on_plan(t) for t in tracks}, _emitted(tracks))
 
 
 def _emitted(tracks: SequenceOf[Tracks]) -> tuple[tuple[int, GroupEvent], ...]:
-    """Returns pairs (frame, event) of all events in one tracker's output `tracks`, in their order.
-
-    frame: that in which the event was emitted (reported), from 1; the event's first frame if that is None."""
     return tuple((e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events)
 
 
 def _marks_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> FrameMarks:
-    """Returns the marks in px of one frame's tracks `t`, over a picture.
-
-    Trails follow the middle of a box's lower edge; without a box the position of tracks in the image plane, else
-    nan. Tracks on the ground without boxes get boxes of upright people through `camera`, nan if it is None. scene:
-    gives the ground's height; None: 0. Groups of people are those of `t.group`, drawn round two or more boxes. Rows
-    that are groups get neither boxes nor ellipses."""
     n, to_picture = len(t.id), partial(_in_picture, plane=t.plane, camera=camera, scene=scene)
     if t.unit == "group":
         return _whole_groups_in_picture(t, to_picture)
@@ -193,10 +166,6 @@ def _whole_groups_in_picture(t: Tracks, to_picture: Callable[[Array], Array]) ->
 
 
 def _marks_on_plan(t: Tracks) -> FrameMarks:
-    """Returns the marks of one frame's tracks `t` on a plan, in m; boxes are nan. Trails follow the positions.
-
-    Ellipses are nan where the covariance is not finite. Group marks are `t.groups` with their hulls, or the rows if
-    these are groups; without both there are none."""
     n, groups, at = len(t.id), t.groups or Groups.none(), t.pos[:, :2]
     if t.unit == "group":
         marks = _whole_groups(t, _on_plan)
@@ -208,12 +177,6 @@ def _marks_on_plan(t: Tracks) -> FrameMarks:
 
 
 def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[GroupMark, ...]:
-    """Returns one mark per row of tracks `t` whose rows are groups, in order.
-
-    to_drawing: maps points (K, 2 or 3) to drawing coordinates (K, 2), or to no rows if they cannot be seen. motion is
-    the row's position now and in 1 s at its velocity, the position alone if the velocity is nan. hull and size (number
-    of people) are those of the row's id in t.groups, none and nan without that id. extent is the 99 % ellipse of
-    `t.groups.extent` (a covariance) round the row's position."""
     groups = t.groups or Groups.none()
     rows = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
 
@@ -230,18 +193,11 @@ def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[Grou
 
 
 def _feet(box: Array) -> Array:
-    """Returns the middles (N, 2), x and y, of the lower edges of boxes (N, 4): left, top, width, height in px. nan
-    stays nan."""
     return np.asarray(box[:, :2] + box[:, 2:] * np.array([0.5, 1.0]))
 
 
 def _box_hulls(group: Ints, box: Array) -> tuple[GroupMark, ...]:
-    """Returns a mark for each group with two or more known boxes, by increasing id: the hull of these boxes and 5 px
-    round each.
-
-    group: (N,) group id of each person, negative for none. box: (N, 4) left, top, width, height in px, nan where
-    unknown.
-    """
+    """Returns a mark for each group with two or more known boxes, by increasing id."""
     names = np.unique(group[group >= 0])
     box = box + BOX_MARGIN * np.array([-1, -1, 2, 2])
     found = [(int(g), box[(group == g) & np.isfinite(box[:, 0])]) for g in names]
@@ -253,10 +209,7 @@ def _all_corners(box: Array) -> Array:
 
 
 def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene | None) -> Array:
-    """Returns points (K, 2 or 3) of a tracker's plane as (K, 2) px, or (0, 2) if one of them cannot be seen.
-
-    plane: "image" points are returned unchanged, others (m) are projected; (0, 2) if `camera` is None, or a point is
-    behind it or nan. scene: gives the height of points with 2 columns; None: 0. No points are returned unchanged."""
+    """Returns points (K, 2 or 3) of a tracker's plane as (K, 2) px, or (0, 2) if one of them cannot be seen."""
     if plane == "image" or not len(points):
         return points
     if camera is None:
@@ -272,13 +225,17 @@ def _on_plan(points: Array) -> Array:
 
 
 def _ellipses(t: Tracks, to_drawing: Callable[[Array], Array]) -> Array:
-    """Returns the 95 % ellipses of the positions of the N people of one frame's tracks `t`, (N, 32, 2), in drawing
-    coordinates.
-
-    to_drawing: as in `_whole_groups`. A row is nan where the covariance is not finite, or a point cannot be seen."""
     found = np.full((len(t.id), len(UNIT_CIRCLE), 2), np.nan)
     for k, cov in enumerate(t.cov[:, :2, :2]):
         points = to_drawing(ellipse(t.pos[k, :2], cov, SIGMA_95))
         if len(points):
             found[k] = points
     return found
+
+
+def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
+    """Returns points (32, 2) of the ellipse at `sigmas` deviations round `centre`, none if `cov` is not finite."""
+    if not np.isfinite(cov).all():
+        return np.zeros((0, 2))
+    values, vectors = np.linalg.eigh(cov)
+    return np.asarray(centre + sigmas * (UNIT_CIRCLE * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)

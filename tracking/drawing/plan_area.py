@@ -11,13 +11,7 @@ MARGIN = 1.0
 
 
 def plan_area(scene: Scene | None, places: Array) -> tuple[Array, Array] | None:
-    """Returns the lower left and upper right corner, x and y (2,) each in m, of the ground to show.
-
-    places: (N, 2) m; rows with nan or inf are ignored. With a scene the area holds places, pillars, doors, service
-    points and stairs, with a margin of 2 m on each side. A margin that crosses the world's border ends there, but is at
-    least 1 m. Without any of these it is the whole world. Without a scene it is the places' bounding box plus 1 m on
-    each side, or None if no place is known.
-    """
+    """Returns the lower left and upper right corner (2,), m, of the ground to show; None if nothing is known."""
     places = _finite(places)
     if scene is not None:
         return _scene_area(scene, places)
@@ -27,11 +21,6 @@ def plan_area(scene: Scene | None, places: Array) -> tuple[Array, Array] | None:
 
 
 def _scene_area(scene: Scene, places: Array) -> tuple[Array, Array]:
-    """Returns the lower left and upper right corner (2,), in m, of the ground to show of a scene.
-
-    It holds `places` (N, 2, no nan), pillars, doors, service points and stairs, with a margin of 2 m on each side. A
-    margin that crosses the world's border ends there, but is at least 1 m. Without any of these it is the whole world.
-    """
     objects = [places, scene.pillars[:, :2], scene.doors.reshape(-1, 2), scene.service]
     objects += [end[None] for flight in scene.stairs for end in (flight.foot, flight.head)]
     points = _finite(np.concatenate([np.asarray(each).reshape(-1, 2) for each in objects]))

@@ -34,12 +34,7 @@ LABEL_DIRECTIONS = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (1, 0), (-1, 0),
 
 
 def draw_scene(canvas: Canvas, scene: Scene | None) -> None:
-    """Draws grid lines, and of a scene its border, stairs, walls with gaps for doors, pillars and service points, in
-    place.
-
-    canvas: a plan in m, drawn on. Grid lines are 1 m apart on plans up to 30 m long, 5 m up to 120 m, else 20 m. scene:
-    None: only the grid.
-    """
+    """Draws grid lines and the fixed objects of a scene, in place."""
     span = float((canvas.high - canvas.low).max())
     step = 1.0 if span <= 30 else 5.0 if span <= 120 else 20.0
     for axis in (0, 1):
@@ -72,12 +67,7 @@ def _draw_stairs(canvas: Canvas, flight: Stairs) -> None:
 
 
 def draw_trails(canvas: Canvas, truth: Truth, index: int, places: Array) -> None:
-    """Draws in place where each person of frame `index` (counted from 1) was during the last 3 s, in a pale colour of
-    the id.
-
-    places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame), not nan. A trail begins
-    after the last frame without that person; one of a single point is not drawn.
-    """
+    """Draws where each person of frame `index` was during the last 3 s, in place; places (R, 2): of all rows."""
     present = truth.id[truth.rows(index)]
     first = truth.rows(max(index - round(TRAIL_SECONDS * truth.fps), 1)).start
     past = slice(first, truth.rows(index).stop)
@@ -95,12 +85,7 @@ def _pale(ink: Colour) -> Colour:
 
 
 def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: Array | None) -> None:
-    """Draws in place the hull and id of each true group that has two or more members in frame `index`, counted from 1.
-
-    The hull is the convex polygon round the members. places: (R, 2) drawing coordinates of the truth's R rows (one row
-    per person and frame), not nan. boxes: (R, 4) left, top, width, height, not nan, whose corners the hull holds; None:
-    it holds a circle round each place, of radius 0.3 m and at least 9 px.
-    """
+    """Draws hull and id of each true group of two or more in frame `index`, in place: round boxes, or circles."""
     rows = truth.rows(index)
     group = truth.group[rows]
     for identity in np.unique(group[group >= 0]):
@@ -117,12 +102,6 @@ def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, bo
 
 
 def _outlines(canvas: Canvas, places: Array, boxes: Array | None) -> Array:
-    """Returns pixel coordinates (4 N, 2) of the corners of N boxes, or (16 N, 2) of 16 points on a circle round each of
-    N places.
-
-    places: (N, 2) drawing coordinates. boxes: (N, 4) left, top, width, height; None: circles of radius 0.3 m, at least
-    9 px.
-    """
     if boxes is not None:
         corners = [boxes[:, :2] + boxes[:, 2:] * np.array(c) for c in ((0, 0), (1, 0), (0, 1), (1, 1))]
         return canvas.map(np.concatenate(corners))
@@ -132,14 +111,7 @@ def _outlines(canvas: Canvas, places: Array, boxes: Array | None) -> Array:
 
 
 def draw_people(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: Array | None, ids: bool) -> None:
-    """Draws in place each person of frame `index` (counted from 1): a disc with a heading line, or a box if `boxes` is
-    given.
-
-    places: (R, 2) drawing coordinates of the truth's R rows (one row per person and frame); people with nan are
-    skipped. boxes: (R, 4) left, top, width, height, known where the place is; None: discs of radius 0.22 drawing units,
-    at least 6 px. ids: also write ids. The heading line is 0.5 drawing units (m on a plan) long; there is none without
-    velocities or below 0.1 m/s.
-    """
+    """Draws each person of frame `index` in place: a disc with a heading line, or a box if `boxes` is given."""
     rows, radius = truth.rows(index), max(0.22 * canvas.scale, 6.0)
     for row in range(rows.start, rows.stop):
         ink, at = colour(int(truth.id[row])), places[row]
@@ -162,12 +134,7 @@ def _draw_heading(canvas: Canvas, truth: Truth, row: int, at: Array, ink: Colour
 
 
 def draw_ids(canvas: Canvas, ids: Ints, places: Array, radius: float) -> None:
-    """Writes each id into the canvas's image, in place, beside the disc at its place.
-
-    ids: (N,). places: (N, 2) in drawing coordinates; those with nan are skipped. radius: of the discs in px. Of eight
-    positions round its disc an id takes the one that covers the least of all discs and of the ids written before; of
-    equal ones the first.
-    """
+    """Writes each id beside the disc at its place (N, 2), where it covers the least of discs and other ids."""
     discs = canvas.map(places)
     taken = np.concatenate([discs - radius, discs + radius], axis=1)
     directions = np.array(LABEL_DIRECTIONS)
@@ -186,10 +153,6 @@ def draw_ids(canvas: Canvas, ids: Ints, places: Array, radius: float) -> None:
 
 
 def _overlap_area(box: Array, others: Array) -> float:
-    """Returns the summed area that a box (4,) shares with each of `others` (N, 4), in the squared unit of the boxes.
-
-    Columns: left, top, right, bottom. Rows with nan count as 0.
-    """
     wide = np.minimum(box[2], others[:, 2]) - np.maximum(box[0], others[:, 0])
     high = np.minimum(box[3], others[:, 3]) - np.maximum(box[1], others[:, 1])
     return float(np.nansum(np.maximum(wide, 0) * np.maximum(high, 0)))

@@ -15,12 +15,7 @@ from sim.types import Array, Ints
 
 
 def nearest(cost: Array) -> tuple[Ints, Ints]:
-    """Returns rows and columns (K,) of the pairs of each measurement with its cheapest track, in order of columns.
-
-    cost (N, M): a row per track, a column per measurement, inf outside a track's gate (region where its measurements
-    may lie), no nan. Of equal costs the first row wins. A track can be in several pairs. A measurement outside all
-    gates is in no pair. An empty matrix gives no pairs.
-    """
+    """Returns rows and columns (K,) of the pairs of each measurement with its cheapest track, in order of columns."""
     if not cost.size:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     row = cost.argmin(0)
@@ -29,11 +24,8 @@ def nearest(cost: Array) -> tuple[Ints, Ints]:
 
 
 def cheapest_per_track(rows: Ints, columns: Ints, cost: Array) -> tuple[Ints, Ints]:
-    """Returns rows and columns (L,) of the cheapest pair of each track that is in a pair, sorted by row.
-
-    rows, columns (K,): track and measurement of the given pairs, in any order; cost (N, M): a row per track, a column
-    per measurement. Of equal costs the smallest column wins. No pairs give empty arrays.
-    """
+    """Returns rows and columns (L,) of the cheapest of the given pairs of each track, sorted by row."""
+    # columns last, so that of equal costs the smallest column wins whatever the order of pairs
     order = np.lexsort((columns, cost[rows, columns], rows))
     rows, columns = rows[order], columns[order]
     first = np.ones(len(rows), bool)
@@ -42,13 +34,8 @@ def cheapest_per_track(rows: Ints, columns: Ints, cost: Array) -> tuple[Ints, In
 
 
 def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
-    """Returns rows and columns (K,) of the one-to-one pairs of tracks and measurements with the least total cost.
-
-    cost (N, M): a row per track, a column per measurement, inf outside a track's gate (region where its measurements
-    may lie), no nan. unassigned: the cost of a track without a measurement, finite; a pair that costs as much or more
-    is never made. The pairs are in no particular order. No possible pair, or an empty matrix, gives empty arrays. Pairs
-    that share neither row nor column with another possible pair are taken directly; scipy solves the rest.
-    """
+    """Returns rows and columns (K,) of the one-to-one pairs with the least total cost, none of `unassigned` or more."""
+    # A pair that shares neither row nor column with another possible pair needs no solver.
     rows, columns = np.nonzero(cost < unassigned)
     in_row = np.bincount(rows, minlength=cost.shape[0])
     in_column = np.bincount(columns, minlength=cost.shape[1])
@@ -56,6 +43,7 @@ def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
     if alone.all():
         return rows, columns
     contested_rows, contested_columns = np.unique(rows[~alone]), np.unique(columns[~alone])
+    # scipy refuses a table of which no full assignment is finite, so that inf becomes the cost of no measurement
     part = np.minimum(cost[np.ix_(contested_rows, contested_columns)], unassigned)
     r, c = _solve(part, unassigned)
     rows = np.concatenate([rows[alone], contested_rows[r]])
@@ -64,12 +52,6 @@ def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
 
 
 def _solve(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
-    """Returns rows and columns (K,) of scipy's one-to-one assignment of least total cost, without pairs that cost
-    `unassigned` or more.
-
-    cost (N, M): finite, a row per track, a column per measurement. The pairs are sorted by row. scipy raises ValueError
-    for nan.
-    """
     from scipy.optimize import linear_sum_assignment
 
     r, c = linear_sum_assignment(cost)

@@ -27,17 +27,19 @@ MOST_RINGS = 8
 
 @njit(cache=True)
 def grid_of(places: Array, count: int) -> tuple[float, float, float, int, int]:
-    """Return the grid of `count` places (N, 2 or more), with about one place in a cell."""
-    mean, spread = np.zeros(2), np.zeros(2)
-    for d in range(2):
-        for k in range(count):
-            mean[d] += places[k, d] / count
-        for k in range(count):
-            spread[d] += abs(places[k, d] - mean[d]) / count
-    size = max(4 * math.sqrt(spread[0] * spread[1] / count), 4 * max(spread[0], spread[1]) / count, 1e-3)
-    corner = mean - COVERED * spread
-    sides = (2 * COVERED * spread / size).astype(np.int64) + 1
-    return corner[0], corner[1], size, sides[0], sides[1]
+    """Returns the grid of `count` places (N, 2 or more), with about one place in a cell."""
+    # mean deviations instead of bounds, so that one far place does not make all cells large
+    x, y, wide, high = 0.0, 0.0, 0.0, 0.0
+    for k in range(count):
+        x += places[k, 0] / count
+        y += places[k, 1] / count
+    for k in range(count):
+        wide += abs(places[k, 0] - x) / count
+        high += abs(places[k, 1] - y) / count
+    # the two other terms bound the number of cells where the places lie on a line, or on one point
+    size = max(4 * math.sqrt(wide * high / count), 4 * max(wide, high) / count, 1e-3)
+    columns, rows = int(2 * COVERED * wide / size) + 1, int(2 * COVERED * high / size) + 1
+    return x - COVERED * wide, y - COVERED * high, size, columns, rows
 
 
 @njit(cache=True)
@@ -52,8 +54,13 @@ def _row(y: float, grid: Any) -> int:
 
 @njit(cache=True)
 def empty_list(count: int, grid: Any) -> Any:
-    """Return a list without places, with room for `count` of them."""
-    return np.full(grid[3] * grid[4], -1), np.full(count, -1), grid
+    """Returns a list without places, with room for `count` of them."""
+    first, after = np.empty(grid[3] * grid[4], np.int64), np.empty(count, np.int64)
+    for c in range(len(first)):
+        first[c] = -1
+    for k in range(count):
+        after[k] = -1
+    return first, after, grid
 
 
 @njit(cache=True)
@@ -66,7 +73,7 @@ def insert(k: int, x: float, y: float, cells: Any) -> None:
 
 @njit(cache=True)
 def remove(k: int, x: float, y: float, cells: Any) -> None:
-    """Take place k, which was added at x, y, out of a list."""
+    """Takes place k, which was added at x, y, out of a list."""
     first, after, grid = cells
     c = _column(x, grid) * grid[4] + _row(y, grid)
     at = first[c]
@@ -80,8 +87,7 @@ def remove(k: int, x: float, y: float, cells: Any) -> None:
 
 @njit(cache=True)
 def nearest_place(places: Array, k: int, cells: Any) -> int:
-    """Return the listed place nearest to place k, of equal ones the first; -1 without another one. places (N, 2 or
-    more)."""
+    """Returns the listed place nearest to place k, of equal ones the first; -1 without another one."""
     first, after, grid = cells
     middle, level = _column(places[k, 0], grid), _row(places[k, 1], grid)
     best, least = -1, np.inf
@@ -111,8 +117,7 @@ def _nearer(places, k, at, after, best, least):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def nearest_places(places: Array, count: int, nearest: Ints) -> None:
-    """Write the nearest other one of `count` places (N, 2 or more) to each, of equal ones the first; -1 without another
-    one."""
+    """Writes the nearest other one of `count` places to each, of equal ones the first; -1 without."""
     if count <= FEW:
         for k in range(count):
             nearest[k], least = -1, np.inf
@@ -130,7 +135,7 @@ def nearest_places(places: Array, count: int, nearest: Ints) -> None:
 
 @njit(cache=True)
 def cell_list(places: Array, count: int) -> Any:
-    """Return the list of `count` places (N, 2 or more), which stays as it is."""
+    """Returns the list of `count` places (N, 2 or more), which stays as it is."""
     grid = grid_of(places, count)
     start, order, cell = np.zeros(grid[3] * grid[4] + 1, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
     for k in range(count):
@@ -138,7 +143,9 @@ def cell_list(places: Array, count: int) -> Any:
         start[cell[k] + 1] += 1
     for c in range(1, len(start)):
         start[c] += start[c - 1]
-    end = start[:-1].copy()
+    end = np.empty(len(start), np.int64)
+    for c in range(len(start)):
+        end[c] = start[c]
     for k in range(count):
         order[end[cell[k]]] = k
         end[cell[k]] += 1
@@ -147,8 +154,7 @@ def cell_list(places: Array, count: int) -> Any:
 
 @njit(cache=True)
 def listed_near(x: float, y: float, reach: float, cells: Any, out: Ints) -> int:
-    """Write the places of the cells within `reach` of a point into out (N,), and return their number. Some of them are
-    farther away."""
+    """Writes the places of the cells within `reach` of a point into out (N,), and returns their number."""
     start, order, grid = cells
     low, high, found = _row(y - reach, grid), _row(y + reach, grid), 0
     for column in range(_column(x - reach, grid), _column(x + reach, grid) + 1):

@@ -12,16 +12,7 @@ Ours: S is shrunk to (N S + n0 S0) / (N + n0), as one or two points have none. N
 covariance with 1/N, S0 a prior covariance and n0 the prior's weight. G_x is repeated until nothing changes, since the
 region of joined components may overlap one that none of them did. Points have weights (the share of a person that a
 pixel is). A component below a least weight is noise.
-
-Two regions overlap by the exact test of Gilitschenski & Hanebeck, "A robust computational test for overlap of two
-arbitrary-dimensional ellipsoids in fault-detection of Kalman filters" (2012); Gennari & Hager do not say how they test.
-
-`prefixes` decides the group constraint for all associations of a group at once. The sets Y_ns (points of the group
-alone) + the first j of the shared points grow by one point each, and G_0 grows with them (4.2.1), with running moments
-of each component. A point is compared with the points of 20 grid cells around it that are not in its component yet.
-While a single component is heavy enough, n points cost O(n). Of more components, only the region of the last point's is
-new; it is compared with the M others if no two of those overlap. Else all regions are sorted along x and joined in
-rounds, which costs each point O(M^1.5) or less on scattered points. The least weight bounds M.
+Gennari & Hager do not say how they test for overlap: see ellipse_overlap_kernels.
 """
 
 from __future__ import annotations
@@ -38,19 +29,13 @@ from tracking.filters.component_regions_kernels import WEIGHT, closure
 
 @dataclass(frozen=True)
 class Constraint:
-    """The rule by which points are one group; lengths in the points' unit (m or px).
+    """The rule by which points are one group; lengths in the points' unit (m or px)."""
 
-    link: 2 r, largest distance of linked points, above 0. gate: squared Mahalanobis radius of the search region of a
-    component (set of linked points). prior (2, 2): S0, the covariance (squared unit) to which a component's covariance
-    S is shrunk. strength: n0, the weight of S0, in units of the points' weights. least: a component whose points have
-    less total weight is noise; 0 (default): none is.
-    """
-
-    link: float
-    gate: float
-    prior: Array
-    strength: float
-    least: float = 0.0
+    link: float  # 2 r, largest distance of linked points, above 0
+    gate: float  # squared Mahalanobis radius of the search region of a component (set of linked points)
+    prior: Array  # (2, 2): S0, the covariance (squared unit) to which a component's covariance S is shrunk
+    strength: float  # n0, the weight of S0, in units of the points' weights
+    least: float = 0.0  # a component whose points have less total weight is noise; 0 (default): none is
 
     @property
     def prior_entries(self) -> Array:
@@ -59,48 +44,29 @@ class Constraint:
 
 
 def linked(points: Array, link: float) -> Ints:
-    """Returns the component of each point, (M,), numbered 0, 1, … in the order of the components' first points.
-
-    points (M, 2): x, y. Two points are in one component if they are at most `link` (above 0, same unit) apart, directly
-    or through other points. No points give an empty array.
-    """
+    """Returns the component of each point (M,), by first points: at most `link` apart, also through others."""
     return kernels.components(points, np.ones(len(points)), link)[0]
 
 
 def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
-    """Returns the group of each point, (M,), numbered 0, 1, … in the order of the groups' first points; -1 for noise.
-
-    points (M, 2): x, y; weights (M,): people that each point stands for, above 0. rule: linked points (at most
-    rule.link apart) are components; components of less total weight than rule.least are noise. Components whose search
-    regions (ellipses round their means) overlap, also through others, are one group. No points give an empty array.
-    """
+    """Returns the group of each point (M,), numbered in order of first points; -1 for noise."""
     label, sums = kernels.components(points, weights, rule.link)
     parts = np.flatnonzero(sums[:, WEIGHT] >= rule.least)
     group = np.full(len(sums), -1)
     if len(parts):
+        # noise must not bridge two groups, so that only the heavy components are joined
         joined = closure(sums[parts], rule.gate, rule.prior_entries, rule.strength)[0]
         group[parts] = np.unique(joined, return_inverse=True)[1]
     return np.asarray(group[label])
 
 
 def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Bools:
-    """Returns flags (M - start + 1,): True if the first start, start + 1, … M points satisfy the group constraint
-    `rule`.
-
-    points (M, 2): x, y; weights (M,): people that each point stands for. start: 0 to M. Points satisfy the rule if they
-    form exactly one group: components of linked points whose search regions overlap. Components of less than the least
-    weight are left out. False for no point, and where all components are left out.
-    """
+    """Returns flags (M - start + 1,): True if the first start, start + 1, … M points are exactly one group."""
     return kernels.prefixes(
         points, weights, start, rule.link, rule.gate, rule.prior_entries, rule.strength, rule.least
     )[0]
 
 
 def regions_overlap(mean: Array, covariance: Array, gate: float) -> Bools:
-    """Returns flags (G, G): True where two search regions (y - mean)' covariance^-1 (y - mean) <= gate have a common
-    point.
-
-    mean (G, 2): x, y; covariance (G, 2, 2), positive definite, squared unit of the means; gate: squared Mahalanobis
-    radius, above 0. Regions that touch overlap. The diagonal is True; no regions give (0, 0).
-    """
+    """Returns flags (G, G): True where two regions (y - mean)' covariance^-1 (y - mean) <= gate overlap or touch."""
     return ellipse_overlap_kernels.overlaps(np.ascontiguousarray(mean), gate * covariance)

@@ -13,7 +13,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import find_root
 from sim.types import Array, Bools, Ints
-from tracking.filters.component_regions_kernels import WEIGHT, XX, XY, YY, X, Y, closure, fit, meet, pool
+from tracking.filters.component_regions_kernels import WEIGHT, XX, XY, YY, X, Y, closure, fit, meet, pool, unset
 
 AROUND = 20
 """Cells round a cell from which points can be linked with its points."""
@@ -27,13 +27,15 @@ FAR = 2.0**40
 
 @njit(cache=True)
 def cells(points: Array, link: float) -> tuple[Ints, Ints]:
-    """Returns the cell of each point (M,), 0, 1, …, and the 20 cells around each cell (C, 20), -1 for an empty one.
-    points (M, 2), M at least 1. A cell's diagonal is `link`, in the points' unit, above 0. Cells are numbered
-    in the order of their first points; points 2^40 cells or more from the first count as at that distance."""
+    """Returns the cell of each point (M,), numbered by first points, and the 20 cells around each (C, 20), -1 empty."""
     m = len(points)
+    # slightly less than link / sqrt 2, so that rounding never puts two points farther apart into one cell
     side = link / np.sqrt(2.0) * (1 - 1e-12)
     place = np.empty((m, 2), np.int64)
-    table = np.full(1 << int(np.ceil(np.log2(2 * m))), -1)
+    slots = 1
+    while slots < 2 * m:  # at most half full, so that searches are short
+        slots *= 2
+    table = unset(slots)
     cell, first = np.empty(m, np.int64), np.empty(m, np.int64)
     count = 0
     for k in range(m):
@@ -44,12 +46,13 @@ def cells(points: Array, link: float) -> tuple[Ints, Ints]:
             table[slot], first[count] = count, k
             count += 1
         cell[k] = table[slot]
-    around = np.full((count, AROUND), -1)
+    around = np.empty((count, AROUND), np.int64)
     for c in range(count):
         x, y = place[first[c], 0], place[first[c], 1]
         n = 0
         for dx in range(-2, 3):
             for dy in range(-2, 3):
+                # the corners of the 5 x 5 cells are farther away than `link`
                 if (dx != 0 or dy != 0) and abs(dx) + abs(dy) < 4:
                     around[c, n] = table[_slot(table, place, first, x + dx, y + dy)]
                     n += 1
@@ -58,12 +61,9 @@ def cells(points: Array, link: float) -> tuple[Ints, Ints]:
 
 @njit(cache=True)
 def _slot(table: Ints, place: Ints, first: Ints, x: int, y: int) -> int:
-    """Returns the slot of the hash table that holds the number of the cell in column x and row y of the grid, or the
-    free slot, -1, where it belongs.
-
-    table (T,): T a power of two, at least one slot free; place (M, 2): grid column and row of each point; first (C,): a
-    point of each cell. Slots are tried one after the other."""
+    """Returns the slot of the hash table that holds the cell in column x and row y, or the free slot for it."""
     last = len(table) - 1
+    # primes and a shift spread neighbouring cells over the table
     mixed = (x * 73_856_093) ^ (y * 19_349_663)
     slot = (mixed ^ (mixed >> 15)) & last
     while table[slot] >= 0 and (place[first[table[slot]], 0] != x or place[first[table[slot]], 1] != y):
@@ -72,16 +72,15 @@ def _slot(table: Ints, place: Ints, first: Ints, x: int, y: int) -> int:
 
 
 @njit(cache=True)
-def insert(
+def add_point(
     k: int, points: Array, weight: float, link: float, cell: Ints, around: Ints,
     parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, work: Ints,
 ) -> None:  # fmt: skip
-    """Add point k to the components (sets of linked points) of the points before it, in place. Returns nothing (4.2.1).
-    points (M, 2): x, y; weight: of point k; link: largest distance of linked points; cell (M,): cell of each point;
-    around (C, 20): cells round each cell, -1 if empty. Changed: parent (M,), union-find forest of the points; head
-    (C,), after (M,), the last added point of each cell and the one before it of each point, -1 at the end; box (C, 4),
-    bounds of each cell's points: least x, y, largest x, y; sums (M, 6), a component's weight, mean x, y, weight times
-    covariance xx, xy, yy, at its root; work (2,): comparisons, number of components."""
+    """Adds point k to the components of the points before it, in place (4.2.1).
+
+    head (C,), after (M,): the last added point of each cell, and the one before each point. box (C, 4): bounds of each
+    cell's points. parent (M,), sums (M, 6): forest of the points, and moments at the roots.
+    """
     c = cell[k]
     x, y = points[k, 0], points[k, 1]
     parent[k] = k
@@ -99,6 +98,7 @@ def insert(
     top = find_root(parent, k)
     for n in range(AROUND):
         other = around[c, n]
+        # everything is one component: nothing more can be joined
         if work[COMPONENTS] == 1:
             break
         if other < 0 or head[other] < 0:
@@ -106,6 +106,7 @@ def insert(
         work[VISITS] += 1
         if find_root(parent, head[other]) == top:
             continue
+        # the bounding box of the cell's points rules most cells out without a look at its points
         gap_x = max(box[other, LOW_X] - x, x - box[other, HIGH_X], 0.0)
         gap_y = max(box[other, LOW_Y] - y, y - box[other, HIGH_Y], 0.0)
         if gap_x * gap_x + gap_y * gap_y > link * link:
@@ -122,12 +123,11 @@ def insert(
 
 @njit(cache=True)
 def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
-    """Join the components of points a and b under the older root, so that roots depend only on the order of points.
-    Changed: parent (M,), union-find forest; sums (M, 6), moments at the roots; work (2,), whose second number, the
-    components, falls by 1. Nothing changes if the points are in one component already."""
+    """Joins the components of points a and b under the older root, so that roots depend only on the order of points."""
     a, b = find_root(parent, a), find_root(parent, b)
     if a == b:
         return
+    # the older root wins: roots depend on the order of points only, not on that of joins
     low, high = min(a, b), max(a, b)
     parent[high] = low
     pool(sums[low], sums[high])
@@ -136,26 +136,23 @@ def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
 
 @njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
-    """Returns the component of each point (M,), numbered in the order of first points, and the moments (K, 6) of K
-    components.
-
-    Points (M, 2) at most `link` (above 0) apart, also through others, are one component (3.3). weights (M,): of the
-    points. Moments: weight N, mean x, y, N times the covariance xx, xy, yy. No points give no components."""
+    """Returns the component of each point (M,), numbered by first points, and the moments (K, 6) of the components."""
     m = len(points)
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     label, count = np.empty(m, np.int64), 0
     if m == 0:
         return label, sums
     cell, around = cells(points, link)
-    head, after, box = np.full(len(around), -1), np.full(m, -1), np.empty((len(around), 4))
+    head, after, box = unset(len(around)), unset(m), np.empty((len(around), 4))
     work = np.zeros(2, np.int64)
     for k in range(m):
-        insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
+        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
     for k in range(m):
         top = find_root(parent, k)
         if top == k:
             label[k] = count
-            sums[count] = sums[k]
+            for c in range(6):
+                sums[count, c] = sums[k, c]
             count += 1
         else:
             label[k] = label[top]
@@ -166,62 +163,77 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
 def prefixes(
     points: Array, weights: Array, start: int, link: float, gate: float, prior: Array, strength: float, least: float
 ) -> tuple[Bools, int]:
-    """Returns flags (M - start + 1,), True if the first start, start + 1, … M points are one group, and the comparisons
-    made.
-
-    points (M, 2), weights (M,). Points at most `link` apart are components, and those lighter than `least` are left
-    out. The others are joined by `closure` with gate (squared radius), prior (3,), strength; one must be left. False
-    for no point and if all are left out. start: 0 to M."""
+    """Returns whether the first start, … M points are one group, (M - start + 1,), and the comparisons made."""
+    # All associations of a group at once: the points of the group alone, then one shared point more each time (4.2.1).
+    # While a single component is heavy, n points cost O(n). Of more, only the region of the last point's is new; it is
+    # compared with the M others if no two of those overlap. Else all are sorted along x and joined in rounds, O(M^1.5)
+    # a point or less on scattered points. The least weight bounds M.
     m = len(points)
     one = np.zeros(m - start + 1, np.bool_)
     if m == 0:
         return one, 0
     cell, around = cells(points, link)
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
-    head, after, box = np.full(len(around), -1), np.full(m, -1), np.empty((len(around), 4))
+    head, after, box = unset(len(around)), unset(m), np.empty((len(around), 4))
     work = np.zeros(2, np.int64)
-    heavy = np.empty(0, np.int64)  # roots of the components that are not left out, from the first prefix asked for
-    shape = np.empty((m, 5))  # their regions
+    # Roots of the components that are not left out, ascending, from the first prefix on; their moments and regions.
+    heavy, count, moments, shape = np.empty(m, np.int64), 0, np.empty((m, 6)), np.empty((m, 5))
     apart = False  # True if no two of the regions overlap
     for k in range(m):
-        before = work[COMPONENTS]
-        insert(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
+        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
         if k + 1 < start:
             continue
         top, now = find_root(parent, k), k + 1 - start
+        # all components once; later only that of the new point changes
         if k + 1 == max(start, 1):
-            heavy = _heavy(np.arange(k + 1), parent, sums, least)
-            for n in range(len(heavy)):
-                top = heavy[n]
-                fit(sums[top], gate, prior, strength, shape[top])
+            for p in range(k + 1):
+                if parent[p] == p and sums[p, WEIGHT] >= least:
+                    top = heavy[count] = p
+                    count += 1
+                    fit(sums[top], gate, prior, strength, shape[top])
         elif sums[top, WEIGHT] < least:  # the others are as before
             one[now] = one[now - 1]
             continue
-        elif work[COMPONENTS] != before or not (heavy == top).any():
-            heavy = _heavy(np.unique(np.append(heavy, top)), parent, sums, least)
+        else:
+            count = _with_root(top, heavy, count, parent, sums, least)
         fit(sums[top], gate, prior, strength, shape[top])
-        if len(heavy) < 2:
-            one[now], apart = len(heavy) == 1, True
+        if count < 2:
+            one[now], apart = count == 1, True
             continue
-        if apart or len(heavy) == 2:  # no region has changed but that of the last point's component
+        if apart or count == 2:  # no region has changed but that of the last point's component
             apart = True
-            for n in range(len(heavy)):
+            for n in range(count):
                 other = heavy[n]
                 work[VISITS] += 1
                 if other != top and meet(shape[max(top, other)], shape[min(top, other)]):
                     apart = False
                     break
-            one[now] = len(heavy) == 2 and not apart
-        if not apart and len(heavy) > 2:
-            label, compared = closure(sums[heavy], gate, prior, strength)
-            one[now], apart = label.max() == 0, bool((label == np.arange(len(heavy))).all())
-            work[VISITS] += len(heavy) + compared
+            one[now] = count == 2 and not apart
+        if not apart and count > 2:
+            for n in range(count):
+                for c in range(6):
+                    moments[n, c] = sums[heavy[n], c]
+            label, compared = closure(moments[:count], gate, prior, strength)
+            one[now] = apart = True
+            for n in range(count):
+                one[now] = one[now] and label[n] == 0
+                apart = apart and label[n] == n
+            work[VISITS] += count + compared
     return one, work[VISITS]
 
 
 @njit(cache=True)
-def _heavy(points: Ints, parent: Ints, sums: Array, least: float) -> Ints:
-    """Returns those of the points (K,) that are roots of components of at least the weight `least`, in their order.
-    parent (M,): union-find forest; sums (M, 6): moments at the roots."""
-    kept = (parent[points] == points) & (sums[points, WEIGHT] >= least)
-    return np.asarray(points[kept])
+def _with_root(top: int, heavy: Ints, count: int, parent: Ints, sums: Array, least: float) -> int:
+    """Adds a root to the ascending list heavy[:count], takes out those that are no roots now, and returns the count."""
+    kept = 0
+    for n in range(count):
+        p = heavy[n]
+        if p != top and parent[p] == p and sums[p, WEIGHT] >= least:
+            heavy[kept] = p
+            kept += 1
+    at = kept
+    while at > 0 and heavy[at - 1] > top:
+        heavy[at] = heavy[at - 1]
+        at -= 1
+    heavy[at] = top
+    return kept + 1

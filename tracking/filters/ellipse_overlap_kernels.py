@@ -19,16 +19,9 @@ STEPS = 60
 
 @njit(cache=True)
 def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float, bxy: float, byy: float) -> bool:
-    """Returns True if the filled ellipses y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 have a common point.
-
-    dx, dy: d, the second centre relative to the first. axx, axy, ayy and bxx, bxy, byy: entries of A and B, squared
-    unit of d, which must be positive definite. Ellipses that touch overlap.
-
-    The ellipses are disjoint if and only if f(s) = d' (A / (1 - s) + B / s)^-1 d > 1 for some s in (0, 1)
-    (Gilitschenski & Hanebeck 2012). In coordinates with B = I and A = diag(l1, l2), f(s) = sum of s (1 - s) d_i^2 / (1
-    + s (l_i - 1)). As f is concave, its tangents at both ends of a bracket bound its maximum; the bracket is halved
-    until the sign of f - 1 is known.
-    """
+    """Returns True if the filled ellipses y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 have a common point."""
+    # Coordinates with B = I and A = diag(l1, l2). The ellipses are disjoint if and only if, for some s in (0, 1), f(s)
+    # = d' (A / (1 - s) + B / s)^-1 d = sum of s (1 - s) d_i^2 / (1 + s (l_i - 1)) > 1 (Gilitschenski & Hanebeck 2012).
     l11 = sqrt(bxx)  # B = L L'
     l21 = bxy / l11
     l22 = sqrt(byy - l21 * l21)
@@ -45,6 +38,7 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
     # Direction of the first eigenvector: (cxy, l1 - cxx) or (l1 - cyy, cxy), whichever is the longer.
     ex, ey = (root + differ, cxy) if differ >= 0 else (cxy, root - differ)
     length = sqrt(ex * ex + ey * ey)
+    # a circle: every direction is an eigenvector
     if length == 0:
         ex, ey, length = 1.0, 0.0, 1.0
     a = (u * ex + v * ey) / length
@@ -53,6 +47,7 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
     low, high = 0.0, 1.0
     value_low, slope_low, value_high, slope_high = 0.0, a2 + b2, 0.0, -(a2 / (1 + p) + b2 / (1 + q))
     for _ in range(STEPS):
+        # f is concave: the tangents at both ends of a bracket bound its maximum
         if min(value_low + slope_low * (high - low), value_high - slope_high * (high - low)) <= 1:
             return True
         s = (low + high) / 2
@@ -70,11 +65,7 @@ def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float
 
 @njit(cache=True)
 def overlaps(mean: Array, shape: Array) -> Bools:
-    """Returns flags (G, G): True where two of G filled ellipses have a common point; the diagonal is True.
-
-    mean (G, 2): centres x, y; shape (G, 2, 2): matrices A of (y - mean)' A^-1 (y - mean) <= 1, positive definite,
-    squared unit of the centres. Ellipses that touch overlap.
-    """
+    """Returns flags (G, G): True where two filled ellipses, centres mean (G, 2), matrices (G, 2, 2), overlap."""
     count = len(mean)
     found = np.ones((count, count), np.bool_)
     for i in range(count):

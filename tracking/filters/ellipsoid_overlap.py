@@ -18,12 +18,8 @@ STEPS = 60
 
 
 def separation(d: Array, A: Array, B: Array) -> float:
-    """Return the largest f(s) of two ellipsoids; they have a common point if and only if it is 1 or less.
-
-    d (D,): second centre minus the first; A, B (D, D): positive definite matrices of the ellipsoids y' A^-1 y <= 1, in
-    the squared units of d. It is the squared factor by which both would have to be enlarged, in all directions, to
-    touch. Raises numpy.linalg.LinAlgError if B is not positive definite.
-    """
+    """Returns the largest f(s) of two ellipsoids A, B (D, D), centres d (D,) apart; they overlap if it is 1 or less."""
+    # The result is also the squared factor by which both would have to be enlarged to touch.
     L = np.linalg.cholesky(B)
     inverse = np.linalg.inv(L)
     values, U = np.linalg.eigh(inverse @ A @ inverse.T)
@@ -34,6 +30,7 @@ def separation(d: Array, A: Array, B: Array) -> float:
         return float((e2 * ((1 - 2 * s) * m - s * (1 - s) * (values - 1)) / m**2).sum())
 
     low, high = 0.0, 1.0
+    # f is concave, so that its slope has one root
     for _ in range(STEPS):
         s = (low + high) / 2
         low, high = (s, high) if slope(s) > 0 else (low, s)

@@ -1,13 +1,7 @@
 """A bank of Kalman filters in arrays: constant velocity in each coordinate, and a random-walk direction.
 
-The model is filterpy's: kinematics of order 1 (`filterpy.common.kinematic_kf`, constant velocity) driven by
-`filterpy.common.Q_discrete_white_noise`, a white acceleration of standard deviation sigma held over a step dt. filterpy
-is imported where a model is made, as its import takes 0.65 s. A bank is equal to as many `filterpy.kalman.KalmanFilter`
-to 1e-9, and faster.
-
 Each of D measured coordinates (for example x, y, h, w) has a filter of its own with state x = (place, rate), A = [[1,
-dt], [0, 1]], C = [1, 0]. As the coordinates are independent, a bank of N filters is one array `state` (5, N, D) with
-rows
+dt], [0, 1]], C = [1, 0] and filterpy's process noise. A bank of N filters is one array `state` (5, N, D) with rows
     PLACE, RATE               the state
     VAR, COV, RATE_VAR        entries 11, 12, 22 of the covariance P
 
@@ -37,12 +31,8 @@ most pi / 2; a uniform distribution has a standard deviation of 52 deg.)"""
 
 
 def white_acceleration(dt: float, sigma: Array | float) -> Array:
-    """Returns entries 11, 12, 22 (place, covariance, rate) of the process noise Q of a step, (3, ...) in the shape of
-    `sigma`.
-
-    dt: length of the step, s. sigma: standard deviation of the acceleration, unit of the place per s^2. It is
-    filterpy's Q_discrete_white_noise.
-    """
+    """Returns entries 11, 12, 22 of the process noise Q of a step, (3, ...) in the shape of `sigma`."""
+    # imported here, as filterpy takes 0.65 s to import; a bank is equal to as many of its filters to 1e-9, and faster
     from filterpy.common import Q_discrete_white_noise
 
     unit = Q_discrete_white_noise(2, dt)
@@ -51,12 +41,7 @@ def white_acceleration(dt: float, sigma: Array | float) -> Array:
 
 
 def constant_velocity(dt: float, axes: int) -> tuple[Array, Array]:
-    """Returns A (transition) and Q (process noise), (2 D, 2 D) each, of D = `axes` coordinates of constant velocity.
-
-    The state is all places, then all rates. dt: length of the step, s. Q is that of a white acceleration of standard
-    deviation 1 in each coordinate. They are filterpy's kinematics of order 1 and Q_discrete_white_noise, with
-    order_by_dim=False.
-    """
+    """Returns A and Q, (2 D, 2 D) each, of D = `axes` coordinates; the state is all places, then all rates."""
     from filterpy.common import Q_discrete_white_noise, kinematic_kf
 
     A = kinematic_kf(axes, 1, dt, order_by_dim=False).F
@@ -64,40 +49,30 @@ def constant_velocity(dt: float, axes: int) -> tuple[Array, Array]:
 
 
 def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:
-    """Returns the state (5, N, D) of N new filters of D coordinates at `place` (N, D), with rate 0.
-
-    Rows of the state: place, rate (per s), variance of the place, covariance, variance of the rate. var, rate_var:
-    variances of place and rate, (D,), (N, D) or a number. The covariance is 0.
-    """
+    """Returns the state (5, N, D) of N new filters at `place` (N, D), with rate 0 and covariance 0."""
     state = np.zeros((5, *place.shape))
     state[PLACE], state[VAR], state[RATE_VAR] = place, var, rate_var
     return state
 
 
 def predict(state: Array, dt: float, q: Array) -> None:
-    """Predict a bank of N filters of D coordinates one step of dt s ahead, in place; returns nothing.
-
-    state (5, N, D): rows place, rate, variance of the place, covariance, variance of the rate. q (3, N, D) or (3, D):
-    process noise of the step, entries place, covariance, rate, from `white_acceleration`.
-    """
+    """Predicts a bank one step of dt s ahead, in place; q (3, N, D) or (3, D): from `white_acceleration`."""
     place, rate, var, cov, rate_var = state
     place += dt * rate  # eq. 1
     step = dt * rate_var  # eq. 2, to the end
+    # place, rate, var … are views of `state`, so that this changes it
     var += dt * (cov + cov + step)
     cov += step
+    # q of common noise has no axis of filters
     state[VAR:] += q if q.ndim == 3 else q[:, None]
 
 
 def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
-    """Update the filters `rows` (K,) of a bank with measurements z (K, D), in place; each row may occur once at most.
+    """Updates the filters `rows` (K,) with measurements z (K, D), in place; each row once at most.
 
-    state (5, N, D): rows place, rate, variance of the place, covariance, variance of the rate; N filters of D
-    coordinates. noise: variances of the measurements, (K, D), (D,) or a number, in the covariances' unit. No rows
-    change nothing.
-
-    Returns y^2 / S of each coordinate, (K, D): squared innovation y = z - place over its variance S before the update.
-    The sum over the coordinates is d^2 (eq. 9). Its unit is the squared unit of z per unit of covariance.
+    Returns y^2 / S of each coordinate, (K, D), whose sum over the coordinates is d^2 (eq. 9).
     """
+    # take copies the rows once; indexing each of the five by `rows` would copy five times
     new = state.take(rows, 1)
     place, rate, var, cov, rate_var = new
     s = var + noise  # eq. 6
@@ -113,15 +88,12 @@ def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
 
 
 def distances(state: Array, z: Array, noise: Array | float, scale: Array | float = 1.0) -> Array:
-    """Returns squared Mahalanobis distances y' S^-1 y (N, M) of N predicted filters and M measurements z (M, D) (eq.
-    9).
+    """Returns squared Mahalanobis distances (N, M) of N predicted filters and M measurements z (M, D) (eq. 9).
 
-    y: measurement minus predicted place; S: variance of y, diagonal. state (5, N, D): rows place, rate, variance of the
-    place, covariance, variance of the rate. noise: variances of the measurements, (M, D), (D,) or a number, in the
-    covariances' unit. scale: units of z per square root of the covariances' unit (px per m), (N,) or a number. No
-    filters or measurements give an empty array.
+    scale: units of z per square root of the covariances' unit (px per m), (N,) or a number.
     """
     place, spread = state[PLACE], np.reshape(np.square(scale), (-1, 1))
+    # one noise for all measurements: matrix products are several times faster than (N, M, D) arrays
     if np.ndim(noise) < 2:
         return _common_noise(place, z, 1.0 / ((state[VAR] + noise) * spread))
     y = z[None] - place[:, None]
@@ -130,14 +102,10 @@ def distances(state: Array, z: Array, noise: Array | float, scale: Array | float
 
 
 def _common_noise(place: Array, z: Array, w: Array) -> Array:
-    """Returns the sum over coordinates of w (z - place)^2, (N, M), at least 0, by matrix products.
-
-    place, w (N, D): predictions and weights (inverse innovation variances); z (M, D): measurements. Places are taken
-    relative to the first measurement, so that little precision cancels. No filter or no measurement gives an empty
-    array.
-    """
+    """Returns the sum over coordinates of w (z - place)^2, (N, M), at least 0, by matrix products."""
     if not len(place) or not len(z):
         return np.zeros((len(place), len(z)))
+    # relative to the first measurement, so that little precision cancels in p² - 2 p m + m²
     p, m = place - z[0], z - z[0]
     pw = p * w
     d2 = w @ (m * m).T
@@ -147,43 +115,26 @@ def _common_noise(place: Array, z: Array, w: Array) -> Array:
 
 
 def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
-    """Returns the innovation variance S to which a filter converges that is measured in every frame.
-
-    S is the variance of measurement minus predicted place. dt: s between frames. sigma: standard deviation of the
-    acceleration, unit per s^2, 0 or more; noise: variance of a measurement, unit squared, above 0. Both are arrays of
-    one shape or numbers, and so is the result. It solves one coordinate's Riccati equation in closed form (Kalata
-    1984): with l = sigma dt^2 / sqrt(noise), r = (4 + l - sqrt(8 l + l^2)) / 4 and S = noise / r^2.
-    """
+    """Returns the innovation variance S to which a filter converges that is measured in every frame (Kalata 1984)."""
     index = np.asarray(sigma) * dt**2 / np.sqrt(noise)
+    # the closed form of the Riccati equation of one coordinate, with the tracking index sigma dt² / sqrt(noise)
     r = (4 + index - np.sqrt(8 * index + index**2)) / 4
     return np.asarray(noise / r**2)
 
 
 def angle_innovation(measured: Array, predicted: Array) -> Array:
-    """Returns measured - predicted of directions of axes (eq. 5), rad in [-pi/2, pi/2); an axis turned by pi is the
-    same axis.
-
-    measured, predicted: directions, rad, of shapes that broadcast.
-    """
+    """Returns measured - predicted of directions of axes, rad in [-pi/2, pi/2) (eq. 5)."""
+    # an axis turned by pi is the same axis
     return (measured - predicted + np.pi / 2) % np.pi - np.pi / 2
 
 
 def directed(noise: Array) -> Bools:
-    """Returns flags (N,): True where a measured direction carries information.
-
-    noise (N,): variance of each measured direction, rad^2. It must be below VAGUE = (30 degrees)^2; that of a near
-    circle is not.
-    """
+    """Returns flags (N,): True where a measured direction carries information, as a near circle's does not."""
     return np.asarray(noise < VAGUE)
 
 
 def angle_update(angle: Array, rows: Ints, z: Array, noise: Array) -> None:
-    """Update the directions `rows` (K,) of `angle` (2, N) with measured directions z (K,) rad, in place.
-
-    Rows of angle: direction, rad modulo pi, and its variance, rad^2. An updated direction is in [0, pi). rows: indices,
-    each once at most. noise (K,): variances of the measurements, rad^2. A measurement with a variance of (30 degrees)^2
-    or more is left out. Returns nothing.
-    """
+    """Updates the directions `rows` (K,) of `angle` (2, N) with measured directions z (K,), rad, in place."""
     usable = directed(noise)
     rows, z, noise = rows[usable], z[usable], noise[usable]
     theta, var = angle[:, rows]

@@ -12,19 +12,16 @@ from sim.types import Array, Ints
 
 
 def effective_number(weights: Array) -> float:
-    """Return the effective number of particles, 1 / sum(w^2): P for equal weights, 1 if one particle has all."""
+    """Returns the effective number of particles, 1 / sum(w^2): P for equal weights, 1 if one particle has all."""
     return float(1.0 / np.square(weights).sum())
 
 
 def residual_resample(weights: Array, uniforms: Array) -> Ints:
-    """Return the indices (P,) of the particles that replace the old ones, ascending: residual sampling (Liu & Chen).
-
-    weights (P,): sum 1. uniforms (P,) in [0, 1). A particle of weight w is taken floor(P w) times; the rest is drawn
-    with the remainders P w - floor(P w) as weights, from as many of the first uniforms. Equal weights keep every
-    particle. filterpy's function takes w - floor(P w) as remainders, which are negative; its copies are these.
-    """
+    """Returns the indices (P,) that replace the particles, ascending: residual sampling (Liu & Chen)."""
     count = len(weights)
     expected = count * weights
+    # filterpy takes w - floor(P w) as remainders, which are negative; its copies are these. Equal weights must keep
+    # every particle, so that rounding below a whole number is raised.
     copies = np.floor(expected + 1e-9).astype(np.int64)
     rest = np.maximum(expected - copies, 0.0)
     missing = count - int(copies.sum())
@@ -35,10 +32,7 @@ def residual_resample(weights: Array, uniforms: Array) -> Ints:
 
 
 def systematic_resample_rows(weights: Array, uniforms: Array) -> Ints:
-    """Return the indices (R, P) that replace the old particles of R sets, ascending in each row: systematic sampling.
-
-    weights (R, P): sum 1 in each row. uniforms (R,) in [0, 1), one for each set.
-    """
+    """Returns the indices (R, P) that replace the particles of R sets: systematic sampling; uniforms (R,)."""
     rows, count = weights.shape
     total = np.cumsum(weights, axis=1)
     total /= total[:, -1:]
@@ -49,8 +43,8 @@ def systematic_resample_rows(weights: Array, uniforms: Array) -> Ints:
 
 
 def _cumulative(weights: Array) -> Array:
-    """Returns the cumulated weights (P,), divided by their sum; inf from the last particle with a weight on."""
     total = np.cumsum(weights)
     total /= total[-1]
+    # rounding may leave the last sum below a uniform close to 1; a particle without weight must not be drawn
     total[np.flatnonzero(weights)[-1] :] = np.inf
     return total

@@ -23,11 +23,9 @@ NOBODY = np.zeros(1, np.uint64)
 
 
 def birth_keys(points: Array, frame: int) -> Keys:
-    """Return the keys of people who are first detected at points (M, 2), m, in a frame.
-
-    People at one place to a millimetre are told apart by their order.
-    """
+    """Returns the keys of people who are first detected at points (M, 2), m, in a frame."""
     place = np.rint(points * PLACE).astype(np.int64)
+    # people at one place, to a millimetre, are told apart by their order
     order = np.lexsort(place.T)
     first = np.ones(len(points), bool)
     first[1:] = (np.diff(place[order], axis=0) != 0).any(axis=1)
@@ -41,10 +39,7 @@ def birth_keys(points: Array, frame: int) -> Keys:
 
 
 class PersonStreams:
-    """The random numbers of a tracker; seed: 0 or more.
-
-    State: entropy, made of the seed; frame, the number of the current one.
-    """
+    """The random numbers of a tracker. State: entropy, made of the seed; frame, the number of the current one."""
 
     def __init__(self, seed: int) -> None:
         self.frame = 0
@@ -52,13 +47,13 @@ class PersonStreams:
         self.entropy = np.asarray(entropy.generate_state(1, np.uint64), np.uint64)
 
     def uniforms(self, role: int, key: Keys, rows: int, columns: int) -> Array:
-        """Return uniform numbers in [0, 1), (rows, K, columns), of this frame; key (K,)."""
+        """Returns uniform numbers in [0, 1), (rows, K, columns), of this frame; key (K,)."""
         out = np.empty((rows, len(key), columns))
         person_streams_kernels.fill_uniforms(self._begin(role), key, out)
         return out
 
     def normals(self, role: int, key: Keys, rows: int, columns: int) -> Array:
-        """Return standard normal numbers, (rows, K, columns), of this frame; key (K,)."""
+        """Returns standard normal numbers, (rows, K, columns), of this frame; key (K,)."""
         out = np.empty((rows, len(key), columns))
         person_streams_kernels.fill_normals(self._begin(role), key, out)
         return out

@@ -25,7 +25,7 @@ HALF_STEP = 2.0**-53
 
 @njit(cache=True)
 def mixed(z: Any) -> Any:
-    """Return the 64 bits of a number, mixed; z: uint64."""
+    """Returns the 64 bits of a number, mixed; z: uint64."""
     z = (z ^ (z >> SHIFTS[0])) * FIRST
     z = (z ^ (z >> SHIFTS[1])) * SECOND
     return z ^ (z >> SHIFTS[2])
@@ -46,6 +46,7 @@ def fill_uniforms(begin: Any, key: Any, out: Array) -> None:
     bits = np.empty(rows * columns, np.uint64)
     values = bits.view(np.float64)
     for k in range(people):
+        # floats in [1, 2) are made from bits alone, without a division
         _fill_bits(mixed(begin[0] ^ key[k]), bits)
         for a in range(rows):
             for c in range(columns):
@@ -74,14 +75,13 @@ def fill_normals(begin: Any, key: Any, out: Array) -> None:
 
 @njit(cache=True)
 def _fill_bits(at, bits):  # type: ignore[no-untyped-def]
-    """Writes floats in [1, 2) as their bits (N,); at: uint64, where the stream begins."""
     for n in range(len(bits)):
         bits[n] = (mixed(at + np.uint64(n + 1) * GOLDEN) >> SHIFTS[3]) | ONE_TO_TWO
 
 
 @njit(cache=True)
 def _tail(centred):  # type: ignore[no-untyped-def]
-    """Returns the normal quantile at 0.5 + centred, |centred| above 0.425."""
+    # the quantile is odd, so that only one tail needs coefficients
     r = math.sqrt(-math.log(0.5 - abs(centred)))
     value = _ratio(TAIL_TOP, TAIL_BELOW, r - 1.6) if r <= 5.0 else _ratio(FAR_TOP, FAR_BELOW, r - 5.0)
     return value if centred > 0.0 else -value
@@ -89,7 +89,6 @@ def _tail(centred):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _ratio(top, below, x):  # type: ignore[no-untyped-def]
-    """Returns the ratio of two polynomials, given by 8 coefficients each, from the highest power down."""
     p, q = top[0], below[0]
     for k in range(1, 8):
         p, q = p * x + top[k], q * x + below[k]

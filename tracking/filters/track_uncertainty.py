@@ -29,46 +29,30 @@ from tracking.filters import kalman
 
 @dataclass(frozen=True)
 class Dynamics:
-    """The nominal Kalman filter of one track with D coordinates (constant velocity in each); lengths in m.
+    """The nominal Kalman filter of one track with D coordinates (constant velocity in each); lengths in m."""
 
-    dt: step, s. sigma (D,): standard deviation of the acceleration, m/s^2. noise (D,): variance of a measurement, m^2,
-    above 0. birth_rate_var (D,): variance of a new track's rate, (m/s)^2; the variance of its place is `noise`.
-    """
-
-    dt: float
-    sigma: Array
-    noise: Array
-    birth_rate_var: Array
+    dt: float  # step, s
+    sigma: Array  # (D,): standard deviation of the acceleration, m/s^2
+    noise: Array  # (D,): variance of a measurement, m^2, above 0
+    birth_rate_var: Array  # (D,): variance of a new track's rate, (m/s)^2; the variance of its place is `noise`
 
     @property
     def q(self) -> Array:
-        """Entries 11, 12, 22 (place in m^2, covariance, rate) of the process noise Q of a step of dt, (3, D)."""
+        """Process noise of a step, (3, D)."""
         return kalman.white_acceleration(self.dt, self.sigma)
 
     @property
     def asymptote(self) -> Array:
-        """Innovation variance S (of measurement minus prediction) of each coordinate, (D,) m^2, of a track in the
-        steady state.
-
-        That is what S converges to if the track is measured in every frame.
-        """
+        """Innovation variance S of each coordinate in the steady state, (D,), m^2."""
         return kalman.asymptote(self.dt, self.sigma, self.noise)
 
     def newborn(self) -> Array:
-        """Returns the state (5, 1, D) of a new track at place 0 with rate 0.
-
-        Rows: place, rate, variance of the place, covariance, variance of the rate; m and s.
-        """
+        """Returns the state (5, 1, D) of a new track at place 0 with rate 0."""
         return kalman.born(np.zeros((1, len(self.noise))), self.noise, self.birth_rate_var)
 
     def steady(self) -> Array:
-        """Returns the state (5, 1, D) of a track at place 0 just after a measurement in the steady state, in closed
-        form.
-
-        Rows: place, rate, variance of the place (P11), covariance (P12), variance of the rate (P22); m and s. With the
-        gain K = 1 - R / S, R the variance of a measurement and S the innovation variance, the posterior P11 is K R. P12
-        and P22 follow from the Riccati equation.
-        """
+        """Returns the state (5, 1, D) just after a measurement in the steady state, in closed form."""
+        # K = 1 - R / S; the posterior P11 is K R, and P12 and P22 follow from the Riccati equation
         s = self.asymptote
         k = 1 - self.noise / s
         rate_gain = 2 * (2 - k) - 4 * np.sqrt(1 - k)
@@ -80,41 +64,23 @@ class Dynamics:
 
 
 def rho(state: Array, noise: Array, asymptote: Array) -> Array:
-    """Returns rho (N,) of N predicted filters: sqrt|S| over its asymptote, S the innovation covariance (sec. 4.5, eq.
-    6).
-
-    state (5, N, D): a bank after `predict`; rows place, rate, variance of the place, covariance, variance of the rate.
-    noise, asymptote (D,): variance of a measurement, and S of a track measured in every frame, in the covariances'
-    unit. As S (of measurement minus predicted place) is diagonal, |S| is a product over the D coordinates. rho is 1 in
-    the steady state and grows with each miss.
-    """
+    """Returns rho (N,) of N predicted filters, (5, N, D) (sec. 4.5, eq. 6); 1 in the steady state, more with misses."""
+    # S is diagonal, so that |S| is a product over the coordinates
     return np.asarray(np.sqrt(np.multiply.reduce((state[kalman.VAR] + noise) / asymptote, 1)))
 
 
 def after_misses(dynamics: Dynamics, misses: int) -> float:
-    """Returns rho (sqrt|S| over its asymptote, S the innovation covariance) at the prediction after `misses` frames
-    without a measurement.
-
-    The track was in the steady state (measured in every frame for long) before. misses = 0 gives 1, up to rounding.
-    """
+    """Returns rho at the prediction after `misses` frames without a measurement, from the steady state."""
     return _rho_after(dynamics, dynamics.steady(), misses + 1)
 
 
 def at_birth(dynamics: Dynamics) -> float:
-    """Returns rho of a new track at its first prediction, one step after its first measurement.
-
-    rho is sqrt|S| over its asymptote, S the innovation covariance.
-    """
+    """Returns rho of a new track at its first prediction, one step after its first measurement."""
     return _rho_after(dynamics, dynamics.newborn(), 1)
 
 
 def hits_to_confirm(dynamics: Dynamics, confirm_ratio: float, limit: int = 1000) -> int:
-    """Returns how many frames with a measurement in a row, the first included, bring a new track's rho down to
-    confirm_ratio.
-
-    rho is sqrt|S| over its asymptote, S the innovation covariance, at the prediction for the last of these frames; so
-    the result is at least 2. Returns `limit` (above 1) if that many frames or more are needed, or if they never do.
-    """
+    """Returns how many frames with a measurement in a row bring a new track's rho to confirm_ratio, `limit` at most."""
     state, q = dynamics.newborn(), dynamics.q
     for hits in range(1, limit):
         kalman.predict(state, dynamics.dt, q)
@@ -125,10 +91,6 @@ def hits_to_confirm(dynamics: Dynamics, confirm_ratio: float, limit: int = 1000)
 
 
 def _rho_after(dynamics: Dynamics, state: Array, steps: int) -> float:
-    """Returns rho (sqrt|S| over its asymptote) after `steps` predictions without a measurement.
-
-    state (5, 1, D): rows place, rate, variance of the place, covariance, variance of the rate; changed in place.
-    """
     q = dynamics.q
     for _ in range(steps):
         kalman.predict(state, dynamics.dt, q)
@@ -136,12 +98,7 @@ def _rho_after(dynamics: Dynamics, state: Array, steps: int) -> float:
 
 
 def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
-    """Raises InputError if rho of a new track at its first prediction is at or below confirm_ratio, else returns
-    nothing.
-
-    rho is sqrt|S| over its asymptote, S the innovation covariance. Its first measurement after birth would confirm such
-    a track.
-    """
+    """Raises InputError if the first measurement after its birth would confirm a track."""
     start = at_birth(dynamics)
     if start <= confirm_ratio:
         got = f"{confirm_ratio:g}, while new tracks start at {start:.3g} times the asymptote"
@@ -150,9 +107,5 @@ def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
 
 
 def time_to_confirm(dynamics: Dynamics, confirm_ratio: float) -> float:
-    """Returns the age, s, that a track measured in every frame must be allowed to reach; the next frame confirms it.
-
-    The age counts from the first measurement. confirm_ratio: largest rho (sqrt|S| over its asymptote) of a confirmed
-    track. If more than 1000 frames are needed, the result is that of 1000.
-    """
+    """Returns the age, s, that a track measured in every frame must reach; the next frame confirms it."""
     return (hits_to_confirm(dynamics, confirm_ratio) - 2) * dynamics.dt

@@ -29,13 +29,12 @@ STEPS = 200
 
 @dataclass(frozen=True)
 class PairSample:
-    """Rows of scenes, one after the other: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all
-    scenes. pairs: number of pairs."""
+    """Rows of scenes: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all scenes."""
 
     values: np.ndarray
     together: Bools
     weight: Array
-    pairs: int
+    pairs: int  # number of pairs
 
 
 def sample_of(scenes: Sequence[PairScene]) -> PairSample:
@@ -79,10 +78,7 @@ def _knots(values: Array) -> Array:
 
 
 def _places(values: Array, at: Sequence[Array]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the index of the knot below each value, among all knots, -1 if unknown, and how far it is to the next.
-
-    values (R, Q); at: knots of each quantity. Both results (R, Q).
-    """
+    """Returns the index of the knot below each value, among all knots, -1 if unknown, and how far it is to the next."""
     place, part = np.full(values.shape, -1, np.int16), np.zeros(values.shape, np.float32)
     offset = 0
     for q, knots in enumerate(at):

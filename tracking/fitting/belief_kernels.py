@@ -15,9 +15,8 @@ def loss_and_gradient(
 ) -> tuple[float, float]:  # fmt: skip
     """Returns the weighted log loss of R rows and its slope with respect to the bias; adds to gradient (M, K).
 
-    place (R, Q): index of the knot below each quantity's value, -1 if unknown; part (R, Q): how far the value is to the
-    next knot, 0 to 1. mix (R, M): weights of the M columns of the tables. together (R,), weight (R,). heights (M, K):
-    log-odds at all knots.
+    place, part (R, Q): knot below each value, -1 if unknown, and how far it is to the next. mix (R, M): weights of the
+    M columns of the tables, whose log-odds at all knots are heights (M, K).
     """
     rows, quantities = place.shape
     loss, slopes = 0.0, 0.0

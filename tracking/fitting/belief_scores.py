@@ -12,11 +12,7 @@ BINS = 15
 
 
 def belief_scores(sample: PairSample, log_odds: Array) -> dict[str, float]:
-    """Returns the scores of beliefs (R,) of a sample's rows, by name; nan for F1 without a pair that belongs together.
-
-    pairs: number of pairs. log loss: weighted mean. calibration error: weighted mean difference of probability and
-    share of mates, by bin. F1: of the rows with a probability above 0.5, each counting once.
-    """
+    """Returns pairs, log loss, calibration error and F1 of beliefs (R,) of a sample's rows, by name."""
     true, weight = sample.together, sample.weight
     loss = np.logaddexp(0.0, log_odds) - log_odds * true
     bins = reliability(log_odds, true, weight)
@@ -30,11 +26,7 @@ def belief_scores(sample: PairSample, log_odds: Array) -> dict[str, float]:
 
 
 def reliability(log_odds: Array, true: Bools, weight: Array) -> Array:
-    """Returns a row for each bin of the probability, (15, 3): share of the weight, mean probability, share of mates;
-    the last two are nan in an empty bin.
-
-    log_odds, true, weight (R,): beliefs, whether they are right, and what each row counts.
-    """
+    """Returns share of the weight, mean probability and share of mates of each bin, (15, 3); nan in an empty one."""
     probability = 1 / (1 + np.exp(-log_odds))
     place = np.minimum((probability * BINS).astype(np.int64), BINS - 1)
     total = np.bincount(place, weight, BINS)

@@ -31,33 +31,19 @@ FEW = 20  # with fewer half hidden rows, boxes are taken as amodal and errors as
 
 @dataclass(frozen=True)
 class ErrorSpread:
-    """A model of the four errors of a detected box: mean + sd (1 + occluded (1 - visibility)) n, n random with variance
-    1.
+    """A model of the errors of a box: mean + sd (1 + occluded (1 - visibility)) n, n random of variance 1."""
 
-    - mean (4,): mean error of middle, foot, top (box heights) and logarithm of the width, the same at any visibility.
-    - sd (4,): standard deviation of the same errors for a person in full view (visibility 1).
-    - occluded: growth of the standard deviation with the hidden share 1 - visibility, 0 or more.
-    - likelihood: log likelihood of the data the model was fitted to, up to a constant; 0 without data.
-    """
-
+    # (4,): mean error of middle, foot, top (box heights) and logarithm of the width, the same at any visibility
     mean: Array
-    sd: Array
-    occluded: float
-    likelihood: float
+    sd: Array  # (4,): standard deviation of the same errors for a person in full view (visibility 1)
+    occluded: float  # growth of the standard deviation with the hidden share 1 - visibility, 0 or more
+    likelihood: float  # log likelihood of the data the model was fitted to, up to a constant; 0 without data
 
 
 def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
-    """Returns "visible" or "amodal", and the errors of the detected boxes against boxes of this kind.
+    """Returns whether detected boxes are of the visible part or of the whole person, and their errors.
 
-    "visible": detected boxes enclose the visible part of a person; "amodal": the whole person. The errors across
-    (middle), foot and top are in box heights, width is the logarithm of the width; each is (mean, standard deviation),
-    rounded to 4 digits. Further fields: `occluded` (growth of the standard deviation with the hidden share), `tails`
-    (excess kurtosis, 0 to 20), `memory` (parts that persist over time, None if there are none), and `floor_px`, its
-    default or the least of the three standard deviations at the median box height if that is less.
-
-    Detected rows (people in frames) less than a quarter visible count for tails and memory only. Without other detected
-    rows all means, standard deviations and `occluded` are 0, and `memory` is None. recordings: matched. Raises
-    ValueError if there is no recording, AssertionError if one has no labelled boxes.
+    If no detected row is a quarter visible, means, standard deviations and `occluded` are 0, and `memory` is None.
     """
     kind: Literal["visible", "amodal"] = "visible" if _of_visible_part(recordings) else "amodal"
     best = _fit_spread(recordings, kind)
@@ -81,16 +67,13 @@ def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visi
 
 
 def _tails(z: Array) -> float:
-    """Returns the excess kurtosis, out of the 12 values TAILS (0 to 20), that is likeliest for Student-t errors of
-    variance 1; 0 means normal errors.
-
-    z: standardised errors, of any shape, without nan. Of equally likely values the smallest; 0 without errors.
-    """
+    """Returns the likeliest excess kurtosis of TAILS for Student-t errors of variance 1."""
     from scipy.special import gammaln
 
     def likelihood(tails: float) -> float:
         if not tails:
             return -0.5 * float((z**2 + np.log(2 * np.pi)).sum())
+        # the excess kurtosis of a Student-t distribution is 6 / (v - 4)
         v = 4.0 + 6.0 / tails
         level = gammaln((v + 1) / 2) - gammaln(v / 2) - 0.5 * np.log(np.pi * (v - 2))
         return float((level - (v + 1) / 2 * np.log1p(z**2 / (v - 2))).sum())
@@ -99,13 +82,7 @@ def _tails(z: Array) -> float:
 
 
 def _of_visible_part(recordings: Sequence[MatchedRecording]) -> bool:
-    """True if the detected boxes of half hidden people are nearer to their visible part than to their whole box.
-
-    Half hidden: visibility between 0.3 and 0.9, both excluded. Compared are the mean absolute errors of middle, foot
-    and top in px, less the recording's median error of detected people in full view (visibility 0.9 or more; nothing if
-    there are none). False if both are equal, or with fewer than 20 half hidden detected rows. Raises ValueError without
-    recordings, AssertionError without labelled boxes.
-    """
+    """True if detected boxes of half hidden people are nearer to the visible part than to the whole box."""
     away: dict[str, list[Array]] = {"visible": [], "amodal": []}
     for m in recordings:
         visibility = m.truth.visibility[m.hit]
@@ -119,23 +96,11 @@ def _of_visible_part(recordings: Sequence[MatchedRecording]) -> bool:
 
 
 def _errors(m: MatchedRecording, kind: str) -> Array:
-    """Returns the errors (H, 4) of the H detected rows against their labelled boxes: middle, foot, top, logarithm of
-    width.
-
-    kind: "visible" compares with the visible part where known, "amodal" with the whole box. Middle (to the right), foot
-    and top (downwards) are in heights of the labelled box. Order: that of the labelled rows. Raises AssertionError
-    without labelled boxes.
-    """
+    """Returns the errors (H, 4) of the H detected rows against their labelled boxes of a kind."""
     return box_errors(m.box[m.match[m.hit]], _true(m, kind))
 
 
 def _true(m: MatchedRecording, kind: str) -> Array:
-    """Returns the labelled boxes (H, 4), left, top, width, height in px, of the H detected rows, in the order of the
-    labels.
-
-    kind: "visible" returns the visible part where it is known, else the whole box; "amodal" always the whole box.
-    Raises AssertionError without labelled boxes.
-    """
     assert m.truth.box is not None
     true = m.truth.box
     if kind == "visible" and m.truth.visible_box is not None:
@@ -144,12 +109,6 @@ def _true(m: MatchedRecording, kind: str) -> Array:
 
 
 def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSpread:
-    """Returns the likeliest `ErrorSpread` of the detected rows; `occluded` is 0 or one of 40 values from 0.1 to 6.
-
-    kind: "visible" or "amodal", the labelled boxes that errors are measured against. Rows less than a quarter visible
-    are left out. `occluded` is 0 if fewer than 20 of the others are more than 10 % hidden. All values are 0 without
-    usable rows. Raises ValueError without recordings, AssertionError without labelled boxes.
-    """
     e = np.concatenate([_errors(m, kind) for m in recordings])
     hidden = np.concatenate([1.0 - m.truth.visibility[m.hit] for m in recordings])
     clear = hidden <= 1.0 - BARELY
@@ -161,17 +120,13 @@ def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSprea
 
 
 def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
-    """Returns the `ErrorSpread` of errors e (H, 4), H above 0, if `occluded` is k; hidden (H,): 1 - visibility.
-
-    Columns of e: middle, foot, top (box heights), logarithm of width. mean and sd (standard deviation) are moments with
-    the weights 1 / (1 + k hidden)^2. The log likelihood is that of a Laplace distribution, which large errors influence
-    little.
-    """
+    """Returns the spread of errors e (H, 4) if `occluded` is k; hidden (H,): 1 - visibility."""
     growth = 1.0 + k * hidden
     weight = 1.0 / growth**2
     mean = weight @ e / weight.sum()
     sd = np.sqrt(np.mean((e - mean) ** 2 * weight[:, None], axis=0))
     near = np.mean(np.abs(e - mean) / growth[:, None], axis=0)  # scale of the Laplace distribution
+    # of a Laplace distribution, which large errors influence little
     likelihood = -len(e) * float(np.log(np.maximum(near, 1e-6)).sum()) - 4 * float(np.log(growth).sum())
     return ErrorSpread(mean, sd, k, likelihood)
 
@@ -179,16 +134,7 @@ def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
 def fit_points(
     recordings: Sequence[MatchedRecording], kind: str
 ) -> tuple[Literal["own", "seen", "foot"], float | None]:
-    """Returns the setting `points` that explains the detections' ground positions best, and their standard deviation,
-    m.
-
-    Compared are the mean absolute errors of the detected rows of all recordings. "own": against the labelled positions.
-    "seen": against these, displaced as the foot of the visible part is (`sim.detector.box_noise.seen_shift`). "foot":
-    against the ground points at the feet of the detected boxes. Without a camera all are alike, and "own" is returned.
-    The standard deviation is the root mean square error per axis, None of "foot". Recordings whose detections or labels
-    have no ground positions are left out; ("foot", None) if nothing is left, or nobody is detected. kind: "visible" or
-    "amodal", what the detected boxes enclose. Raises AssertionError without labelled boxes.
-    """
+    """Returns the setting `points` that explains the detections' ground positions best, and its deviation, m."""
     found = [_point_errors(m, kind) for m in recordings if m.pos is not None and m.truth.pos is not None]
     e = np.concatenate([np.zeros((3, 0, 2)), *found], axis=1)
     best = int(np.abs(e).sum(axis=(1, 2)).argmin())
@@ -198,10 +144,6 @@ def fit_points(
 
 
 def _point_errors(m: MatchedRecording, kind: str) -> Array:
-    """Returns the errors (3, H, 2) in m of the positions of the H detected rows under each of POINTS.
-
-    Raises AssertionError if the detections or labels have no ground positions, or the labels no boxes.
-    """
     assert m.pos is not None
     assert m.truth.pos is not None
     pos = m.pos[m.match[m.hit]]

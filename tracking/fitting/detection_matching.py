@@ -31,29 +31,17 @@ IGNORED = 0.5  # least overlap of an unmatched detection with an unscored box fo
 
 @dataclass(frozen=True)
 class MatchedRecording:
-    """A recording with R labelled rows (people in frames) and M detections, both sorted by frame, matched to each
-    other.
+    """A recording with R labelled rows and M detections, both sorted by frame, matched to each other."""
 
-    - truth: the labels, with boxes and visibilities (visible shares, 0 to 1).
-    - size: image width and height in px.
-    - camera: of the recording, None if unknown.
-    - frame (M,): frame number of each detection, from 1.
-    - box (M, 4): left, top, width, height of each detection in px.
-    - score (M,): the detector's score of each detection; 1 without scores.
-    - pos (M, 2): the detections' positions x, y on the ground in m; None if they or the labels have none.
-    - match (R,): index of the detection of each labelled row, -1 missed.
-    - owner (M,): index of the labelled row of each detection, -1 false alarm.
-    """
-
-    truth: Truth
-    size: tuple[int, int]
-    camera: Camera | None
-    frame: Ints
-    box: Array
-    score: Array
-    pos: Array | None
-    match: Ints
-    owner: Ints
+    truth: Truth  # the labels, with boxes and visibilities (visible shares, 0 to 1)
+    size: tuple[int, int]  # image width and height in px
+    camera: Camera | None  # of the recording, None if unknown
+    frame: Ints  # (M,): frame number of each detection, from 1
+    box: Array  # (M, 4): left, top, width, height of each detection in px
+    score: Array  # (M,): the detector's score of each detection; 1 without scores
+    pos: Array | None  # (M, 2): the detections' positions x, y on the ground in m; None if they or the labels have none
+    match: Ints  # (R,): index of the detection of each labelled row, -1 missed
+    owner: Ints  # (M,): index of the labelled row of each detection, -1 false alarm
 
     @property
     def hit(self) -> Bools:
@@ -74,12 +62,8 @@ class MatchedRecording:
 def match_sequence(sequence: Sequence) -> MatchedRecording:
     """Returns the labels and detections of a recording, matched one to one in each frame.
 
-    A match needs an IoU (intersection over union) of at least 0.3. Rows of a MOT folder's gt/gt.txt that MOTChallenge
-    does not score are no labels. An unmatched detection that overlaps such a row by an IoU of at least 0.5 is dropped.
-    If the labels are sparse, the recording consists of its annotated frames, numbered from 1.
-
-    Raises InputError if there are no labelled people, labels without boxes, no detections, or detections without boxes.
-    Reading raises InputError if a file is invalid, and WorkError if an order of a simulated script was not fulfilled.
+    Sparse labels leave their annotated frames, numbered from 1. Raises InputError without labelled people, detections,
+    or the boxes of either.
     """
     file, truth = sequence.source.get("path", sequence.name), sequence.truth
     missing = (
@@ -103,7 +87,6 @@ def match_sequence(sequence: Sequence) -> MatchedRecording:
 def _annotated(
     truth: Truth, found: list[Detections], left_out: tuple[Ints, Array] | None
 ) -> tuple[Truth, list[Detections], tuple[Ints, Array] | None]:
-    """Returns labels, detections and unscored rows of the annotated frames, numbered from 1."""
     annotated = annotated_frames(truth)
     if annotated.step == 1:
         return truth, found, left_out
@@ -124,17 +107,10 @@ def match_detections(
     camera: Camera | None = None,
     left_out: tuple[Ints, Array] | None = None,
 ) -> MatchedRecording:
-    """Returns the labels and detections, matched one to one in each frame; both must have boxes.
+    """Returns labels and detections, one per frame, matched one to one; both must have boxes.
 
-    A match needs an IoU (intersection over union) of at least 0.3 with the whole or the visible labelled box. The
-    matching is done twice; the second time the labelled boxes are shifted and scaled by the median error of the first.
-    Visibilities are estimated from the boxes if the truth has none.
-
-    found: the detections, one per frame, sorted. size: image width and height in px; None takes the extent of all
-    boxes. camera: stored in the result. left_out: frame numbers (L,) and boxes (L, 4; left, top, width, height in px)
-    of labelled rows that are not scored. A detection that covers one of them by an IoU of 0.5 or more is dropped unless
-    it matches a person. Detections without scores get the score 1. Raises AssertionError if the truth has no boxes;
-    ValueError if size is None and a box is nan.
+    size: of the picture, px; None: the extent of all boxes. left_out: frames (L,) and boxes (L, 4) of labelled rows
+    that are not scored; a detection that covers one is dropped unless it matches a person.
     """
     assert truth.box is not None
     box = np.concatenate([np.zeros((0, 4)), *(d.box for d in found if d.box is not None)])
@@ -146,6 +122,7 @@ def match_detections(
     true, truth = truth.box, with_visibility(truth, size)
     pairs = _pairs(truth, frame, box)
     if len(pairs[0]):
+        # a detector whose boxes are all too wide would lose matches by this alone
         usual = np.median(box_errors(box[pairs[1]], true[pairs[0]]), axis=0)
         pairs = _pairs(truth, frame, box, usual)
     owner, partner = np.full(len(box), -1, np.int64), np.full(len(truth.id), -1, np.int64)
@@ -158,13 +135,7 @@ def match_detections(
 
 
 def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) -> tuple[Ints, Ints]:
-    """Returns the matched pairs: indices of labelled rows (K,) and of detections (K,), sorted by frame.
-
-    In each frame the sum of IoU is greatest; a pair needs an IoU of at least 0.3 with the whole or the visible labelled
-    box. frame (M,), box (M, 4): frame number, sorted, and left, top, width, height (px) of the detections. usual (4,):
-    errors (middle, foot, top in box heights, logarithm of the width) that are applied to the labelled boxes first; None
-    applies none. K may be 0. Raises AssertionError if the truth has no boxes.
-    """
+    """Returns the matched labelled rows and detections (K,); usual (4,): errors applied to the labelled boxes first."""
     assert truth.box is not None
     whole = truth.box
     part = whole if truth.visible_box is None else np.where(np.isfinite(truth.visible_box), truth.visible_box, whole)
@@ -184,31 +155,21 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
 
 
 def box_iou(a: Array, b: Array) -> Array:
-    """Returns the intersection over union (N, M) of boxes a (N, 4) and b (M, 4): left, top, width, height in one unit.
-
-    0 where the boxes do not overlap or a box is nan, or, with a numpy warning, where both have no area.
-    """
+    """Returns the IoU (N, M) of boxes a (N, 4) and b (M, 4); 0 where one is nan."""
     inner = box_intersections(a, b)
     area = (a[:, 2] * a[:, 3])[:, None] + (b[:, 2] * b[:, 3])[None]
     return np.nan_to_num(inner / (area - inner))
 
 
 def box_intersections(a: Array, b: Array) -> Array:
-    """Returns the common areas (N, M) in px² of boxes a (N, 4) and b (M, 4): left, top, width, height in px.
-
-    0 where boxes do not overlap, nan where a box is nan.
-    """
+    """Returns the common areas (N, M) of boxes a (N, 4) and b (M, 4); nan where a box is nan."""
     low = np.maximum(a[:, None, :2], b[None, :, :2])
     high = np.minimum(a[:, None, :2] + a[:, None, 2:], b[None, :, :2] + b[None, :, 2:])
     return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2))
 
 
 def _covered(frame: Ints, box: Array, out_frame: Ints, out_box: Array) -> Bools:
-    """Returns which of M detections overlap an unscored box of their frame by an IoU of 0.5 or more, (M,) bool.
-
-    frame (M,), box (M, 4): of the detections; out_frame (L,), out_box (L, 4): of the unscored labels. Boxes: left, top,
-    width, height in px.
-    """
+    """Returns which detections overlap an unscored box of their frame by an IoU of 0.5 or more, (M,)."""
     covered = np.zeros(len(box), bool)
     for index in np.unique(out_frame):
         here, there = np.flatnonzero(frame == index), out_frame == index
@@ -218,13 +179,7 @@ def _covered(frame: Ints, box: Array, out_frame: Ints, out_box: Array) -> Bools:
 
 
 def _left_out(sequence: Sequence) -> tuple[Ints, Array] | None:
-    """Returns frame numbers (L,) and boxes (L, 4; left, top, width, height in px) of the rows of gt/gt.txt that
-    MOTChallenge does not score.
-
-    These are the rows with 0 in column 7 (with an id of 0 or more) or, with 8 or 9 columns, one of the classes 2, 7, 8,
-    12 in column 8. None if the source is no MOT folder, has no gt/gt.txt, or the file has only 6 columns. Raises
-    InputError if the file is invalid.
-    """
+    """Returns frames (L,) and boxes (L, 4) of the rows of gt/gt.txt that MOTChallenge does not score; None without."""
     path = Path(str(sequence.source.get("path", ""))) / "gt" / "gt.txt"
     if sequence.source.get("kind") != "mot" or not path.is_file():
         return None

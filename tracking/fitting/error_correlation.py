@@ -27,26 +27,15 @@ FEW = 20  # a lag with fewer pairs is left out
 
 @dataclass(frozen=True)
 class Correlations:
-    """Correlations of errors over time at K lags, K may be 0.
+    """Correlations of errors over time at K lags, K may be 0."""
 
-    - lag (K,): time between two errors of one person, s, ascending.
-    - rho (K,): their correlation.
-    - pairs (K,): number of pairs of errors (from rows of the labels) behind each value.
-    """
-
-    lag: Array
-    rho: Array
-    pairs: Array
+    lag: Array  # (K,): time between two errors of one person, s, ascending
+    rho: Array  # (K,): their correlation
+    pairs: Array  # (K,): number of pairs of errors (from rows of the labels) behind each value
 
 
 def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
-    """Returns a list of (lag in s, i (P,), j (P,)): indices of labelled rows of one person, row j this lag after row i.
-
-    keep (R,): bool, which labelled rows (people in frames) are used. The up to 14 lags are whole frames, evenly spaced
-    in their logarithm, ascending, from one frame to 10 s or the recording's length. Lags with fewer than 20 pairs are
-    left out; the list may be empty. Pairs are sorted by person, then frame. From 12 000 pairs on, only every second
-    (third, …) is returned.
-    """
+    """Returns (lag in s, i (P,), j (P,)) by lag: labelled rows of one person, row j this lag after row i."""
     rows = np.flatnonzero(keep)
     people, column = np.unique(truth.id[rows], return_inverse=True)
     row_of = np.full((len(people), truth.length + 1), -1, np.int64)
@@ -63,24 +52,13 @@ def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
 
 
 def correlations(truth: Truth, z: Array, keep: Bools) -> Correlations:
-    """Returns the correlations over time of errors z (R, D) of one person, pooled over the D columns.
-
-    rho is the mean product of two errors. z: one row per labelled row of the truth, with mean 0 and variance 1; it may
-    be nan where keep (R,) is false. keep: bool, which rows are used. Lags, of one frame to 10 s, with fewer than 20
-    pairs of rows are left out; without any the arrays are empty.
-    """
+    """Returns the correlations over time of errors z (R, D) of variance 1, pooled; keep (R,): the rows used."""
     rows = [(lag, float((z[i] * z[j]).mean()), len(i)) for lag, i, j in pairs_by_lag(truth, keep)]
     return _table(rows)
 
 
 def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlations:
-    """Returns the tetrachoric correlations of one person's misses over time, in [-0.5, 0.995].
-
-    A miss is taken as a standard normal number below a threshold; rho is the correlation of two such numbers that
-    explains how often both are missed. missed (R,): bool, p_miss (R,): probability of a miss, clipped to [0.001,
-    0.999]; one per labelled row of the truth. Lags, of one frame to 10 s, with fewer than 20 pairs are left out;
-    without any the arrays are empty.
-    """
+    """Returns the tetrachoric correlations over time of misses (R,), whose probability is p_miss (R,)."""
     from scipy.special import ndtri
 
     threshold = ndtri(np.clip(p_miss, 1e-3, 1.0 - 1e-3))
@@ -92,20 +70,18 @@ def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlation
 
 
 def _table(rows: list[tuple[float, float, int]]) -> Correlations:
-    """Returns rows (lag in s, correlation, number of pairs) as `Correlations`, with empty arrays without rows."""
     a = np.array(rows, dtype=float).reshape(-1, 3)
     return Correlations(a[:, 0], a[:, 1], a[:, 2])
 
 
 def bivariate_normal_cdf(a: Array, b: Array, rho: float) -> Array:
-    """Returns P(x < a, y < b), (P,), for standard normals x, y with correlation rho, |rho| < 1; a, b (P,): finite
-    thresholds.
+    """Returns P(x < a, y < b), (P,), of standard normals with correlation rho, |rho| < 1; a, b (P,): finite.
 
-    It is Φ(a) Φ(b) + 1 / 2π ∫ exp(-(a² + b² - 2 a b sin θ) / (2 cos² θ)) dθ from 0 to asin(rho), by 16 Gauss-Legendre
-    nodes. Φ: distribution function of the standard normal.
+    Φ(a) Φ(b) + 1 / 2π ∫ exp(-(a² + b² - 2 a b sin θ) / (2 cos² θ)) dθ, from 0 to asin(rho)
     """
     from scipy.special import ndtr
 
+    # 16 nodes reach full precision in the range of rho that is asked for
     nodes, weights = np.polynomial.legendre.leggauss(16)
     angle = 0.5 * np.arcsin(rho) * (nodes + 1.0)
     power = np.outer(a**2 + b**2, -0.5 / np.cos(angle) ** 2) + np.outer(a * b, np.sin(angle) / np.cos(angle) ** 2)
@@ -113,11 +89,7 @@ def bivariate_normal_cdf(a: Array, b: Array, rho: float) -> Array:
 
 
 def _tetrachoric(a: Array, b: Array, both: float) -> float:
-    """Returns the correlation rho with which the expected number of pairs below both thresholds equals `both`.
-
-    a, b (P,): thresholds of the P pairs of standard normal numbers. both: observed number of pairs below both. The
-    result is -0.5 if even that expects as many pairs or more, 0.995 if even that expects as many or fewer.
-    """
+    """Returns the correlation with which as many pairs are expected below both thresholds as `both`."""
     from scipy.optimize import brentq
 
     low, high = -0.5, 0.995
@@ -131,14 +103,7 @@ def _tetrachoric(a: Array, b: Array, both: float) -> float:
 
 
 def fit_memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
-    """Returns at most two parts of an error's memory, each with share and time (s), whose sum of share · exp(-lag /
-    time) is nearest to the correlations.
-
-    found: correlations of several recordings, pooled. The squared distance, weighted by the numbers of pairs, is
-    minimised over 26 times from 0.05 to 20 s, up to twice the longest lag. Shares are at least 0 and at most 1 in
-    total. A part with a share below 0.03 is left out. The shorter time comes first. The result is () without
-    correlations, if no part is left, or if no sum is nearer to the correlations than 0 is.
-    """
+    """Returns at most two parts whose sum of share · exp(-lag / time) is nearest to the correlations; () if none is."""
     lag, rho, pairs = (np.concatenate([getattr(c, name) for c in found] or [[]]) for name in ("lag", "rho", "pairs"))
     if not len(lag):
         return ()
@@ -157,12 +122,7 @@ def fit_memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
 
 
 def _shares(curves: Array, target: Array) -> Array:
-    """Returns the least-squares shares (1,) or (2,) of one or two curves, in their order, at least 0 and at most 1 in
-    total.
-
-    curves (K, 1 or 2): value of each curve at K lags; target (K,): the values to approach. Both are weighted already.
-    Two curves must differ if their best shares exceed 1 in total.
-    """
+    """Returns the least-squares shares of one or two curves (K, 1 or 2), at least 0 and at most 1 in total."""
     from scipy.optimize import nnls
 
     share = nnls(curves, target)[0]
@@ -170,6 +130,7 @@ def _shares(curves: Array, target: Array) -> Array:
         return np.asarray(share)
     if len(share) == 1:
         return np.ones(1)
+    # the best shares exceed 1: the best of those on the line of sum 1
     difference = curves[:, 0] - curves[:, 1]
     first = float(np.clip(difference @ (target - curves[:, 1]) / (difference @ difference), 0.0, 1.0))
     return np.array([first, 1.0 - first])

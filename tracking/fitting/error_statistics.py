@@ -19,31 +19,13 @@ LAGS = (0.2, 1.0)  # s: lags of the error correlation
 
 
 def simulated_detections(m: MatchedRecording, sensor: Sensor, seed: int) -> MatchedRecording:
-    """Returns the recording with its detections replaced by those of a simulated sensor, matched to the labels.
-
-    seed: of the random draws; negative raises ValueError. Raises InputError if `sensor.hide` names a group, or if
-    `sensor.box` is "visible" and the labels have no visible boxes.
-    """
+    """Returns the recording with its detections replaced by those of a simulated sensor, matched to the labels."""
     found = sense(m.truth, sensor, seed, m.camera, m.size)
     return match_detections(m.truth, found, m.size, m.camera)
 
 
 def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]:
-    """Returns a dict of 26 statistics of a detector's errors, all recordings pooled. Keys, in order:
-
-    - "missed": share of labelled rows (people in frames) that are not detected; "missed, visibility 0-0.25",
-      "0.25-0.5", "0.5-0.75", "0.75-0.95", "0.95-1": the same by visible share, upper limits except 1 excluded.
-    - "misses: mean run, s"; "misses in runs over 1 s": share of the missed time.
-    - "false alarms per frame": unmatched detections; "false alarms: at people": share of these that belong to a person;
-      "false alarms: mean stay, s": from an alarm's first to its last detection, both included.
-    - "overlap, 10% quantile", 50%, 90%: of the IoU with the whole labelled box.
-    - "error across: mean", "error across: sd" (standard deviation), and so for foot, top (all in box heights) and log
-      width.
-    - "error correlation after 0.2 s", "error correlation after 1 s".
-    - "score of true, median", "score of false, median".
-
-    nan where nothing was observed. Raises ValueError without recordings, AssertionError without labelled boxes.
-    """
+    """Returns 26 statistics of a detector's errors by name, all recordings pooled; nan where nothing was observed."""
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
     found: dict[str, float] = {"missed": _mean(~hit)}
@@ -75,10 +57,7 @@ def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]
 
 
 def miss_runs(m: MatchedRecording) -> Ints:
-    """Returns the length in frames of each run of successive frames in which a labelled person is present and missed.
-
-    Runs are in order of person id, then time. A frame without the person ends a run. Empty without misses.
-    """
+    """Returns the length in frames of each run of frames in which a labelled person is present and missed."""
     lengths = []
     for id in np.unique(m.truth.id):
         rows = np.flatnonzero(m.truth.id == id)
@@ -90,12 +69,6 @@ def miss_runs(m: MatchedRecording) -> Ints:
 
 
 def _iou_and_errors(m: MatchedRecording) -> tuple[Array, Array]:
-    """Returns two arrays of the H detected rows, in order of the labels: IoU with the whole labelled box (H,), errors
-    (H, 4).
-
-    Errors: middle, foot, top in heights of the labelled box, logarithm of width. Raises AssertionError without labelled
-    boxes.
-    """
     assert m.truth.box is not None
     true, box = m.truth.box[m.hit], m.box[m.match[m.hit]]
     low, high = np.maximum(true[:, :2], box[:, :2]), np.minimum(true[:, :2] + true[:, 2:], box[:, :2] + box[:, 2:])
@@ -105,12 +78,7 @@ def _iou_and_errors(m: MatchedRecording) -> tuple[Array, Array]:
 
 
 def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -> float:
-    """Returns the correlation of one person's errors about `lag` s apart (half to one and a half times), nan without
-    any.
-
-    e (H, 4): errors of the detected rows of all recordings, one recording after the other. The four kinds of error
-    (middle, foot, top, logarithm of the width) are standardised over all recordings and pooled.
-    """
+    """Returns the correlation of one person's errors about `lag` s apart, nan without any; e (H, 4)."""
     if not len(e):
         return float("nan")
     total, count, first = 0.0, 0, 0

@@ -31,16 +31,11 @@ PLACES = 32  # greatest number of foot points in `at`
 
 @dataclass(frozen=True)
 class AlarmTrack:
-    """One false alarm over time.
+    """One false alarm over time."""
 
-    - recording: where it occurred.
-    - rows (L,): indices of its detections in the recording, in order of time.
-    - person: id of the labelled person it belongs to, -1 none.
-    """
-
-    recording: MatchedRecording
-    rows: Ints
-    person: int
+    recording: MatchedRecording  # where it occurred
+    rows: Ints  # (L,): indices of its detections in the recording, in order of time
+    person: int  # id of the labelled person it belongs to, -1 none
 
     @property
     def frame(self) -> Ints:
@@ -54,14 +49,7 @@ class AlarmTrack:
 
 
 def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, FalseAlarms | None]:
-    """Returns the mean number of false alarms (unmatched detections) per frame, and their profile; None if there are
-    fewer than 5 alarm tracks.
-
-    An alarm track is a series of unmatched detections of one false alarm. Fields about alarms at people (across, foot,
-    near_height), or elsewhere (height, drift, at), keep their defaults if there are fewer than 5 alarm tracks of this
-    kind. recordings: matched; without any frame the mean is 0. Raises AssertionError if there are false alarms and the
-    labels have no boxes.
-    """
+    """Returns the mean number of false alarms per frame, and their profile; None with fewer than 5 alarm tracks."""
     tracks = [track for m in recordings for track in alarm_tracks(m)]
     frames = sum(m.truth.length for m in recordings)
     rate = sum(len(t.rows) for t in tracks) / max(frames, 1)
@@ -80,13 +68,7 @@ def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, Fal
 
 
 def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
-    """Returns the false alarms of a recording as tracks over time, in the order of their first detection.
-
-    In each frame unmatched detections continue the open tracks, greatest IoU first, one each, if the IoU with a track's
-    last detection is at least 0.3. The others begin new tracks. A track that is not detected for more than 0.5 s (at
-    least one frame) ends. Empty without false alarms. Raises AssertionError if there are some and the labels have no
-    boxes.
-    """
+    """Returns the false alarms of a recording as tracks over time, in the order of their first detection."""
     pause = max(1, round(PAUSE * m.truth.fps))
     found: list[list[int]] = []
     for index in np.unique(m.frame[m.false]).tolist():
@@ -106,13 +88,7 @@ def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
 
 
 def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
-    """Returns the id of the labelled person that an alarm belongs to, -1 none.
-
-    rows: indices of the alarm's detections, not empty. All people together must cover at least half of its box, in the
-    median over its detections. Candidates cover at least 0.6, summed over the detections, of what the person who covers
-    most does. Chosen is the candidate whose feet have the steadiest offset to the alarm's, then the one who covers
-    more. Raises AssertionError without labelled boxes.
-    """
+    """Returns the id of the labelled person that an alarm belongs to, -1 none."""
     assert m.truth.box is not None
     share: dict[int, float] = {}
     offset: dict[int, list[Array]] = {}
@@ -134,13 +110,7 @@ def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
 
 
 def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
-    """Returns the mean life of a false alarm in s, and the probability that an alarm that still lasts is detected in a
-    frame.
-
-    (0, 1) if less than 5 % of the alarms are detected again after any lag below 1.5 s. If only one lag of one recording
-    has alarms detected again, the probability is 1. Else the life is at most 60 s, and the probability from 0.2 to 1.
-    tracks: the alarm tracks of all recordings.
-    """
+    """Returns the mean life of a false alarm, s, and the probability that a living one is detected in a frame."""
     lag, share, weight = [], [], []
     for m in recordings:
         frames_of_tracks = [set(t.frame.tolist()) for t in tracks if t.recording is m]
@@ -155,6 +125,7 @@ def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[Alar
         return 0.0, 1.0
     if len(lag) == 1:
         return round(float(-lag[0] / np.log(min(share[0], 0.98))), 3), 1.0
+    # share = seen · exp(-lag / life)
     slope, level = np.polyfit(lag, np.log(share), 1, w=np.sqrt(weight))
     if slope > -1.0 / LONGEST:
         slope, level = -1.0 / LONGEST, float(np.average(np.log(share), weights=weight))
@@ -165,12 +136,7 @@ def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[Alar
 
 
 def _robust_spread(values: Sequence[float], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
-    """Returns the weighted median, and half the width of the middle 68 %, in place of mean and standard deviation.
-
-    Both are rounded to 4 digits. values: one per alarm track, not empty. tracks: the same alarm tracks in the same
-    order; the weight of a track is the root of its number of detections. Quantiles are used because some alarms are
-    assigned to a person wrongly.
-    """
+    """Returns the weighted median and half the width of the middle 68 %: some alarms get a wrong person."""
     order = np.argsort(values, kind="stable")
     w, v = np.sqrt([len(t.rows) for t in tracks])[order], np.array(values)[order]
     low, middle, high = np.interp((0.16, 0.5, 0.84), (np.cumsum(w) - w / 2) / w.sum(), v)
@@ -178,39 +144,23 @@ def _robust_spread(values: Sequence[float], tracks: Sequence[AlarmTrack]) -> tup
 
 
 def _aspect(tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
-    """Returns median and spread (half the middle 68 %) of the natural logarithm of width / height of the alarms' boxes.
-
-    The logarithm is averaged over each alarm track first; tracks must not be empty. A track weighs the root of its
-    number of detections.
-    """
     return _robust_spread([float(np.log(t.box[:, 2] / t.box[:, 3]).mean()) for t in tracks], tracks)
 
 
 def _jitter(tracks: Sequence[AlarmTrack]) -> float:
-    """Returns the standard deviation of an alarm box's edge from frame to frame, in the alarm's mean box height.
-
-    It is estimated from second differences x(t-1) - 2 x(t) + x(t+1) of left, top, right and lower edge, which steady
-    motion leaves at 0: 1.4826 times their median absolute value, divided by sqrt 6. 0 if no alarm is detected in three
-    successive frames.
-    """
+    """Returns the standard deviation of an alarm box's edge from frame to frame, in mean box heights."""
     second_differences = [np.zeros((0, 4))]
     for t in tracks:
         edges = np.concatenate([t.box[:, :2], t.box[:, :2] + t.box[:, 2:]], axis=1) / t.box[:, 3].mean()
         steady = (np.diff(t.frame)[1:] == 1) & (np.diff(t.frame)[:-1] == 1)
+        # steady motion leaves second differences at 0; 1.4826 and sqrt 6 make their median the standard deviation
         second_differences.append(np.diff(edges, n=2, axis=0)[steady])
     size = np.abs(np.concatenate(second_differences))
     return round(float(1.4826 * np.median(size) / np.sqrt(6.0)), 4) if len(size) else 0.0
 
 
 def _fit_at_people(tracks: Sequence[AlarmTrack]) -> dict[str, tuple[float, float]]:
-    """Returns a dict of the fields across, foot and near_height of `FalseAlarms`, each (median, spread) over alarm
-    tracks.
-
-    They are relative to the alarm's person: middle to the right (across) and foot downwards, in heights of the person's
-    box, and the logarithm of the alarm's height / the person's (near_height). The spread is half the middle 68 %.
-    tracks: alarms that belong to a person, not empty; frames without the person are left out. Raises AssertionError
-    without labelled boxes.
-    """
+    """Returns across, foot and near_height of `FalseAlarms`, relative to the alarm's person."""
     rows = []
     for t in tracks:
         truth = t.recording.truth
@@ -229,14 +179,7 @@ def _fit_at_people(tracks: Sequence[AlarmTrack]) -> dict[str, tuple[float, float
 
 
 def _fit_elsewhere(tracks: Sequence[AlarmTrack]) -> dict[str, object]:
-    """Returns a dict of the fields height, drift and at of `FalseAlarms`, for alarms that belong to no person.
-
-    height: median and spread (half the middle 68 %) of the logarithm of the height relative to a person standing there.
-    drift: root mean square speed per axis in box heights per s, from tracks of four or more detections; 0 without any.
-    at: up to 32 foot points, x to the right and y down, as shares (0 to 1, clipped) of the rectangle of the image that
-    shows ground (`VisibleGround.low` to `high`). They are selected evenly from all detections, alarm track after alarm
-    track. tracks: not empty.
-    """
+    """Returns height, drift and at of `FalseAlarms`, of alarms that belong to no person."""
     height, place, velocity = [], [], []
     for t in tracks:
         ground = VisibleGround(t.recording.truth, t.recording.camera, np.array(t.recording.size, dtype=float))

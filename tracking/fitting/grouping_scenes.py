@@ -31,47 +31,36 @@ MOST_PAIRS = 300
 
 @dataclass(frozen=True)
 class PairScene:
-    """One scene as rows of pairs, sorted by pair, then step (`pair_evidence`).
+    """One scene as rows of pairs, sorted by pair, then step (`pair_evidence`)."""
 
-    name: of the suite or scenario. seconds: length of a step, s. pair, step (R,); values (R, len(NAMES)) float32;
-    together (R,): True if the two are in one true group in the step's last frame.
-    """
-
-    name: str
-    seconds: float
+    name: str  # of the suite or scenario
+    seconds: float  # length of a step, s
     pair: Ints
     step: Ints
-    values: np.ndarray
-    together: Bools
+    values: np.ndarray  # (R, len(NAMES)), float32
+    together: Bools  # (R,): True if the two are in one true group in the step's last frame
 
 
 @dataclass(frozen=True)
 class Walkers:
-    """People of a scene whose positions a grouping sees, (R,) rows: frame from 0, column of the person, pos (R, 2), m.
+    """People of a scene whose positions a grouping sees, R rows."""
 
-    labels (T, P): true group by frame and column, -1 alone or absent. fps: frames per second.
-    """
-
-    frame: Ints
+    frame: Ints  # (R,): from 0
     column: Ints
-    pos: Array
-    labels: Ints
-    fps: float
+    pos: Array  # (R, 2), m
+    labels: Ints  # (T, P): true group by frame and column, -1 alone or absent
+    fps: float  # frames per second
 
 
 def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScene]:
-    """Yields two scenes for each entry of the named scenarios, suites or *.toml files and each seed; those without a
-    pair are left out.
-
-    Raises InputError if a name or file is wrong, WorkError if a script cannot be fulfilled.
-    """
+    """Yields two scenes for each entry of the named scenarios, suites or *.toml files and each seed."""
     for name, entries in [(name, resolve(name)) for name in names]:
         for entry in entries:
             for seed in seeds:
                 truth = simulated(entry, seed)
                 begin = BEGINS[seed % len(BEGINS)] if truth.length / truth.fps >= LEAST + max(BEGINS) else 0.0
                 for rough in (False, True):
-                    found = rows_of(name, walkers(truth, seed, entry.repeat, rough=rough, begin=begin))
+                    found = pair_scene(name, walkers(truth, seed, entry.repeat, rough=rough, begin=begin))
                     if len(found.pair):
                         yield found
 
@@ -84,11 +73,7 @@ def simulated(entry: Entry, seed: int) -> Truth:
 
 
 def walkers(truth: Truth, seed: int, repeat: int, *, rough: bool, begin: float = 0.0, every: int = 0) -> Walkers:
-    """Returns the people of a truth from `begin` s on. They are left out where more than half outside the image.
-
-    rough: positions err by 0.1 m and 5 % are missing, at the truth's frame rate; else by the errors of labels, at 2.5
-    frames/s. every: one frame in so many is kept instead; 0: as said.
-    """
+    """Returns the people of a truth from `begin` s on; rough: with a detector's errors, else those of labels."""
     erring = with_label_errors(truth, DETECTED if rough else SURVEYED, seed, repeat)
     assert erring.pos is not None
     every = every or (1 if rough else max(1, round(truth.fps / SLOW)))
@@ -105,7 +90,7 @@ def walkers(truth: Truth, seed: int, repeat: int, *, rough: bool, begin: float =
     return Walkers(frame[kept] // every, column[kept], erring.pos[kept], labels, truth.fps / every)
 
 
-def rows_of(name: str, people: Walkers) -> PairScene:
+def pair_scene(name: str, people: Walkers) -> PairScene:
     """Returns the rows of pairs of people, with the truth of each."""
     size = frames_per_step(people.fps)
     length, count = people.labels.shape

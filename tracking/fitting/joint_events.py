@@ -37,20 +37,16 @@ CLASSES = ("merge", "split", "none")
 
 @dataclass(frozen=True)
 class EventRows:
-    """Groups and what happened to them within the lag, one row for each group and time.
+    """Groups and what happened to them within the lag, one row for each group and time."""
 
-    features (R, 6): as group_events_kernels; event (R,): MERGE, SPLIT or NONE; possible (R, 3): which events are: one
-    person does not split, a group without another one does not merge. seconds: time that the partitions cover.
-    """
-
-    features: Array
-    event: Ints
-    possible: Bools
-    seconds: float
+    features: Array  # (R, 6): as group_events_kernels
+    event: Ints  # (R,): MERGE, SPLIT or NONE
+    possible: Bools  # (R, 3): one person does not split, a group without another one does not merge
+    seconds: float  # time that the partitions cover
 
     @classmethod
     def joined(cls, parts: Iterable[EventRows]) -> EventRows:
-        """Return all rows together."""
+        """Returns all rows together."""
         given = [*parts, cls(np.zeros((0, FEATURES)), np.zeros(0, np.int64), np.zeros((0, 3), bool), 0.0)]
         features, event, possible = (
             np.concatenate([getattr(p, name) for p in given]) for name in ("features", "event", "possible")
@@ -59,11 +55,7 @@ class EventRows:
 
 
 def event_rows(truth: Truth, lag: float, seed: int, *, wrong: bool = True) -> EventRows:
-    """Return the rows of a sequence; lag: s between the two times of the features; seed: of the errors. wrong:
-    whether there are wrong copies of partitions.
-
-    truth: with positions, velocities and groups of a simulated sequence.
-    """
+    """Returns the rows of a sequence; lag: s between the two times of the features; seed: of the errors."""
     assert truth.pos is not None
     assert truth.vel is not None
     frames, stride = max(1, round(lag * truth.fps)), max(1, round(STRIDE * truth.fps))
@@ -73,20 +65,16 @@ def event_rows(truth: Truth, lag: float, seed: int, *, wrong: bool = True) -> Ev
         _, i, j = np.intersect1d(truth.id[a], truth.id[b], return_indices=True)
         i, j = i + a.start, j + b.start
         states = [_erring(np.concatenate([truth.pos[r], truth.vel[r]], axis=1), draws) for r in (i, j)]
-        found.append(rows_of(states[0], states[1], truth.group[i], truth.group[j]))
+        found.append(partition_rows(states[0], states[1], truth.group[i], truth.group[j]))
         if wrong and (early - 1) // stride % WRONG == 0 and len(i) > 1:
             copy = wrong_partition(truth.group[i], states[0], draws)
-            found.append(rows_of(states[0], states[1], copy, truth.group[j]))
+            found.append(partition_rows(states[0], states[1], copy, truth.group[j]))
     parts = EventRows.joined(found)
     return EventRows(parts.features, parts.event, parts.possible, truth.length / truth.fps)
 
 
 def wrong_partition(group: Ints, state: Array, draws: np.random.Generator) -> Ints:
-    """Return groups (K,), -1 for alone, with an error: with probability 1/2 a part leaves a group, else two people, and
-    with them their groups, are joined who are nearest to each other among those of different groups.
-
-    group (K,): true groups of two or more people; state (K, 4). The part is one person or, as often, half of the group.
-    """
+    """Returns groups (K,), -1 alone, with an error: a part leaves a group, or two groups are joined."""
     out, new = group.copy(), group.max(initial=0) + 1
     named = np.unique(group[group >= 0])
     if len(named) and draws.random() < 0.5:
@@ -107,17 +95,12 @@ def wrong_partition(group: Ints, state: Array, draws: np.random.Generator) -> In
 
 
 def _erring(state: Array, draws: np.random.Generator) -> Array:
-    """Returns states (K, 4) with errors of a filter."""
     spread = np.array([PLACE_ERROR, PLACE_ERROR, VELOCITY_ERROR, VELOCITY_ERROR])
     return np.asarray(state + spread * draws.standard_normal(state.shape))
 
 
-def rows_of(early: Array, late: Array, before: Ints, after: Ints) -> EventRows:
-    """Return the rows of one partition; early, late (K, 4): states; before, after (K,): groups, -1 for alone.
-
-    A group splits if its members are not in one group afterwards, and merges if it shares a group with a member of the
-    nearest group.
-    """
+def partition_rows(early: Array, late: Array, before: Ints, after: Ints) -> EventRows:
+    """Returns the rows of one partition; early, late (K, 4): states; before, after (K,): groups, -1 for alone."""
     people = len(before)
     label = before + 1
     canonical(label)
@@ -136,10 +119,7 @@ def rows_of(early: Array, late: Array, before: Ints, after: Ints) -> EventRows:
 
 
 def fit_events(rows: EventRows) -> dict[str, list[float]]:
-    """Return the weights of Merge and Split by the names of the config, merge_weights and split_weights.
-
-    Raises InputError with fewer than LEAST merges or splits.
-    """
+    """Returns the weights of Merge and Split by the names of the config, merge_weights and split_weights."""
     from scipy.optimize import minimize
 
     counts = np.bincount(rows.event, minlength=3)
@@ -170,7 +150,7 @@ def fit_events(rows: EventRows) -> dict[str, list[float]]:
 
 
 def log_probabilities(rows: EventRows, weights: Mapping[str, Sequence[float]]) -> Array:
-    """Return log pi of Merge, Split and None, (R, 3); -inf for an event that is not possible."""
+    """Returns log pi of Merge, Split and None, (R, 3); -inf for an event that is not possible."""
     table = np.array([weights[f"{CLASSES[event]}_weights"] for event in (MERGE, SPLIT)])
     design = np.concatenate([rows.features, np.ones((len(rows.event), 1))], axis=1)
     return _log_probabilities(design, table, rows.possible)
@@ -184,9 +164,7 @@ def _log_probabilities(design: Array, weights: Array, possible: Bools) -> Array:
 
 
 def event_scores(rows: EventRows, weights: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return scores of a classifier on rows: rows, merges and splits (numbers); log_loss and prior_log_loss, of a model
-    that knows the frequencies alone, per row; and of merge and split the mean probability of the rows with and without
-    the event, and the expected number of events over the true one."""
+    """Returns scores of a classifier on rows: numbers, log losses, and probabilities of merges and splits."""
     log_p = log_probabilities(rows, weights)
     p, counts = np.exp(log_p), np.bincount(rows.event, minlength=3)
     share = np.maximum(counts / max(len(rows.event), 1), 1e-12)

@@ -28,41 +28,27 @@ FEW_MISSES = 10  # with fewer misses in all, no memory is fitted
 
 @dataclass(frozen=True)
 class DetectionProbability:
-    """Probability that a person is detected, by visibility (visible share, 0 to 1) and box height.
+    """Probability that a person is detected, by visibility (visible share, 0 to 1) and box height."""
 
-    - best: probability P for a large person in full view, 0 to 1.
-    - curve: factors c at the visibilities 0, 0.25, 0.5, 0.75 and 1, linear between them; ascending, the last is 1.
-    - small: half the box height in px below which detection becomes less likely; 0: height has no effect.
-    """
-
-    best: float
+    best: float  # probability P for a large person in full view, 0 to 1
+    # factors c at the visibilities 0, 0.25, 0.5, 0.75 and 1, linear between them; ascending, the last is 1.
     curve: tuple[float, ...]
-    small: float
+    small: float  # half the box height in px below which detection becomes less likely; 0: height has no effect
 
     def at(self, visibility: Array, height: Array) -> Array:
-        """Returns the probabilities of detection (R,) at visibility (R,), 0 to 1, and box height (R,) in px.
-
-        It is best · c(visibility) · min(1, height / (2 small)), without the last factor if `small` is 0.
-        """
+        """Returns best · c(visibility) · min(1, height / (2 small)), (R,); the last factor only if `small` is not 0."""
         c = np.interp(visibility, np.linspace(0.0, 1.0, NODES), self.curve)
         return self.best * c * (np.minimum(1.0, height / (2 * self.small)) if self.small else 1.0)
 
 
 def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbability, tuple[Memory, ...]]:
-    """Returns the probability of detection, and the parts of the misses' memory (each with share and time in s).
-
-    `small` is the best of 16 candidates, from half the 1 % quantile to half the 90 % quantile of the heights, or 0 if
-    none raises the log likelihood enough. The second result is () if there are fewer than 10 misses or no correlation
-    over time.
-
-    recordings: matched. Raises ValueError without recordings, IndexError without labelled rows, AssertionError without
-    labelled boxes.
-    """
+    """Returns the probability of detection, and the parts of the misses' memory, () with fewer than 10 misses."""
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
     height = np.concatenate([_heights(m) for m in recordings])
     plain, likelihood = _fit_probability(hit, visibility, height, 0.0)
     gain = GAIN * _rows_per_independent_row(recordings, plain)
+    # misses persist, so that rows carry little new information: `small` must gain in independent rows
     chosen = plain
     least, most = np.quantile(height, (0.01, 0.9)) / 2
     for small in np.geomspace(least, most, SIZES).round(1):
@@ -78,11 +64,7 @@ def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbabi
 
 
 def _heights(m: MatchedRecording) -> Array:
-    """Returns the heights (R,) in px of the labelled rows that decide on detection.
-
-    They are the heights of the whole boxes; for a camera seen from above (kind "top"), the longer side of the box /
-    SHOULDER_SHARE (0.27: shoulders over body height). Raises AssertionError without labelled boxes.
-    """
+    """Returns the heights (R,), px, that decide on detection: from above, those that the shoulders stand for."""
     assert m.truth.box is not None
     from sim.scene.body import SHOULDER_SHARE
 
@@ -92,12 +74,7 @@ def _heights(m: MatchedRecording) -> Array:
 
 
 def _fit_probability(hit: Bools, visibility: Array, height: Array, small: float) -> tuple[DetectionProbability, float]:
-    """Returns the likeliest probability of detection for a given `small`, and its log likelihood, prior included.
-
-    The prior, worth 2 rows at each of the 5 visibilities, is that the factor c equals the visibility. hit (R,): bool,
-    which labelled rows are detected; visibility (R,), 0 to 1; height (R,): of boxes in px. small: half the height in px
-    below which detection becomes less likely; 0: no effect.
-    """
+    """Returns the likeliest probability of detection for a given `small`, and its log likelihood with the prior."""
     from scipy.optimize import minimize
 
     levels = np.linspace(0.0, 1.0, NODES)
@@ -121,12 +98,7 @@ def _fit_probability(hit: Bools, visibility: Array, height: Array, small: float)
 
 
 def _rows_per_independent_row(recordings: Sequence[MatchedRecording], probability: DetectionProbability) -> float:
-    """Returns how many labelled rows carry as much information as one independent row, at least 1.
-
-    It is 1 + 2 Σ rho over the lags in frames, up to 10 s, rho being the correlation of one person's misses, clipped to
-    [0, 1]. The greatest of all recordings is returned; 1 if none has enough pairs of rows. probability: of detection,
-    by which misses are standardised. Raises AssertionError without labelled boxes.
-    """
+    """Returns how many labelled rows carry as much information as one independent row, at least 1."""
     found = []
     for m in recordings:
         p = probability.at(m.truth.visibility, _heights(m))

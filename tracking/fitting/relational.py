@@ -35,25 +35,19 @@ STEPS = 50
 
 @dataclass(frozen=True)
 class TruePairs:
-    """Pairs of people of a sequence, one row per pair and frame, sorted by pair, then frame.
-
-    pair, frame (R,). design (R, 3): 1, minus distance in m, minus velocity difference in m/s. same (R,): True if both
-    are in one true group. dt: s between frames.
-    """
+    """Pairs of people of a sequence, one row per pair and frame, sorted by pair, then frame. pair, frame (R,)."""
 
     pair: Ints
     frame: Ints
-    design: Array
-    same: Bools
-    dt: float
+    design: Array  # (R, 3): 1, minus distance in m, minus velocity difference in m/s
+    same: Bools  # (R,): True if both are in one true group
+    dt: float  # s between frames
 
 
 def fit_relational(truths: Iterable[Truth], ends: Sequence[float]) -> dict[str, float | list[float]]:
-    """Return fitted parameters of `relational` by name: drift, diffusion, relation_rate, _bias, _distance,
-    _velocity.
+    """Returns fitted parameters of `relational` by name: drift, diffusion, relation_rate, _bias, _distance, _velocity.
 
-    truths: of simulated sequences with positions, velocities and groups; ends: upper ends of the rows of the speed
-    table, m/s. Raises InputError with fewer than 500 changes of velocity, or without pairs of both kinds.
+    ends: upper ends of the rows of the speed table, m/s.
     """
     changes, pairs = [], []
     for truth in truths:
@@ -89,8 +83,7 @@ def fit_relational(truths: Iterable[Truth], ends: Sequence[float]) -> dict[str, 
 
 
 def velocity_changes(truth: Truth) -> tuple[Array, Array, Array, Array]:
-    """Return speed (R,), m/s, and the change of velocity after it along and across its direction (R,), m/s, and the
-    time of the change (R,), s."""
+    """Returns speed, change of velocity along and across its direction, m/s, and its time, s, (R,) each."""
     assert truth.pos is not None
     assert truth.vel is not None
     frames = max(1, round(LAG * truth.fps))
@@ -110,7 +103,7 @@ def velocity_changes(truth: Truth) -> tuple[Array, Array, Array, Array]:
 
 
 def pair_rows(truth: Truth) -> TruePairs:
-    """Return the rows of the pairs of a sequence that are at most NEAR apart."""
+    """Returns the rows of the pairs of a sequence that are at most NEAR apart."""
     assert truth.pos is not None
     assert truth.vel is not None
     people, found = int(truth.id.max(initial=0)) + 1, []
@@ -129,8 +122,7 @@ def pair_rows(truth: Truth) -> TruePairs:
 
 
 def logistic(design: Array, same: Bools) -> Array:
-    """Return the weights (3,) of a logistic regression with a normal prior, by Newton's method; design (R, 3), same
-    (R,)."""
+    """Returns the weights (3,) of a logistic regression with a normal prior, by Newton's method."""
     weights = np.zeros(design.shape[1])
     for _ in range(STEPS):
         p = 1 / (1 + np.exp(-np.clip(design @ weights, -40, 40)))
@@ -144,7 +136,6 @@ def logistic(design: Array, same: Bools) -> Array:
 
 
 def _log_loss(sequences: list[TruePairs], weights: Array, rate: float) -> float:
-    """Returns the mean log loss of the relation's expectation, a moving average of probabilities with this rate."""
     from scipy.signal import lfilter
 
     total, count = 0.0, 0

@@ -21,24 +21,13 @@ FEW_SCORES = 20  # with fewer scores, no quantiles are given
 
 
 def fit_sensor(sequences: Iterable[Recording] | Recording) -> Sensor:
-    """Returns the sensor whose errors are like those of the detector on these recordings, pooled.
-
-    sequences: one recording or several. Raises InputError if a recording lacks labels, detections or boxes, or a file
-    of it is invalid. Raises InputError if there are fewer than 50 labelled rows (people in frames) or fewer than 25 of
-    them are detected; so without any recording. Raises WorkError if an order of a simulated script was not fulfilled.
-    """
+    """Returns the sensor whose errors are like those of the detector on these recordings, pooled."""
     recordings = [sequences] if isinstance(sequences, Recording) else list(sequences)
     return fit_matched([match_sequence(s) for s in recordings])
 
 
 def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
-    """Returns the sensor whose errors are like those of the detector on matched recordings, pooled.
-
-    `min_visibility` is 0. Without ground positions of labels and detections `points` is "foot", and `noise_m` keeps its
-    default. `true_scores` and `false_scores` are None with fewer than 20 scores, `miss_memory` and `false_alarms` if
-    nothing was found. Raises InputError if there are fewer than 50 labelled rows (people in frames) or fewer than 25 of
-    them are detected. Raises AssertionError without labelled boxes.
-    """
+    """Returns the sensor whose errors are like those of the detector on matched recordings, pooled."""
     people, hits = sum(len(m.match) for m in recordings), sum(int(m.hit.sum()) for m in recordings)
     if people < LEAST or hits < LEAST // 2:
         name = recordings[0].truth.name if recordings else "fit sensor"
@@ -71,13 +60,10 @@ def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
 
 
 def _digits(x: float) -> float:
-    """Returns x rounded to four significant digits."""
     return float(f"{x:.4g}")
 
 
 def _quantiles(score: Array) -> tuple[float, ...] | None:
-    """Returns 11 quantiles of the scores (N,), evenly spaced from the least to the greatest, rounded to 4 digits; None
-    if N is below 20."""
     if len(score) < FEW_SCORES:
         return None
     return tuple(round(float(q), 4) for q in np.quantile(score, np.linspace(0.0, 1.0, SCORES)))

@@ -41,31 +41,25 @@ NUMBERS = ("bias", "stay", "come", "memory", "arrival")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Evidence from one quantity, in log-odds: piecewise linear, constant beyond the ends, 0 where it is unknown.
+    """Evidence from one quantity, in log-odds: piecewise linear, constant beyond the ends, 0 where it is unknown."""
 
-    name: one of `NAMES`. at (K,): ascending values of the quantity. log_odds (4, K): at these values, for `SITUATIONS`.
-    """
-
-    name: str
-    at: Array
-    log_odds: Array
+    name: str  # one of `NAMES`
+    at: Array  # (K,): ascending values of the quantity
+    log_odds: Array  # (4, K): at these values, for `SITUATIONS`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Belief:
-    """A fitted belief: its tables, and how beliefs of pairs become groups.
-
-    bias: log-odds added to the tables. stay, come: log-odds added for pairs that were in one group a step before, and
-    taken from all others: groups change the later the greater they are. memory (s): a missed member stays so long in
-    the group. arrival (s): people who were together so soon after a first frame arrived together: no merge.
-    """
+    """A fitted belief: its tables, and how beliefs of pairs become groups."""
 
     tables: tuple[Table, ...]
-    bias: float
+    bias: float  # log-odds added to the tables
+    # stay, come: log-odds added for pairs that were in one group a step before, and taken from all others: groups
+    # change the later the greater they are
     stay: float = 5.0
     come: float = 1.6
-    memory: float = 1.0
-    arrival: float = 1.0
+    memory: float = 1.0  # (s): a missed member stays so long in the group
+    arrival: float = 1.0  # (s): people who were together so soon after a first frame arrived together: no merge
 
     @property
     def smooth(self) -> float:
@@ -114,10 +108,7 @@ class Belief:
 
 
 def situations(values: Array) -> Array:
-    """Returns how far each of `SITUATIONS` holds for rows of quantities (R, len(NAMES)), (R, 4), of sum 1.
-
-    Pairs whose speed is unknown count as walking.
-    """
+    """Returns how far each of `SITUATIONS` holds for rows of quantities, (R, 4); unknown speed is walking."""
     speed, others = values[:, SPEED], values[:, OTHERS]
     stand = np.where(np.isnan(speed), 0.0, np.clip((WALKS - speed) / (WALKS - STANDS), 0.0, 1.0))
     many = np.clip((others - FEW) / (MANY - FEW), 0.0, 1.0)
@@ -126,23 +117,17 @@ def situations(values: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairBeliefs:
-    """Log-odds that two people belong together, one row per pair and step in which both were seen within 4 m.
+    """Log-odds that two people belong together, one row per pair and step in which both were seen within 4 m."""
 
-    step (R,): from 0, ascending; a, b (R,): columns, a < b; log_odds (R,).
-    """
-
-    step: Ints
+    step: Ints  # (R,): from 0, ascending
+    # a, b (R,): columns, a < b; log_odds (R,)
     a: Ints
     b: Ints
     log_odds: Array
 
 
 def pair_beliefs(pos: Array, time: Array, seconds: float, belief: Belief) -> PairBeliefs:
-    """Returns the beliefs of all pairs of people who come within 4 m of each other. Nothing looks ahead.
-
-    pos (S, P, 2), time (S, P): m and s by step and person (`step_positions`), nan where not seen. seconds: length of a
-    step, s.
-    """
+    """Returns the beliefs of all pairs who come within 4 m; pos (S, P, 2), time (S, P): by step, nan where not seen."""
     parts = [(rows.step, rows.a, rows.b, belief.log_odds(rows.values)) for rows in evidence(pos, time, seconds)]
     if not parts:
         nobody = np.zeros(0, np.int64)
@@ -151,11 +136,7 @@ def pair_beliefs(pos: Array, time: Array, seconds: float, belief: Belief) -> Pai
 
 
 def beliefs_of_tracks(frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief) -> PairBeliefs:
-    """Returns the beliefs of all pairs of people of a sequence of `length` frames.
-
-    A row is one person in one frame: frame (R,) from 0; column (R,): number of the person, from 0; pos (R, 2): x, y in
-    m. fps: frames per second. Step s of the result is known in frame s `frames_per_step(fps)`.
-    """
+    """Returns the beliefs of all pairs of a sequence; frame, column (R,), pos (R, 2): one row per person and frame."""
     size = frames_per_step(fps)
     places, times = step_positions(frame, column, pos, length, int(column.max(initial=-1)) + 1, fps)
     return pair_beliefs(places, times, size / fps, belief)
@@ -168,7 +149,6 @@ def default_belief() -> Belief:
 
 
 def _table(path: str | Path, number: int, row: Any) -> Table:
-    """Returns a table of a file; number: its place among the tables, from 1. Raises InputError if it is wrong."""
     place = f"table {number}"
     keys = ("name", "at", *SITUATIONS)
     if not isinstance(row, dict) or set(row) != set(keys):

@@ -10,15 +10,14 @@ from sim.types import Array, Ints
 
 @njit(cache=True)
 def table_sums(values: Array, mix: Array, bias: float, column: Ints, cut: Ints, at: Array, heights: Array) -> Array:
-    """Returns the beliefs (R,), log-odds: bias plus what each table says of its quantity, 0 where it is unknown.
+    """Returns the beliefs (R,) of quantities (R, Q): bias plus what each table says, 0 where a quantity is unknown.
 
-    values (R, Q): quantities; mix (R, M): weights of the M columns of the tables. column (T,): the quantity of each
-    table; cut (T + 1,): where each table's knots begin in at (N,) and heights (M, N): the knots, ascending in each
-    table, and the log-odds there. Tables are linear between knots and constant beyond the ends.
+    mix (R, M): weights of the M columns of the tables. cut (T + 1,): where the knots of each table begin in at (N,) and
+    heights (M, N).
     """
     out = np.empty(len(values))
-    out[:] = bias
     for r in range(len(values)):
+        out[r] = bias
         for t in range(len(column)):
             x = values[r, column[t]]
             if not np.isnan(x):
@@ -27,6 +26,7 @@ def table_sums(values: Array, mix: Array, bias: float, column: Ints, cut: Ints, 
                     k += 1
                 part = (x - at[k]) / (at[k + 1] - at[k]) if x > at[k] and k < last else 0.0
                 for m in range(len(heights)):
+                    # most rows have a weight in one or two columns only
                     if mix[r, m] > 0:
                         out[r] += mix[r, m] * heights[m, k]
                         if part > 0:

@@ -16,14 +16,13 @@ from tracking.grouping.link_rule import Links
 from tracking.grouping.pair_evidence import frames_per_step, step_positions
 
 
-def partition(
+def groups_of_steps(
     step: Ints, a: Ints, b: Ints, log_odds: Array, unseen: float, stay: float = 0.0, come: float = 0.0
 ) -> tuple[Ints, Ints, Ints]:
-    """Returns the people in groups of each step, (step, person, group), (N,) each, sorted by group.
+    """Returns step, person and group (N,) of all people in groups, sorted by group; people alone are left out.
 
-    step, a, b (R,): one row per pair and step, step ascending, persons a != b. log_odds (R,). unseen: log-odds of pairs
-    without a row. stay, come: added for pairs that were in one group in the step before, taken from all others. group:
-    any number that no other group of any step has. People alone are left out.
+    step, a, b, log_odds (R,): one row per pair and step, step ascending. stay, come: added for pairs that were in one
+    group in the step before, taken from all others.
     """
     from tracking.grouping.linkage_kernels import linked_groups
 
@@ -38,11 +37,7 @@ def partition(
 
 
 def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief) -> Links:
-    """Returns all switches of links in a sequence of `length` frames: any two members of a group are linked.
-
-    A row is one person in one frame: frame (R,) from 0; column (R,): number of the person, from 0; pos (R, 2): x, y in
-    m. fps: frames per second.
-    """
+    """Returns all switches of links in a sequence of `length` frames: any two members of a group are linked."""
     size = frames_per_step(fps)
     people = int(column.max(initial=0)) + 1
     places, times = step_positions(frame, column, pos, length, people, fps)
@@ -55,7 +50,7 @@ def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float,
     step = np.concatenate([found.step, at])
     order = np.argsort(step, kind="stable")
     row, step = row[order], step[order]
-    t, person, group = partition(
+    t, person, group = groups_of_steps(
         step, found.a[row], found.b[row], found.log_odds[row], UNSEEN, belief.stay, belief.come
     )
     i, j = runs(np.arange(len(group)) + 1, np.searchsorted(group, group, side="right"))
@@ -72,11 +67,7 @@ def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float,
 
 
 def _remembered(pair: Ints, step: Ints, seen: Bools, memory: int) -> tuple[Ints, Ints]:
-    """Returns rows that stand for steps in which one of a pair was missed: (row, step), (N,) each.
-
-    pair, step (R,): rows sorted by pair, then step; pair is a * P + b. seen (S, P): True where a person was seen.
-    memory: steps for which a row is repeated.
-    """
+    """Returns (row, step) of rows that stand for steps in which one of a pair was missed; seen (S, P)."""
     steps, people = seen.shape
     last = np.concatenate([np.diff(pair) != 0, [True]])[: len(pair)]
     following = np.where(last, steps, np.append(step[1:], steps)[: len(step)])

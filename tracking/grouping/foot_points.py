@@ -34,9 +34,7 @@ def boxed(tracks: Sequence[Tracks]) -> bool:
 
 
 def can_stand(tracks: Sequence[Tracks], camera: Camera | None, pixels: bool) -> bool:
-    """Returns True if tracks in the image can be moved to the ground: of people with boxes, with a camera, and not made
-    from pixels.
-    """
+    """Returns True if tracks in the image can be moved to the ground: boxes of people, a camera, not from pixels."""
     return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and not pixels
 
 
@@ -50,11 +48,7 @@ def completed(
     scene: Scene | None,
     pixels: bool,
 ) -> tuple[Tracks, ...]:
-    """Returns the tracks of a sequence with groups and events filled in: as `with_groups`, or from where boxes stand.
-
-    camera, scene: of the sequence. pixels: the tracks are made from pixels. Tracks that `can_stand` are grouped on the
-    ground, so that px_per_m has no influence. They stay in the image, with the hulls of groups round boxes.
-    """
+    """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground."""
     if camera is None or not can_stand(tracks, camera, pixels) or all(t.derived for t in tracks):
         return with_groups(tracks, fps, px_per_m, rule)
     grouped = with_groups([standing(t, camera, scene) for t in tracks], fps, 1.0, rule)
@@ -63,7 +57,6 @@ def completed(
 
 
 def _grouped_as(t: Tracks, grouped: Tracks, named: bool) -> Tracks:
-    """Returns the tracks of a frame with the group ids and new events of the same people on the ground."""
     new = moved_events(grouped.events[len(t.events) :], t.id, t.pos)
     out = t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
     return out if named and t.groups is not None else out.replace(groups=groups_of_people(out))
@@ -79,9 +72,7 @@ def standing(t: Tracks, camera: Camera, scene: Scene | None) -> Tracks:
 
 
 def groups_of_people(t: Tracks) -> Groups:
-    """Returns the groups of tracks of people that follow from `group`: hulls round boxes in the image, else round
-    footprints. People at unknown positions are left out.
-    """
+    """Returns the groups that follow from `group`: hulls round boxes in the image, else round footprints."""
     there = np.isfinite(t.pos).all(axis=1)
     rows = (t.id[there], t.group[there], t.pos[there], t.vel[there])
     if t.plane != "image" or t.box is None:

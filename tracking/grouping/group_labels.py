@@ -25,23 +25,18 @@ from tracking.grouping.merge_split_events import LinkSwitch, Parts, TrackedMotio
 
 @dataclass
 class LinkedPeople:
-    """Who is present and linked to whom at one moment. People are numbers, as columns of arrays or ids of tracks.
+    """Who is present and linked to whom at one moment. People are numbers, as columns of arrays or ids of tracks."""
 
-    present: dict by person: the frame since which the person has been present; the caller decides how long a person who
-    is missed stays present. linked: dict by person, the set of people with a link to the person, present or not.
-    identities: the groups of the last step, with members (people) and ids (from 1).
-    """
-
+    # dict by person: the frame since which the person has been present; the caller decides how long a person who is
+    # missed stays present
     present: dict[int, int] = field(default_factory=dict)
+    # dict by person, the set of people with a link to the person, present or not
     linked: dict[int, set[int]] = field(default_factory=dict)
+    # the groups of the last step, with members (people) and ids (from 1)
     identities: Identities = field(default_factory=Identities)
 
     def components(self) -> list[PersonSet]:
-        """Returns the connected components of the present people under their links, as sets of people, in order of
-        the least person.
-
-        People alone are left out. Links to people who are not present do not count. No links give an empty list.
-        """
+        """Returns the connected components of two or more present people, in order of the least person."""
         found, seen = [], set[int]()
         for p in sorted(self.present.keys() & self.linked.keys()):
             part, new = {p}, [] if p in seen else [p]
@@ -54,11 +49,7 @@ class LinkedPeople:
         return found
 
     def step(self, t: int, switched: Sequence[LinkSwitch], arrival: int) -> list[GroupChange]:
-        """Switch links in frame t and return what changes in the groups, as `Identities.step`; updates `identities`.
-
-        switched: (a, b, on, since) of the links. arrival: frames; people who are linked so soon after they came enter
-        with their group instead of joining it later. `present` is brought up to date before.
-        """
+        """Switches links in frame t and returns what changes in the groups; `present` is up to date before."""
         for a, b, on, _ in switched:
             self.switch(a, b, on)
         entered = _entered(self, switched, arrival)
@@ -74,15 +65,9 @@ class LinkedPeople:
 def label_people(
     frame: Ints, column: Ints, motion: TrackedMotion, links: Links, rule: LinkRule | Belief
 ) -> tuple[Ints, list[GroupEvent]]:
-    """Return the group id of each row (R,), -1 for a person alone, and the membership events in order of `emitted`.
+    """Returns the group id of each row (R,), from 1, -1 alone, and the membership events in order of `emitted`.
 
-    A row is one person in one frame. frame (R,): from 0, sorted; column (R,): the person, from 0; motion: of all people
-    by frame and column; links: all switches of links of the sequence.
-
-    Ids count from 1 and last as long as the group. A member who is not seen stays in the group for `rule.memory` s. In
-    a frame in which only one member of a group is seen, that member's label is -1. Kinds of events: merge, split, form,
-    dissolve, enter, leave. In them members are columns + 1, positions are in m and frames count from 1. Groups that
-    enter within `rule.arrival` s of the first frame have no event.
+    frame, column (R,): from 0. In events members are columns + 1 and frames count from 1.
     """
     length = len(motion.pos)
     spells = _spells(frame, column, frames_of(rule.memory, motion.fps), length)
@@ -107,10 +92,8 @@ def label_people(
 def _dated(
     state: LinkedPeople, t: int, switched: Iterable[tuple[int, int, bool]], motion: TrackedMotion
 ) -> list[LinkSwitch]:
-    """Returns the links (a, b, on) switched in frame t with the frame in which the two came together.
-
-    Only links that are set and have a person in no group need it, as only these may enter; the others have t.
-    """
+    """Returns the links switched in frame t with the frame in which the two came together."""
+    # only links of people in no group yet may enter; the onset of the others is not needed
     grouped = {p for people in state.identities.groups.values() for p in people}
     return [
         (a, b, on, motion.onset(frozenset([a]), frozenset([b]), t, joins=True) if on and not {a, b} <= grouped else t)
@@ -119,32 +102,20 @@ def _dated(
 
 
 def parts_of_change(change: GroupChange, old: Members, state: LinkedPeople) -> Parts:
-    """Return the groups and people alone that a change joined, or into which it divided a group.
-
-    old: members of the groups before the change; state: after it. People who are absent are left out.
-    """
+    """Returns the groups and people alone that a change joined, or into which it divided a group."""
     parts = part_sets(change, old, state.identities.groups, frozenset(state.present.keys() & set(change.members)))
     return Parts(parts, max((min(state.present[p] for p in part) for part in parts), default=0))
 
 
 def part_sets(change: GroupChange, old: Members, new: Members, people: PersonSet) -> list[PersonSet]:
-    """Returns the groups and people alone, of `people`, that a change joined, or into which it divided a group.
-
-    old, new: members of the groups before and after the change.
-    """
+    """Returns the groups and people alone, of `people`, that a change joined, or into which it divided a group."""
     groups, names = (new, change.after) if change.kind in ("split", "dissolve") else (old, change.before)
     parts = [part for g in names if g >= 0 and (part := groups[g] & people)]
     return parts + [frozenset([p]) for p in sorted(people.difference(*parts))]
 
 
 def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, list[tuple[int, int | None]]]:
-    """Returns a dict from a frame (from 0) to a list of who comes, as (column, frame), and whose spell ends, as
-    (column, None), in that frame.
-
-    A spell is the time from a person's first row until `memory` frames after the last. frame, column (R,): frame and
-    person of each row. length: of the sequence, in frames. A gap of at most `memory` frames does not end a spell.
-    Spells that last to the end of the sequence have no end.
-    """
+    """Returns by frame who comes, (column, frame), and whose spell ends, (column, None), after the last row."""
     order = np.lexsort((frame, column))
     found: dict[int, list[tuple[int, int | None]]] = {}
     for p, first, last in zip(*stretches(column[order], frame[order], 1, memory + 1), strict=True):
@@ -162,12 +133,7 @@ def _come_or_go(state: LinkedPeople, p: int, since: int | None) -> None:
 
 
 def _entered(state: LinkedPeople, switched: Iterable[LinkSwitch], arrival: int) -> PersonSet:
-    """Returns the people who count as entering with their group instead of joining it later.
-
-    They are present and in no group yet, and a link of theirs that is set in this frame began at most `arrival` frames
-    after the frame since which they have been present. switched: (a, b, on, since) of the links switched in this frame:
-    both people, True if set, and the first frame of what caused the switch.
-    """
+    """Returns the people who enter with their group: in none yet, and linked within `arrival` frames of coming."""
     grouped = {p for people in state.identities.groups.values() for p in people}
     return frozenset(
         p for a, b, on, since in switched if on for p in (a, b)
@@ -176,10 +142,6 @@ def _entered(state: LinkedPeople, switched: Iterable[LinkSwitch], arrival: int) 
 
 
 def _without_singles(frame: Ints, group: Ints) -> Ints:
-    """Returns the labels (R,) with -1 wherever a group has only one row in a frame; a row is one person in one frame.
-
-    frame, group (R,): frame and group id (-1 alone) of each row; not changed.
-    """
     key = frame * (int(group.max(initial=0)) + 2) + group + 1
     _, place, count = np.unique(key, return_inverse=True, return_counts=True)
     return np.where(count[place] > 1, group, -1)

@@ -22,10 +22,7 @@ def default_grouping() -> Grouping:
 
 
 def grouping_of(source: str | Path) -> Grouping:
-    """Returns the grouping "rule" or "belief" with its default parameters, or that of a TOML file.
-
-    Raises InputError if the file cannot be read or is neither a file of `tune grouping` nor one of `fit grouping`.
-    """
+    """Returns the grouping "rule" or "belief" with its default parameters, or that of a TOML file."""
     if str(source) == "rule":
         return LinkRule()
     if str(source) == KIND:

@@ -16,15 +16,10 @@ LOOK_AHEAD = ("mot", "mot text")
 
 
 def known_people(sequence: Sequence) -> list[Tracks]:
-    """Return the labelled people of a sequence as causal tracks of persons without groups, one `Tracks` per frame
-    from 1.
+    """Returns the labelled people as causal tracks without groups, one `Tracks` per frame from 1.
 
-    They are those of `people_as_tracks`, with two exceptions. Velocities that the source does not state (MOTChallenge)
-    are nan. People who have boxes only are on the ground, in m, if the sequence has a camera (sim.dataset.replay).
-
-    Raises InputError if the sequence has no people with ids, its labels cannot be read, or only some people have a
-    position on the ground; a box above the horizon of the camera has none. Raises WorkError if an order of a simulated
-    script was not fulfilled.
+    Velocities that the source does not state are nan. People who have boxes only are on the ground if there is a
+    camera. Raises InputError without people with ids, or if only some have a position on the ground.
     """
     truth, file = sequence.truth, sequence.source.get("path", sequence.name)
     if truth is None:
@@ -51,13 +46,7 @@ def known_people(sequence: Sequence) -> list[Tracks]:
 
 
 def people_as_tracks(truth: Truth) -> list[Tracks]:
-    """Returns the labelled people of every frame as tracks of persons without groups, one `Tracks` per frame from 1.
-
-    The tracks lie on the ground in m, or at box centres in the image in px if the truth has no positions. Ids and boxes
-    are the labelled ones, scores 1. With positions there are no boxes if one is unknown, as of people behind the
-    camera. Velocities are nan if the truth has none; covariances are 0. A frame without people has no rows. Fails an
-    assertion if the truth has neither positions nor boxes.
-    """
+    """Returns the labelled people of every frame as tracks of persons without groups, one `Tracks` per frame from 1."""
     plane: Plane = "image" if truth.pos is None else "ground"
     if truth.pos is not None and truth.box is not None and not np.isfinite(truth.box).all():
         truth = truth.replace(box=None)

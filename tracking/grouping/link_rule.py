@@ -8,7 +8,6 @@ also the truth's merge and split rule come from sim.truth.merge_split_rules.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -29,19 +28,9 @@ ARRIVAL = 1.0
 
 @dataclass(frozen=True)
 class LinkRule(Config):
-    """Parameters of the baseline rule that links two people: distance, velocity difference and times; each states its
-    unit.
+    """Parameters of the baseline rule that links two people: distance, velocity difference and times.
 
-    It is a Config: it is read from TOML files and searched like a tracker's. Raises InputError if a value is not
-    allowed.
-
-    near (m), alike (m/s): a pair is near and alike if its distance and its velocity difference are below these. share,
-    window (s): a pair is linked if it was so in this share of those frames of the last `window` in which both were
-    seen. acquaintance (s): least time within the window in which both were seen. apart (m): a pair farther than this is
-    apart. patience (s): time apart after which a link breaks. idle (m/s): two people both slower than this are not
-    near; 0: off. diverge (m/s): a pair farther than `near` whose velocities differ by more is apart; 10: never. smooth
-    (s): velocities are chords over this time; 0: the tracker's own. memory (s): a missed member stays so long in the
-    group. arrival (s): a link that began so soon after a track's first frame is no merge.
+    It is a Config: it is read from TOML files and searched like a tracker's.
     """
 
     tracker: ClassVar[str] = "grouping"
@@ -70,26 +59,20 @@ class LinkRule(Config):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Links:
-    """All switches of links (setting or removing one) of a sequence: L rows, sorted by frame, then pair.
+    """All switches of links (setting or removing one) of a sequence: L rows, sorted by frame, then pair."""
 
-    frame (L,): in which the link is switched, from 0. a, b (L,): numbers of the two people, from 0, a < b: indices of
-    their ids in the sorted ids of the sequence. on (L,): True if the link is set, False if it is removed. since (L,):
-    first frame, from 0, of the stretch that caused the switch (of being near and alike, or of being apart).
-    """
-
-    frame: Ints
+    frame: Ints  # (L,): in which the link is switched, from 0
+    # a, b (L,): numbers of the two people, from 0, a < b: indices of their ids in the sorted ids of the sequence
     a: Ints
     b: Ints
-    on: Bools
+    on: Bools  # (L,): True if the link is set, False if it is removed
 
 
 def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: LinkRule) -> Links:
-    """Return all switches of links (setting or removing one) in a sequence of `length` frames, sorted by frame, then
-    pair.
+    """Returns all switches of links in a sequence of `length` frames.
 
-    A row is one person in one frame: frame (R,) from 0, sorted; column (R,): number of the person, from 0; pos, vel (R,
-    2): x, y in m and m/s. fps: frames per second. rule: distances, velocities and times that decide. A pair with an
-    unknown (nan) velocity counts as moving alike. No rows, or no pair that is ever near, give no switches.
+    frame, column (R,), pos, vel (R, 2): one row per person and frame, frame sorted. A pair with an unknown (nan)
+    velocity counts as moving alike.
     """
     i, j = close_pairs(frame, pos, max(rule.apart, rule.near))
     swap = column[i] > column[j]
@@ -106,7 +89,10 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
     present[frame, column] = True
     within = (distance <= rule.apart) & ~((distance > rule.near) & (differ > rule.diverge))
     found = []
-    for pairs in _portions(known, max(1, CELLS // max(length, 1))):
+    # in portions, as tables of all frames and pairs would not fit in memory
+    size = max(1, CELLS // max(length, 1))
+    for low in range(0, len(known), size):
+        pairs = known[low : low + size]
         rows = np.flatnonzero((pair >= pairs[0]) & (pair <= pairs[-1]))
         place = np.searchsorted(pairs, pair[rows])
         kept = pairs[np.minimum(place, len(pairs) - 1)] == pair[rows]
@@ -118,23 +104,10 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
     return Links(t, pair // people, pair % people, on.astype(bool))
 
 
-def _portions(pairs: Ints, size: int) -> Iterator[Ints]:
-    """Yields the pairs (K,) in consecutive slices of `size`; the last one may be shorter. No pairs give no slice."""
-    for low in range(0, len(pairs), size):
-        yield pairs[low : low + size]
-
-
 def _switches(
     frame: Ints, place: Ints, near: Bools, within: Bools, pairs: Ints, present: Bools, fps: float, rule: LinkRule
 ) -> tuple[Ints, Ints, Ints]:
-    """Returns the switches of links of K pairs, (S,) each: frame (from 0), pair (the value a * P + b), on (1)
-    or off (0).
-
-    pairs (K,): a * P + b, with a < b columns of people. frame, place, near, within (Q,): a row for each pair and frame
-    in which the two are close; place is the index in `pairs`; near: they are near and move alike; within: they are not
-    apart. present (T, P): True where a person is seen. fps: frames per second; rule: share and times that decide.
-    Sorted by frame, then pair.
-    """
+    """Returns frame, pair and on (1, 0) of the switches (S,) of K pairs; rows (Q,): frames in which they are close."""
     people = present.shape[1]
     both = present[:, pairs // people] & present[:, pairs % people]
     together, far = np.zeros_like(both), both.copy()
@@ -154,10 +127,7 @@ def _switches(
 
 
 def _recent(flags: Bools, frames: int) -> Ints:
-    """Returns the number (T, K) of True flags among the last `frames` frames up to each frame, that frame included.
-
-    flags (T, K): by frame and pair. The first frames count only what is there.
-    """
+    """Returns the number (T, K) of True flags among the last `frames` frames up to each frame."""
     total = np.cumsum(flags, axis=0)
     late = np.zeros_like(total)
     late[frames:] = total[:-frames] if frames < len(total) else 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
+from sim.elementary_kernels import find_root
 from sim.types import Array, Ints
 
 
@@ -12,15 +13,16 @@ from sim.types import Array, Ints
 def linked_groups(
     cut: Ints, a: Ints, b: Ints, log_odds: Array, unseen: float, stay: float, come: float, label: Ints
 ) -> None:
-    """Finds the groups of each of S steps by average linkage.
+    """Finds the groups of each of S steps by average linkage, with a memory of the step before.
 
-    cut (S + 1,): where the rows of each step begin in a, b, log_odds (R,): two people and their log-odds. unseen:
-    log-odds of pairs without a row. stay, come: added for pairs that were in one group in the step before, taken from
-    all others. label (S, P): filled with a number of each person's group, its member in the lowest column; -1, as
-    given, where a person is alone.
+    cut (S + 1,): where the rows of each step begin in a, b, log_odds (R,). label (S, P): filled with the lowest member
+    of each person's group; -1, as given, where a person is alone.
     """
+    # Only people whose log-odds are positive with somebody can be in a group: linkage runs in each connected component
+    # of these pairs alone, in a table of the component's size.
     steps, people = label.shape
-    root, place, size, start, found, member = np.empty((6, people), np.int64)
+    root, place, size = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
+    start, node, member = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
     for p in range(people):
         root[p], place[p] = p, -1
     for s in range(steps):
@@ -29,43 +31,48 @@ def linked_groups(
         for r in rows:
             if log_odds[r] + _memory(before, a[r], b[r], stay, come) > 0:
                 place[a[r]] = place[b[r]] = 0
-                i, j = _root(root, a[r]), _root(root, b[r])
+                i, j = find_root(root, a[r]), find_root(root, b[r])
                 root[max(i, j)] = min(i, j)
         count = 0
         for p in range(people):
             if place[p] == 0:
-                found[count] = p
+                node[count] = p
                 count += 1
-        node = found[:count]
-        for p in node:
+        for n in range(count):
+            p = node[n]
             size[p], start[p] = 0, -1
         total = 0
-        for p in node:
-            i = _root(root, p)
+        for n in range(count):
+            p = node[n]
+            i = find_root(root, p)
             place[p] = size[i]
             size[i] += 1
-        for p in node:
+        for n in range(count):
+            p = node[n]
             if root[p] == p:
                 start[p] = total
-                total += size[p] ** 2
+                total += size[p] * size[p]
         table = np.empty(total)
-        table[:] = unseen
+        for n in range(total):
+            table[n] = unseen
         for r in rows:
-            i = _root(root, a[r])
-            if place[a[r]] >= 0 and i == _root(root, b[r]):
+            i = find_root(root, a[r])
+            if place[a[r]] >= 0 and i == find_root(root, b[r]):
                 table[start[i] + place[a[r]] * size[i] + place[b[r]]] = log_odds[r]
                 table[start[i] + place[b[r]] * size[i] + place[a[r]]] = log_odds[r]
-        for i in node:
+        for k in range(count):
+            i = node[k]
             if root[i] == i:
                 m = 0
-                for p in node:
-                    if _root(root, p) == i:
+                for n in range(count):
+                    p = node[n]
+                    if find_root(root, p) == i:
                         member[m] = p
                         m += 1
-                x = table[start[i] : start[i] + m * m].reshape(m, m)
+                x = np.empty((m, m))
                 for u in range(m):
                     for v in range(m):
-                        x[u, v] += _memory(before, member[u], member[v], stay, come)
+                        x[u, v] = table[start[i] + u * m + v] + _memory(before, member[u], member[v], stay, come)
                 group = _average_linkage(x)
                 for u in range(m):
                     alone = True
@@ -73,7 +80,8 @@ def linked_groups(
                         alone &= v == u or group[v] != group[u]
                     if not alone:
                         label[s, member[u]] = member[group[u]]
-        for p in node:
+        for n in range(count):
+            p = node[n]
             root[p], place[p] = p, -1
 
 
@@ -84,28 +92,18 @@ def _memory(before: Ints, p: int, q: int, stay: float, come: float) -> float:
 
 
 @njit(cache=True)
-def _root(root: Ints, p: int) -> int:
-    """Returns the lowest person of p's component; root (P,): a lower person of the same component, or oneself."""
-    while root[p] != p:
-        root[p] = root[root[p]]
-        p = root[p]
-    return p
-
-
-@njit(cache=True)
 def _average_linkage(x: Array) -> Ints:
-    """Returns the group (M,) of each of M people, its lowest member.
-
-    x (M, M): symmetric log-odds of pairs, changed in place; the diagonal is not read. The two groups with the highest
-    mean are joined while it is above 0. Each group remembers its best partner, so that most joins cost M operations.
-    """
+    """Returns the group (M,) of each person, its lowest member; x (M, M): log-odds of pairs, changed in place."""
     count = len(x)
-    size, group, best = np.ones(count), np.arange(count), np.empty(count, np.int64)
+    size, group, best = np.empty(count), np.empty(count, np.int64), np.empty(count, np.int64)
+    for u in range(count):
+        size[u], group[u] = 1.0, u
     for u in range(count):
         best[u] = _best_partner(x, size, u)
     while True:
         u = -1
         for p in range(count):
+            # each group remembers its best partner, so that most joins cost M operations
             if size[p] > 0 and best[p] >= 0 and (u < 0 or x[p, best[p]] > x[u, best[u]]):
                 u = p
         if u < 0 or x[u, best[u]] <= 0:
@@ -127,7 +125,6 @@ def _average_linkage(x: Array) -> Ints:
 
 @njit(cache=True)
 def _best_partner(x: Array, size: Array, u: int) -> int:
-    """Returns the group with the highest mean log-odds with group u, the lowest of equals; -1 if there is none."""
     found = -1
     for q in range(len(x)):
         if q != u and size[q] > 0 and (found < 0 or x[u, q] > x[u, found]):

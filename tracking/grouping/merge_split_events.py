@@ -32,21 +32,15 @@ LOOK_BACK = 20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedMotion:
-    """The motion of tracked people in T frames. pos, vel (T, P, 2): m, m/s by frame and column, nan where absent or
-    unknown. fps: frames per second."""
+    """The motion of tracked people in T frames."""
 
+    # pos, vel (T, P, 2): m, m/s by frame and column, nan where absent or unknown
     pos: Array
     vel: Array
-    fps: float
+    fps: float  # frames per second
 
     def onset(self, a: PersonSet, b: PersonSet, t: int, *, joins: bool) -> int:
-        """Returns the frame (from 0) in which two parts, sets of columns, came together, or parted, as known in frame
-        t.
-
-        It is the first frame, of the last 20 s, in which the truth's merge rule held between them since its split rule
-        last held (joins), or the reverse; t if there is none. A rule holds in stretches of 2 s or more, with gaps up to
-        0.5 s, or until t.
-        """
+        """Returns the frame in which two parts (sets of columns) came together, or parted, as known in frame t."""
         first = max(0, t + 1 - frames_of(SEARCHED, self.fps))
         found = separation(self.pos[first : t + 1], self.vel[first : t + 1], *(np.array(sorted(x)) for x in (a, b)))
         rules = [self._lasting(holds) for holds in (found.split_rule(), found.merge_rule())]
@@ -66,39 +60,24 @@ class TrackedMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """What a change joined, or divided into: sets of columns, groups and people alone. since: frame (from 0) from which
-    on a person of each has been present."""
+    """What a change joined, or divided into: sets of columns, groups and people alone."""
 
     sets: Sequence[PersonSet]
-    since: int
+    since: int  # frame (from 0) from which on a person of each has been present
 
 
 def event_of_change(
     change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, arrival: int
 ) -> GroupEvent | None:
-    """Return the event of one change of groups that became known in frame t (from 0), or None.
-
-    change: of a group; its members are columns. parts: what was joined (merge, form, enter) or what the group divided
-    into (split, dissolve). arrival: frames. In the event people are columns + 1, frames count from 1, the position is
-    in m.
-
-    `start` is the first onset (`TrackedMotion.onset`) between two of the parts; t if there is one part. For a leave it
-    is the last frame in which two of its people were seen, or one if there is none. `end` equals `start` for enter and
-    leave, else t. Returns None for an enter that starts in frame `arrival` (from 0) or before, as that group was there
-    from the beginning, and for a merge or form that starts at most `arrival` frames after `parts.since`, as those
-    people were together when they were first seen. Raises ValueError if no member was seen from 20 frames before the
-    start to t.
-
-    Kinds: a merge joins groups, or groups and people alone; a split is its reverse. A form joins people who were all
-    alone; a dissolve leaves all alone. At enter and leave a whole group comes or goes, at most one of it excepted, who
-    is alone before or after.
-    """
+    """Returns the event of a change that became known in frame t, None for people who were together from the start."""
+    # a group leaves when its last two people were seen, or its last one
     if change.kind == "leave":
         seen = np.isfinite(motion.pos[: t + 1, change.members, 0]).sum(axis=1)
         start = int(np.flatnonzero(seen >= min(seen.max(), 2))[-1])
     else:
         joins = change.kind not in ("split", "dissolve")
         start = min((motion.onset(a, b, t, joins=joins) for a, b in combinations(parts.sets, 2)), default=t)
+    # people who were together when they were first seen neither met nor came: no event
     known = {"enter": arrival, "merge": parts.since + arrival, "form": parts.since + arrival}
     if start <= known.get(change.kind, -1):
         return None
@@ -107,17 +86,7 @@ def event_of_change(
 
 
 def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:
-    """Return the membership events (merge, split, form, dissolve, enter, leave) in a tracker's group labels, by time.
-
-    group (T, P): label by frame and column, -1 for a person alone. pos (T, P, 2): x, y in m, nan where a person is
-    absent. T is at least 1 (else IndexError). A label that only one person carries in a frame counts as alone. Groups
-    of the first frame have no event. `start`, `end` and `emitted` are the frame of the change; a leave starts and ends
-    in the frame before it. In the events people are columns + 1, frames count from 1.
-
-    Kinds: a merge joins groups, or groups and people alone; a split is its reverse. A form joins people who were all
-    alone; a dissolve leaves all alone. At enter and leave a whole group comes or goes, at most one of it excepted, who
-    is alone before or after.
-    """
+    """Returns the membership events, by time, of labels group (T, P), -1 alone, and pos (T, P, 2), nan absent."""
     there = np.isfinite(pos).all(axis=2)
     state = np.where(there, group, ABSENT)
     changed = np.flatnonzero((np.diff(state, axis=0) != 0).any(axis=1)) + 1
@@ -131,16 +100,11 @@ def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:
 
 
 def _event(change: GroupChange, start: int, end: int, t: int, pos: Array) -> GroupEvent:
-    """Returns the event of a change, with people as columns + 1 and frames from 1; start, end, t (emitted) count from
-    0.
-
-    Its position is the mean of its people, x, y in m, in the frame nearest to `start` in which one of them was seen.
-    Searched are the frames from 20 before `start` to t; one of them must show a member (else ValueError). pos (T, P,
-    2): m, nan where absent.
-    """
+    """Returns the event of a change, people as columns + 1, frames from 1; start, end, t count from 0."""
     first = max(start - LOOK_BACK, 0)
     places = pos[first : t + 1, change.members]
     known = np.flatnonzero(np.isfinite(places[..., 0]).sum(axis=1))
+    # at the start itself nobody may be seen
     nearest = known[np.abs(known - (start - first)).argmin()]
     x, y = np.nanmean(places[nearest], axis=0)
     members = tuple(p + 1 for p in change.members)
@@ -150,11 +114,6 @@ def _event(change: GroupChange, start: int, end: int, t: int, pos: Array) -> Gro
 
 
 def _members(state: Ints) -> dict[int, PersonSet]:
-    """Returns a dict from label to the people (a frozenset of columns, from 0) of each group of two or more, in one
-    frame.
-
-    state (P,): label of each person. Labels below 0 (-1 alone, -2 absent) are no groups.
-    """
     found: dict[int, set[int]] = {}
     for p in np.flatnonzero(state >= 0).tolist():
         found.setdefault(int(state[p]), set()).add(p)

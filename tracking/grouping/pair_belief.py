@@ -19,6 +19,7 @@ from tracking.grouping.pair_evidence import (
     REACH,
     TIMES,
     ExponentialMeans,
+    arrival_gap,
     frames_per_step,
     instant_evidence,
 )
@@ -51,11 +52,9 @@ class PairBelief:
         self.means = ExponentialMeans(0, len(QUANTITIES), self.seconds)
 
     def add(self, state: Array, ago: Array | None = None) -> None:
-        """Add people as the last rows; state (K, 4): x, y, m, vx, vy, m/s, of all people now, nan for those not seen.
+        """Adds people as the last rows; state (K, 4): x, y, m, vx, vy, m/s, of all people now, nan if not seen.
 
-        ago (M,): time from the first sight of each new person to the last frame, s; None: they are first seen in the
-        next one. A person who was confirmed later than seen so has the time of the first sight. The evidence of a pair
-        with a new person is that of this moment.
+        ago (M,): time from the first sight of each new person to the last frame, s; None: seen first in the next one.
         """
         old, n = len(self.count), len(state)
         self._reorder(np.concatenate([np.arange(old), np.full(n - old, -1)]))
@@ -72,6 +71,7 @@ class PairBelief:
         self.log_odds[pairs] = UNSEEN
         if len(i):
             distance, quantities = instant_evidence(pos, state[:, 2:], i, j)
+            # new people have no past: the evidence of this moment stands for all times
             averaged = np.repeat(quantities, len(TIMES), axis=1)
             self._judge(i, j, averaged, distance, came, self.first_distance[i, j])
 
@@ -89,7 +89,7 @@ class PairBelief:
         self.frames += 1
 
     def seen(self) -> Bools:
-        """Return which people were seen in the last step, (K,); nobody before its end."""
+        """Returns which people were seen in the last step, (K,); nobody before its end."""
         none = np.zeros(len(self.count), bool)
         return np.isfinite(self.past[-1][:, 0]) if self.past else none
 
@@ -100,6 +100,7 @@ class PairBelief:
         self.past.append(now)
         self.total, self.count = np.zeros((n, 3)), np.zeros(n)
         pos = now[:, :2]
+        # people who are there in step 0 were there before: how far apart they came is unknown
         fresh = np.isnan(self.first) & np.isfinite(pos[:, 0])
         self.first[fresh] = self.steps
         new = fresh[:, None] | fresh
@@ -117,15 +118,12 @@ class PairBelief:
         self.steps += 1
 
     def _judge(self, i: Ints, j: Ints, averaged: Array, distance: Array, came: Array, first: Array) -> None:
-        """Sets the log-odds of the pairs i, j (R,): averaged (R, Q), distance and first distance (R,), m; came (K,):
-        step."""
-        both = np.stack([came[i], came[j]])
-        gap = np.where(both.min(axis=0) > 0, np.abs(both[0] - both[1]) * self.seconds, np.nan)
+        """Sets the log-odds of the pairs i, j (R,); came (K,): step of arrival."""
+        gap = arrival_gap(np.stack([came[i], came[j]]), self.seconds)
         values = np.column_stack([averaged, distance, gap, first])
         self.log_odds[i, j] = self.log_odds[j, i] = default_belief().log_odds(values)
 
     def _pairs(self, pos: Array) -> tuple[Ints, Ints]:
-        """Returns the pairs i < j (R,) of people less than 4 m apart; pos (K, 2), nan where not seen."""
         seen = np.flatnonzero(np.isfinite(pos[:, 0]))
         i, j = close_pairs(np.zeros(len(seen), np.int64), pos[seen], REACH)
         return seen[np.minimum(i, j)], seen[np.maximum(i, j)]
@@ -167,5 +165,4 @@ class PairBelief:
 
 
 def _distances(pos: Array) -> Array:
-    """Returns the distances (K, K) of all pairs, m; pos (K, 2)."""
     return np.asarray(np.hypot(*(pos[:, None] - pos).transpose(2, 0, 1)))

@@ -30,10 +30,19 @@ TOUCHING = 0.1
 """m: least distance by which the growth of the distance is divided."""
 TIMES = (0.8, 5.0, 15.0)
 """s: means over the past have weights exp(-age / time)."""
+# Averaged over the pair's rows, with weights exp(-age / time). Unknown velocities leave nan out of the means.
+# velocity difference: of vectors, m/s. sideways, lengthwise: parts of the distance, m, across and along the mean
+# velocity of the two where that is at least 0.3 m/s, else the whole distance and nan. others: mean of the two numbers
+# of other people within 3 m. stream: of the people other than the pair within 4 m of one of them, the share whose
+# velocity differs from that person's by less than 0.5 m/s. speed: mean of the two. rank: how many other people are
+# nearer to the one than the other is, mean of both. growth: of the distance, m/s. turn: angle between the two
+# velocities, rad, nan if one is slower than 0.3 m/s. common: third people less than 1.5 m from both, of velocities
+# less than 0.7 m/s apart.
 QUANTITIES = (
     "velocity difference", "sideways", "lengthwise", "others", "stream", "speed", "rank", "growth", "turn", "common",
 )  # fmt: skip
-"""Averaged quantities: see `evidence`."""
+# Not averaged: distance, m, of the row; arrival gap, s, between the steps in which the two were first seen; first
+# distance, m, when both had been seen. The last two are nan if that was step 0: people were there before.
 NOW = ("distance", "arrival gap", "first distance")
 NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *NOW)
 """Names of the columns of `PairRows.values`."""
@@ -43,17 +52,14 @@ PORTION = 100_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairRows:
-    """Evidence about pairs of people, one row per pair and step in which both were seen less than 4 m apart.
+    """Evidence about pairs of people, one row per pair and step in which both were seen less than 4 m apart."""
 
-    step (R,): from 0, ascending. a, b (R,): columns of the two people, a < b. pair (R,): number of the pair, from 0.
-    values (R, len(NAMES)): columns `NAMES`; nan if unknown.
-    """
-
-    step: Ints
+    step: Ints  # (R,): from 0, ascending
+    # a, b (R,): columns of the two people, a < b
     a: Ints
     b: Ints
-    pair: Ints
-    values: Array
+    pair: Ints  # (R,): number of the pair, from 0
+    values: Array  # (R, len(NAMES)): columns `NAMES`, nan if unknown
 
 
 def frames_per_step(fps: float) -> int:
@@ -62,12 +68,10 @@ def frames_per_step(fps: float) -> int:
 
 
 def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: int, fps: float) -> tuple[Array, Array]:
-    """Returns each person's mean position in each step (S, people, 2), m, and the mean time of the frames in which the
-    person was seen in it (S, people), s; nan if in none.
+    """Returns each person's mean position (S, people, 2), m, and time (S, people), s, in each step; nan if not seen.
 
-    frame (R,): from 0; column (R,): person; pos (R, 2): x, y in m. length: frames of the sequence; fps: frames per
-    second. Step s ends with the frame s `frames_per_step(fps)`: the first one is the first frame alone. Frames after
-    the end of the last step are left out.
+    Step s ends with the frame s `frames_per_step(fps)`: the first one is the first frame alone. Frames after the end of
+    the last step are left out.
     """
     size = frames_per_step(fps)
     steps, step = -(-length // size), -(-frame // size)
@@ -82,10 +86,7 @@ def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: i
 
 
 def step_velocities(pos: Array, time: Array, seconds: float) -> Array:
-    """Returns velocities (S, P, 2), m/s: chords from a person's earliest position within the last 0.8 s; else nan.
-
-    pos (S, P, 2), time (S, P): m and s by step and person, nan where not seen. seconds: length of a step, s.
-    """
+    """Returns velocities (S, P, 2), m/s: chords from a person's earliest position within the last 0.8 s; else nan."""
     vel = np.full_like(pos, np.nan)
     for steps in range(1, min(max(1, round(CHORD / seconds)), len(pos) - 1) + 1):
         chord = (pos[steps:] - pos[:-steps]) / (time[steps:] - time[:-steps])[..., None]
@@ -94,25 +95,7 @@ def step_velocities(pos: Array, time: Array, seconds: float) -> Array:
 
 
 def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
-    """Yields the rows of all pairs in portions of whole steps, in order.
-
-    pos (S, P, 2), time (S, P): m and s by step and person (`step_positions`), nan where not seen. seconds: length of a
-    step, s.
-
-    Averaged over the pair's rows, with weights exp(-age / time): velocity difference (m/s), of vectors; sideways and
-    lengthwise (m): parts of the distance across and along the mean velocity of the two, where that is at least 0.3 m/s,
-    else the whole distance and nan; others: mean of the two numbers of other people within 3 m; stream: of the people
-    other than the pair within 4 m of one of them, the share whose velocity differs from that person's by less than 0.5
-    m/s, nan without others; speed (m/s): mean of the two; rank: how many other people are nearer to the one than the
-    other is, mean of both; growth (m/s): of the distance, below 0 if they approach; turn: angle between the two
-    velocities, rad, nan if one is slower than 0.3 m/s; common: number of third people who are less than 1.5 m from both
-    and whose velocities differ from both by less than 0.7 m/s.
-
-    Not averaged: distance (m) of the row; arrival gap (s): between the steps in which the
-    two were first seen, nan if one was seen in step 0; first distance (m): in the first step in which both had been
-    seen, nan if that is step 0.
-    Unknown velocities leave nan out of the means.
-    """
+    """Yields the rows of all pairs in portions of whole steps; pos (S, P, 2), time (S, P): from `step_positions`."""
     vel = step_velocities(pos, time, seconds)
     step, column = np.nonzero(np.isfinite(pos[..., 0]))
     place, motion = pos[step, column], vel[step, column]
@@ -127,7 +110,7 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
     came = np.stack([first[column[i]], first[column[j]]])
     late = came.max(axis=0)
     apart = np.hypot(*(pos[late, column[i]] - pos[late, column[j]]).T)
-    gap = np.where(came.min(axis=0) > 0, np.abs(came[0] - came[1]) * seconds, np.nan)
+    gap = arrival_gap(came, seconds)
     apart = np.where(late > 0, apart, np.nan)
     means = ExponentialMeans(count, len(QUANTITIES), seconds)
     for r in _portions(step[i]):
@@ -137,8 +120,13 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
         yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values)
 
 
+def arrival_gap(came: Array | Ints, seconds: float) -> Array:
+    """Returns the time, s, (R,) between the steps (2, R) in which two were first seen; nan if one was in step 0."""
+    return np.where(came.min(axis=0) > 0, np.abs(came[0] - came[1]) * seconds, np.nan)
+
+
 def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> tuple[Array, Array]:
-    """Returns the distance (R,) and the quantities of `QUANTITIES` of each pair of rows i, j at its own step, (R, 10).
+    """Returns the distance (R,) and `QUANTITIES` (R, 10) of each pair of rows i, j at its own step.
 
     pos, vel (N, 2): m, m/s, one row per person and step. i, j (R,): all pairs within 4 m in some steps.
     """
@@ -171,13 +159,11 @@ def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> tuple[Array, A
 
 
 def _per_row(i: Ints, j: Ints, flag: Array, rows: int) -> Array:
-    """Returns for each row the number of its pairs (i, j) (R,) whose flag (R,) is True, (rows,)."""
     return np.asarray(np.bincount(i[flag], minlength=rows) + np.bincount(j[flag], minlength=rows))
 
 
 def _rank(i: Ints, j: Ints, distance: Array) -> Array:
-    """Returns for each pair of rows i, j (R,) how many other rows are nearer to i than j is, and to j than i is, as the
-    mean of both, (R,). distance (R,)."""
+    """Returns for each pair how many other rows are nearer to the one than the other is, mean of both, (R,)."""
     centre, far = np.concatenate([i, j]), np.concatenate([distance, distance])
     order = np.lexsort((far, centre))
     centre, far = centre[order], far[order]
@@ -190,7 +176,6 @@ def _rank(i: Ints, j: Ints, distance: Array) -> Array:
 
 
 def _portions(step: Ints) -> Iterator[slice]:
-    """Yields slices of rows that hold whole steps, of about 100,000 rows each. step (R,): ascending."""
     low = 0
     while low < len(step):
         high = int(np.searchsorted(step, step[min(low + PORTION, len(step)) - 1], side="right"))
@@ -199,22 +184,15 @@ def _portions(step: Ints) -> Iterator[slice]:
 
 
 class ExponentialMeans:
-    """Means of the values of pairs over their rows so far, weighted by exp(-age / time), for each of T times.
-
-    State, by pair: total (K, V, T) of weighted values, weight (K, V, T), and last (K,), the pair's last step.
-    """
+    """Means of the values of pairs over their rows so far, weighted by exp(-age / time), for each of T times."""
 
     def __init__(self, pairs: int, values: int, seconds: float, times: tuple[float, ...] = TIMES) -> None:
-        """pairs: number of pairs; values: per row; seconds: length of a step, s; times: s."""
         self.seconds, self.times = seconds, np.array(times)
         self.total = np.zeros((pairs, values, len(times)))
         self.weight, self.last = np.zeros_like(self.total), np.zeros(pairs, np.int64)
 
     def add(self, step: Ints, pair: Ints, values: Array) -> Array:
-        """Adds rows and returns their means (R, V * T), times varying fastest; nan before a pair's first number.
-
-        step (R,): ascending, not before the last one added; pair (R,): once in a step; values (R, V): nan is left out.
-        """
+        """Adds rows, steps ascending, and returns the means of their pairs (R, V * T), times varying fastest."""
         from tracking.grouping.pair_evidence_kernels import add_to_means
 
         out = np.empty((*values.shape, len(self.times)))

@@ -12,16 +12,15 @@ from sim.types import Array, Bools, Ints
 def add_to_means(
     step: Ints, pair: Ints, values: Array, times: Array, total: Array, weight: Array, last: Ints, out: Array
 ) -> None:
-    """Adds R rows to the means of their pairs, in order, and writes the means after each row.
+    """Adds rows (R,) of values (R, V) to the means of their pairs, in order, and writes the means after each to out.
 
-    step (R,); pair (R,): index in total, weight and last; values (R, V), nan is left out; times (T,): in steps. total,
-    weight (K, V, T), last (K,): sums of weighted values, of weights, and step of the last row, changed in place. out
-    (R, V, T): the means, nan before a pair's first number.
+    times (T,): in steps. total, weight (K, V, T), last (K,): state by pair. out (R, V, T): nan before the first number.
     """
     fade = np.empty(len(times))
     for r in range(len(step)):
         k = pair[r]
         for n in range(len(times)):
+            # the age of all former rows, applied once for each time
             fade[n] = np.exp(-(step[r] - last[k]) / times[n])
         last[k] = step[r]
         for v in range(values.shape[1]):
@@ -35,10 +34,8 @@ def add_to_means(
 
 @njit(cache=True)
 def common_neighbours(i: Ints, j: Ints, linked: Bools, rows: int) -> Array:
-    """Returns for each pair (i, j) (R,) of `rows` rows how many third rows are linked with both, (R,).
-
-    linked (R,): True for pairs that are linked with each other.
-    """
+    """Returns for each pair (i, j) (R,) of `rows` rows how many third rows are linked with both, (R,)."""
+    # neighbours of each row, one list after the other
     start = np.zeros(rows + 1, np.int64)
     for r in range(len(i)):
         if linked[r]:
@@ -46,14 +43,17 @@ def common_neighbours(i: Ints, j: Ints, linked: Bools, rows: int) -> Array:
             start[j[r] + 1] += 1
     for r in range(rows):
         start[r + 1] += start[r]
-    neighbour, end = np.empty(start[-1], np.int64), start[:-1].copy()
+    neighbour, end = np.empty(start[rows], np.int64), np.empty(rows, np.int64)
+    for r in range(rows):
+        end[r] = start[r]
     for r in range(len(i)):
         if linked[r]:
             neighbour[end[i[r]]], neighbour[end[j[r]]] = j[r], i[r]
             end[i[r]] += 1
             end[j[r]] += 1
     out, marked = np.zeros(len(i)), np.empty(rows, np.int64)
-    marked[:] = -1
+    for r in range(rows):
+        marked[r] = -1
     for r in range(len(i)):
         if start[i[r]] < end[i[r]] and start[j[r]] < end[j[r]]:
             for n in range(start[i[r]], end[i[r]]):

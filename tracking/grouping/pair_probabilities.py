@@ -27,10 +27,7 @@ class PairProbabilities:
 def pair_probabilities(tracks: Sequence[Tracks], fps: float, px_per_m: float, belief: Belief) -> PairProbabilities:
     """Returns the probability that two people belong together, for all pairs less than 4 m apart, in each frame.
 
-    The belief changes once in a step of at most 0.4 s and holds until the next; there is no row in frames in which one
-    of the two has no row. tracks: one `Tracks` per frame, of people, at least one. fps: frames per second. px_per_m: px
-    per m, used only in the image. Raises InputError if the tracks are in the image and px_per_m is not a number above
-    0.
+    The belief changes once in a step of at most 0.4 s and holds until the next.
     """
     table = tabulate(tracks, fps, px_per_m)
     found = beliefs_of_tracks(table.frame, table.column, table.pos, table.length, fps, belief)

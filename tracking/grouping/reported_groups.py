@@ -9,22 +9,18 @@ from sim.types import Groups, Ints
 
 
 def group_ids(identities: Identities, frame: int, ids: Ints, groups: list[Ints]) -> Ints:
-    """Return the id of each person's group, (N,), -1 for a person alone; `identities` goes on to this frame.
-
-    frame: number, ascending from call to call. ids (N,): of the reported people; groups: rows of the members of each
-    group. The ids follow the identity rule of the truth (sim.truth.identity).
-    """
+    """Returns the id of each person's group, (N,), -1 for a person alone; `identities` goes on to this frame."""
     parts = [frozenset(ids[rows].tolist()) for rows in groups]
     identities.step(frame, frozenset(ids.tolist()), parts)
     return known_groups(identities, ids)
 
 
 def known_groups(identities: Identities, ids: Ints) -> Ints:
-    """Return the id of each person's group, (N,), as `identities` has it, -1 for a person alone; ids (N,)."""
+    """Returns the id of each person's group, (N,), as `identities` has it, -1 for a person alone; ids (N,)."""
     group_of = {person: group for group, people in identities.groups.items() for person in people}
     return np.array([group_of.get(person, -1) for person in ids.tolist()], np.int64)
 
 
 def no_groups(group: Ints) -> Groups | None:
-    """Return empty Groups if nobody is in a group, which says so; else None: hulls are derived from the group ids."""
+    """Returns empty Groups if nobody is in a group, which says so; else None: hulls are derived from the group ids."""
     return Groups.none() if (group < 0).all() else None

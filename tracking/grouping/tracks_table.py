@@ -15,35 +15,28 @@ from sim.types import Array, Bools, Ints, Tracks
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TracksTable:
-    """All person tracks of a sequence as R rows, one per track and frame, sorted by frame, then id; lengths in m.
+    """All person tracks of a sequence as R rows, one per track and frame, sorted by frame, then id; lengths in m."""
 
-    frame (R,): from 0. id (R,): of the track. column (R,): index of the id in `ids`. ids (P,): the ids, sorted. pos,
-    vel (R, 2): x, y in m and m/s; vel is nan if unknown. group (R,): the tracker's own group id, -1 for a person alone.
-    length: frames T of the sequence, the number of the last. scale: px per m by which pos and vel were divided if the
-    tracks are in the image, else 1.
-    """
-
-    frame: Ints
-    id: Ints
-    column: Ints
-    ids: Ints
+    frame: Ints  # (R,): from 0
+    id: Ints  # (R,): of the track
+    column: Ints  # (R,): index of the id in `ids`
+    ids: Ints  # (P,): sorted
     pos: Array
-    vel: Array
-    group: Ints
-    length: int
-    scale: float
+    vel: Array  # (R, 2): m/s, nan if unknown
+    group: Ints  # (R,): the tracker's own group id, -1 for a person alone
+    length: int  # frames T of the sequence, the number of the last
+    scale: float  # px per m by which pos and vel were divided if the tracks are in the image, else 1
 
     def positions(self) -> Array:
-        """Return positions (T, P, 2): x, y in m by frame (from 0) and column; nan where a person is absent."""
+        """Returns positions (T, P, 2): x, y in m by frame (from 0) and column; nan where a person is absent."""
         return self._dense(self.pos)
 
     def velocities(self) -> Array:
-        """Return velocities (T, P, 2): x, y in m/s by frame (from 0) and column; nan where a person is absent or it is
-        unknown."""
+        """Returns velocities (T, P, 2): x, y in m/s by frame (from 0) and column."""
         return self._dense(self.vel)
 
     def labels(self) -> Ints:
-        """Return the tracker's own group ids (T, P) by frame (from 0) and column; -1 for a person alone or absent."""
+        """Returns the tracker's own group ids (T, P) by frame (from 0) and column; -1 for a person alone or absent."""
         out = np.full((self.length, len(self.ids)), -1, np.int64)
         out[self.frame, self.column] = self.group
         return out
@@ -55,15 +48,10 @@ class TracksTable:
 
 
 def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, smooth: float = 0.0) -> TracksTable:
-    """Return the table of a sequence's person tracks, one `Tracks` per frame; there must be at least one (else
-    IndexError).
+    """Returns the table of a sequence's person tracks, one `Tracks` per frame, at least one.
 
-    fps: frames per second. px_per_m: px per m, used only if the tracks are in the image. Of positions in space z is
-    dropped. Velocities are the tracker's own. Unknown ones (nan) are replaced by chords (mean velocities) over the last
-    0.5 s. If `smooth` (s) is above 0, all are replaced by chords over that time. A chord is nan in a person's
-    first frame, and where the person was not seen within that time before.
-
-    Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
+    Unknown velocities are replaced by chords over the last 0.5 s, or, if `smooth` (s) is above 0, all by chords over
+    it. Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
     """
     scale = px_per_m if tracks[0].plane == "image" else 1.0
     if not math.isfinite(scale) or scale <= 0:
@@ -86,27 +74,19 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, smooth: floa
 
 
 def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:
-    """Returns a list with, for each frame, the tracker's group id of each track, (N,), in order of the tracks; -1 for a
-    person alone.
-
-    It is `Tracks.group`, or, of a person for whom that is -1, the group in `Tracks.groups` that lists the person as a
-    member; of several the last.
-    """
+    """Returns for each frame the group that the tracker names of each track, in `group` or by members of `groups`."""
     found = []
     for t in tracks:
         members = () if t.groups is None else zip(t.groups.id.tolist(), t.groups.members, strict=False)
         group_of = {p: g for g, people in members for p in people.tolist()}
         listed = np.array([group_of.get(p, -1) for p in t.id.tolist()], np.int64) if group_of else t.group
+        # a tracker may name groups by members only; of several that list a person the last counts
         found.append(np.where(t.group >= 0, t.group, listed))
     return found
 
 
 def boxes_of_rows(tracks: Sequence[Tracks]) -> Array:
-    """Return the boxes (R, 4) left, top, width, height, px, round which group hulls are drawn, sorted by frame, then
-    id; nan where hulls are not drawn round boxes: the tracks are not in the image or the frame has no boxes.
-
-    tracks: one `Tracks` per frame, in order.
-    """
+    """Returns the boxes (R, 4) of group hulls, sorted by frame, then id; nan where hulls go round no boxes."""
     return np.concatenate([
         np.full((len(t.id), 4), np.nan) if t.box is None or t.plane != "image" else t.box[np.argsort(t.id)]
         for t in tracks

@@ -17,33 +17,26 @@ class GroupIds:
         self.next = 1
 
     def new(self) -> int:
-        """Return the next id, which was never returned before."""
+        """Returns the next id, which was never returned before."""
         self.next += 1
         return self.next - 1
 
 
 @dataclass(frozen=True)
 class WholeGroupEvent:
-    """A change of the set of confirmed groups.
+    """A change of the set of confirmed groups."""
 
-    kind: "merge", "split", "enter" or "leave". onset: time, s, when it began. before, after: ids (tuples) of the groups
-    concerned before and after the change, sorted; () before an enter of one group and after a leave. pos: x, y in the
-    tracker's own unit.
-    """
-
-    kind: str
-    onset: float
+    kind: str  # "merge", "split", "enter" or "leave"
+    onset: float  # time, s, when it began
+    # before, after: ids (tuples) of the groups concerned before and after the change, sorted; () before an enter of one
+    # group and after a leave
     before: tuple[int, ...]
     after: tuple[int, ...]
-    pos: tuple[float, float]
+    pos: tuple[float, float]  # x, y in the tracker's own unit
 
 
 def reported_event(event: WholeGroupEvent, index: int, t: float, fps: float, scale: float = 1.0) -> GroupEvent:
-    """Return the event as it is reported in frame `index`, from 1, at time t, s.
-
-    fps: frames per second. scale: reported units per unit of the event's position. Its start is the frame of the onset,
-    from 1 to this one; its end and `emitted` are this frame; it has no members.
-    """
+    """Returns the event as it is reported in frame `index`, from 1, at time t, s."""
     start = min(max(index - round((t - event.onset) * fps), 1), index)
     x, y = event.pos
     return GroupEvent(event.kind, start, index, index, event.before, event.after, (), (x * scale, y * scale))

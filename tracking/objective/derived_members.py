@@ -19,14 +19,9 @@ from tracking.scoring.rows import FrameRows
 
 
 def derived_members(tracks: Sequence[Tracks], fps: float, px_per_m: float, labelled: Bools) -> tuple[FrameRows, Ints]:
-    """Returns frame and id of each of the K members of groups of two or more in the frames f where labelled[f] is true,
-    and the number of each one's group (K,), from 0. Both are sorted by group, groups by frame.
+    """Returns frame and id of the K members of groups of two or more in labelled frames, and their group (K,), from 0.
 
-    tracks: of one tracker, of people, without `groups`, sorted by frame; none raises IndexError. If the tracker names
-    groups (`names_groups`), its group ids define the groups, else the default grouping does. fps: frames per second.
-    px_per_m: px per m, used only in the image. labelled (length + 1,): bool by frame number from 1, index 0 unused.
-
-    Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
+    Both are sorted by group, groups by frame. labelled (length + 1,): bool by frame number.
     """
     table = tabulate(tracks, fps, px_per_m, default_grouping().smooth)
     group = _group_of_rows(table, fps, names_groups(tracks))
@@ -41,13 +36,7 @@ def derived_members(tracks: Sequence[Tracks], fps: float, px_per_m: float, label
 
 
 def _group_of_rows(table: TracksTable, fps: float, named: bool) -> Ints:
-    """Returns a label for each of the R table rows (tracks in frames), (R,): equal for members of one group in a frame,
-    -1 alone.
-
-    If the tracker names groups (`named`), its ids are returned, else the components that the default grouping links:
-    the label is the least column of the group, and a group of which one member is seen has -1. fps: frames per
-    second.
-    """
+    """Returns a label for each of the R table rows, equal for members of one group in a frame, -1 alone."""
     from tracking.objective.derived_members_kernels import connected_people
 
     if named:

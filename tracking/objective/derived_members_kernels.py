@@ -9,20 +9,17 @@ from sim.compiler import njit
 
 @njit(cache=True)
 def connected_people(frame, column, length, people, memory, when, a, b, on):  # type: ignore[no-untyped-def]
-    """Returns a label for each of R rows (people in frames) that connected people of a frame share, -1 alone: (R,).
+    """Returns a label for each of R rows (people in frames), shared by connected people of a frame, -1 alone.
 
-    Two people are connected by a link that is on, directly or through others. The label is the least column of the
-    connected people seen in the frame; someone connected only to people not seen now is alone. The groups are those of
-    tracking.grouping.group_labels.label_people, without its ids.
-
-    frame (R,): from 0, sorted; column (R,): number of the person, from 0, ascending in a frame; length: number of
-    frames; people: number of columns; memory: frames for which a missed person still connects others. Links switch on
-    or off in frame when (L,), sorted, between the columns a (L,) and b (L,); on (L,): bool, the new state.
+    Links switch on or off in frames `when` (L,), sorted, between columns a and b. Someone missed for at most `memory`
+    frames still connects others. The groups are those of group_labels.label_people, without its ids.
     """
     linked = np.zeros((people, people), np.bool_)
-    seen = np.full(people, -memory - 2)
-    label, stack, size = np.empty(people, np.int64), np.empty(people, np.int64), np.zeros(people, np.int64)
-    out = np.full(len(frame), -1)
+    seen, label, stack, size = np.empty((4, people), np.int64)
+    out = np.empty(len(frame), np.int64)
+    for p in range(people):
+        seen[p] = -memory - 2
+    # rows and switches are sorted by frame: one pass over both
     row, link = 0, 0
     for t in range(length):
         first = row
@@ -32,27 +29,21 @@ def connected_people(frame, column, length, people, memory, when, a, b, on):  # 
         while link < len(when) and when[link] == t:
             linked[a[link], b[link]] = linked[b[link], a[link]] = on[link]
             link += 1
-        label[:] = -1
-        size[:] = 0
+        for p in range(people):
+            label[p], size[p] = -1, 0
         for k in range(first, row):
             p = column[k]
             if label[p] < 0:
                 _spread(p, linked, seen, t - memory, label, stack)
             size[label[p]] += 1
         for k in range(first, row):
-            if size[label[column[k]]] > 1:
-                out[k] = label[column[k]]
+            out[k] = label[column[k]] if size[label[column[k]]] > 1 else -1
     return out
 
 
 @njit(cache=True)
 def _spread(p, linked, seen, since, label, stack):  # type: ignore[no-untyped-def]
-    """Sets label[q] = p for person p and all people q connected to p, directly or through others, and seen in frame
-    `since` or later. Changes `label` and `stack` in place.
-
-    linked (P, P): bool by column; seen (P,): last frame of each person; label (P,): -1 not yet labelled; stack (P,):
-    work space.
-    """
+    """Sets label[q] = p for p and all people connected to p and seen in frame `since` or later."""
     stack[0], n, label[p] = p, 1, p
     while n:
         n -= 1

@@ -29,7 +29,7 @@ from tracking.scoring.rows import FrameRows, find_rows
 class ObjectiveScorer:
     """Computes the objective (mean of HOTA and group_F1) of any number of trackers against one truth.
 
-    Made from that Truth. State: scorer, a `Scorer` of the truth, which must not change.
+    State: scorer, a `Scorer` of the truth, which must not change.
     """
 
     def __init__(self, truth: Truth) -> None:
@@ -38,17 +38,10 @@ class ObjectiveScorer:
     def scores(
         self, tracks: Sequence[Tracks], px_per_m: float, pixels: bool = False, similarity: Similarity | None = None
     ) -> dict[str, float]:
-        """Returns a dict of HOTA, group_F1 and objective over the frames 1 … last, the frame of the last `Tracks`.
+        """Returns HOTA, group_F1 and objective of tracks sorted by frame, over the frames 1 … that of the last.
 
-        The objective is the mean of the other two; if one is nan the other, if both are nan nan. tracks: one tracker's,
-        sorted by frame, no id twice in a frame (not checked); without any, HOTA and objective are 0 and group_F1 is
-        nan. px_per_m: scale for deriving groups in the image; nan takes the truth's. pixels: the tracker works on
-        pictures. similarity: of people, None by the data. The result equals that of `evaluate` for the tracks completed
-        with groups (tracking.grouping.foot_points) and frames=last. A score is nan where it is nan there: HOTA for a
-        tracker of whole groups, group_F1 without labelled groups.
-
-        Raises IncomparableError if boxes or positions to be compared are missing, and InputError if groups must be
-        derived in the image and the scale is 0 or less.
+        px_per_m: scale for deriving groups in the image; nan takes the truth's. pixels: the tracker works on pictures.
+        A score is nan where that of `evaluate` is.
         """
         (moved,), similarity = in_one_plane(self.scorer.truth, [tracks], [pixels], similarity)
         scorer, last = self.scorer.judge(tracks, moved), tracks[-1].index if tracks else 0
@@ -65,28 +58,19 @@ class ObjectiveScorer:
 
 
 def _group_f1(scorer: Scorer, sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: float) -> float:
-    """Returns group_F1 in the labelled frames, nan if members are unknown.
-
-    sides: the truth's and the tracker's data in the scored frames, people mapped. tracks: of all frames up to the last.
-    The true groups of all frames stand on the true side, as groups of later frames share nobody with tracked ones.
-    """
     found = _tracked_members(sides, tracks, px_per_m)
     if found is None:
         return float("nan")
     est, person = found
     true, people = scorer.groups(sides.surface).groups, scorer.people.rows
+    # the true groups of all frames stand on this side: groups of later frames share nobody with tracked ones
     row = np.append(np.flatnonzero(sides.inside[people.frame]), -1)
     shared = shared_members(true, est, row[person], len(people))
     return f1(int(groups_found(true, est, shared).sum()), int(sides.frames[true.rows.frame].sum()), len(est))
 
 
 def _tracked_members(sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: float) -> tuple[GroupRows, Ints] | None:
-    """Returns the tracker's groups that are scored, without shapes if they are derived, and the row of the true person
-    of each membership, -1 none. None if members are unknown.
-
-    sides, tracks: as of `_group_f1`. px_per_m: scale for deriving groups in the image; if not finite the truth's is
-    taken. Raises InputError if groups must be derived in the image and the scale is 0 or less.
-    """
+    """Returns the tracker's scored groups, and the true person of each membership, -1 none; None if unknown."""
     fps = sides.truth.fps
     px_per_m = px_per_m if np.isfinite(px_per_m) else sides.truth.px_per_m
     named, given = names_groups(tracks), [t.groups is not None for t in tracks]
@@ -100,10 +84,6 @@ def _tracked_members(sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: f
 
 
 def _of_derived(sides: ComparedSides, members: FrameRows, of: Ints) -> tuple[GroupRows, Ints]:
-    """Returns derived groups, and the row of the true person of each of the K memberships, -1 none.
-
-    members: frame and id of each of K members, group after group; of (K,): number of the group.
-    """
     first = np.flatnonzero(np.diff(of, prepend=-1))
     rows, none = FrameRows(members.frame[first], of[first]), np.zeros((0, 2))
     groups = bare_groups(rows, np.full((len(rows), 2), np.nan), (none,) * len(rows))

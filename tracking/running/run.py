@@ -105,7 +105,7 @@ def track(
     """
     from tracking.grouping.foot_points import can_stand, completed
     from tracking.grouping.grouped_tracks import late_groups, names_groups
-    from tracking.grouping.velocity_check import velocity_warning
+    from tracking.grouping.plausibility import velocity_warning
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
@@ -181,8 +181,7 @@ def group(
     from tracking.grouping.foot_points import can_stand, completed
     from tracking.grouping.grouped_tracks import without_groups
     from tracking.grouping.known_people import known_people
-    from tracking.grouping.plausibility import implausible
-    from tracking.grouping.velocity_check import velocity_warning
+    from tracking.grouping.plausibility import implausible, velocity_warning
 
     rule = (grouping_of(grouping) if isinstance(grouping, str | Path) else grouping) or default_grouping()
     people = known_people(sequence) if run is None else without_groups(run)

@@ -33,11 +33,10 @@ MOST = 0.5
 
 @dataclass(frozen=True, eq=False)
 class AnnotatedFrames:
-    """frames (length + 1,): bool by frame number, which are annotated; frame 0 never is. step: from one annotated frame
-    to the next, 1 if all are, None if they are not evenly spaced."""
+    """"""
 
-    frames: Bools
-    step: int | None = 1
+    frames: Bools  # (length + 1,): bool by frame number, which are annotated; frame 0 never is
+    step: int | None = 1  # from one annotated frame to the next, 1 if all are, None if they are not evenly spaced
 
     @property
     def count(self) -> int:
@@ -46,11 +45,7 @@ class AnnotatedFrames:
 
 
 def annotated_frames(truth: Truth) -> AnnotatedFrames:
-    """Returns the annotated frames of a truth: all, or if its labels are clearly sparse those with labels.
-
-    Rows that are not scored (`Truth.unscored`) and frames with group labels (`Truth.labelled`) are labels, too. Of
-    evenly spaced labels with a step, all frames at this step are annotated, also those in which nobody is.
-    """
+    """Returns the annotated frames of a truth: all, or those with labels if these are clearly sparse."""
     every = np.ones(truth.length + 1, bool)
     every[0] = False
     labelled = _labelled_frames(truth)
@@ -67,7 +62,6 @@ def annotated_frames(truth: Truth) -> AnnotatedFrames:
 
 
 def _labelled_frames(truth: Truth) -> Ints:
-    """Returns the frames with a label, ascending, each once."""
     beside = [] if truth.unscored is None else [truth.unscored.frame]
     grouped = [] if truth.labelled is None else [np.flatnonzero(truth.labelled) + 1]
     return np.unique(np.concatenate([truth.frame, *beside, *grouped]))
@@ -84,19 +78,12 @@ def _outlasted(truth: Truth, labelled: Ints) -> Bools:
 
 
 def widest_step(inside: Bools) -> int:
-    """Returns the greatest number of frames from one scored frame to the next, 1 if there are not two.
-
-    inside (length + 1,): bool by frame number, which are scored.
-    """
+    """Returns the greatest number of frames from one scored frame to the next, 1 if there are not two."""
     return int(np.diff(np.flatnonzero(inside)).max(initial=1))
 
 
 def first_seen(events: Iterable[GroupEvent], inside: Bools) -> list[GroupEvent]:
-    """Returns the events, each with the first scored frame from its start on as start.
-
-    Events before the first scored frame and after the last one stay. inside (length + 1,): bool by frame number, which
-    are scored.
-    """
+    """Returns the events, each starting in the first scored frame from its start on."""
     frames = np.flatnonzero(inside).tolist()
 
     def moved(event: GroupEvent) -> GroupEvent:
@@ -107,11 +94,7 @@ def first_seen(events: Iterable[GroupEvent], inside: Bools) -> list[GroupEvent]:
 
 
 def seen_in(tracks: Sequence[Tracks], inside: Bools) -> list[Tracks]:
-    """Returns the tracks of the scored frames, each with the events reported since the scored frame before.
-
-    tracks: sorted by frame. inside (length + 1,): bool by frame number, which are scored. An event starts in the first
-    scored frame from its start on (`first_seen`). Reports before the first scored frame are left out.
-    """
+    """Returns the tracks of the scored frames, each with the events reported since the scored frame before."""
     first = int(np.argmax(inside))
     if inside[first:].all():
         return [t for t in tracks if inside[t.index]]

@@ -29,17 +29,15 @@ SLACK = 1e-6  # share of the coordinates' range: more than rounding can move a r
 
 @dataclass(frozen=True)
 class Pairs:
-    """K candidate pairs of a true and an estimated row of one frame, sorted by true row and therefore by frame.
+    """K candidate pairs of a true and an estimated row of one frame, sorted by true row and therefore by frame."""
 
-    - true, est: all R true and S estimated rows (people or groups in frames), with or without a pair.
-    - i (K,), j (K,): int64, index of the pair's row in `true` and in `est`.
-    - s (K,): similarity of the two rows, 0 < s <= 1. `compare` stores whatever its function returns, such as distances.
-    """
-
+    # true, est: all R true and S estimated rows (people or groups in frames), with or without a pair
     true: FrameRows
     est: FrameRows
+    # i (K,), j (K,): int64, index of the pair's row in `true` and in `est`
     i: Ints
     j: Ints
+    # (K,): similarity of the two rows, 0 < s <= 1. `compare` stores whatever its function returns, such as distances.
     s: Array
 
     @property
@@ -48,31 +46,30 @@ class Pairs:
         return self.true.frame[self.i]
 
     def keep(self, mask: Bools) -> Pairs:
-        """Returns the pairs where the bool mask (K,) is true. All true and estimated rows are kept, also those without
-        a pair.
-        """
+        """Returns the pairs where the bool mask (K,) is true."""
         return Pairs(self.true, self.est, self.i[mask], self.j[mask], self.s[mask])
+
+    def require_unique_ids(self) -> None:
+        """Raises ValueError if an id occurs twice in one frame on a side."""
+        self.true.require_unique_ids("truth")
+        self.est.require_unique_ids("tracks")
 
     @cached_property
     def true_ids(self) -> tuple[Ints, Ints]:
-        """Returns two arrays: the N distinct true ids in ascending order, (N,), and for each true row the index of its
-        id in the first array, (R,). Both are empty without true rows.
-        """
+        """Returns the N distinct true ids, ascending (N,), and the index of each true row's id among them (R,)."""
         return numbered(self.true.id)
 
     @cached_property
     def est_ids(self) -> tuple[Ints, Ints]:
-        """Returns two arrays: the M distinct estimated ids in ascending order, (M,), and for each estimated row the
-        index of its id in the first array, (S,). Both are empty without estimated rows.
-        """
+        """Returns the M distinct estimated ids, ascending (M,), and the index of each row's id among them (S,)."""
         return numbered(self.est.id)
 
     @cached_property
     def links(self) -> tuple[Ints, Ints, Ints]:
-        """The U distinct combinations (true id, estimated id) among the K pairs, as three arrays.
+        """The U distinct combinations of a true and an estimated id, sorted, as three arrays.
 
-        They are: the index of the true id in `true_ids[0]` (U,), the index of the estimated id in `est_ids[0]` (U,),
-        and for each pair the index of its combination (K,). Combinations are sorted by true id, then estimated id.
+        They are the index of the true id in `true_ids[0]` (U,), of the estimated id in `est_ids[0]` (U,), and the
+        combination of each pair (K,).
         """
         width = max(len(self.est_ids[0]), 1)
         key = self.true_ids[1][self.i] * width + self.est_ids[1][self.j]
@@ -80,11 +77,7 @@ class Pairs:
         return distinct // width, distinct % width, which
 
     def in_frames(self, mask: Bools) -> Pairs:
-        """Returns the rows and pairs of the frames f where mask[f] is true, with i and j renumbered to the kept rows.
-
-        mask (F,): bool, indexed by frame number; it must reach to the last frame of both sides, else IndexError is
-        raised. Frame numbers themselves do not change.
-        """
+        """Returns the rows and pairs of the frames f where mask[f] is true, with i and j renumbered."""
         true, est = mask[self.true.frame], mask[self.est.frame]
         kept = true[self.i]
         place_i, place_j = np.cumsum(true) - 1, np.cumsum(est) - 1
@@ -101,16 +94,10 @@ PairSimilarity = Callable[[Ints, Ints], tuple[Ints, Array]]
 def compare(
     true: FrameRows, est: FrameRows, similarity: PairSimilarity, within: tuple[Array, Array, Array] | None = None
 ) -> Pairs:
-    """Returns the pairs of rows of one frame that a similarity function keeps.
+    """Returns the pairs of rows of one frame that a similarity function keeps; both sides are sorted by frame.
 
-    true, est: R true and S estimated rows, sorted by frame. similarity(i, j) gets row indices i (P,) of `true` and j
-    (P,) of `est` of equal frame. It returns the positions (Q,), ascending, of the pairs to keep among these P, and
-    their similarities (Q,), which are stored unchanged. It is called once per portion of about 200 000 pairs.
-
-    within = (low, high, at) limits the pairs that the function is called for: low, high (R,) belong to the true rows,
-    at (S,) to the estimated ones. Every pair with low[i] <= at[j] <= high[i] is passed, and a few others close to these
-    limits. A true row with a nan or infinite limit, or an estimated row with such an `at`, gets no pairs. None passes
-    all pairs of equal frame.
+    within = (low, high, at) limits the pairs that the function is called for to those with low[i] <= at[j] <= high[i],
+    and a few more: low, high (R,) of the true rows, at (S,) of the estimated ones. A row with a nan there has no pair.
     """
     found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))]
     for i, j in same_frame(true.frame, est.frame) if within is None else _near(true, est, *within):
@@ -120,21 +107,13 @@ def compare(
 
 
 def same_frame(a: Ints, b: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Yields all pairs (index in a, index in b) with equal frame, as two int arrays (P,) per portion.
-
-    a (N,), b (M,): frame numbers, b sorted. Pairs are in ascending order of a, then b. A portion has at most about 200
-    000 pairs, but always all partners of at least one element of a. Empty input yields no or empty portions.
-    """
+    """Yields all pairs (index in a, index in b) with equal frame, in portions; b is sorted."""
     first = np.searchsorted(b, a, side="left")
     return _portions(first, np.searchsorted(b, a, side="right") - first)
 
 
 def _portions(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Yields arrays k, first[k] + n for all k and all n in 0 … count[k] - 1, in ascending order.
-
-    first (K,): start of each k's range; count (K,): its length, 0 allowed. A portion has at most 200 000 pairs, or all
-    pairs of a single k if that has more.
-    """
+    """Yields arrays k, first[k] + n for all k and n in 0 … count[k] - 1, in order, in portions."""
     total = np.concatenate(([0], np.cumsum(count)))
     cuts = [0]
     while cuts[-1] < len(count):
@@ -146,18 +125,13 @@ def _portions(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
 
 
 def _near(a: FrameRows, b: FrameRows, low: Array, high: Array, at: Array) -> Iterator[tuple[Ints, Ints]]:
-    """Yields arrays of row indices i of a and j of b of equal frame with low[i] <= at[j] <= high[i], and a few pairs
-    just outside these limits.
-
-    low, high (R,): limits of the R rows of a; at (S,): values of the S rows of b. A row with a nan or infinite limit or
-    value gets no pairs. Rows of b are sorted by frame * span + at, where span exceeds the range of `at`. One binary
-    search over this axis then finds the partners of every row of a in its own frame. Pairs are in ascending order of i;
-    a portion has about 200 000.
-    """
+    """Yields row indices i of a and j of b of equal frame with low[i] <= at[j] <= high[i], and a few others."""
     finite = at[np.isfinite(at)]
     least, most = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     slack = SLACK * (most - least + 1)
     span = most - least + 3 * slack
+    # One axis for all frames: one binary search finds the partners of every row in its own frame. The span between
+    # frames exceeds the range of `at`.
     place = b.frame * span + (at - least)
     order = np.argsort(place, kind="stable")
     axis = place[order]
@@ -168,12 +142,7 @@ def _near(a: FrameRows, b: FrameRows, low: Array, high: Array, at: Array) -> Ite
 
 
 def box_pairs(true: FrameRows, est: FrameRows, true_box: Array, est_box: Array) -> Pairs:
-    """Returns the pairs of overlapping boxes of one frame, with their intersection over union as similarity.
-
-    true_box (R, 4), est_box (S, 4): left, top, width, height of each row of `true` and `est`, in one unit (px). A box
-    with a nan, or without positive width and height, has no pairs. Nor has an overlap too small to differ from 0 by
-    rounding.
-    """
+    """Returns the pairs of boxes (R, 4), (S, 4) of one frame that overlap, with their IoU; a nan box has no pairs."""
     (la, ta, ra, ba), (lb, tb, rb, bb) = _edges(true_box), _edges(est_box)
     area_a, area_b = (np.maximum(box[:, 2], 0) * np.maximum(box[:, 3], 0) for box in (true_box, est_box))
     widest = float(est_box[np.isfinite(est_box[:, 2]), 2].max(initial=0.0))
@@ -195,11 +164,7 @@ def _edges(box: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array, reach: float) -> Pairs:
-    """Returns the pairs of positions of one frame closer than `reach`, with 1 - distance / reach as similarity.
-
-    true_pos (R, 2), est_pos (S, 2): x, y of each row of `true` and `est`, in the unit of `reach` (m or px). A position
-    with a nan or infinity has no pairs. reach: finite, above 0.
-    """
+    """Returns the pairs of positions (R, 2), (S, 2) of one frame closer than `reach`: 1 - distance / reach."""
     ax, ay, bx, by = (np.ascontiguousarray(pos[:, k]) for pos in (true_pos, est_pos) for k in (0, 1))
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
@@ -214,12 +179,7 @@ def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array
 def matrix_pairs(
     true_ids: Sequence[NDArray[Any]], est_ids: Sequence[NDArray[Any]], similarity: Sequence[NDArray[Any]]
 ) -> Pairs:
-    """Returns the pairs of similarity above 0, from lists with one entry per frame; entry 0 becomes frame 0.
-
-    true_ids: whole-number ids (N,) of each frame; est_ids: ids (M,); similarity: a matrix (N, M) of each frame, rows as
-    true_ids, columns as est_ids. N and M may differ between frames and may be 0. A similarity of 2.2e-16 or less, or
-    nan, gives no pair. All three lists must have equal length and fitting shapes; this is not checked.
-    """
+    """Returns the pairs of similarity above 0 from ids (N,), (M,) and a matrix (N, M) of each frame, from frame 0."""
     true, est = _stack_ids(true_ids), _stack_ids(est_ids)
     flat = np.concatenate([np.zeros(0), *(np.asarray(m, float).ravel() for m in similarity)])
     n, m = (np.array([len(a) for a in ids], np.int64) for ids in (true_ids, est_ids))

@@ -6,14 +6,65 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import inf
 from types import MappingProxyType
+from typing import Literal
 
-from tracking.scoring.catalogue_entries import Score, count, from_source, in_family, length, share
 from tracking.scoring.events import HEADLINE, KINDS
 
 CORE = "groups, core"
+
+Better = Literal["higher", "lower", "neither"]
+
+
+@dataclass(frozen=True)
+class Score:
+    """One score of the catalogue."""
+
+    key: str  # its name in the results, such as "HOTA"
+    family: str  # name of the group of scores that are shown together, such as "people"
+    # "1" for a share; "m | px" for a length in m on the ground or in px in the image ("m² | px²" squared); "m/s",
+    # "count", "s", "people"
+    unit: str
+    # low, high: range of possible values; may be infinite
+    low: float
+    high: float
+    better: Better  # whether "higher" or "lower" values are better, or "neither"
+    meaning: str  # definition in words
+    source: str = ""  # the paper that defines it, "" if flockscope does
+
+    @property
+    def best(self) -> float:
+        """The value of a perfect tracker: `high` if higher is better, 0 if lower is better."""
+        value = {"higher": self.high, "lower": 0.0, "neither": inf}[self.better]
+        return value if value < inf else float("nan")
+
+
+def share(key: str, meaning: str, low: float = 0.0) -> Score:
+    """Returns a score of unit 1 from `low` to 1, higher is better, without family and source."""
+    return Score(key, "", "1", low, 1.0, "higher", meaning)
+
+
+def count(key: str, meaning: str, better: Better = "lower") -> Score:
+    """Returns a number of 0 or more, without family and source."""
+    return Score(key, "", "count", 0.0, inf, better, meaning)
+
+
+def length(key: str, meaning: str, unit: str = "m | px") -> Score:
+    """Returns an error of 0 or more in `unit`, lower is better, without family and source."""
+    return Score(key, "", unit, 0.0, inf, "lower", meaning)
+
+
+def in_family(family: str, *scores: Score) -> tuple[Score, ...]:
+    """Returns the scores with the family `family`."""
+    return tuple(replace(score, family=family) for score in scores)
+
+
+def from_source(source: str, *scores: Score) -> tuple[Score, ...]:
+    """Returns the scores with the source `source`."""
+    return tuple(replace(score, source=source) for score in scores)
+
 
 OBJECTIVE = in_family(
     "objective",
@@ -145,7 +196,6 @@ GROUPS = in_family(
 
 
 def _groups_right(name: str, right: str) -> tuple[Score, ...]:
-    """Returns F1, precision and recall of groups, without family and source; right: when a true group is right."""
     p, r = f"{name}_precision", f"{name}_recall"
     return (
         share(f"{name}_F1", f"2 P R / (P + R) of P = {p} and R = {r}"),
@@ -182,11 +232,6 @@ LINEAGE = (
 
 
 def _of_events(name: str, what: str) -> Iterable[Score]:
-    """Yields the scores of one kind of event: F1, precision, recall, TP, FP, FN, latency (in s, -1 or more).
-
-    name: the kind, which begins the keys ("merge" gives merge_F1); "event" yields no TP, FP and FN. what: the events as
-    a plural noun for the meanings. The scores have no family yet.
-    """
     yield share(f"{name}_F1", f"2 matched / (true + reported) {what}")
     yield share(f"{name}_precision", f"matched / reported {what}")
     yield share(f"{name}_recall", f"matched / true {what}")
@@ -199,9 +244,6 @@ def _of_events(name: str, what: str) -> Iterable[Score]:
 
 
 def _headline(score: Score) -> Score:
-    """Returns an `event_…` score with a new meaning: the mean of the same score of merge and of split, or the known one
-    of the two. `event_latency` keeps its meaning.
-    """
     if score.key == "event_latency":
         return replace(score, meaning="mean time from the true start to the report, of matched merges and splits")
     name = score.key.removeprefix("event_")
@@ -243,11 +285,7 @@ CATALOGUE = MappingProxyType({score.key: score for score in ALL})
 
 
 def table() -> str:
-    """Returns the catalogue as a Markdown table with the columns key, unit, range, better, meaning, source, one line
-    per score.
-
-    Core scores, whose keys end in `_core`, are left out.
-    """
+    """Returns the catalogue as a Markdown table, one line per score, without core scores."""
     lines = ["| key | unit | range | better | meaning | source |", "| --- | --- | --- | --- | --- | --- |"]
     for score in ALL:
         if score.family != CORE:

@@ -19,6 +19,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
 from tracking.scoring.matching import solve_frame
+from tracking.scoring.weighted_sums import FrameSums, WeightedScores, ratio
 
 BONUS = 1000.0  # added to the weight of a pair that was matched in the previous frame
 MOSTLY, LOST = 0.8, 0.2
@@ -27,17 +28,12 @@ MOSTLY, LOST = 0.8, 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClearMatches:
-    """The matches of CLEAR: `found`, the matched pairs of similarity 0.5 or more.
-
-    - switched: frame number of each identity switch, the frame of the later match.
-    - resumed: frame number of each match that follows a pause of its true id.
-    - share (N,): matched frames / frames of each of the N true ids, in the order of `Pairs.true_ids[0]`.
-    """
+    """The matches of CLEAR: `found`, the matched pairs of similarity 0.5 or more."""
 
     found: Pairs
-    switched: Ints
-    resumed: Ints
-    share: Array
+    switched: Ints  # frame number of each identity switch, the frame of the later match
+    resumed: Ints  # frame number of each match that follows a pause of its true id
+    share: Array  # (N,): matched frames / frames of each of the N true ids, in the order of `Pairs.true_ids[0]`.
 
 
 def clear_matches(pairs: Pairs) -> ClearMatches:
@@ -55,56 +51,47 @@ def clear_matches(pairs: Pairs) -> ClearMatches:
     return ClearMatches(near, frame[1:][switched], frame[1:][resumed], share)
 
 
-def clear(pairs: Pairs) -> dict[str, float]:
-    """Returns a dict of the CLEAR scores: MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag; all values are floats.
+def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
+    """Returns the weighted MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag, with the matches kept.
 
-    pairs: candidate pairs of people (or groups) of any similarity; a row is one of them in one frame, no id twice in a
-    frame. Pairs of similarity 0.5 or more are matched one to one in each frame; a match of the previous frame is kept.
-    TP, FN, FP count matches, true rows without one and estimated rows without one. IDSW counts how often a true id is
-    matched to another estimated id than in its previous match. Frag counts how often a true id's matches resume after a
-    pause. MT, PT, ML count true ids matched in more than 80 %, in 20 to 80 %, in less than 20 % of their frames.
-
-    MOTA = 1 - (FN + FP + IDSW) / true rows, or 0 if either side has no rows. MOTP is the mean similarity of the
-    matches, 0 without matches. The counts are 0 where there is nothing to count.
+    A switch and a resumed match have the weight of the later match. MT, PT and ML sum up the mean weights of their
+    people's frames.
     """
-    matches = clear_matches(pairs)
-    n, m, hits = len(pairs.true), len(pairs.est), len(matches.found.s)
-    switches, share = len(matches.switched), matches.share
-    mostly, tracked = int((share > MOSTLY).sum()), int((share >= LOST).sum())
-    return {
-        "MOTA": (hits - (m - hits) - switches) / n if n and m else 0.0,
-        "MOTP": float(matches.found.s.sum()) / max(1, hits),
-        "TP": float(hits),
-        "FN": float(n - hits),
-        "FP": float(m - hits),
-        "IDSW": float(switches),
-        "MT": float(mostly),
-        "PT": float(tracked - mostly),
-        "ML": float(len(share) - tracked),
-        "Frag": float(len(matches.resumed)),
-    }
+    matches, sums = clear_matches(pairs), FrameSums(size)
+    sums.add("true", pairs.true.frame)
+    sums.add("est", pairs.est.frame)
+    sums.add("TP", matches.found.frame)
+    sums.add("similarity", matches.found.frame, matches.found.s, float(matches.found.s.sum()))
+    sums.add("IDSW", matches.switched)
+    sums.add("Frag", matches.resumed)
+    who, share = pairs.true_ids[1], matches.share
+    part = 1 / np.bincount(who)[who]
+    kinds = {"MT": share > MOSTLY, "PT": (share >= LOST) & (share <= MOSTLY), "ML": share < LOST}
+    for key, inside in kinds.items():
+        sums.add(key, pairs.true.frame, part * inside[who], float(inside.sum()))
+
+    def score(weights: Array) -> dict[str, Array]:
+        s = sums.of(weights)
+        n, m, hits = s["true"], s["est"], s["TP"]
+        quality = ratio(hits - (m - hits) - s["IDSW"], n, 0.0)
+        return {
+            "MOTA": np.where(m > 0, quality, 0.0), "MOTP": ratio(s["similarity"], hits, 0.0),
+            "TP": hits, "FN": n - hits, "FP": m - hits,
+            **{key: s[key] for key in ("IDSW", "MT", "PT", "ML", "Frag")},
+        }  # fmt: skip
+
+    return score
 
 
 def turns(pairs: Pairs) -> Ints:
-    """Returns for each frame number 0 … last how many frames up to and including it have rows on both sides, (last +
-    1,).
-
-    pairs: candidate pairs with all true and estimated rows. last: the last frame with a row on either side; 0 if there
-    is none.
-    """
+    """Returns for each frame number 0 … last how many frames up to it have rows on both sides, (last + 1,)."""
     end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
     true, est = (np.bincount(rows.frame, minlength=end) > 0 for rows in (pairs.true, pairs.est))
     return np.cumsum(true & est)
 
 
 def follow(near: Pairs, turn: Ints) -> Bools:
-    """Returns which of the K pairs of `near` are matched, (K,) bool, where matches of the previous frame are kept.
-
-    In each frame the matching is one to one: first all pairs whose two ids were matched in the previous frame, then the
-    greatest total similarity. The previous frame is the last one with rows on both sides. near: the candidate pairs of
-    similarity 0.5 or more. turn: from `turns`, for each frame number the number of frames up to it with rows on both
-    sides.
-    """
+    """Returns which of the K pairs of `near` are matched, (K,) bool, where matches of the previous frame are kept."""
     i, j, frame = near.i, near.j, near.frame
     before = _before(near.links[2], turn[frame])
     chosen = np.zeros(len(i) + 1, bool)  # the last element stands for "no previous pair"
@@ -128,11 +115,7 @@ def follow(near: Pairs, turn: Ints) -> Bools:
 
 
 def _before(link: Ints, turn: Ints) -> Ints:
-    """Returns for each of K pairs the index of the pair of the same two ids one turn earlier, K if there is none: (K,).
-
-    link (K,): number of the pair's combination of true and estimated id; turn (K,): number of frames with people on
-    both sides up to the pair's frame.
-    """
+    """Returns for each of K pairs the index of the pair of the same two ids one turn earlier, K if there is none."""
     order = np.argsort(link, kind="stable")
     follows = (np.diff(link[order]) == 0) & (np.diff(turn[order]) == 1)
     before = np.full(len(link), len(link))

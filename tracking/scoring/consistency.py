@@ -21,34 +21,21 @@ LAGS = 5  # frames
 
 
 def normalised(errors: Array, covariances: Array) -> Array:
-    """Returns L^-1 e, shape (K, n), for K errors e (K, n) with covariances (K, n, n) = L L', L the lower Cholesky
-    factor.
-
-    For a consistent filter the n components are uncorrelated with variance 1. Raises numpy.linalg.LinAlgError if a
-    covariance is not positive definite. K = 0 gives an empty array.
-    """
+    """Returns L^-1 e (K, n) of errors e (K, n) with covariances (K, n, n) = L L': white if consistent."""
     return np.asarray(np.linalg.solve(np.linalg.cholesky(covariances), errors[..., None])[..., 0])
 
 
 def normalised_square(errors: Array, covariances: Array) -> Array:
-    """Returns e' C^-1 e, shape (K,), for K errors e (K, n) with covariances C (K, n, n).
-
-    This is NEES for estimation errors and NIS for innovations (measurement minus prediction). Its mean is n for a
-    consistent filter. Raises numpy.linalg.LinAlgError if a covariance is not positive definite. K = 0 gives an empty
-    array.
-    """
+    """Returns e' C^-1 e, shape (K,), for K errors e (K, n) with covariances C (K, n, n)."""
     return np.asarray(np.square(normalised(errors, covariances)).sum(axis=1))
 
 
 def mean_band(runs: int, dims: int, level: float = LEVEL) -> tuple[float, float]:
-    """Returns the interval (low, high) that contains the mean of NEES or NIS of a consistent filter with probability
+    """Returns the interval (low, high) that holds the mean of NEES or NIS of a consistent filter with probability
     `level`.
 
-    NEES, NIS: squared estimation errors or innovations, normalised by their covariance. runs: number of independent
-    values in the mean, at least 1. dims: length n of one error vector. level: between 0 and 1. The limits are
-    chi-square quantiles with runs * dims degrees of freedom, divided by runs. NEES values of one run are not
-    independent over frames, so take the mean over runs at one frame. NIS values of one run may be averaged over frames
-    if the innovations are white.
+    runs: number of independent values in the mean; dims: length of one error vector. NEES values of one run depend on
+    each other, so take the mean over runs at one frame; NIS values may be averaged over frames if they are white.
     """
     from scipy.stats import chi2
 
@@ -57,12 +44,7 @@ def mean_band(runs: int, dims: int, level: float = LEVEL) -> tuple[float, float]
 
 
 def whiteness(innovations: Array, lags: int = LAGS) -> Array:
-    """Returns the autocorrelation r of one track's normalised innovations: (lags,), r at lags 1, 2, … `lags` in frames.
-
-    innovations (T, n): measurement minus prediction, divided by its Cholesky factor, one row v(t) per frame. r(l) = sum
-    v(t)' v(t + l) / (sum |v(t)|^2 sum |v(t + l)|^2)^1/2, all sums over the same T - l frames. It is nan at lags of T or
-    more, and where a sum of squares is 0 or nan.
-    """
+    """Returns the autocorrelation (lags,) of one track's normalised innovations (T, n) at lags 1, 2, …"""
     found = np.full(lags, np.nan)
     for lag in range(1, min(lags, len(innovations) - 1) + 1):
         a, b = innovations[:-lag], innovations[lag:]
@@ -73,12 +55,7 @@ def whiteness(innovations: Array, lags: int = LAGS) -> Array:
 
 
 def whiteness_band(frames: int, dims: int, lag: int = 1, level: float = LEVEL) -> float:
-    """Returns the bound that the size of the autocorrelation |r(lag)| of white innovations stays below with probability
-    `level`.
-
-    frames: number T of frames, above `lag`; dims: length n of one innovation; lag: in frames; level: 0 to 1, default
-    0.95. r is approximately normal with mean 0 and variance 1 / (n (T - lag)).
-    """
+    """Returns the bound below which |r(lag)| of white innovations stays with probability `level`."""
     from scipy.stats import norm
 
     return float(norm.ppf((1 + level) / 2) / np.sqrt(dims * (frames - lag)))

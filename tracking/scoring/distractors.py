@@ -17,10 +17,7 @@ from tracking.scoring.rows import FrameRows
 
 
 def without_distractors(truth: Truth, unscored: Unscored, tracked: PersonRows) -> PersonRows:
-    """Returns the tracked people without those on distractors; all of them if they have no boxes.
-
-    unscored: labelled rows beside the truth's people, whose boxes must be known.
-    """
+    """Returns the tracked people without those on distractors; all of them if they have no boxes."""
     if tracked.box is None:
         return tracked
     assert truth.box is not None

@@ -18,12 +18,12 @@ from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.annotated_frames import annotated_frames, seen_in
 from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.clear import clear
+from tracking.scoring.clear import weighted_clear
 from tracking.scoring.distractors import without_distractors
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.hota import hota
-from tracking.scoring.identity import identity
+from tracking.scoring.identity import weighted_identity
 from tracking.scoring.matching import mapped_people
 from tracking.scoring.one_plane import from_pixels, grounded, in_one_plane, on_feet
 from tracking.scoring.people_and_groups import (
@@ -40,7 +40,7 @@ from tracking.scoring.people_comparison import (
     people_pairs,
     plane_of,
 )
-from tracking.scoring.position_errors import position_scores
+from tracking.scoring.position_errors import weighted_positions
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
 from tracking.scoring.weighted_sums import unweighted
 
@@ -49,29 +49,28 @@ __all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity"
 
 @dataclass(frozen=True, eq=False)
 class MatchedSides:
-    """One truth and one tracker's tracks, compared but not counted yet.
+    """One truth and one tracker's tracks, compared but not counted yet."""
 
-    - sides: both sides in the scored frames, people mapped.
-    - similarity: how people are compared. people: their candidate pairs, None for a tracker of whole groups.
-    - groups: the true groups in the scored frames, None if none of these frames is labelled.
-    """
-
-    sides: ComparedSides
-    similarity: Similarity
-    people: Pairs | None
-    groups: TrueGroups | None
+    sides: ComparedSides  # both sides in the scored frames, people mapped
+    similarity: Similarity  # how people are compared
+    people: Pairs | None  # their candidate pairs, None for a tracker of whole groups
+    groups: TrueGroups | None  # the true groups in the scored frames, None if none of these frames is labelled
 
 
 @dataclass(frozen=True, eq=False)
 class Scores(Mapping[str, float]):
-    """A read-only mapping from key to score (float), with every key of the catalogue in its order; KeyError for others.
+    """A read-only mapping from key to score (float), with every key of the catalogue in its order.
 
-    - by_key: the scores. nan: not labelled, not comparable, or a denominator of 0.
-    - similarity: how people were compared, by "boxes" (IoU) or by positions on the "ground" or in the "image".
-    - surface: where groups were compared, "ground" or "image".
-    - group_match: how groups were matched, by "hull" or by "members".
-    - frames: number of scored frames. length: number of frames of the sequence. step: from one annotated frame to the
-      next, 1 unless the labels are sparse; None if they are not evenly spaced.
+    Printed, it shows one line per score that is not nan.
+
+    Attributes:
+        by_key: the scores. nan: not labelled, not comparable, or a denominator of 0.
+        similarity: how people were compared, by "boxes" (IoU) or by positions on the "ground" or in the "image".
+        surface: where groups were compared, "ground" or "image".
+        group_match: how groups were matched, by "hull" or by "members".
+        frames: number of scored frames.
+        length: number of frames of the sequence.
+        step: frames from one annotated frame to the next, 1 unless the labels are sparse; None if not evenly spaced.
     """
 
     by_key: Mapping[str, float]
@@ -92,9 +91,6 @@ class Scores(Mapping[str, float]):
         return len(self.by_key)
 
     def __str__(self) -> str:
-        """Returns one line per score that is not nan: key, padded to 28 characters, and value with four significant
-        digits.
-        """
         return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items() if not math.isnan(value))
 
 
@@ -106,32 +102,36 @@ def evaluate(
     group_match: GroupMatch = "hull",
     frames: int | range | None = None,
 ) -> Scores:
-    """Returns every score of the catalogue (docs/reference/metrics.md) for one tracker; a score that cannot be computed
-    is nan.
+    """Returns every score of the catalogue (docs/reference/metrics.md) for one tracker.
 
-    tracks: the tracker's `Tracks`, one per frame, in any order; of two with equal frame the later is used. similarity:
-    compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) ("ground", "image"), d being their distance. None follows
-    the data, as tracking.scoring.one_plane says. group_match: matches groups by IoU of their hulls ("hull") or
-    Jaccard index of their members ("members"); group_F1, group_precision and group_recall are by members in both cases.
-    frames: a number n scores frames 1 … n, a range only its frames, None all frames. A frame without tracks counts as
-    empty. If the labels are clearly sparse, only annotated frames are scored (`annotated_frames`).
+    Args:
+        truth: the labels of a sequence. If they are clearly sparse, only annotated frames are scored.
+        tracks: the tracker's `Tracks`, one per frame, in any order; a frame without tracks counts as empty. Groups and
+            events that they lack are derived by the default grouping, in the image only if `truth.px_per_m` is known.
+        similarity: compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) of their distance d ("ground", "image").
+            None follows the data: the ground if both sides can be there, else boxes, else the image.
+        group_match: matches groups by IoU of their hulls ("hull") or Jaccard index of their members ("members").
+            group_F1, group_precision and group_recall are by members in both cases.
+        frames: a number n scores frames 1 … n, a range only its frames, None all frames.
 
-    Groups and events that the tracks lack come from the default grouping, in the image only if `truth.px_per_m` is
-    known. Scores of people are nan for a tracker of whole groups, scores of groups and events if no scored frame has
-    group labels.
+    Returns:
+        `Scores`, a mapping from key to value. A score is nan if it cannot be computed: scores of people for a tracker
+        of
+        whole groups, scores of groups and events if no scored frame has group labels.
 
-    Raises IncomparableError if boxes or positions to be compared are missing, ValueError if an id occurs twice in one
-    frame, and InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
+    Raises:
+        IncomparableError: boxes or positions to be compared are missing.
+        ValueError: an id occurs twice in one frame.
+        InputError: groups must be derived in the image and `truth.px_per_m` is 0 or less.
     """
     return Scorer(truth).evaluate(tracks, similarity=similarity, group_match=group_match, frames=frames)
 
 
 class Scorer:
-    """Scores any number of trackers against one truth.
+    """Scores any number of trackers against one truth, which must not change meanwhile.
 
     State: truth, on the ground if its boxes can be; annotated, its frames that can be scored; labelled (length + 1,),
-    bool by frame number: the frame is annotated with groups; the true people and groups as rows of arrays, built at
-    first use and kept. The truth must not change meanwhile.
+    bool by frame number: annotated with groups; the true people and groups as rows, built at first use and kept.
     """
 
     def __init__(self, truth: Truth) -> None:
@@ -151,29 +151,17 @@ class Scorer:
         return true_people(self.truth, chosen_frames(None, self.truth.length))
 
     def scored(self, frames: int | range | None) -> Bools:
-        """Returns which of the frame numbers 0 … length are scored, (length + 1,) bool: chosen and annotated ones.
-
-        frames: n for frames 1 … n, a range, or None for all.
-        """
+        """Returns which of the frame numbers 0 … length are scored, (length + 1,) bool: chosen and annotated ones."""
         return chosen_frames(frames, self.truth.length) & self.annotated.frames
 
     def groups(self, surface: Surface) -> TrueGroups:
-        """Returns the true groups of two or more people in all labelled frames; members are row indices of `people`.
-
-        surface: "ground" (m) or "image" (px). If the truth has groups on the other surface only, their shapes do not
-        count: `comparable` is False. Raises AssertionError if the truth has groups on neither.
-        """
+        """Returns the true groups of two or more in all labelled frames; members are row indices of `people`."""
         if surface not in self._groups:
             self._groups[surface] = true_groups(self.truth, self.labelled, self.people.rows, surface)
         return self._groups[surface]
 
     def sides(self, tracks: Sequence[Tracks], frames: Bools) -> ComparedSides:
-        """Returns the truth's and the tracker's data in the frames f where frames[f] is true, before people are mapped.
-
-        tracks: one tracker's, of these frames only, sorted by frame. frames (length + 1,): bool by frame number. In the
-        result `frames` keeps only labelled frames, and `mapping` is -1 for every tracked row. Tracked people on
-        distractors are left out.
-        """
+        """Returns both sides' data in the frames f where frames[f] is true, nobody mapped yet, distractors left out."""
         kept = frames[self.people.rows.frame]
         true = self.people if kept.all() else self.people.keep(kept)
         est, plane = tracked_people(tracks), plane_of(self.truth, tracks)
@@ -190,7 +178,7 @@ class Scorer:
         group_match: GroupMatch = "hull",
         frames: int | range | None = None,
     ) -> Scores:
-        """Returns every score of the catalogue for one tracker against this truth, as the function `evaluate` does."""
+        """Returns the scores of one tracker against this truth, as the function `evaluate` does."""
         (found,) = self.evaluate_all([tracks], similarity=similarity, group_match=group_match, frames=frames)
         return found
 
@@ -202,23 +190,13 @@ class Scorer:
         group_match: GroupMatch = "hull",
         frames: int | range | None = None,
     ) -> list[Scores]:
-        """Returns the scores of several runs, all compared in one plane and by one similarity; else as `evaluate`.
-
-        Raises what `evaluate` raises, and IncomparableError if the runs fit no common plane.
-        """
+        """Returns the scores of several runs, all compared in one plane and by one similarity; else as `evaluate`."""
         return [_scores(one, group_match, self.annotated.step) for one in self.compare(runs, similarity, frames)]
 
     def compare(
         self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None, frames: int | range | None
     ) -> list[MatchedSides]:
-        """Returns this truth and the tracks of each run with people mapped, ready to be counted.
-
-        runs: `Tracks` in any order, at most one per frame counts. similarity: as in `evaluate`. frames: those to score,
-        as in `evaluate`.
-
-        Raises IncomparableError if boxes or positions are missing or the runs fit no common plane, and InputError if
-        groups must be derived in the image and `truth.px_per_m` is 0 or less.
-        """
+        """Returns this truth and the tracks of each run with people mapped; arguments as of `evaluate`."""
         inside = self.scored(frames)
         ordered = [_in_order(run, inside) for run in runs]
         moved, chosen = in_one_plane(self.truth, ordered, [from_pixels(run) for run in runs], similarity)
@@ -247,8 +225,7 @@ def _scores(compared: MatchedSides, group_match: GroupMatch, step: int | None) -
     frames_scored = int(sides.inside.sum())
     if compared.people is not None:
         found |= people_scores(compared.people)
-        where = (sides.surface, sides.plane, sides.scale)
-        found |= position_scores(sides.true, sides.est, sides.mapping, *where, frames_scored)
+        found |= unweighted(weighted_positions(sides), len(sides.inside))
     if compared.groups is not None:
         scores = weighted_groups_and_events(sides, compared.groups, group_match)
         found |= unweighted(scores, len(sides.frames))
@@ -257,11 +234,7 @@ def _scores(compared: MatchedSides, group_match: GroupMatch, step: int | None) -
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:
-    """Returns which of the frame numbers 0 … length are chosen, (length + 1,) bool; frame 0 never is.
-
-    frames: a number n chooses frames 1 … n (none if n < 1, all if n > length), a range its frames between 1 and length,
-    None all.
-    """
+    """Returns which of the frame numbers 0 … length are chosen (length + 1,): 1 … n, those of a range, or None: all."""
     inside = np.zeros(length + 1, bool)
     if isinstance(frames, range):
         inside[[f for f in frames if 1 <= f <= length]] = True
@@ -271,11 +244,7 @@ def chosen_frames(frames: int | range | None, length: int) -> Bools:
 
 
 def labelled_frames(truth: Truth) -> Bools:
-    """Returns which of the frame numbers 0 … length have labelled groups, (length + 1,) bool; frame 0 never has.
-
-    Without groups on the ground and in the image no frame has. With groups and without `truth.labelled`, all frames
-    have.
-    """
+    """Returns which of the frame numbers 0 … length have labelled groups, (length + 1,)."""
     if truth.groups is None and truth.groups_px is None:
         return np.zeros(truth.length + 1, bool)
     labelled = np.ones(truth.length, bool) if truth.labelled is None else truth.labelled
@@ -283,33 +252,21 @@ def labelled_frames(truth: Truth) -> Bools:
 
 
 def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
-    """Returns one tracker's `Tracks` sorted by frame, from frame 1 to the last chosen frame.
-
-    tracks: in any order. inside (length + 1,): which frame numbers are chosen. Frames before the last chosen one are
-    kept even if not chosen; later ones are dropped, as they must not influence the scores. Of two `Tracks` with equal
-    frame the later in the input is kept. Empty if no frame is chosen.
-    """
+    # later frames must not influence the scores; earlier ones do, as groups are derived from them
     last = int(np.flatnonzero(inside)[-1]) if inside.any() else 0
     by_frame = {t.index: t for t in tracks if 1 <= t.index <= last}
     return [by_frame[index] for index in sorted(by_frame)]
 
 
 def people_scores(pairs: Pairs) -> dict[str, float]:
-    """Returns the scores of HOTA, CLEAR and Identity as one dict by key.
-
-    pairs: all people of both sides and their candidate pairs of any similarity in (0, 1]. CLEAR and Identity use pairs
-    of 0.5 or more. Without people on a side all scores are 0, except LocA, which is 1, and the counts FN and ML, or FP,
-    of the other side's people. Raises ValueError if an id occurs twice in one frame on a side.
-    """
-    pairs.true.require_unique_ids("truth")
-    pairs.est.require_unique_ids("tracks")
-    return {**hota(pairs), **clear(pairs), **identity(pairs)}
+    """Returns the scores of HOTA, CLEAR and Identity by key. Raises ValueError if an id is twice in a frame."""
+    pairs.require_unique_ids()
+    size = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
+    counted = (unweighted(scores(pairs, size), size) for scores in (weighted_clear, weighted_identity))
+    return hota(pairs) | {key: value for part in counted for key, value in part.items()}
 
 
 def objective_of(found: Mapping[str, float]) -> float:
-    """Returns the mean of found["HOTA"] and found["group_F1"]; if one is nan the other, if both are nan nan.
-
-    Raises KeyError if a key is missing.
-    """
+    """Returns the mean of found["HOTA"] and found["group_F1"], or the one that is known, or nan."""
     known = [v for v in (found["HOTA"], found["group_F1"]) if v == v]
     return sum(known) / len(known) if known else float("nan")

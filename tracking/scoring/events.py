@@ -27,19 +27,13 @@ PersonIds = frozenset[int]
 
 @dataclass(frozen=True, slots=True)
 class EventMembers:
-    """The members of an event, or of one group before or after it, as true people.
+    """The members of an event, or of one group before or after it, as true people."""
 
-    - people: ids of true people.
-    - unmatched: number of further members that are mapped to no true person, or to one already in `people`.
-    """
-
-    people: PersonIds
-    unmatched: int = 0
+    people: PersonIds  # ids of true people
+    unmatched: int = 0  # number of further members that are mapped to no true person, or to one already in `people`
 
     def jaccard(self, other: EventMembers) -> float:
-        """Returns common people / all members of this and `other`, between 0 and 1; unmatched members are never common.
-        0 if both are empty.
-        """
+        """Returns common people / all members of both, 0 if both are empty."""
         common = len(self.people & other.people)
         whole = len(self.people | other.people) + self.unmatched + other.unmatched
         return common / whole if whole else 0.0
@@ -47,58 +41,40 @@ class EventMembers:
 
 @dataclass(frozen=True, slots=True)
 class ComparableEvent:
-    """An event whose members are true people, so that a true and a tracker's event can be compared.
+    """An event whose members are true people, so that a true and a tracker's event can be compared."""
 
-    - kind: "merge", "split", "cross", "queue", "enter", "leave", "form" or "dissolve".
-    - start: frame number from 1 in which the event begins.
-    - emitted: frame number of the `Tracks` that report it; None in the truth.
-    - members: the people concerned; None if the tracker names no people.
-    - pos: x, y, in m on the ground or px in the image; nan unknown.
-    - parents, children: one `EventMembers` per group (or single person) before and after the event; None if unknown.
-    """
-
-    kind: str
-    start: int
-    emitted: int | None
-    members: EventMembers | None
-    pos: tuple[float, float]
+    kind: str  # "merge", "split", "cross", "queue", "enter", "leave", "form" or "dissolve"
+    start: int  # frame number from 1 in which the event begins
+    emitted: int | None  # frame number of the `Tracks` that report it; None in the truth
+    members: EventMembers | None  # the people concerned; None if the tracker names no people
+    pos: tuple[float, float]  # x, y, in m on the ground or px in the image; nan unknown
+    # parents, children: one `EventMembers` per group (or single person) before and after the event; None if unknown
     parents: tuple[EventMembers, ...] | None = None
     children: tuple[EventMembers, ...] | None = None
 
     @property
     def has_lineage(self) -> bool:
-        """True if neither `parents` nor `children` is None."""
+        """True if parents and children are known."""
         return self.parents is not None and self.children is not None
 
 
 @dataclass(frozen=True, slots=True)
 class MatchedEvents:
-    """All events of one kind in a sequence, of the truth and of a tracker, and which of them match.
+    """All events of one kind in a sequence, of the truth and of a tracker, and which of them match."""
 
-    - kind: "merge", "split", "cross", "queue", "enter" or "leave"; "form" is among the merges, "dissolve" among the
-      splits.
-    - true, est: the true events and the tracker's events of this kind, matched or not.
-    - pairs: the matched events, each (true event, tracker's event); an event is in one pair at most.
-    """
-
+    # "merge", "split", "cross", "queue", "enter" or "leave"; "form" is among the merges, "dissolve" among the splits
     kind: str
+    # true, est: the true events and the tracker's events of this kind, matched or not
     true: Sequence[ComparableEvent]
     est: Sequence[ComparableEvent]
+    # the matched events, each (true event, tracker's event); an event is in one pair at most
     pairs: Sequence[tuple[ComparableEvent, ComparableEvent]]
 
 
 def match_events(
     true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float
 ) -> list[MatchedEvents]:
-    """Returns one `MatchedEvents` per kind, in the order of `KINDS`: merge, split, cross, queue, enter, leave.
-
-    true, est: the true and the tracker's events, any kinds; those of other kinds are ignored ("form" counts as merge,
-    "dissolve" as split). fps: frames per second. scale: units of `pos` per metre.
-
-    Events match if their starts are at most 1 s apart and the Jaccard index of their members is at least 0.5. If a side
-    names no members, their positions must be at most 1.5 m apart instead; a nan position never matches. Matching is one
-    to one, with as many pairs as possible, and then with the most similar pairs.
-    """
+    """Returns the matched events of each kind in the order of `KINDS`; scale: units of `pos` per metre."""
     found = []
     for kind in KINDS:
         a, b = ([e for e in side if COUNTS_AS.get(e.kind, e.kind) == kind] for side in (true, est))
@@ -107,12 +83,7 @@ def match_events(
 
 
 def _similarity(true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float) -> Array:
-    """Returns the similarity of N true and M estimated events, (N, M); 0 if they cannot be matched.
-
-    It is the Jaccard index of the members (0 below 0.5). If either event names no members, it is 1 - distance / 3 m
-    instead (0 beyond 1.5 m, or if a position is nan). Starts more than 1 s apart give 0. Up to 0.001 is added for near
-    starts, to decide between equals. fps: frames per second; scale: units of `pos` per metre.
-    """
+    """Returns the similarity (N, M) of true and estimated events, 0 if they cannot be matched."""
     starts = [np.array([e.start for e in side], float) for side in (true, est)]
     late = np.abs(starts[0][:, None] - starts[1][None]) / fps
     similarity = np.zeros(late.shape)
@@ -131,11 +102,6 @@ def _similarity(true: Sequence[ComparableEvent], est: Sequence[ComparableEvent],
 def _one_to_one(
     true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], similarity: Array
 ) -> list[tuple[ComparableEvent, ComparableEvent]]:
-    """Returns pairs (true event, estimated event), each event at most once: as many as possible, then of greatest total
-    similarity.
-
-    similarity (N, M): rows as `true`, columns as `est`; events of similarity 0 are never paired.
-    """
     if not similarity.any():
         return []
     from scipy.optimize import linear_sum_assignment
@@ -146,17 +112,11 @@ def _one_to_one(
 
 
 def same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
-    """True if the parents of both events agree and the children agree; False if any of the four is None.
-
-    They agree if both sides have equally many, and each true one has a Jaccard index above 0.5 with some estimated one.
-    """
+    """Returns True if both events have equally many parents and children, and each true one has its like (J > 0.5)."""
     if true.parents is None or true.children is None or est.parents is None or est.children is None:
         return False
     return _same_parts(true.parents, est.parents) and _same_parts(true.children, est.children)
 
 
 def _same_parts(true: Sequence[EventMembers], est: Sequence[EventMembers]) -> bool:
-    """True if both sides have equally many parts (groups of members), and each true part has a Jaccard index above 0.5
-    with some estimated part. True if both have none.
-    """
     return len(true) == len(est) and all(any(a.jaccard(b) > SAME_PART for b in est) for a in true)

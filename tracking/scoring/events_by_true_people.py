@@ -24,17 +24,11 @@ CHANGES = frozenset(HEADLINE) | {kind for kind, counts_as in COUNTS_AS.items() i
 def true_events(
     events: Iterable[GroupEvent], people: PersonRows, positions: Array | None, frames: Bools, step: int
 ) -> list[ComparableEvent]:
-    """Returns the truth's events of known kinds that start in a frame f where frames[f] is true, in the order given.
+    """Returns the truth's events of known kinds that start in a frame f where frames[f] is true.
 
-    Known kinds are merge, split, cross, queue, enter, leave, form and dissolve. frames (length + 1,): bool by frame
-    number. people: the R true people in frames. positions (R, 2): their x, y on the surface of comparison, in m or px;
-    None if `GroupEvent.pos` is on it already. With positions, an event lies at the mean of its members at its start
-    (nan if none is present).
-
-    Parents are the groups of the members before the start, each in the last frame, of the `step` frames before it, in
-    which the member is. Children are the groups at the start. A member alone or absent is a part of its own. If both
-    are equal, form and dissolve take parents and children from the kind.
-    Both are None if they are still equal, or if the kind is none of merge, split, form, dissolve. `emitted` is None.
+    positions (R, 2): of the true people on the surface of comparison; None if `GroupEvent.pos` is on it. Parents are
+    the groups of the members in the last of the `step` frames before the start in which each is there, children those
+    at the start. A member alone or absent is a part of its own.
     """
     lookup, group = RowLookup(people.rows), _group_by_row(people.group)
 
@@ -53,24 +47,16 @@ def true_events(
 
 
 def _counts(event: GroupEvent, frames: Bools) -> bool:
-    """True if the event's kind is scored, and frames[event.start] is true; False if the start is outside `frames`.
-
-    Scored kinds are merge, split, cross, queue, enter, leave, form and dissolve. frames: bool by frame number.
-    """
     known = event.kind in KINDS or event.kind in COUNTS_AS
     return known and 0 <= event.start < len(frames) and bool(frames[event.start])
 
 
 def _group_by_row(group: Ints) -> list[int]:
-    """Returns group (R,) as a list with -1 appended, so that row index -1 (no row) has group -1 (no group)."""
     return [*group.tolist(), -1]
 
 
 def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[int]]:
-    """Returns the members (person ids) as lists, one per group, in the order of the groups' first member.
-
-    group(id): the member's group, -1 for none. A member without a group is a list of its own. No members give [].
-    """
+    """Returns the members as lists, one per group in order of first members; -1 is no group."""
     parts: dict[tuple[int, int], list[int]] = {}
     for m in members:
         g = group(m)
@@ -81,23 +67,14 @@ def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[
 def _by_kind(
     event: GroupEvent, before: list[list[int]], after: list[list[int]]
 ) -> tuple[list[list[int]], list[list[int]]]:
-    """Returns parents and children of an event, each a list of parts, a part being a list of member ids.
-
-    before, after: parts by the group labels before and after the event. If they differ they are returned. If they are
-    equal (data whose labels never change), `form` turns all members from single people into one group, and `dissolve`
-    does the reverse. Other kinds keep `before` and `after`.
-    """
     if sorted(before) != sorted(after):
         return before, after
+    # data whose labels never change: a form joins people alone, a dissolve leaves them alone
     one, alone = [list(event.members)], [[m] for m in event.members]
     return {"form": (alone, one), "dissolve": (one, alone)}.get(event.kind, (before, after))
 
 
 def _mean_position(event: GroupEvent, lookup: RowLookup, positions: Array) -> tuple[float, float]:
-    """Returns the mean x, y of the event's members who are present at its start; (nan, nan) if none is.
-
-    positions (R, 2): of the rows that `lookup` finds; the result has their unit.
-    """
     rows = [row for m in event.members if (row := lookup.nearest(m, event.start, 0)) >= 0]
     if not rows:
         return float("nan"), float("nan")
@@ -108,17 +85,11 @@ def _mean_position(event: GroupEvent, lookup: RowLookup, positions: Array) -> tu
 def tracked_events(
     tracks: Sequence[Tracks], people: PersonRows, mapping: Ints, true: FrameRows, frames: Bools, reach: int
 ) -> list[ComparableEvent]:
-    """Returns a tracker's events with members, of known kinds, that start in a frame f where frames[f] is true.
+    """Returns a tracker's events with members that start in a frame f where frames[f] is true.
 
-    Known kinds are merge, split, cross, queue, enter, leave, form and dissolve. tracks: of the scored frames. people:
-    the R tracked people in frames. mapping (R,): the row of `true` that each is mapped to, -1 none. true: rows of the
-    true people. frames (length + 1,): bool by frame number. reach: number of frames.
-
-    A member becomes the person it is mapped to at the event's start, or in the nearest frame within reach of it. A
-    member that is never mapped there, or to a person already listed, is unmatched. Parents are the groups of the
-    members in the frame before the report, children those in the frame of the report, each within reach if a member is
-    absent. If both are equal, parents are those of the frame before the event's start. If both are still equal, form
-    and dissolve take them from the kind. `emitted` is the frame of the `Tracks` that hold the event.
+    mapping (R,): the row of `true` of each tracked person, -1 none. A member becomes the person it is mapped to in the
+    frame nearest to the start, within `reach` frames. Parents are the groups of the members in the frame before the
+    report, or before the start if nothing changes there; children those in the frame of the report.
     """
     mapped, lookup, group = RowLookup(people.rows, mapping >= 0), RowLookup(people.rows), _group_by_row(people.group)
     person = np.append(true.id, -1)[mapping].tolist()
@@ -141,11 +112,6 @@ def tracked_events(
 
 
 def _true_members(members: Sequence[int], known: Mapping[int, int]) -> EventMembers:
-    """Returns the true people that an event's members (track ids) are mapped to.
-
-    known: true id of each mapped track id. Members without one, or mapped to the same person as another, count as
-    unmatched.
-    """
     people = frozenset(known[m] for m in members if m in known)
     return EventMembers(people, len(members) - len(people))
 
@@ -153,17 +119,10 @@ def _true_members(members: Sequence[int], known: Mapping[int, int]) -> EventMemb
 def events_of_hulls(
     tracks: Sequence[Tracks], groups: GroupRows, true: FrameRows, frames: Bools, span: int, without_members: bool
 ) -> list[ComparableEvent]:
-    """Returns a tracker's events of known kinds that start in a frame f where frames[f] is true; `members` is None.
+    """Returns a tracker's events by who is inside the hulls of its groups, without `members`.
 
-    Known kinds are merge, split, cross, queue, enter, leave, form and dissolve. without_members: if True, only events
-    that name no members; else all. tracks: of the scored frames. groups: the tracker's groups, whose members are rows
-    of `true` (from `people_inside`). true: rows of the true people. frames (length + 1,): bool by frame number. span:
-    number of frames. `emitted` is the frame of the `Tracks` that hold the event.
-
-    Parents are the people inside the hulls of the groups in `event.before`, children those inside the groups in
-    `event.after`. Children are judged in `span` frames from the report on. Parents are judged in `span` frames before
-    the event's start, or before the report if a parent group appears only at the start or later. A group counts a
-    person who is inside it longer than inside other groups, and in more than half of its frames.
+    Members of `groups` are rows of `true`. Children are judged in `span` frames from the report on, parents in as many
+    before the start, or before the report if a parent group appears only at the start or later.
     """
     person = true.id[groups.member]
 
@@ -178,23 +137,15 @@ def events_of_hulls(
 
 
 def _last_appearance(rows: FrameRows, ids: Sequence[int]) -> int:
-    """Returns the frame number in which the last of these group ids appears for the first time; 0 if none has a row.
-
-    rows: groups in frames, sorted by frame. Ids without a row are ignored.
-    """
+    """Returns the frame in which the last of these group ids appears for the first time; 0 if none has a row."""
     frames = [rows.frame[rows.id == id] for id in ids]
     return max((int(own[0]) for own in frames if len(own)), default=0)
 
 
 def _contained(groups: GroupRows, person: Ints, ids: Sequence[int], span: range) -> tuple[EventMembers, ...]:
-    """Returns the people of each group id in `ids` during the frames `span`, one `EventMembers` per id, in order.
-
-    groups: the tracker's groups in frames; person (K,): true id of each of their memberships; span: frame numbers, only
-    its start and stop (excluded) count. A person belongs to the one group that contained the person in most frames (of
-    equals the one that contained the fewest people, then the lowest id), and only if these are more than half of the
-    frames in which the group was reported. One frame is not enough, because the hulls of people behind each other
-    overlap in the image. A group without people gives an empty `EventMembers`.
-    """
+    """Returns the people of each group id in `ids` in the frames `span`; person (K,): of each membership."""
+    # One frame is not enough: the hulls of people behind each other overlap in the image. A person belongs to the group
+    # that contained the person in most frames, of equals to the smaller one, then to the lowest id.
     rows, now = groups.rows, (groups.rows.frame >= span.start) & (groups.rows.frame < span.stop)
     reported = Counter(rows.id[now].tolist())
     inside = now[groups.of]
@@ -210,9 +161,4 @@ def _contained(groups: GroupRows, person: Ints, ids: Sequence[int], span: range)
 
 
 def _reports(tracks: Sequence[Tracks], frames: Bools) -> list[tuple[GroupEvent, int]]:
-    """Returns pairs (event, frame number of the `Tracks` that hold it), whatever the event's `emitted` is.
-
-    tracks: one tracker's; the pairs keep their order. Events of unknown kinds, or that start in a frame f where
-    frames[f] is false or outside `frames`, are left out.
-    """
     return [(event, t.index) for t in tracks for event in t.events if _counts(event, frames)]

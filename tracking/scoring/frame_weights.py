@@ -2,7 +2,9 @@
 
 Identities and matchings are those of the whole recording. The weight w(t) of frame t enters every sum: a match, a miss,
 a switch or an event of frame t counts w(t) times. So no frames are joined, and no switch or event is made by a join.
-Weights of 1 give the scores of `evaluate`. Sums by frame are made once; each draw of weights is a matrix product.
+Fixed are also the core frames and who counts for MT, PT and ML. Only IDF1, IDP, IDR and IDTP assign ids anew for each
+draw, as their definition is a best assignment. Weights of 1 give the scores of `evaluate`. Sums by frame are made once;
+each draw of weights is a matrix product.
 """
 
 from __future__ import annotations
@@ -13,11 +15,14 @@ import numpy as np
 
 from sim.types import Array, Tracks, Truth
 from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.clear import weighted_clear
 from tracking.scoring.evaluation import MatchedSides, Scorer
 from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.hota import weighted_hota
+from tracking.scoring.identity import weighted_identity
 from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.position_errors import weighted_positions
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
-from tracking.scoring.weighted_people_scores import weighted_people, weighted_positions
 from tracking.scoring.weighted_sums import WeightedScores, mean_of_known
 
 PORTION = 100
@@ -31,24 +36,10 @@ def weighted_scorers(
     group_match: GroupMatch = "hull",
     frames: int | range | None = None,
 ) -> list[Callable[[Array], Array]]:
-    """Returns for each run of one sequence a function from weights of frames to scores; all are compared alike.
+    """Returns for each run of one sequence a function from weights of frames to scores; arguments as of `evaluate`.
 
-    The argument of such a function is an array (D, length) of D draws of weights, 0 or more, of the frames 1 … length.
-    Their mean should be 1: counts such as `IDSW` are sums of weights. The result is an array (D, K) of all scores in
-    the order of `CATALOGUE`. It is nan where `evaluate` gives nan, and where the frames of a score's denominator have
-    no weight.
-
-    Fixed are the matchings in every frame, who is matched with whom before a switch, the core frames, and the share of
-    matched frames that decides on MT, PT and ML; a person counts there by the mean weight of its frames. Only IDF1,
-    IDP, IDR and IDTP assign ids anew for each draw, because their definition is the best assignment of weighted
-    frames. A true event has the weight of its start, a false one that of its reported start.
-
-    runs: one `Tracks` per frame each. Groups that a tracker leaves out are derived first. similarity: "boxes",
-    "ground", "image" or None (by the data); group_match: "hull" or "members". frames: a
-    number n scores frames 1 … n, a range only its frames, None all; weights of other frames have no effect.
-
-    Raises IncomparableError if boxes or positions to compare are missing, ValueError if an id occurs twice in one
-    frame, and InputError if groups must be derived in the image and `truth.px_per_m` is 0 or less.
+    The function takes D draws (D, length) of weights of the frames 1 … length, of mean 1, as counts are their sums.
+    It returns all scores (D, K) in the order of `CATALOGUE`, nan where the frames of a denominator have no weight.
     """
     found = Scorer(truth).compare(runs, similarity, frames)
     return [_weighted(one, truth.length + 1, group_match) for one in found]
@@ -57,7 +48,9 @@ def weighted_scorers(
 def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Callable[[Array], Array]:
     parts: list[WeightedScores] = []
     if compared.people is not None:
-        parts += [weighted_people(compared.people, size), weighted_positions(compared.sides)]
+        compared.people.require_unique_ids()
+        parts += [scores(compared.people, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]
+        parts.append(weighted_positions(compared.sides))
     if compared.groups is not None:
         parts.append(weighted_groups_and_events(compared.sides, compared.groups, group_match))
     place = {key: k for k, key in enumerate(CATALOGUE)}

@@ -28,25 +28,18 @@ CORE = 1.0  # s around the start of each true merge or split that the core score
 
 @dataclass(frozen=True, eq=False)
 class ComparedSides:
-    """The truth's and one tracker's data in the scored frames.
+    """The truth's and one tracker's data in the scored frames."""
 
-    - truth: all of it.
-    - tracks: one `Tracks` per scored frame, labelled or not (an event may be reported in an unlabelled one), sorted by
-      frame.
-    - inside (length + 1,): bool by frame number: scored. frames (length + 1,): scored, and with labelled groups.
-    - true, est: the R true and S tracked people in the scored frames.
-    - mapping (S,): row of `true` that each row of `est` is mapped to, -1 none.
-    - plane: of the tracks' positions: "ground", "space" or "image".
-    """
-
-    truth: Truth
+    truth: Truth  # all of it
+    # one `Tracks` per scored frame, labelled or not (an event may be reported in an unlabelled one), sorted by frame
     tracks: Sequence[Tracks]
-    inside: Bools
-    frames: Bools
+    inside: Bools  # (length + 1,): bool by frame number: scored
+    frames: Bools  # (length + 1,): scored, and with labelled groups
+    # true, est: the R true and S tracked people in the scored frames
     true: PersonRows
     est: PersonRows
-    mapping: Ints
-    plane: str
+    mapping: Ints  # (S,): row of `true` that each row of `est` is mapped to, -1 none
+    plane: str  # of the tracks' positions: "ground", "space" or "image"
 
     @property
     def surface(self) -> Surface:
@@ -66,32 +59,24 @@ class ComparedSides:
 
 @dataclass(frozen=True, eq=False)
 class TrackedGroups:
-    """One tracker's groups in the labelled frames.
+    """One tracker's groups in the labelled frames."""
 
-    - every: all groups; memberships hold rows of the true people. Members mapped to nobody are left out. If the tracker
-      names no members, they are the true people inside the hull.
-    - counted: the groups that are scored. Members are rows of the tracked people if the tracker names members, else
-      rows of the true people inside the hull.
-    - person (K,): for each of the K memberships of `counted`, the row of the true person, -1 none.
-    - named: True if the tracker names members, or follows people and has no groups.
-    - known: False if the tracker names no members, and who is inside its hulls is unknown.
-    """
-
+    # all groups; memberships hold rows of the true people. Members mapped to nobody are left out. If the tracker names
+    # no members, they are the true people inside the hull.
     every: GroupRows
+    # the groups that are scored. Members are rows of the tracked people if the tracker names members, else rows of the
+    # true people inside the hull.
     counted: GroupRows
-    person: Ints
-    named: bool
-    known: bool = True
+    person: Ints  # (K,): for each of the K memberships of `counted`, the row of the true person, -1 none
+    named: bool  # True if the tracker names members, or follows people and has no groups
+    known: bool = True  # False if the tracker names no members, and who is inside its hulls is unknown
 
 
 def tracked_groups(sides: ComparedSides) -> TrackedGroups:
     """Returns the tracker's groups in labelled frames, and which of them are scored.
 
-    sides: both sides' people in the scored frames. If the tracker names members, groups of two or more members are
-    scored. Otherwise, and for a tracker of whole groups, the true people inside the hull or at most 0.3 m from it are
-    the members. A hull with one person inside is not scored, as a person alone is no group. A hull with nobody inside
-    is scored, as a false group. If the truth has no positions on the surface, or its scale is unknown, the members
-    named (if any) stay. `Tracks` whose `groups` is None count as having no groups.
+    If the tracker names members, groups of two or more are scored. Else the true people inside the hull or at most 0.3
+    m from it are the members; a hull with one is no group, a hull with nobody is a false one.
     """
     tracks = [t for t in sides.tracks if sides.frames[t.index]]
     frames = np.array([t.index for t in tracks], np.int64)
@@ -102,6 +87,7 @@ def tracked_groups(sides: ComparedSides) -> TrackedGroups:
         known = positions is not None and bool(np.isfinite(sides.scale))
         if positions is not None and known:
             every = people_inside(every, sides.true.rows, positions, sides.scale)
+        # a person alone is no group; a hull with nobody inside is a false one
         counted = every.keep(every.count != 1)
         return TrackedGroups(every, counted, counted.member, not (wholes or len(every)), known or not len(every))
     counted = every.keep(every.count > 1)
@@ -111,20 +97,11 @@ def tracked_groups(sides: ComparedSides) -> TrackedGroups:
 
 
 def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
-    """Returns for each of the K memberships of `groups` the row of the true person that the member is mapped to, -1
-    none: (K,).
-
-    groups.member: rows of the tracked people, -1 unknown; mapping (S,): true row of each tracked row, -1 none.
-    """
     return np.where(groups.member >= 0, np.append(mapping, -1)[groups.member], -1)
 
 
 def near_changes(truth: Truth) -> Bools:
-    """Returns which frame numbers 0 … length of a truth are at most 1 s from the start of a true merge or split,
-    (length + 1,) bool.
-
-    `form` and `dissolve` count as merge and split. Without events no frame is near one.
-    """
+    """Returns which frame numbers 0 … length are at most 1 s from the start of a true merge or split, (length + 1,)."""
     kinds = {*HEADLINE, *(kind for kind, counts_as in COUNTS_AS.items() if counts_as in HEADLINE)}
     starts = np.array([e.start for e in truth.events or () if e.kind in kinds], float)
     frame = np.arange(truth.length + 1)
@@ -133,11 +110,7 @@ def near_changes(truth: Truth) -> Bools:
 
 
 def compared_events(sides: ComparedSides, tracked: TrackedGroups) -> list[MatchedEvents]:
-    """Returns the events of both sides that start in labelled frames, matched, one entry per kind. Fails an assertion
-    if the truth has no events. If frames between are not scored, an event starts in the next scored one.
-
-    sides: both sides' people; tracked: the tracker's groups.
-    """
+    """Returns the events of both sides that start in labelled frames, matched, one entry per kind."""
     truth, rows, frames, fps = sides.truth, sides.true.rows, sides.frames, sides.truth.fps
     assert truth.events is not None
     step, happened = widest_step(sides.inside), first_seen(truth.events, sides.inside)
@@ -151,9 +124,7 @@ def compared_events(sides: ComparedSides, tracked: TrackedGroups) -> list[Matche
 
 
 def unknown_kinds(sides: ComparedSides) -> set[str]:
-    """Returns the kinds of events whose scores are unknown: crossings and queues that a tracker of whole groups does
-    not report itself. For a tracker of people they are derived, so the result is empty.
-    """
+    """Returns the kinds of events whose scores are unknown: those that a tracker of whole groups does not report."""
     if not sides.groups_only:
         return set()
     return {"cross", "queue"} - {event.kind for t in sides.tracks for event in t.events}

@@ -1,4 +1,7 @@
-"""Group detection as papers measure it: G-MITRE, and the groups that are right up to a tolerance T.
+"""Who is in one group: pairwise membership, G-MITRE, and the groups that are right up to a tolerance T.
+
+Pairwise membership: F1 over pairs of people who are in one group, independent of ids and shapes. Estimated pairs are
+pairs of tracked people, mapped to true people; a pair is right if the two are in one true group.
 
 G-MITRE: Solera, Calderara & Cucchiara (2016), "Socially Constrained Structural Learning for Groups Detection in Crowd",
 IEEE TPAMI 38(5). It is the MITRE score of Vilain et al. (1995), "A Model-Theoretic Coreference Scoring Scheme", after
@@ -19,9 +22,11 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Ints
+from tracking.scoring.candidate_pairs import compare
 from tracking.scoring.group_and_event_scores import ComparedSides, TrackedGroups
 from tracking.scoring.group_scores import SharedMembers, group_of_person
 from tracking.scoring.people_and_groups import GroupRows, PersonRows
+from tracking.scoring.rows import FrameRows
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, ratio
 
 TOLERANCES = {"right_groups": (2, 3), "exact_groups": (1, 1)}
@@ -31,12 +36,7 @@ TOLERANCES = {"right_groups": (2, 3), "exact_groups": (1, 1)}
 def weighted_detection(
     sides: ComparedSides, true: GroupRows, tracked: TrackedGroups, shared: SharedMembers
 ) -> list[WeightedScores]:
-    """Returns functions from weights (D, size) by frame number to F1, precision and recall of G-MITRE ("GMITRE_F1" …)
-    and of the groups right at T = 2/3 ("right_groups_F1" …) and T = 1 ("exact_groups_F1" …), (D,) by key.
-
-    sides: both sides' people in the scored frames; true, tracked: their groups of two or more in labelled frames;
-    shared: numbers of common people, from `shared_members`. G-MITRE is missing if the tracker names no members.
-    """
+    """Returns the weighted F1, precision and recall of G-MITRE, and of the groups right at T = 2/3 and T = 1."""
     size, est = len(sides.frames), tracked.counted
     n, m = (np.bincount(groups.rows.frame, minlength=size) for groups in (true, est))
     parts = []
@@ -49,16 +49,7 @@ def weighted_detection(
 
 
 def link_counts(sides: ComparedSides, true: GroupRows, est: GroupRows) -> Array:
-    """Returns the links of G-MITRE by frame number, (3, size): true, estimated, right ones. The numbers of unlabelled
-    frames have no meaning.
-
-    sides: both sides' people, mapped. true, est: groups of two or more in labelled frames, members being rows of
-    sides.true and of sides.est. Everybody in no group is alone. A person in several groups is in the last of them, but
-    counts as a member of each.
-
-    Right links are the same seen from either side: in each pair of a true and an estimated group the common people less
-    one, and each person who is alone on both sides.
-    """
+    """Returns the links of G-MITRE by frame number, (3, size): true, estimated, right ones."""
     size = len(sides.frames)
     group, found = (group_of_person(g, len(p.rows))[:-1] for g, p in ((true, sides.true), (est, sides.est)))
     mapped = np.flatnonzero(sides.mapping >= 0)
@@ -70,20 +61,12 @@ def link_counts(sides: ComparedSides, true: GroupRows, est: GroupRows) -> Array:
 
 
 def _links(groups: GroupRows, people: PersonRows, group: Ints, size: int) -> Array:
-    """Returns the number of links of one side by frame number, (size,): members - 1 of each group, and 1 of each of the
-    R people who is in none. group (R,): the group of each, -1 none.
-    """
     inside = np.bincount(groups.rows.frame, groups.count - 1, minlength=size)
     return np.asarray(inside + np.bincount(people.rows.frame[group < 0], minlength=size), float)
 
 
 def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, tolerance: tuple[int, int]) -> Bools:
-    """Returns which true groups are right, (G,): an estimated group holds at least ceil(T n) of the n members and at
-    most ceil((1 - T) n) others.
-
-    shared: numbers of common people of `true` and `est`, which have two or more members. tolerance: numerator and
-    denominator of T, 2/3 or more: then no estimated group fits two true ones, and the pairs are one to one.
-    """
+    """Returns which true groups are right, (G,): some estimated group holds T of the members, and few others."""
     part, whole = tolerance
     i, j = np.divmod(shared.key, max(shared.width, 1))
     n = true.count[i]
@@ -95,12 +78,6 @@ def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, toleran
 
 
 def _means_over_frames(name: str, frames: Bools, counts: Array, f1_of_means: bool) -> WeightedScores:
-    """Returns a function from weights (D, size) to F1, precision and recall, (D,) by key, which begins with `name`.
-
-    Precision and recall are means over the frames f where frames[f] is true. counts (3, size): true, estimated and
-    right items by frame number. F1 is the harmonic mean of the two means (0 if both are 0), or else a mean over frames,
-    too.
-    """
     n, m, hits = counts
     sums, every = FrameSums(len(frames)), np.flatnonzero(frames)
     for key, part, whole in (("F1", 2 * hits, n + m), ("precision", hits, m), ("recall", hits, n)):
@@ -115,3 +92,35 @@ def _means_over_frames(name: str, frames: Bools, counts: Array, f1_of_means: boo
         return found
 
     return score
+
+
+def pair_counts(true: GroupRows, est: GroupRows, person: Ints) -> Ints:
+    """Returns how many pairs of people are in one group in each frame, (last + 1, 3): true, estimated, right pairs.
+
+    person (K,): row of the true person of each membership of `est`, -1 none. An estimated pair is right if both are in
+    one true group; a pair inside several estimated groups counts once.
+    """
+    group = group_of_person(true, int(max(true.member.max(initial=-1), person.max(initial=-1))) + 1)
+    order = np.argsort(est.of, kind="stable")
+    mapped = person[order]
+    inside = FrameRows(est.of[order], order)  # the group takes the place of the frame
+
+    def ordered(a: Ints, b: Ints) -> tuple[Ints, Array]:
+        kept = np.flatnonzero((mapped[a] >= 0) & (mapped[a] < mapped[b]))
+        return kept, np.ones(len(kept))
+
+    both = compare(inside, inside, ordered)
+    frame = est.rows.frame[est.of[order][both.i]]
+    pairs = np.stack([mapped[both.i], mapped[both.j]])
+    (p, q), first = np.unique(pairs, axis=1, return_index=True)  # hulls may overlap: a pair inside two of them is one
+    size = 1 + int(max(true.rows.frame.max(initial=-1), est.rows.frame.max(initial=-1)))
+    distinct = np.bincount(frame[first], minlength=size)
+    repeated = np.bincount(frame, minlength=size) - distinct
+    right = np.bincount(frame[first][(group[p] >= 0) & (group[p] == group[q])], minlength=size)
+    return np.column_stack([_pairs_in(true, size), _pairs_in(est, size) - repeated, right])
+
+
+def _pairs_in(groups: GroupRows, size: int) -> Ints:
+    pairs = np.zeros(size, np.int64)
+    np.add.at(pairs, groups.rows.frame, groups.count * (groups.count - 1) // 2)
+    return pairs

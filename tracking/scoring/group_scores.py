@@ -30,22 +30,14 @@ TIE = 1e-9  # weight of closeness in a matching: decides between equal similarit
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedMembers:
-    """Number of people that a true and an estimated group (rows of `GroupRows`) have in common, 0 for pairs not listed.
+    """Numbers of people that true and estimated groups have in common, 0 for pairs not listed."""
 
-    key (K,): true row * width + estimated row, ascending; count (K,): common people, above 0; width: number of
-    estimated groups.
-    """
-
-    key: Ints
-    count: Ints
+    key: Ints  # (K,): true row * width + estimated row, ascending
+    count: Ints  # (K,): common people, above 0; width: number of estimated groups
     width: int
 
     def of(self, i: Ints, j: Ints) -> Ints:
-        """Returns the number of common people of each of P pairs, (P,); i (P,): rows of true groups, j (P,): of
-        estimated ones.
-
-        0 for a pair without common people.
-        """
+        """Returns the number of common people of the true groups i and the estimated groups j, (P,) each."""
         if not len(self.key):
             return np.zeros(len(i), np.int64)
         sought = i * self.width + j
@@ -54,12 +46,7 @@ class SharedMembers:
 
 
 def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -> SharedMembers:
-    """Returns the numbers of common members of all true and estimated groups.
-
-    true.member: rows of true people. person (K,): row of the true person that each of the K memberships of `est` is
-    mapped to, -1 none (never common). people: number of rows of true people. A true person counts for one true group
-    only, the last that lists the person.
-    """
+    """Returns the numbers of common members; person (K,): true person of each estimated membership, -1 none."""
     i = group_of_person(true, people)[person]  # -1 selects the last element, which is -1
     known = i >= 0
     key, count = np.unique(i[known] * len(est) + est.of[known], return_counts=True)
@@ -67,25 +54,18 @@ def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -
 
 
 def groups_found(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Bools:
-    """Returns which true groups are found, (G,): the Jaccard index of the members with some estimated group is above
-    1/2.
-
-    shared: numbers of common people of `true` and `est`. At 1/2 a pair would be found in a group of twice its size, so
-    one group of everybody would be right wherever two pairs walk. Of several estimated groups that find one true group
-    (hulls may overlap) one counts, as a true group is found once.
-    """
+    """Returns which true groups are found, (G,): the Jaccard index with some estimated group is above 1/2."""
     i, j = np.divmod(shared.key, max(shared.width, 1))
     found = np.zeros(len(true), bool)
+    # Above 1/2 no matching is needed: two true groups share nobody, so that at most one has most of an estimated group.
+    # At 1/2 a pair would be found in a group of twice its size, and one group of everybody would be right wherever two
+    # pairs walk. Integers avoid rounding.
     found[i[3 * shared.count > true.count[i] + est.count[j]]] = True
     return found
 
 
 def group_of_person(groups: GroupRows, people: int) -> Ints:
-    """Returns the group (row of `groups`) of each row of people, -1 for a person in no group: (people + 1,).
-
-    The last element is always -1, so that index -1 means no person. people: number of rows of people that groups.member
-    refers to. Memberships with member -1 are ignored. Of several groups with one person the last is returned.
-    """
+    """Returns the group of each row of people, -1 for none, and -1 as last element: (people + 1,)."""
     group = np.full(people + 1, -1, np.int64)
     known = groups.member >= 0
     group[groups.member[known]] = groups.of[known]
@@ -93,20 +73,14 @@ def group_of_person(groups: GroupRows, people: int) -> Ints:
 
 
 def hull_iou(true: Sequence[Array], est: Sequence[Array]) -> Callable[[Ints, Ints], Array]:
-    """Returns a function of row indices i, j (K,) that gives the intersection over union (K,) of polygons true[i] and
-    est[j].
-
-    true, est: convex polygons (V, 2) of x, y, counter-clockwise, in one unit. A polygon without area has IoU 0.
-    """
+    """Returns a function of row indices i, j (K,) that gives the IoU (K,) of polygons true[i] and est[j]."""
     width = max(map(len, (*true, *est)), default=1)
     a, b = pack(true, width), pack(est, width)
     return lambda i, j: iou_pairs(a, b, i, j)
 
 
 def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
-    """Returns the pairs of true and estimated groups of one frame whose hulls (convex polygons) overlap; similarity:
-    the intersection over union of the hulls. A group without a hull has no pairs.
-    """
+    """Returns the pairs of groups of one frame whose hulls overlap, with the IoU of the hulls."""
     iou = hull_iou(true.hull, est.hull)
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
@@ -118,11 +92,7 @@ def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
 
 
 def member_pairs(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Pairs:
-    """Returns the pairs of true and estimated groups of one frame with common members; similarity: their Jaccard index.
-
-    It is common / (true members + estimated members - common), common from `shared`. An estimated member who is mapped
-    to no true person counts as wrong.
-    """
+    """Returns the pairs of groups of one frame with common members, with the Jaccard index of the members."""
     n, m = true.count, est.count
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
@@ -134,52 +104,36 @@ def member_pairs(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Pair
 
 
 def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float = 0.0) -> Pairs:
-    """Returns the pairs of the one-to-one matching of each frame with the greatest total similarity.
-
-    pairs: candidate pairs of groups; those of similarity below `least` are not used. true_pos (G, 2), est_pos (H, 2):
-    centres x, y of the true and estimated groups in the rows of `pairs`. Of several best matchings (Jaccard indices are
-    often equal) the one with the nearer centres is returned, so the order of groups has no influence. A nan centre
-    counts as far away.
-    """
+    """Returns the one-to-one matching of each frame with the greatest total similarity, then nearest centres."""
     near = pairs.keep(pairs.s >= least - EPS)
     apart = np.hypot(*(true_pos[near.i] - est_pos[near.j]).T)
     closeness = np.nan_to_num(1 / (1 + apart), nan=0.0)
+    # Jaccard indices are often equal: the nearer centres decide, so that the order of groups has no influence
     return near.keep(match(near.frame, near.i, near.j, near.s + TIE * closeness))
 
 
 @dataclass(frozen=True, eq=False)
 class GroupComparison:
-    """G true and H estimated groups in frames, with their matchings.
+    """G true and H estimated groups in frames, with their matchings."""
 
-    true, est: the groups; shared: numbers of their common people. pairs: all candidate pairs; chosen: the one-to-one
-    matching of all pairs. nearest (G,): distance (m or px) of each true group to the group matched by distance alone,
-    nan if it has none.
-    """
-
+    # true, est: the groups
     true: GroupRows
     est: GroupRows
-    shared: SharedMembers
-    pairs: Pairs
-    chosen: Pairs
+    shared: SharedMembers  # numbers of their common people
+    pairs: Pairs  # all candidate pairs
+    chosen: Pairs  # the one-to-one matching of all pairs
+    # (G,): distance (m or px) of each true group to the group matched by distance alone, nan if it has none
     nearest: Array
 
 
 def compare_groups(true: GroupRows, est: GroupRows, shared: SharedMembers, pairs: Pairs) -> GroupComparison:
-    """Returns both sides' groups with the matchings of candidate pairs, from `hull_pairs` or `member_pairs`.
-
-    true, est: groups in frames. shared: numbers of their common people, from `shared_members`.
-    """
+    """Returns both sides' groups with the matchings of candidate pairs, from `hull_pairs` or `member_pairs`."""
     chosen = matched_groups(true.pos, est.pos, pairs)
     return GroupComparison(true, est, shared, pairs, chosen, nearest_distances(true, est))
 
 
 def nearest_distances(true: GroupRows, est: GroupRows) -> Array:
-    """Returns for each of G true groups the distance to the estimated group it is matched with by distance, (G,), in m
-    or px.
-
-    Each frame's one-to-one matching has as many pairs as possible and then the least total distance of centres. nan:
-    not matched, or a centre is nan.
-    """
+    """Returns the distance of each true group to the one matched with it by distance alone, (G,), nan without."""
 
     def distance(i: Ints, j: Ints) -> tuple[Ints, Array]:
         d = np.hypot(*(true.pos[i] - est.pos[j]).T)
@@ -195,12 +149,7 @@ def nearest_distances(true: GroupRows, est: GroupRows) -> Array:
 
 
 def correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
-    """Returns two bool masks (K,) of the K matches of true rows i and estimated rows j: correct for GDSR, and for
-    GDSR2.
-
-    GDSR: at least 60 % of the true group's members are in the estimated group. GDSR2: in addition, at least 60 % of the
-    estimated members are in the true group. compared: both sides' groups, whose row indices i and j are.
-    """
+    """Returns which matches of true rows i and estimated rows j (K,) are correct for GDSR, and for GDSR2."""
     common = compared.shared.of(i, j)
     part, whole = CORRECT
     right = whole * common >= part * compared.true.count[i]
@@ -209,12 +158,7 @@ def correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
 
 
 def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:
-    """Returns the frame number of each switch: a true id is matched with a different estimated id than in its previous
-    match.
-
-    frame, true, est (K,): frame number, true id and estimated id of each match, in any order. Frames without a match do
-    not count as a switch. A switch belongs to the frame of the later match.
-    """
+    """Returns the frames in which a true id is matched with another estimated id than in its previous match."""
     order = np.lexsort((frame, true))
     f, t, e = frame[order], true[order], est[order]
     return np.asarray(f[1:][(t[1:] == t[:-1]) & (e[1:] != e[:-1])])

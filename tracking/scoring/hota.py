@@ -18,33 +18,28 @@ import numpy as np
 from sim.types import Array, Ints
 from tracking.scoring.candidate_pairs import EPS, Pairs
 from tracking.scoring.matching import match_as_table
+from tracking.scoring.weighted_sums import BinSums, FrameSums, WeightedScores, ratio
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
+CELLS = 2_000_000  # numbers of matches held at once
 LEAST = 1e-10  # keeps LocA at 1 where nothing is matched
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HotaMatches:
-    """The K matches of HOTA, and the U links, a link being a combination of a true and an estimated id.
+    """The K matches of HOTA, and the U links, a link being a combination of a true and an estimated id."""
 
-    - true_id, est_id (U,): the ids of each link, as indices into `Pairs.true_ids[0]` and `Pairs.est_ids[0]`.
-    - link (K,): link of each match; frame (K,): its frame number; s (K,): its similarity.
-    - level (K,): number of thresholds at which the match counts, 0 to 19; these are the lowest ones.
-    """
-
+    # true_id, est_id (U,): the ids of each link, as indices into `Pairs.true_ids[0]` and `Pairs.est_ids[0]`.
     true_id: Ints
     est_id: Ints
-    link: Ints
-    frame: Ints
-    s: Array
-    level: Ints
+    link: Ints  # (K,): link of each match
+    frame: Ints  # (K,): its frame number
+    s: Array  # (K,): its similarity
+    level: Ints  # (K,): number of thresholds at which the match counts, 0 to 19; these are the lowest ones
 
 
 def hota_matches(pairs: Pairs) -> HotaMatches:
-    """Returns the matches that serve all thresholds: in each frame the greatest sum of A(i, j) s(i, j).
-
-    pairs: candidate pairs of any similarity above 0, no id twice in a frame.
-    """
+    """Returns the matches that serve all thresholds: in each frame the greatest sum of A(i, j) s(i, j)."""
     true_id, est_id, link = pairs.links
     n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
     m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
@@ -55,59 +50,75 @@ def hota_matches(pairs: Pairs) -> HotaMatches:
 
 
 def hota(pairs: Pairs) -> dict[str, float]:
-    """Returns a dict of HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each the mean over the 19 similarity
-    thresholds `ALPHAS` = 0.05, 0.10 … 0.95.
+    """Returns HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA by key, each the mean over `ALPHAS`."""
+    matches, bins = hota_matches(pairs), len(ALPHAS) + 1
+    frames_of = (pairs.true_ids[1], matches.true_id), (pairs.est_ids[1], matches.est_id)
+    n, m = (np.bincount(ids).astype(float)[of] for ids, of in frames_of)
+    together = (
+        np.bincount(matches.link * bins + matches.level, minlength=len(n) * bins).astype(float).reshape(1, -1, bins)
+    )
+    near: Array = np.bincount(matches.level, weights=matches.s, minlength=bins).astype(float)[None]
+    rows = np.array([float(len(pairs.true))]), np.array([float(len(pairs.est))])
+    return {key: float(value[0]) for key, value in _scores(_reached(together), _reached(near), n, m, *rows).items()}
 
-    Det: detection, Ass: association, Loc: localisation; A: accuracy, Re: recall, Pr: precision; all between 0 and 1.
-    pairs: candidate pairs of true and estimated rows of any similarity above 0, no id twice in a frame (not checked).
-    At a threshold without matches LocA is 1 and all others are 0; so all are 0 and LocA is 1 if a side is empty.
+
+def weighted_hota(pairs: Pairs, size: int) -> WeightedScores:
+    """Returns the eight weighted scores of `hota`, with its matches kept."""
+    matches, bins = hota_matches(pairs), len(ALPHAS) + 1
+    used, link = np.unique(matches.link, return_inverse=True)
+    true_id, est_id = matches.true_id[used], matches.est_id[used]
+    true_rows = BinSums(pairs.true.frame, pairs.true_ids[1], len(pairs.true_ids[0]), size)
+    est_rows = BinSums(pairs.est.frame, pairs.est_ids[1], len(pairs.est_ids[0]), size)
+    met = BinSums(matches.frame, link * bins + matches.level, len(used) * bins, size)
+    near = FrameSums(size)
+    for k in range(1, bins):  # the sums of similarity at each threshold
+        near.add(str(k), matches.frame, np.where(matches.level >= k, matches.s, 0.0))
+
+    def score(weights: Array) -> dict[str, Array]:
+        rows = max(1, CELLS // max(1, len(used) * bins))
+        parts = [of_part(weights[k : k + rows]) for k in range(0, len(weights), rows)]
+        return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]} if parts else {}
+
+    def of_part(weights: Array) -> dict[str, Array]:
+        n, m = true_rows.of(weights), est_rows.of(weights)
+        together = _reached(met.of(weights).reshape(len(weights), len(used), bins))
+        similar = np.column_stack(list(near.of(weights).values()))
+        return _scores(together, similar, n[:, true_id], m[:, est_id], n.sum(axis=1), m.sum(axis=1))
+
+    return score
+
+
+def _reached(by_level: Array) -> Array:
+    """Returns sums at each threshold (…, 19) from those of the items that reach just so many (…, 20)."""
+    return np.cumsum(by_level[..., :0:-1], axis=-1)[..., ::-1]
+
+
+def _scores(together: Array, near: Array, n: Array, m: Array, true: Array, est: Array) -> dict[str, Array]:
+    """Returns the eight scores, (D,) by key.
+
+    At each threshold: together (D, U, 19), matches of each link; near (D, 19), sum of similarities. n, m (D, U) or
+    (U,): frames of the two ids of each link. true, est (D,): rows of both sides.
     """
-    return {name: float(curve.mean()) for name, curve in curves(pairs).items()}
+    found = together.sum(axis=1)
+    n, m, true, est = n[..., None], m[..., None], true[:, None], est[:, None]
 
+    def share(part: Array, whole: Array) -> Array:
+        return ratio(part, np.broadcast_to(whole, part.shape), 0.0)
 
-def curves(pairs: Pairs) -> dict[str, Array]:
-    """Returns a dict of HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each an array (19,) over the similarity
-    thresholds `ALPHAS` = 0.05, 0.10 … 0.95.
+    def mean_share(of: Array) -> Array:
+        return share(share(together * together, of).sum(axis=1), found)
 
-    Det: detection, Ass: association, Loc: localisation; A: accuracy, Re: recall, Pr: precision. pairs: candidate pairs
-    of any similarity above 0, no id twice in a frame. At a threshold without matches LocA is 1 and all others are 0.
-    """
-    matches = hota_matches(pairs)
-    n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[matches.true_id]  # n_i of each link
-    m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[matches.est_id]
-    s, link, level = matches.s, matches.link, matches.level
-    bins = len(ALPHAS) + 1
-    together = np.bincount(link * bins + level, minlength=len(n) * bins).reshape(-1, bins)
-    together = np.cumsum(together[:, :0:-1], axis=1)[:, ::-1]  # matches of each link at each threshold
-    found = together.sum(axis=0)
-    near = np.cumsum(np.bincount(level, weights=s, minlength=bins)[:0:-1])[::-1]
-
-    def mean_share(of: Ints) -> Array:
-        return np.asarray((together * together / np.maximum(1, of)).sum(axis=0) / np.maximum(1, found))
-
-    n, m = n[:, None], m[:, None]
-    det = found / np.maximum(1, len(pairs.true) + len(pairs.est) - found)
-    ass = mean_share(n + m - together)
-    return {
-        "HOTA": np.sqrt(det * ass),
-        "DetA": det,
-        "AssA": ass,
-        "DetRe": found / max(1, len(pairs.true)),
-        "DetPr": found / max(1, len(pairs.est)),
-        "AssRe": mean_share(n),
-        "AssPr": mean_share(m),
+    det, ass = share(found, true + est - found), mean_share(n + m - together)
+    curves = {
+        "HOTA": np.sqrt(det * ass), "DetA": det, "AssA": ass, "DetRe": share(found, true), "DetPr": share(found, est),
+        "AssRe": mean_share(n), "AssPr": mean_share(m),
         "LocA": np.maximum(LEAST, near) / np.maximum(LEAST, found),
-    }
+    }  # fmt: skip
+    return {key: curve.mean(axis=1) for key, curve in curves.items()}
 
 
 def alignment(pairs: Pairs, frames: Ints) -> Array:
-    """Returns the alignment A in [0, 1] of each of the U links, a link being a combination of a true and an estimated
-    id, (U,).
-
-    pairs: the candidate pairs; links are ordered as in `Pairs.links`. frames (U,): number of rows of the true id plus
-    that of the estimated id. A = C / (frames - C). C is the sum over common frames of s(i, j) / (sum of row i + sum of
-    column j - s(i, j)), where the sums run over all similarities of that frame.
-    """
+    """Returns the alignment A in [0, 1] of each of U links (U,); frames (U,): rows of its two ids together."""
     i, j, s = pairs.i, pairs.j, pairs.s
     of_i = np.bincount(i, weights=s, minlength=len(pairs.true))
     of_j = np.bincount(j, weights=s, minlength=len(pairs.est))

@@ -9,27 +9,32 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.types import Array
 from tracking.scoring.candidate_pairs import FOUND, Pairs
 from tracking.scoring.matching import match
+from tracking.scoring.weighted_sums import BinSums, FrameSums, WeightedScores, ratio
 
 
-def identity(pairs: Pairs) -> dict[str, float]:
-    """Returns a dict of IDF1, IDP, IDR and IDTP.
-
-    pairs: candidate pairs of true and estimated rows, one row per person and frame. Ids are assigned one to one over
-    the whole sequence, so that assigned ids share as many frames as possible with a similarity of 0.5 or more. IDTP is
-    the number of shared frames, summed over assigned ids. IDP = IDTP / estimated rows, IDR = IDTP / true rows, and IDF1
-    = 2 IDTP / (true rows + estimated rows). A score with a denominator of 0 is 0.
-    """
+def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
+    """Returns the weighted IDF1, IDP, IDR and IDTP; ids are assigned anew for each draw of weights."""
+    near = pairs.s >= FOUND
     true_id, est_id, link = pairs.links
-    frames = np.bincount(link[pairs.s >= FOUND], minlength=len(true_id)).astype(float)
-    some = frames > 0
-    true_id, est_id, frames = true_id[some], est_id[some], frames[some]
-    found = float(frames[match(np.zeros_like(true_id), true_id, est_id, frames)].sum())
-    n, m = len(pairs.true), len(pairs.est)
-    return {
-        "IDF1": 2 * found / max(1, n + m),
-        "IDP": found / max(1, m),
-        "IDR": found / max(1, n),
-        "IDTP": found,
-    }
+    common = BinSums(pairs.frame[near], link[near], len(true_id), size)
+    sums = FrameSums(size)
+    sums.add("true", pairs.true.frame)
+    sums.add("est", pairs.est.frame)
+
+    def assigned(frames: Array) -> float:
+        some = frames > 0
+        i, j, weight = true_id[some], est_id[some], frames[some]
+        return float(weight[match(np.zeros_like(i), i, j, weight)].sum())
+
+    def score(weights: Array) -> dict[str, Array]:
+        s, found = sums.of(weights), np.array([assigned(frames) for frames in common.of(weights)])
+        n, m = s["true"], s["est"]
+        return {
+            "IDF1": ratio(2 * found, n + m, 0.0), "IDP": ratio(found, m, 0.0), "IDR": ratio(found, n, 0.0),
+            "IDTP": found,
+        }  # fmt: skip
+
+    return score

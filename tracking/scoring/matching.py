@@ -25,11 +25,9 @@ WORTH = 0.2  # share of pairs that a pass must remove for another pass to be qui
 
 
 def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
-    """Returns which of K pairs are matched, (K,) bool: one to one, with the greatest sum of weights in each frame.
+    """Returns which of K pairs are matched, (K,): one to one, with the greatest sum of weights in each frame.
 
-    frame (K,), i (K,): sorted ascending; frame number and row index of one side. j (K,): row index of the other side. A
-    row index belongs to one frame only. weight (K,): above 0. Each i and each j is matched at most once. Which of
-    several best matchings is returned is unspecified. K = 0 gives an empty array.
+    frame, i (K,): ascending; each row index i, j belongs to one frame; weight (K,): above 0.
     """
     chosen, left = _settle(i, j, weight, strict=False)
     chosen[left[_solved(frame[left], i[left], j[left], weight[left])]] = True
@@ -37,28 +35,19 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
 
 
 def match_as_table(pairs: Pairs, weight: Array) -> Bools:
-    """Returns which of the K pairs are matched, (K,) bool: the greatest sum of weights in each frame, ties broken as
-    TrackEval does.
-
-    pairs: candidate pairs. weight (K,): above 0, one per pair, used in place of its similarity. Of several best
-    matchings of a frame the result is the one that scipy finds in the table of all the frame's rows, cells without a
-    pair being 0.
-    """
+    """Returns which of the pairs are matched, (K,), with ties broken as TrackEval does; weight (K,): above 0."""
     chosen, left = _settle(pairs.i, pairs.j, weight, strict=True)
     frame = pairs.frame
     tangled = np.unique(frame[left])
     starts, ends = (np.searchsorted(frame, tangled, side=side).tolist() for side in ("left", "right"))
     for start, end in zip(starts, ends, strict=True):
+        # the whole frame, as TrackEval's ties follow from its whole table
         chosen[start:end] = solve_frame(pairs, start, end, weight[start:end])
     return chosen
 
 
 def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
-    """Returns which of the pairs start … end - 1 scipy's linear_sum_assignment matches, (end - start,) bool.
-
-    These must be all pairs of one frame, at least one. weight (end - start,): their weights; the greatest sum is
-    sought. The table has all rows of the frame on both sides, and cells without a pair weigh 0.
-    """
+    """Returns which of the pairs start … end - 1, all pairs of one frame, scipy's linear_sum_assignment matches."""
     from scipy.optimize import linear_sum_assignment
 
     i, j = pairs.i[start:end], pairs.j[start:end]
@@ -73,19 +62,14 @@ def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
 
 
 def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]:
-    """Returns a bool mask (K,) of the pairs that are matched without a solver, and the indices of the pairs that a
-    solver must still decide.
-
-    i, j (K,): row indices of both sides; weight (K,): above 0. A settled pair weighs at least as much as the best rival
-    of i and of j together; with `strict` clearly more, so that it is in every best matching. Pairs in neither result
-    are not matched.
-    """
+    """Returns which pairs are matched without a solver, (K,), and the indices of those that a solver must decide."""
     chosen = np.zeros(len(i), bool)
     left = np.arange(len(i))
     while len(left):
         settled = _settled(i[left], j[left], weight[left], strict)
         chosen[left[settled]] = True
         free = left[~_touched(i[left], j[left], settled)]
+        # another pass must be quicker than the solver
         worth = len(left) - len(free) >= WORTH * len(left)
         left = free
         if not worth:
@@ -94,12 +78,7 @@ def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]
 
 
 def _settled(i: Ints, j: Ints, w: Array, strict: bool) -> Bools:
-    """Returns which of K pairs one pass settles, (K,) bool; no two settled pairs share i or j.
-
-    i, j (K,): row indices of both sides; w (K,): weights above 0. The weight of a settled pair is at least the sum of
-    the best other weight of its i and the best other weight of its j. With `strict` it exceeds (1 + 1e-9) times this
-    sum. Without, of several such pairs of one i or one j only the first is settled.
-    """
+    """Returns which of K pairs one pass settles, (K,); no two of them share i or j."""
     best_i, rival_i = _leaders(i, w)
     best_j, rival_j = _leaders(j, w)
     candidate = np.flatnonzero((w >= best_i[i]) & (w >= best_j[j]))
@@ -116,12 +95,7 @@ def _settled(i: Ints, j: Ints, w: Array, strict: bool) -> Bools:
 
 
 def _leaders(row: Ints, w: Array) -> tuple[Array, Array]:
-    """Returns the greatest and the second greatest weight of each row index 0 … max(row), 0 where there are too few
-    pairs.
-
-    row (K,), not empty: row index of each pair; w (K,): its weight, above 0. If two pairs share the greatest weight,
-    both results equal it.
-    """
+    """Returns the greatest and the second greatest weight of each row 0 … max(row), 0 where there are too few pairs."""
     n = int(row.max()) + 1
     best, second = np.zeros(n), np.zeros(n)
     np.maximum.at(best, row, w)
@@ -131,7 +105,6 @@ def _leaders(row: Ints, w: Array) -> tuple[Array, Array]:
 
 
 def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
-    """Returns which of K pairs are chosen, or share i or j with a chosen pair, (K,) bool; chosen (K,): bool."""
     if len(i) == 0:
         return chosen
     taken_i, taken_j = np.zeros(int(i.max()) + 1, bool), np.zeros(int(j.max()) + 1, bool)
@@ -141,12 +114,7 @@ def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
 
 
 def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
-    """Returns the indices (in 0 … K - 1) of the pairs that scipy matches, with the greatest sum of weights w in each
-    frame.
-
-    frame (K,): sorted; i, j (K,): row indices of both sides; w (K,): weights above 0. Each frame is one table of the
-    rows that occur in its pairs; cells without a pair weigh 0. Empty without pairs.
-    """
+    """Returns the indices of the pairs that scipy matches; each frame is one table of the rows in its pairs."""
     from scipy.optimize import linear_sum_assignment
 
     if len(w) == 0:
@@ -170,12 +138,7 @@ def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
 
 
 def _local(row: Ints, which: Ints, frames: int) -> tuple[Ints, Ints]:
-    """Returns for each of K pairs the index of its row within its frame (K,), and the number of distinct rows of each
-    frame (F,).
-
-    row (K,): row index of each pair, each row in one frame only, lower rows in earlier frames. which (K,): number 0 …
-    frames - 1 of the pair's frame; frames: F.
-    """
+    """Returns the index of each pair's row within its frame (K,), and the number of rows of each frame (F,)."""
     home = np.full(int(row.max()) + 1, -1)
     home[row] = which
     seen = home >= 0
@@ -185,11 +148,7 @@ def _local(row: Ints, which: Ints, frames: int) -> tuple[Ints, Ints]:
 
 
 def mapped_people(pairs: Pairs, least: float = FOUND) -> Ints:
-    """Returns for each of the S rows of pairs.est the row of pairs.true that it is mapped to, -1 none: (S,) int64.
-
-    The mapping is the one-to-one matching of each frame with the greatest total similarity, using only pairs of
-    similarity `least` (default 0.5) or more.
-    """
+    """Returns for each row of pairs.est the row of pairs.true that it is mapped to, -1 none, (S,)."""
     near = pairs.keep(pairs.s >= least - EPS)
     chosen = match(near.true.frame[near.i], near.i, near.j, near.s)
     mapped = np.full(len(pairs.est), -1, np.int64)

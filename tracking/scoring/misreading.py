@@ -77,13 +77,10 @@ POINT_ORDERS: dict[str, Order] = {"x,y": lambda a: a, "y,x": lambda a: a[:, ::-1
 
 @dataclass(frozen=True)
 class Side:
-    """The people of the truth or of the tracks, R rows sorted by frame.
+    """The people of the truth or of the tracks, R rows sorted by frame."""
 
-    rows: frame and id. values: boxes (R, 4) in px, or positions (R, 2) in m.
-    """
-
-    rows: FrameRows
-    values: Array
+    rows: FrameRows  # frame and id
+    values: Array  # boxes (R, 4) in px, or positions (R, 2) in m
 
     @property
     def points(self) -> bool:
@@ -121,19 +118,14 @@ class Side:
 
 @dataclass(frozen=True)
 class Reading:
-    """A way to read the tracks, and how well it matches.
+    """A way to read the tracks, and how well it matches."""
 
-    columns: their order, by names of a header line. scale: factors of x and y. frames: how the frames are numbered, in
-    words; "" as they are. labels: the labels are read so, not the tracks. simple: the scale follows from the
-    size of the pictures. share: of boxes that match.
-    """
-
-    columns: str
-    scale: tuple[float, float] = (1.0, 1.0)
-    frames: str = ""
-    labels: bool = False
-    simple: bool = False
-    share: float = 0.0
+    columns: str  # their order, by names of a header line
+    scale: tuple[float, float] = (1.0, 1.0)  # factors of x and y
+    frames: str = ""  # how the frames are numbered, in words; "" as they are
+    labels: bool = False  # the labels are read so, not the tracks
+    simple: bool = False  # the scale follows from the size of the pictures
+    share: float = 0.0  # of boxes that match
 
     @property
     def effort(self) -> int:
@@ -148,8 +140,7 @@ def likely_misreading(
 ) -> str:
     """Returns a warning if hardly any tracked person matches a label though both sides have people, else "".
 
-    size: width and height of the pictures in px, None if unknown. given: what the tracks are, for the remedy. There is
-    no warning for trackers of groups, and if the two sides have neither boxes nor positions on the ground in common.
+    size: width and height of the pictures, px, None if unknown. given: what the tracks are, for the remedy.
     """
     sides = _comparable(truth, tracks)
     if sides is None:
@@ -181,8 +172,6 @@ def likely_misreading(
 
 
 def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] | None:
-    """Returns the people of both sides with boxes, else with positions on the ground; None if there is nothing to
-    compare."""
     some = [t for t in tracks if len(t.id)]
     if not len(truth.frame) or not some or some[0].unit == "group":
         return None
@@ -200,7 +189,6 @@ def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] |
 
 
 def _some(frames: Ints, true: Side, est: Side) -> tuple[Side, Side]:
-    """Returns the rows of some of the frames, evenly spread, with about `PAIRS` pairs of rows; at least one frame."""
     a, b = (np.searchsorted(s.rows.frame, [frames, frames + 1]) for s in (true, est))
     pairs = int(((a[1] - a[0]) * (b[1] - b[0])).sum())
     chosen = frames[:: max(1, -(-pairs // PAIRS))]
@@ -208,7 +196,6 @@ def _some(frames: Ints, true: Side, est: Side) -> tuple[Side, Side]:
 
 
 def _share(true: Side, est: Side) -> float:
-    """Returns the share of matching boxes, of the side that has fewer of them; 0 without any."""
     pairs = box_pairs(true.rows, est.rows, true.boxes, est.boxes)
     near = pairs.s >= FOUND
     matched = min(len(np.unique(pairs.i[near])), len(np.unique(pairs.j[near])))
@@ -216,7 +203,6 @@ def _share(true: Side, est: Side) -> float:
 
 
 def _other_orders(true: Side, est: Side) -> Iterator[Reading]:
-    """Yields the readings of the tracks, and of the labels, with another order of columns."""
     _, *others = (POINT_ORDERS if true.points else BOX_ORDERS).items()
     for name, order in others:
         yield Reading(name, share=_share(true, est.read(order)))
@@ -224,7 +210,6 @@ def _other_orders(true: Side, est: Side) -> Iterator[Reading]:
 
 
 def _other_scales(true: Side, est: Side, size: tuple[int, int] | None) -> Iterator[Reading]:
-    """Yields the best scale of each order of columns that makes boxes of most rows."""
     for name, order in (POINT_ORDERS if true.points else BOX_ORDERS).items():
         plain = est.read(order)
         if (plain.boxes[:, 2:] <= 0).any(axis=1).mean() > FEW:
@@ -237,7 +222,6 @@ def _other_scales(true: Side, est: Side, size: tuple[int, int] | None) -> Iterat
 
 
 def _length(side: Side) -> Array:
-    """Returns a length along each axis, (2,), that grows with the scale: of boxes the median side."""
     return np.asarray(np.median(np.abs(side.values[:, -2:]), axis=0))
 
 
@@ -247,8 +231,7 @@ def _scaled(true: Side, est: Side, reading: Reading, scale: Array) -> Reading:
 
 
 def _refined(true: Side, est: Side, scale: Array) -> Array:
-    """Returns the scale (2,) after some steps. Each step pairs each box with the nearest label of its frame, and takes
-    the scale that fits the nearer half of these pairs best."""
+    """Returns the scale (2,) after some steps that each fit the nearer half of the pairs of nearest boxes best."""
     portions = list(same_frame(est.rows.frame, true.rows.frame))
     j, i = (np.concatenate([p[k] for p in portions]) for k in (0, 1))
     a, b = true.centres[i], est.centres[j]
@@ -264,7 +247,6 @@ def _refined(true: Side, est: Side, scale: Array) -> Array:
 
 
 def _rounded(true: Side, est: Side, found: Reading, size: tuple[int, int] | None) -> Reading:
-    """Returns the reading with the simplest scale near its own that matches about as many boxes."""
     one = float(np.sqrt(found.scale[0] * found.scale[1]))
     simple = [(u, u) for u in UNITS] if true.points else []
     simple += [(f, f) for f in (float(Fraction(one).limit_denominator(4)), one)]
@@ -278,10 +260,6 @@ def _rounded(true: Side, est: Side, found: Reading, size: tuple[int, int] | None
 
 
 def _other_frames(true: Side, est: Side, usual: Reading) -> Iterator[Reading]:
-    """Yields readings with other frame numbers: shifted, at another rate, or in the column of the ids.
-
-    Of these the first is taken that matches about as much as the best, as shifts of a slow person are alike.
-    """
     frame, labelled = est.rows.frame, true.rows.frame
     ends = {int(labelled[0] - frame[0]), int(labelled[-1] - frame[-1])}
     maps = {f"{k:+d}": frame + k for k in sorted({*SHIFTS, *ends} - {0}, key=abs)}
@@ -299,7 +277,6 @@ def _other_frames(true: Side, est: Side, usual: Reading) -> Iterator[Reading]:
 
 
 def _simplest(found: list[Reading], share: float) -> Reading | None:
-    """Returns the simplest reading that matches about as much as the best, if this is clearly more than `share`."""
     most = max((r.share for r in found), default=0.0)
     good = [r for r in found if r.share >= ABOUT * most and most >= share + CLEARLY]
     return min(good, key=lambda r: (r.effort, -r.share), default=None)
@@ -314,7 +291,6 @@ def _factor(scale: tuple[float, float]) -> str:
 
 
 def _words(best: Reading) -> str:
-    """Returns the reading in words."""
     if best.frames == "id":
         return "with ids in column 1 and frames in column 2"
     if best.frames:
@@ -325,7 +301,6 @@ def _words(best: Reading) -> str:
 
 
 def _remedy(best: Reading, usual: Reading, size: tuple[int, int] | None, given: Given) -> str:
-    """Returns what the user can do, as a sentence without a full stop."""
     if best.frames and best.frames != "id":
         return "Number the frames of both alike"
     if given == "arrays":
@@ -347,7 +322,6 @@ def _remedy(best: Reading, usual: Reading, size: tuple[int, int] | None, given: 
 
 
 def _made(best: Reading, size: tuple[int, int] | None) -> str:
-    """Returns the size of the pictures that the boxes were made in, in brackets; "" if it is unknown."""
     if size is None:
         return ""
     width, height = (side / factor for side, factor in zip(size, best.scale, strict=True))

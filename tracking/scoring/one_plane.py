@@ -44,12 +44,9 @@ def in_one_plane(
 ) -> tuple[list[Sequence[Tracks]], Similarity]:
     """Returns the tracks of all runs of one sequence in one plane, and the similarity of people to use for all.
 
-    truth: as `grounded` returns it. runs: one `Tracks` per frame each, in order; pixels: for each, if it comes from
-    pixels. similarity: "ground" or "image" moves all runs there; None follows the data. Tracks that are in the right
-    plane are returned as they are, except that groups of boxes of calibrated data are derived on the ground
-    (`completed`). Those that were moved to the ground are to be compared with `on_feet`.
-
-    Raises IncomparableError if a run on the ground must be moved to the image, and has no boxes of people.
+    truth: as `grounded` returns it. pixels: for each run, whether it comes from pixels. Tracks that were moved to the
+    ground are to be compared with `on_feet`. Raises IncomparableError if a run on the ground must be moved to the
+    image, and has no boxes of people.
     """
     ground = similarity == "ground"
     if similarity in (None, "boxes"):
@@ -73,23 +70,16 @@ def from_pixels(run: Iterable[Tracks]) -> bool:
 
 
 def _can_be_grounded(truth: Truth, run: Sequence[Tracks], pixels: bool) -> bool:
-    """Returns True if a run is on the ground, or can be moved there: it has boxes, not from pixels, and a camera."""
     return plane_of(truth, run) != "image" or can_stand(run, truth.camera, pixels)
 
 
 def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
-    """Returns a run in the image at the foot points of its boxes; as it is if it is on the ground, or has none."""
     if truth.camera is None or not can_stand(run, truth.camera, pixels=False):
         return run
     return [standing(t, truth.camera, truth.scene) for t in run]
 
 
 def _in_image(truth: Truth, run: Sequence[Tracks], pixels: bool) -> Sequence[Tracks]:
-    """Returns a run on the ground as one in the image, at the centres of its boxes. A run in the image stays there.
-
-    Ids, groups and events stay; the hulls of groups are those of their members' boxes. Velocities are nan. Raises
-    IncomparableError for tracks of whole groups, and for people without boxes.
-    """
     if plane_of(truth, run) == "image":
         if not can_stand(run, truth.camera, pixels) or all(t.derived for t in run):
             return run

@@ -25,22 +25,15 @@ INSIDE = 0.3  # m: a person at most this far from a hull is a member, where a tr
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonRows:
-    """R rows, one per person and frame, sorted by frame.
+    """R rows, one per person and frame, sorted by frame."""
 
-    - rows: frame number and id of each row.
-    - group (R,): group id, -1 alone.
-    - pos (R, 2), vel (R, 2): x, y of position and velocity in the plane of this side's data, m and m/s or px and px/s.
-      nan unknown.
-    - box (R, 4): left, top, width, height in px.
-
-    pos, vel or box is None if this side has no such data.
-    """
-
-    rows: FrameRows
-    group: Ints
+    rows: FrameRows  # frame number and id of each row
+    group: Ints  # (R,): group id, -1 alone
+    # pos (R, 2), vel (R, 2): x, y of position and velocity in the plane of this side's data, m and m/s or px and px/s.
+    # nan unknown.
     pos: Array | None
     vel: Array | None
-    box: Array | None
+    box: Array | None  # (R, 4): left, top, width, height in px.
 
     def keep(self, mask: Bools | slice) -> PersonRows:
         """Returns the rows that a bool mask (R,) or a slice selects, with all their columns."""
@@ -48,13 +41,7 @@ class PersonRows:
         return PersonRows(self.rows.keep(mask), self.group[mask], pos, vel, box)
 
     def positions_on(self, surface: Surface, plane: str) -> Array | None:
-        """Returns the positions x, y (R, 2) on a surface, in m ("ground") or px ("image"); None if they are unknown
-        there.
-
-        plane: the plane of `pos` ("ground", "space" or "image"). On the surface "image" the centre of the box is
-        returned where boxes are known, else `pos` if its plane is "image". On "ground" `pos` is returned unless its
-        plane is "image".
-        """
+        """Returns the positions (R, 2) on a surface, m or px, None if unknown there; plane: of `pos`."""
         if surface == "image" and self.box is not None:
             return self.box[:, :2] + self.box[:, 2:] / 2
         own = "image" if plane == "image" else "ground"
@@ -63,24 +50,15 @@ class PersonRows:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupRows:
-    """G rows, one per group and frame, sorted by frame, and K memberships; len() gives G.
+    """G rows, one per group and frame, sorted by frame, and K memberships; len() gives G."""
 
-    - rows: frame number and id of each group row.
-    - pos (G, 2): centre x, y. nan unknown.
-    - size (G,): number of people as reported, nan unknown.
-    - extent (G, 2, 2): covariance of the members' positions, nan unknown.
-    - hull: G convex polygons (V, 2) round the members, counter-clockwise; (0, 2) unknown.
-    - of (K,), member (K,): membership k says that the person in row member[k] (-1: not among the people) belongs to the
-      group in row of[k].
-
-    pos, extent and hull are in m on the ground (extent m²), in px in the image (extent px²).
-    """
-
-    rows: FrameRows
-    pos: Array
-    size: Array
-    extent: Array
-    hull: tuple[Array, ...]
+    rows: FrameRows  # frame number and id of each group row
+    pos: Array  # (G, 2): centre x, y. nan unknown.
+    size: Array  # (G,): number of people as reported, nan unknown
+    extent: Array  # (G, 2, 2): covariance of the members' positions, nan unknown
+    hull: tuple[Array, ...]  # G convex polygons (V, 2) round the members, counter-clockwise; (0, 2) unknown
+    # of (K,), member (K,): membership k says that the person in row member[k] (-1: not among the people) belongs to the
+    # group in row of[k]. pos, extent and hull are in m on the ground (extent m²), in px in the image (extent px²).
     of: Ints
     member: Ints
 
@@ -89,15 +67,11 @@ class GroupRows:
 
     @property
     def count(self) -> Ints:
-        """Number of memberships of each of the G groups, (G,) int64; 0 for a group without members. A member who is not
-        among the people (-1) counts.
-        """
+        """Number of memberships of each group, (G,)."""
         return np.bincount(self.of, minlength=len(self)).astype(np.int64)
 
     def keep(self, mask: Bools) -> GroupRows:
-        """Returns the groups where the bool mask (G,) is true, with their memberships; `of` is renumbered, `member`
-        stays.
-        """
+        """Returns the groups where the mask (G,) is true, with their memberships, `of` renumbered."""
         place, kept = np.cumsum(mask) - 1, mask[self.of]
         return GroupRows(
             self.rows.keep(mask), self.pos[mask], self.size[mask], self.extent[mask],
@@ -107,21 +81,13 @@ class GroupRows:
 
 
 def true_people(truth: Truth, frames: Bools) -> PersonRows:
-    """Returns the truth's people in the frames f where frames[f] is true, sorted by frame; frames (length + 1,): bool
-    by frame number.
-
-    pos is in m and vel in m/s on the ground, box in px; pos, vel or box is None if the truth has none.
-    """
+    """Returns the truth's people in the frames f where frames[f] is true, sorted by frame."""
     every = PersonRows(FrameRows(truth.frame, truth.id), truth.group, truth.pos, truth.vel, truth.box)
     return every.keep(frames[truth.frame])
 
 
 def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
-    """Returns one tracker's people in frames as rows, in the order of `tracks`, which must be sorted by frame.
-
-    pos and vel keep x and y only, in the tracks' plane and unit. box is None if any frame with people lacks boxes.
-    Without people all arrays have 0 rows.
-    """
+    """Returns one tracker's people as rows, `tracks` sorted by frame; box is None if a frame lacks boxes."""
     count = [len(t.id) for t in tracks]
     frame = np.repeat(np.array([t.index for t in tracks], np.int64), count)
     none = np.zeros(0, np.int64)
@@ -136,12 +102,7 @@ def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
 
 
 def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> GroupRows:
-    """Returns the groups of F frames as rows and memberships.
-
-    frames (F,): frame numbers, ascending; groups: one `Groups` per frame. people: rows (frame, id) in which members are
-    looked up; a membership holds the index of the member's row. A member without a row in this frame gets index -1.
-    Groups that list no members have no memberships.
-    """
+    """Returns the groups of F frames as rows, and memberships as rows of `people`, -1 for a member without one."""
     count = [len(g.id) for g in groups]
     none = np.zeros(0, np.int64)
     rows = FrameRows(np.repeat(frames, count), np.concatenate([none, *(g.id for g in groups)]))
@@ -161,34 +122,22 @@ def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> Gro
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueGroups:
-    """The truth's groups of two or more people in labelled frames, on one surface ("ground" or "image").
+    """The truth's groups of two or more people in labelled frames, on one surface ("ground" or "image")."""
 
-    - groups: the groups, members as rows of the true people.
-    - comparable: True if the truth has group shapes on the surface. Otherwise all centres are nan, and hulls and
-      extents belong to the other surface.
-    """
-
-    groups: GroupRows
+    groups: GroupRows  # the groups, members as rows of the true people
+    # True if the truth has group shapes on the surface. Otherwise all centres are nan, and hulls and extents belong to
+    # the other surface.
     comparable: bool
 
     def in_frames(self, frames: Bools, people: Bools) -> TrueGroups:
-        """Returns the groups of the frames f where frames[f] is true, members renumbered to the kept people.
-
-        frames (length + 1,): bool by frame number. people (R,): bool, which rows of the true people are kept; all rows
-        of the kept frames must be among them.
-        """
+        """Returns the groups of the frames f where frames[f] is true, members renumbered to the kept people (R,)."""
         groups = self.groups.keep(frames[self.groups.rows.frame])
         number = np.append(np.cumsum(people) - 1, -1)  # the last element keeps -1, an unknown member
         return TrueGroups(replace(groups, member=number[groups.member]), self.comparable)
 
 
 def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surface) -> TrueGroups:
-    """Returns the truth's groups of two or more members in the frames f where labelled[f] is true.
-
-    labelled (length + 1,): bool by frame number. people: rows in which members are looked up. surface: "ground" or
-    "image". If the truth has groups on the other surface only, these are returned with centres nan and `comparable`
-    False. Fails an assertion if the truth has groups on neither.
-    """
+    """Returns the truth's groups of two or more; centres are nan if only the other surface has groups."""
     wanted, other = truth.groups, truth.groups_px
     if surface == "image":
         wanted, other = other, wanted
@@ -203,27 +152,18 @@ def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surfa
 
 
 def hulls_of(groups: Groups) -> tuple[Array, ...]:
-    """Returns one polygon (V, 2) per group; if `groups` has no hulls each is empty, (0, 2)."""
+    """Returns one polygon (V, 2) per group, (0, 2) if there are no hulls."""
     return groups.hull if len(groups.hull) else (np.zeros((0, 2)),) * len(groups.id)
 
 
 def bare_groups(rows: FrameRows, pos: Array, hull: tuple[Array, ...]) -> GroupRows:
-    """Returns groups with centre and hull only: no members, size 0, extent 0.
-
-    rows: frame number and id of the G groups; pos (G, 2): centres; hull: G polygons (V, 2), in the unit of pos.
-    """
+    """Returns groups with centre and hull only: no members, size 0, extent 0."""
     n, nobody = len(rows), np.zeros(0, np.int64)
     return GroupRows(rows, pos, np.zeros(n), np.zeros((n, 2, 2)), hull, nobody, nobody)
 
 
 def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> GroupRows:
-    """Returns the groups with new members: the people of the same frame inside the hull or at most 0.3 m from it.
-
-    groups: their hulls are in m or px. `member` of the result holds row indices of `people`; former members are
-    dropped. positions (R, 2): x, y of the R rows of `people`, in the unit of the hulls. scale: units of the hulls per
-    metre; nan makes nobody a member. One person may become a member of several groups. A group without a hull, and a
-    person whose position is nan, is in no membership.
-    """
+    """Returns the groups with new members: the `people` at `positions` (R, 2) inside the hull or near it."""
     hulls, points = pack(groups.hull), pack_padded(positions[:, None])
     low, high = hulls.box[:, :2] - INSIDE * scale, hulls.box[:, 2:] + INSIDE * scale
 

@@ -18,30 +18,17 @@ Similarity = Literal["boxes", "ground", "image"]
 
 
 class IncomparableError(ValueError):
-    """Raised if the truth or the tracks have people but lack the boxes or positions that are to be compared. By boxes
-    also if the truth has no boxes at all. It is a ValueError.
-    """
+    """Raised if the truth or the tracks have people but lack the boxes or positions that are to be compared."""
 
 
 def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
-    """Returns the plane of one tracker's positions: "ground", "space" or "image".
-
-    It is that of the first `Tracks` with people, else of the first `Tracks`. If `tracks` is empty it is the truth's:
-    "image" if the truth has no positions on the ground, else "ground".
-    """
+    """Returns the plane of one tracker's positions, or the truth's without tracks: "ground", "space" or "image"."""
     own = "image" if truth.pos is None else "ground"
     return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else own)
 
 
 def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
-    """Returns the candidate pairs of true and tracked people of one frame, with a similarity in (0, 1].
-
-    sides: both sides' people in the scored frames. similarity: "boxes" takes the IoU; "ground" and "image" take 1 -
-    distance / 2 m, the image by `truth.px_per_m`. Without people on a side there are no pairs. Raises
-    IncomparableError if a side has people but not the boxes or positions to be compared; with "image" also if both have
-    people and `truth.px_per_m` is not a finite number above 0. With "boxes" it is also raised if the truth has no boxes
-    at all.
-    """
+    """Returns the candidate pairs of true and tracked people of one frame. Raises IncomparableError if data lack."""
     true, est = sides.true, sides.est
     if similarity == "boxes":
         if true.box is None or est.box is None:
@@ -57,11 +44,6 @@ def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
 
 
 def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
-    """Returns the positions x, y (R, 2) of the R rows of `people` on a surface, in m ("ground") or px ("image").
-
-    plane: plane of the positions in `people`. Without rows and positions the result has shape (0, 2). Raises
-    IncomparableError if there are rows but no positions on the surface.
-    """
     positions = people.positions_on(surface, plane)
     if positions is None and len(people.rows):
         where, other = {

@@ -1,100 +1,104 @@
 """Errors of positions, velocities and group extents: RMSE of mapped people, GOSPA, Wasserstein distance of extents.
 
 RMSE, the root mean square error, counts only people of the tracker that are mapped (matched one to one) to true people.
-It rewards a tracker that drops difficult people. So read it together with GOSPA, a distance between sets of positions
-that also counts missed people and false tracks.
+It rewards a tracker that drops difficult people. So read it together with GOSPA.
+
+Rahmathullah, García-Fernández & Svensson (2017), "Generalized optimal sub-pattern assignment metric", definition 1 with
+alpha = 2 in the form of proposition 1. For true positions x and estimated positions y of one frame, minimised over all
+one-to-one assignments theta of some x to some y:
+
+    d(x, y)^p = min over theta of  sum over (i, j) in theta of |x_i - y_j|^p  +  c^p / 2 (|x| + |y| - 2 |theta|)
+
+c is the cut-off distance, p the exponent; |x|, |y| and |theta| are the numbers of positions and of assigned pairs. A
+pair farther apart than c counts as one missed person and one false track. The parts are localisation (the sum over
+pairs), missed (c^p / 2 per missed person) and false (c^p / 2 per false track).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from sim.types import Array, Ints
-from tracking.scoring.candidate_pairs import point_pairs
-from tracking.scoring.gospa import gospa
+from sim.types import Array
+from tracking.scoring.candidate_pairs import Pairs, point_pairs
+from tracking.scoring.group_and_event_scores import ComparedSides
+from tracking.scoring.matching import match
 from tracking.scoring.people_and_groups import PersonRows, Surface
+from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, ratio
 
 REACH = 2.0  # m: distance from which the similarity of two positions is 0; also the cut-off of GOSPA
+POWER = 2.0
+PARTS = ("localisation", "missed", "false")
+"""Parts of GOSPA."""
 
 
-def position_scores(
-    true: PersonRows, est: PersonRows, mapping: Ints, surface: Surface, plane: str, scale: float, frames: int
-) -> dict[str, float]:
-    """Returns a dict: RMSE_pos, RMSE_vel (root mean square errors of mapped people), GOSPA and its three parts
-    GOSPA_localisation, GOSPA_missed and GOSPA_false.
-
-    true, est: the R true and S tracked people in frames. mapping (S,): index of the row of `true` that each row of
-    `est` is mapped to, -1 none. surface: "ground" or "image", where positions are compared. plane: of `est.pos`,
-    "ground", "space" or "image". scale: units of the surface per metre. frames: number of scored frames.
-
-    Lengths are in m on the ground or px in the image, RMSE_vel in m/s. RMSE_vel is nan in the image and where a side
-    has no velocities; both RMSE are nan without mapped people. GOSPA's cut-off distance is 2 m; its four values are nan
-    if frames is 0. The result is empty if one side has no positions on the surface, or if the scale is not finite
-    and above 0.
-    """
-    compared = compared_positions(true, est, surface, plane, scale)
+def weighted_positions(sides: ComparedSides) -> WeightedScores:
+    """Returns the weighted RMSE_pos, RMSE_vel, GOSPA and its parts; {} without positions or scale on the surface."""
+    true, est = sides.true, sides.est
+    compared = compared_positions(true, est, sides.surface, sides.plane, sides.scale)
     if compared is None:
-        return {}
-    true_pos, est_pos, *vel = compared
-    pairs = point_pairs(true.rows, est.rows, true_pos, est_pos, REACH * scale)
-    return people_errors(mapping, true_pos, est_pos, *vel) | gospa(pairs, REACH * scale, frames)
+        return lambda weights: {}
+    true_pos, est_pos, true_vel, est_vel = compared
+    sums, reach = FrameSums(len(sides.inside)), REACH * sides.scale
+    j = np.flatnonzero(sides.mapping >= 0)
+    i = sides.mapping[j]
+    off = np.full((len(i), 2), np.nan) if true_vel is None or est_vel is None else est_vel[j] - true_vel[i]
+    for key, error in (("RMSE_pos", est_pos[j] - true_pos[i]), ("RMSE_vel", off)):
+        squares = np.square(error).sum(axis=1)
+        sums.add_mean(key, true.rows.frame[i], squares, float(squares[np.isfinite(squares)].sum()))
+    parts = gospa_parts(point_pairs(true.rows, est.rows, true_pos, est_pos, reach), reach)
+    for name, values, total in zip(PARTS, parts.T, parts.sum(axis=0).tolist(), strict=True):
+        sums.add(name, np.arange(len(parts)), values, total)
+    sums.add("frames", np.flatnonzero(sides.inside))
+
+    def score(weights: Array) -> dict[str, Array]:
+        s = sums.of(weights)
+        return {key: np.sqrt(mean(s, key)) for key in ("RMSE_pos", "RMSE_vel")} | gospa_of(s)
+
+    return score
 
 
 def compared_positions(
     true: PersonRows, est: PersonRows, surface: Surface, plane: str, scale: float
 ) -> tuple[Array, Array, Array | None, Array | None] | None:
-    """Returns true and estimated positions on the surface, (R, 2) and (S, 2), then true and estimated velocities or
-    None.
-
-    surface: "ground" or "image". plane: of `est.pos`. scale: units of the surface per metre. Velocities are None in the
-    image and where a side has none. The result is None if a side has no positions on the surface, or if the scale is
-    not finite and above 0.
-    """
+    """Returns positions on the surface (R, 2), (S, 2), and velocities or None; None if a side has no positions."""
     true_pos, est_pos = true.positions_on(surface, "ground"), est.positions_on(surface, plane)
     if true_pos is None or est_pos is None or not 0 < scale < np.inf:
         return None
     return (true_pos, est_pos, true.vel, est.vel) if surface == "ground" else (true_pos, est_pos, None, None)
 
 
-def people_errors(
-    mapping: Ints, true_pos: Array, est_pos: Array, true_vel: Array | None = None, est_vel: Array | None = None
-) -> dict[str, float]:
-    """Returns a dict of RMSE_pos and RMSE_vel, root mean square errors over mapped people, in the units of the inputs.
+def gospa_of(sums: Mapping[str, Array], power: float = POWER) -> dict[str, Array]:
+    """Returns GOSPA and its parts by key: roots of means of d^p and of its parts over the frames; nan without frames.
 
-    mapping (S,): index of the true row that each estimated row is mapped to, -1 none. true_pos, true_vel (R, 2) and
-    est_pos, est_vel (S, 2): x, y of one plane, in one unit. Rows with a nan or infinity are left out. A score is nan if
-    no mapped person has both values; RMSE_vel also if a velocity array is None.
+    sums: (D,) each, of `PARTS` and "frames".
     """
-    j = np.flatnonzero(mapping >= 0)
-    i = mapping[j]
-    found = {"RMSE_pos": root_mean_square(est_pos[j] - true_pos[i]), "RMSE_vel": float("nan")}
-    if true_vel is not None and est_vel is not None:
-        found["RMSE_vel"] = root_mean_square(est_vel[j] - true_vel[i])
-    return found
+    means = {f"GOSPA_{name}": ratio(sums[name], sums["frames"]) for name in PARTS}
+    means = {"GOSPA": means["GOSPA_localisation"] + means["GOSPA_missed"] + means["GOSPA_false"], **means}
+    # float by float: numpy takes another root of arrays, which differs in the last bit
+    return {key: np.array([v ** (1 / power) for v in values.tolist()]) for key, values in means.items()}
 
 
-def root_mean_square(errors: Array) -> float:
-    """Returns the square root of the mean of |e|^2 over the rows e of errors (K, D); |e|^2 is the sum over the D
-    columns.
-
-    Rows with a nan or infinity are left out. The result is nan if no row is left.
-    """
-    squares = np.square(errors).sum(axis=1)
-    squares = squares[np.isfinite(squares)]
-    return float(np.sqrt(squares.mean())) if len(squares) else float("nan")
+def gospa_parts(pairs: Pairs, cutoff: float, power: float = POWER) -> Array:
+    """Returns localisation, missed and false parts of d^p for each frame number 0 … last, (last + 1, 3)."""
+    end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=-1)
+    cost = (cutoff * (1 - pairs.s)) ** power
+    frame = pairs.frame
+    chosen = match(frame, pairs.i, pairs.j, cutoff**power - cost)
+    n, m, hits = (np.bincount(f, minlength=end) for f in (pairs.true.frame, pairs.est.frame, frame[chosen]))
+    near = np.bincount(frame[chosen], weights=cost[chosen], minlength=end)
+    half = cutoff**power / 2
+    return np.column_stack([near, half * (n - hits), half * (m - hits)])
 
 
 def gaussian_wasserstein(pos: Array, extent: Array, other_pos: Array, other_extent: Array) -> Array:
-    """Returns the 2-Wasserstein distances (K,) of K pairs of two-dimensional Gaussians, nan where an input is nan.
-
-    Means pos, other_pos (K, 2), covariances extent, other_extent (K, 2, 2), symmetric and without negative eigenvalues,
-    in the squared unit of the means. The distance has the unit of the means. Givens & Shortt (1984):
+    """Returns the 2-Wasserstein distances (K,) of K pairs of Gaussians in the plane (Givens & Shortt 1984).
 
         d^2 = |m1 - m2|^2 + tr(S1 + S2 - 2 (S1^1/2 S2 S1^1/2)^1/2)
-
-    with means m, covariances S and the trace tr. A symmetric 2 x 2 matrix M >= 0 has tr M^1/2 = (tr M + 2 (det
-    M)^1/2)^1/2. Here M = S1^1/2 S2 S1^1/2, with tr M = tr(S1 S2) and det M = det S1 det S2.
+    with means m (K, 2) and covariances S (K, 2, 2).
     """
+    # tr M^1/2 = (tr M + 2 (det M)^1/2)^1/2 of a symmetric 2 x 2 matrix M >= 0; here M = S1^1/2 S2 S1^1/2
     inner = np.einsum("kab,kba->k", extent, other_extent)
     det = np.maximum(_det(extent), 0) * np.maximum(_det(other_extent), 0)
     shape = np.trace(extent + other_extent, axis1=1, axis2=2) - 2 * np.sqrt(np.maximum(inner + 2 * np.sqrt(det), 0))

@@ -17,14 +17,10 @@ NO_ROWS = (0, 0)
 
 @dataclass(frozen=True, slots=True)
 class FrameRows:
-    """R rows of people or groups, one per frame and id, sorted by frame.
+    """R rows of people or groups, one per frame and id, sorted by frame."""
 
-    frame (R,): int64, frame number, 0 or more; id (R,): int64. An id should occur once per frame, and frames should be
-    sorted. The constructor checks neither; `require_unique_ids` checks the ids.
-    """
-
-    frame: Ints
-    id: Ints
+    frame: Ints  # (R,): int64, frame number, 0 or more
+    id: Ints  # (R,): int64, once in a frame; not checked here, but by `require_unique_ids`
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -34,11 +30,7 @@ class FrameRows:
         return FrameRows(self.frame[mask], self.id[mask])
 
     def require_unique_ids(self, side: str) -> None:
-        """Raises ValueError if an id occurs twice in one frame, else returns None.
-
-        side: "truth" or "tracks", begins the message. The message names the first such frame, and in it the lowest such
-        id.
-        """
+        """Raises ValueError if an id occurs twice in one frame; side begins the message."""
         again = self.keep(repeated_ids(self.frame, self.id))
         if len(again):
             k = np.lexsort((again.id, again.frame))[0]
@@ -46,12 +38,7 @@ class FrameRows:
 
 
 def numbered(values: Ints) -> tuple[Ints, Ints]:
-    """Returns the U distinct values in ascending order, (U,), and for each of the N values its index among them, (N,)
-    int64.
-
-    Equals `numpy.unique(values, return_inverse=True)`, but counts instead of sorting where the range is small. Both are
-    empty for N = 0.
-    """
+    """Equals `numpy.unique(values, return_inverse=True)`, but counts instead of sorting where the range is small."""
     if len(values) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     low, high = int(values.min()), int(values.max())
@@ -65,11 +52,7 @@ def numbered(values: Ints) -> tuple[Ints, Ints]:
 
 
 def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
-    """Returns for each row of `wanted` the index of the row of `rows` with equal frame and id, -1 if there is none:
-    (W,) int64.
-
-    `wanted` need not be sorted. Of equal rows in `rows` the first is found.
-    """
+    """Returns the index of the first row of `rows` with the frame and id of each row of `wanted`, -1 none, (W,)."""
     if not len(rows):
         return np.full(len(wanted), -1, np.int64)
     ids, place = numbered(rows.id)
@@ -83,15 +66,12 @@ def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
 
 
 class RowLookup:
-    """Finds the row of one id that is last up to a frame, first from a frame on, or nearest to it, by single lookups.
+    """Finds the row of one id that is last up to a frame, first from a frame on, or nearest to it.
 
-    rows: people or groups in frames; only: bool mask of the rows to find, None for all. State, as Python lists, because
-    single lookups in lists are faster than in arrays: row, the row indices sorted by id and frame; frame, their frame
-    numbers; span, a dict from id to the range (low, high), high excluded, that it occupies in both lists.
+    State: row, the row indices sorted by id and frame; frame, their frame numbers; span, by id the range in both lists.
     """
 
     def __init__(self, rows: FrameRows, only: Bools | None = None) -> None:
-        """Indexes all R rows, or those where the bool mask `only` (R,) is true; other rows are never found."""
         chosen = np.arange(len(rows)) if only is None else np.flatnonzero(only)
         ids, place = numbered(rows.id[chosen])
         order = np.lexsort((rows.frame[chosen], place))
@@ -102,31 +82,19 @@ class RowLookup:
         self.span = dict(zip(ids.tolist(), pairwise(cuts), strict=True))
 
     def last(self, id: int, frame: int, reach: int) -> int:
-        """Returns the index, in the rows given at creation, of the id's row with the latest frame in [frame - reach,
-        frame].
-
-        -1 if there is none or the id is unknown. reach: number of frames.
-        """
+        """Returns the id's row with the latest frame in [frame - reach, frame], -1 if there is none."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_right(self.frame, frame, low, high) - 1
         return self.row[at] if at >= low and frame - self.frame[at] <= reach else -1
 
     def next(self, id: int, frame: int, reach: int) -> int:
-        """Returns the index, in the rows given at creation, of the id's row with the earliest frame in [frame, frame +
-        reach].
-
-        -1 if there is none or the id is unknown. reach: number of frames.
-        """
+        """Returns the id's row with the earliest frame in [frame, frame + reach], -1 if there is none."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)
         return self.row[at] if at < high and self.frame[at] - frame <= reach else -1
 
     def nearest(self, id: int, frame: int, reach: int) -> int:
-        """Returns the index, in the rows given at creation, of the id's row nearest to `frame`, at most `reach` frames
-        before or after.
-
-        -1 if there is none or the id is unknown. Of two equally near rows the earlier one is returned.
-        """
+        """Returns the id's row nearest to `frame`, at most `reach` away, of two the earlier; -1 if there is none."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)
         if at > low and (at == high or frame - self.frame[at - 1] <= self.frame[at] - frame):

@@ -42,31 +42,34 @@ def score_arrays(
     similarity: Similarity | None = None,
     group_match: GroupMatch = "hull",
 ) -> Scores:
-    """Returns every score of the catalogue for a truth and tracks given as tables of columns, one row per person and
-    frame.
+    """Returns every score of the catalogue for a truth and tracks given as tables of columns.
 
-    A table is a mapping from column names to arrays of R rows, in any order: frame (R,), whole numbers from 1; id (R,),
-    whole numbers; pos (R, 2), x, y on the ground in m; box (R, 4): left, top, width, height in px; group (R,), group
-    id, -1 alone. frame, id and one of pos and box are required. Groups are compared on the ground if both tables have
-    pos, else in the image. A table whose columns have 0 rows fits both.
+    A table is a mapping from column names to arrays of R rows, one per person and frame, in any order: frame (R,),
+    whole numbers from 1; id (R,), whole numbers; pos (R, 2), x, y on the ground in m; box (R, 4): left, top, width,
+    height in px; group (R,), group id, -1 alone. frame, id and one of pos and box are required. The bounds are those of
+    files: ids from 0, coordinates within 1e6, boxes with an area, at most 5000 rows of one frame, 1,000,000 frames.
 
-    Without a group column in the truth only people are scored. Without one in the tracks they get groups by the
-    default grouping. Events of both sides (merges, splits, crossings, queues …) are derived from groups and positions.
-    A score that cannot be computed is nan. If the truth's labels are clearly sparse, as in every 10th frame, only these
-    frames are scored. Warns if hardly any tracked person matches a true one (tracking.scoring.misreading).
+    Groups are compared on the ground if both tables have pos, else in the image. Without a group column in the truth
+    only people are scored. Without one in the tracks they get groups by the default grouping. Events of both sides are
+    derived from groups and positions. Clearly sparse labels, as in every 10th frame, limit the scores to their frames.
+    Warns if hardly any tracked person matches a true one.
 
-    fps: frames per second. px_per_m: pixels per metre, for boxes only; None takes the median height of the true boxes
-    for 1.7 m. similarity: compares people by "boxes", "ground" or "image"; None: by boxes if both have them, else by
-    positions. group_match: matches groups by "hull" or "members".
+    Args:
+        truth: the table of the labelled people.
+        tracks: the table of the tracked people.
+        fps: frames per second, 0.01 to 1000.
+        px_per_m: pixels per metre, for boxes only; None takes the median height of the true boxes for 1.7 m.
+        similarity: compares people by "boxes", "ground" or "image"; None: by boxes if both have them, else by
+            positions.
+        group_match: matches groups by "hull" or "members".
 
-    The bounds are those of files: frames from 1 to 1,000,000, ids from 0, groups from -1, coordinates within 1e6, boxes
-    with an area, at most 5000 rows of one frame, 0.01 to 1000 frames per second. Ids that are texts must be numbered
-    first.
+    Returns:
+        `Scores`, a mapping from key to value; a score that cannot be computed is nan.
 
-    Raises ValueError if a column is unknown, missing, of a wrong shape, or holds a value that is no number or is out of
-    bounds; if columns differ in length, if ids, frames or groups are not whole, if fps is out of bounds, if both tables
-    lack a common kind of position or the one of `similarity`, or if an id occurs twice in one frame. Raises InputError
-    if groups must be derived in the image and px_per_m is not above 0, or unknown because there are no true boxes.
+    Raises:
+        ValueError: a column is unknown, missing, of a wrong shape, or holds a value out of bounds; the tables have no
+            kind of position in common; or an id occurs twice in one frame.
+        InputError: groups must be derived in the image, and px_per_m is not above 0 or unknown without true boxes.
     """
     low, high = FRAME_RATES
     if not is_number(fps, low, high):
@@ -89,13 +92,7 @@ def score_arrays(
 
 
 def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
-    """Returns a dict of all columns (frame, id, pos, box, group) as arrays, rows sorted by frame, then id; an optional
-    column that is missing is None.
-
-    columns: as given by the user. side ("truth" or "tracks") begins the error messages. Raises ValueError if a
-    column is unknown or invalid, if frame or id is missing, or both pos and box, if the columns differ in length,
-    or if a frame is below 1.
-    """
+    """Returns all columns as arrays, sorted by frame, then id, None for a missing one. Raises ValueError if invalid."""
     for name in columns:
         if name not in COLUMNS:
             raise ValueError(f"{side}: got the column {name!r}, expected some of {', '.join(COLUMNS)}")
@@ -115,13 +112,6 @@ def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
 
 
 def _column(given: ArrayLike, name: str, side: str) -> Any:
-    """Returns one column as float64 (pos, box) or int64 (frame, id, group); empty input gives 0 rows of the right
-    shape.
-
-    given: the user's values; name: of the column; side ("truth" or "tracks") begins the error messages. Raises
-    ValueError if the shape is wrong, a value is not finite, or a frame, id or group is not whole. Raises TypeError for
-    values that are no numbers.
-    """
     values, shape = np.asarray(given), COLUMNS[name]
     values = values if values.size else values.reshape(0, *shape)
     if values.shape[1:] != shape or values.ndim == 0:
@@ -142,7 +132,6 @@ def _column(given: ArrayLike, name: str, side: str) -> Any:
 
 
 def _require_range(values: Any, name: str, side: str) -> None:
-    """Raises ValueError for the first finite value of a column that is out of bounds, or a box without area."""
     low, high = RANGES[name]
     outside = values[(values < low) | (values > high)]
     if outside.size:
@@ -153,23 +142,11 @@ def _require_range(values: Any, name: str, side: str) -> None:
 
 
 def _scale(box: Any) -> float:
-    """Returns pixels per metre: the median height of the boxes divided by 1.7 m; nan if box is None or empty.
-
-    box (R, 4): left, top, width, height in px.
-    """
     return float("nan") if box is None or not len(box) else float(np.median(box[:, 3])) / PERSON_HEIGHT
 
 
 def _tracks(table: Table, known: Ints, fps: float, px_per_m: float, plane: Plane, grouped: bool) -> list[Tracks]:
-    """Returns `Tracks` of people, with velocities and covariances nan and scores 1; [] without known frames. Of the
-    known frames those are left out in which nothing is and nothing can change (`_live_frames`).
-
-    table: checked columns, sorted by frame. known (K,): the frames that are tracked or annotated, ascending, all of the
-    table's among them; they count as evenly spaced in time. fps: frames per second. plane: "ground" takes pos, "image"
-    the centres of the boxes. grouped: derive groups without a group column, too. With such a column groups and events
-    are derived from it, and px_per_m (px per metre) scales image positions. Then InputError is raised if the plane is
-    "image", there are rows and px_per_m is not a finite number above 0.
-    """
+    """Returns `Tracks` of the known frames (K,), evenly spaced in time, without frames in which nothing can change."""
     box, group, rows = table["box"], table["group"], len(table["frame"])
     pos = table["pos"] if plane == "ground" else box[:, :2] + box[:, 2:] / 2
     label = np.full(rows, -1, np.int64) if group is None else group
@@ -196,7 +173,6 @@ def _tracks(table: Table, known: Ints, fps: float, px_per_m: float, plane: Plane
 
 
 def _in_frames(tracks: Tracks, known: Ints, fps: float) -> Tracks:
-    """Returns tracks whose frame numbers count the known frames with the numbers of these frames."""
     index = int(known[tracks.index - 1])
 
     def moved(event: GroupEvent) -> GroupEvent:
@@ -207,10 +183,7 @@ def _in_frames(tracks: Tracks, known: Ints, fps: float) -> Tracks:
 
 
 def _live_frames(frame: Ints, length: int, fps: float) -> Ints:
-    """Returns the frame numbers, ascending, of frames with rows, of the 10 s after each, and 1 and `length`.
-
-    Groups and events of these frames are the same with and without the other frames. frame: sorted, of all rows.
-    """
+    """Returns the frames with rows, those up to 10 s after each, 1 and `length`: the others decide nothing."""
     if not length:
         return np.zeros(0, np.int64)
     live: Bools = np.zeros(length + 1, bool)
@@ -224,13 +197,6 @@ def _live_frames(frame: Ints, length: int, fps: float) -> Ints:
 
 
 def _truth(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> Truth:
-    """Returns the rows of the table as a truth of frames 1 … length; all annotated frames are labelled if there is a
-    group column, else none.
-
-    table: checked columns, sorted by frame; fps: frames per second; px_per_m: px per metre. With a group column groups
-    (on the ground or in the image, by `plane`) and events are derived from it. Then InputError is raised if the plane
-    is "image", there are rows and px_per_m is not a finite number above 0.
-    """
     frame, group, rows = table["frame"], table["group"], len(table["frame"])
     truth = Truth(
         "arrays", fps, length, px_per_m, frame, table["id"], np.full(rows, -1) if group is None else group,

@@ -1,7 +1,7 @@
 """Scores of groups, pairwise membership, events and lineage, from their matchings, under weights of the frames.
 
 `evaluate` gives every frame the weight 1, intervals by resampling give it others. A score whose denominator is 0 is
-nan. `group_scores.py`, `pairwise_membership.py`, `group_detection.py` and `events.py` match both sides and count.
+nan. `group_scores.py`, `group_detection.py` and `events.py` match both sides and count.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tracking.scoring.group_and_event_scores import (
     tracked_groups,
     unknown_kinds,
 )
-from tracking.scoring.group_detection import weighted_detection
+from tracking.scoring.group_detection import pair_counts, weighted_detection
 from tracking.scoring.group_scores import (
     GroupComparison,
     GroupMatch,
@@ -35,28 +35,17 @@ from tracking.scoring.group_scores import (
     sizes,
     switch_frames,
 )
-from tracking.scoring.pairwise_membership import pair_counts
+from tracking.scoring.hota import weighted_hota
 from tracking.scoring.people_and_groups import GroupRows, TrueGroups
 from tracking.scoring.position_errors import gaussian_wasserstein
-from tracking.scoring.weighted_people_scores import weighted_hota
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, mean_of_known, ratio
 
 
 def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> WeightedScores:
-    """Returns a function from weights (D, size) by frame number to all scores of groups ("group_…", "group_…_core"),
-    pairwise membership ("pairwise_…"), group detection ("GMITRE_…", "right_groups_…", "exact_groups_…"), events
-    ("merge_F1" …, "event_…") and lineage ("lineage_…"), (D,) by the keys of the catalogue.
+    """Returns the weighted scores of groups, membership, events and lineage, by the keys of the catalogue.
 
-    sides: both sides in the scored frames, people mapped. true: the true groups in these frames. by: matches groups by
-    "hull" (IoU) or by "members" (Jaccard index) for all scores of groups but F1, precision and recall, which are by
-    members, and F1_hull. Core frames are the labelled frames more than 1 s away from the start of every true merge,
-    split, form or dissolve.
-
-    Keys are missing if the truth lacks data. group_F1_hull, and with by = "hull" all scores of groups that depend on
-    it, are missing if `true` is not comparable (has no shapes on the surface). Scores by members are missing if members
-    are unknown (`TrackedGroups.known`). Scores of events and lineage are missing if the truth has no events, those of
-    crossings and queues if the tracker says nothing of them (`unknown_kinds`), and G-MITRE if the tracker names no
-    members.
+    by: matches groups by "hull" (IoU) or by "members" (Jaccard index). Core frames are more than 1 s away from every
+    true merge and split. Keys are missing where the truth or the tracker lacks data.
     """
     size, core = len(sides.frames), sides.frames & ~near_changes(sides.truth)
     tracked = tracked_groups(sides)
@@ -108,7 +97,6 @@ def _pairwise(true: TrueGroups, tracked: TrackedGroups, size: int) -> WeightedSc
 
 
 def _f1_and_parts(s: Mapping[str, Array]) -> dict[str, Array]:
-    """Returns F1, precision and recall, (D,) each, of weighted numbers (D,) of "hits" among "true" and "est" ones."""
     return {
         "F1": ratio(2 * s["hits"], s["true"] + s["est"]),
         "precision": ratio(s["hits"], s["est"]),
@@ -117,11 +105,6 @@ def _f1_and_parts(s: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _detection(true: GroupRows, est: GroupRows, found: Ints, frames: Bools) -> WeightedScores:
-    """Returns a function from weights (D, size) to F1, precision and recall of groups in the frames f where frames[f]
-    is true.
-
-    found (K,): frame number of each true group that is found.
-    """
     sums = FrameSums(len(frames))
     sums.add("true", _kept(true.rows.frame, frames))
     sums.add("est", _kept(est.rows.frame, frames))
@@ -138,17 +121,7 @@ def _kept(frame: Ints, frames: Bools) -> Ints:
 
 
 def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
-    """Returns a function from weights (D, size) to the scores of groups over the frames f where frames[f] is true, (D,)
-    by key.
-
-    Keys: 1-FP, 1-FN, 1-FP_frames, 1-FN_frames, GDSR, GDSR2, MOTP, MSE, MOTP_ungated, MOTA, IDSW, TP, FP, FN, those of
-    `hota` (HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr, LocA), size_error, extent_error.
-    The catalogue explains them with "group_" in front. 1-FP_frames and 1-FN_frames are 1 - the mean over frames of
-    false (missed) groups / max(true groups, 1); Bazzani et al. (2012) leave open whether they mean these or the ratios
-    of sums. compared: both sides' groups with their matchings. A switch has the weight of the later match. MOTP,
-    MOTP_ungated and extent_error are in m or px, MSE squared, size_error in people. The keys of `hota` are missing if
-    neither side has a group in these frames.
-    """
+    """Returns the weighted scores of groups over the frames f where frames[f] is true, by key without "group_"."""
     true, est, sums = compared.true, compared.est, _sums_of_groups(compared, frames)
     hota = weighted_hota(compared.pairs.in_frames(frames), len(frames))
     groups = bool(frames[true.rows.frame].any() or frames[est.rows.frame].any())
@@ -175,7 +148,6 @@ def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
 
 
 def _sums_of_groups(compared: GroupComparison, frames: Bools) -> FrameSums:
-    """Returns the sums that `weighted_groups` needs, over the frames f where frames[f] is true."""
     true, est, chosen = compared.true, compared.est, compared.chosen
     kept = frames[chosen.frame]
     i, j, frame = chosen.i[kept], chosen.j[kept], chosen.frame[kept]
@@ -200,21 +172,7 @@ def _sums_of_groups(compared: GroupComparison, frames: Bools) -> FrameSums:
 
 
 def weighted_events(matched: Sequence[MatchedEvents], fps: float, size: int) -> WeightedScores:
-    """Returns a function from weights (D, size) to the scores of events and lineage, (D,) by key.
-
-    matched: the events of each kind, from `match_events`; fps: frames per second. Keys: "<kind>_F1", "_precision",
-    "_recall", "_TP", "_FP", "_FN" and "_latency" for each entry of `matched`; "event_F1", "event_precision",
-    "event_recall" and "event_latency"; lineage_accuracy and lineage_accuracy_found.
-
-    Event F1, precision and recall are means of the values of merge and split that are not nan. Latency is the mean of
-    (emitted - true start) / fps over matched events, in s, those with emitted None left out; event_latency pools the
-    matched merges and splits. lineage_accuracy divides the matched merges and splits with right lineage
-    (`same_lineage`) by all true ones, lineage_accuracy_found by the matched ones. True events with unknown parents or
-    children are left out of both (labels that never change say nothing about lineage).
-
-    A true event, matched or not, has the weight of the frame
-    of its start; a report that matches none has the weight of the start that it reports.
-    """
+    """Returns a function from weights (D, size) to the scores of events and lineage, (D,) by key."""
     sums = FrameSums(size)
     for m in matched:
         _add_events(sums, m, fps)
@@ -247,7 +205,6 @@ def weighted_events(matched: Sequence[MatchedEvents], fps: float, size: int) -> 
 
 
 def _add_events(sums: FrameSums, events: MatchedEvents, fps: float) -> None:
-    """Adds the counts of one kind of event to `sums`, at the frames where the events start."""
     kind, pairs = events.kind, events.pairs
     hit = {id(event) for pair in pairs for event in pair}
     start = np.array([a.start for a, _ in pairs], np.int64)

@@ -21,29 +21,35 @@ def unweighted(scores: WeightedScores, size: int) -> dict[str, float]:
 
 
 class FrameSums:
-    """Named sums that are linear in the weights of the frames: counts, and sums of errors.
-
-    State: table (size, columns), the part of each frame in each sum; names of the columns.
-    """
+    """Named sums that are linear in the weights of the frames; State: by name, the part of each frame (size,)."""
 
     def __init__(self, size: int) -> None:
-        """Starts without sums; size: number of frame numbers, from 0."""
         self._size = size
         self._columns: dict[str, Array] = {}
+        self._totals: dict[str, float] = {}
 
-    def add(self, name: str, frame: Ints, values: Array | Ints | None = None) -> None:
-        """Adds the sum `name` of K items: frame (K,), their frame numbers; values (K,), 1 each by default."""
+    def add(self, name: str, frame: Ints, values: Array | Ints | None = None, total: float | None = None) -> None:
+        """Adds the sum `name` of K items: frame (K,), their frame numbers; values (K,), 1 each by default.
+
+        total: at weights of 1, where it is added up in another order; the last bit of a score depends on it.
+        """
         self._columns[name] = np.bincount(frame, weights=values, minlength=self._size).astype(float)
+        if total is not None:
+            self._totals[name] = total
 
-    def add_mean(self, name: str, frame: Ints, values: Array) -> None:
+    def add_mean(self, name: str, frame: Ints, values: Array, total: float | None = None) -> None:
         """Adds what `mean` needs: the sum `name` of the finite values (K,), and their number."""
         known = np.isfinite(values)
-        self.add(name, frame[known], values[known])
+        self.add(name, frame[known], values[known], total)
         self.add(f"{name} known", frame[known])
 
     def of(self, weights: Array) -> dict[str, Array]:
         """Returns the weighted sums (D,) by name; weights (D, size)."""
-        return dict(zip(self._columns, (weights @ np.column_stack(list(self._columns.values()))).T, strict=True))
+        columns = np.column_stack(list(self._columns.values()))
+        found = dict(zip(self._columns, (weights @ columns).T, strict=True))
+        exact = [place for place, name in enumerate(self._columns) if name in self._totals]
+        changes = ((weights - 1) @ columns[:, exact]).T  # sum w x = total + sum (w - 1) x
+        return found | {n: total + d for (n, total), d in zip(self._totals.items(), changes, strict=True)}
 
 
 def mean(sums: dict[str, Array], name: str) -> Array:
@@ -63,13 +69,9 @@ def mean_of_known(values: Array) -> Array:
 
 
 class BinSums:
-    """Numbers of items by bin (for example by id), weighted by their frames.
-
-    State: a sparse matrix (bins, size): how many items of each frame are in each bin.
-    """
+    """Numbers of items by bin (for example by id), weighted by their frames: items of each bin and frame, sparse."""
 
     def __init__(self, frame: Ints, bin: Ints, bins: int, size: int) -> None:
-        """Counts K items; frame, bin (K,): their frame numbers and bins from 0; bins, size: number of both."""
         from scipy.sparse import csr_array
 
         self._counts = csr_array((np.ones(len(frame)), (bin, frame)), shape=(bins, size))

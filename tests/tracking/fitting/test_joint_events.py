@@ -21,7 +21,7 @@ from tracking.fitting.joint_events import (
     event_scores,
     fit_events,
     log_probabilities,
-    rows_of,
+    partition_rows,
 )
 from tracking.papers.joint.config import FITTED, JointConfig
 from tracking.papers.joint.group_events_kernels import event_probabilities
@@ -36,15 +36,15 @@ def test_rows_say_what_happened_to_each_group():
     pos = state([[0, 0], [0.7, 0], [2, 0], [9, 0], [9.7, 0]])
 
     def found(before, after):
-        return rows_of(pos, pos, np.array(before), np.array(after)).event.tolist()
+        return partition_rows(pos, pos, np.array(before), np.array(after)).event.tolist()
 
     assert found([1, 1, -1, 2, 2], [1, 1, -1, 2, 2]) == [NONE, NONE, NONE]
     assert found([1, 1, -1, 2, 2], [1, 1, 1, 2, 2]) == [MERGE, MERGE, NONE]
     assert found([1, 1, -1, 2, 2], [1, 1, -1, -1, -1]) == [NONE, NONE, SPLIT]
     assert found([1, 1, -1, 2, 2], [1, -1, -1, 2, 2]) == [SPLIT, NONE, NONE]
-    rows = rows_of(pos, pos, np.array([1, 1, -1, 2, 2]), np.array([1, 1, -1, 2, 2]))
+    rows = partition_rows(pos, pos, np.array([1, 1, -1, 2, 2]), np.array([1, 1, -1, 2, 2]))
     assert rows.possible.tolist() == [[True, True, True], [True, False, True], [True, True, True]]
-    assert rows_of(pos[:1], pos[:1], np.array([-1]), np.array([-1])).possible.tolist() == [[False, False, True]]
+    assert partition_rows(pos[:1], pos[:1], np.array([-1]), np.array([-1])).possible.tolist() == [[False, False, True]]
 
 
 def test_the_fit_finds_its_weights():

@@ -8,7 +8,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tests import reference_belief as slow
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
-from tracking.grouping.belief_partition import partition
+from tracking.grouping.belief_partition import groups_of_steps
 from tracking.grouping.grouped_tracks import MEMBERSHIP_KINDS, derive
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.pair_evidence import NAMES, evidence, frames_per_step, step_positions
@@ -68,14 +68,14 @@ def test_beliefs_equal_the_slow_twin(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_partition_equals_average_linkage_one_join_at_a_time(seed):
+def test_groups_of_steps_equals_average_linkage_one_join_at_a_time(seed):
     r = np.random.default_rng(seed)
     steps, people = 4, 8
     step, a, b = (x.ravel() for x in np.meshgrid(range(steps), range(people), range(people), indexing="ij"))
     kept = (a < b) & (r.random(len(a)) < 0.7)
     step, a, b = step[kept], a[kept], b[kept]
     log_odds = r.normal(0, 3, len(a))
-    t, person, group = partition(step, a, b, log_odds, -4.0)
+    t, person, group = groups_of_steps(step, a, b, log_odds, -4.0)
     for s in range(steps):
         table = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
         found = {frozenset(person[(t == s) & (group == g)].tolist()) for g in set(group[t == s].tolist())}
@@ -83,7 +83,7 @@ def test_partition_equals_average_linkage_one_join_at_a_time(seed):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_partition_remembers_the_step_before(seed):
+def test_groups_of_steps_remembers_the_step_before(seed):
     """Average linkage of log-odds to which `stay` is added in groups of the step before, `come` taken elsewhere."""
     r = np.random.default_rng(seed)
     steps, people, unseen, stay, come = 5, 9, -4.0, 2.5, 1.5
@@ -91,7 +91,7 @@ def test_partition_remembers_the_step_before(seed):
     kept = (a < b) & (r.random(len(a)) < 0.7)
     step, a, b = step[kept], a[kept], b[kept]
     log_odds = r.normal(0.5, 3, len(a))
-    t, person, group = partition(step, a, b, log_odds, unseen, stay, come)
+    t, person, group = groups_of_steps(step, a, b, log_odds, unseen, stay, come)
     before, differ = set(), 0
     for s in range(steps):
         known = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
@@ -111,7 +111,7 @@ def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
     a, b = np.array(pairs).T
     chain, stretched = np.array([1.0, -5, -6, 1, -5, 1]), np.array([4.0, 1, -1, 4, 1, 4])
     for log_odds, size in ((chain, 2), (stretched, 4)):
-        _, _, group = partition(np.zeros(6, np.int64), a, b, log_odds, -4.0)
+        _, _, group = groups_of_steps(np.zeros(6, np.int64), a, b, log_odds, -4.0)
         assert np.bincount(group).max() == size
 
 

@@ -16,7 +16,7 @@ from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Scene, Sequence, Stairs
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page.page import camera_json, page_data, scene_json
-from tracking.drawing.covariance_ellipse import SIGMA_99, ellipse
+from tracking.drawing.layers import SIGMA_99, ellipse
 
 NODE = shutil.which("node")
 HERE = Path(tracking.app.replay_page.__file__).parent
