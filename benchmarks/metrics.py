@@ -32,10 +32,7 @@ from sim.types import Groups, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring import evaluate
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
-from tracking.scoring.clear import clear
 from tracking.scoring.evaluation import people_scores
-from tracking.scoring.hota import hota
-from tracking.scoring.identity import identity
 from tracking.scoring.rows import FrameRows
 
 REACH = 2.0  # m
@@ -112,17 +109,15 @@ def print_speed(frames: int, people: int, rounds: int) -> None:
     (true, place), (est, found) = crowd(frames, people, np.random.default_rng(0))
     pairs = point_pairs(true, est, place, found, REACH)
     data, peers = trackeval_input(pairs), trackeval_metrics()
-    fresh = lambda: Pairs(pairs.true, pairs.est, pairs.i, pairs.j, pairs.s)  # noqa: E731  without cached values
     works = {
         "ours": lambda: people_scores(point_pairs(true, est, place, found, REACH)),
         "TrackEval": lambda: [peer.eval_sequence(data) for peer in peers],
-        "pairs": lambda: point_pairs(true, est, place, found, REACH),
-        **{f.__name__: lambda f=f: f(fresh()) for f in (hota, clear, identity)},
+        "ours, search for pairs alone": lambda: point_pairs(true, est, place, found, REACH),
     }
     best = best_in_turn(works, rounds)
-    parts = ", ".join(f"{name} {1000 * best[name]:.1f}" for name in ("pairs", "hota", "clear", "identity"))
-    print(f"{frames} frames x {people} people: {best['ours']:.3f} s ({parts} ms);", end=" ")
-    print(f"TrackEval {best['TrackEval']:.3f} s: {best['TrackEval'] / best['ours']:.1f} times as long")
+    head([f"HOTA, CLEAR, Identity of {frames} frames × {people} people", "s", "times ours"])
+    for name, spent in best.items():
+        row([name, f"{spent:.3f}", f"{spent / best['ours']:.1f}"])
 
 
 def recordings(data: Path) -> Iterator[tuple[str, Pairs]]:
