@@ -240,7 +240,7 @@ def test_from_pixels():
     assert named["seen"] == named["detections"] == 0
     assert 0 < named["brightness"] < 1
     assert len(rewards) == 2
-    assert "grid" in info["names"]
+    assert "pixel_radius" in info["names"]
     assert "radius" not in info["names"]
     assert env.render().shape == (152, 160, 3)
 
