@@ -1,4 +1,4 @@
-"""`group-pda`: scores by scene, its decisions one by one, events, recordings, cost of a step, consistency.
+"""`group-pda`: scores by scene, its decisions one by one, events, ids against the difference of velocities.
 
     python -m benchmarks.group_pda MODE [--seeds a:b] [--detections file|truth|image] [--only A,B] [--json FILE] …
 
@@ -8,10 +8,9 @@ decisions    each decision of the tracker switched off: paired differences
 events       merges and splits of the suites standard and friends-meet
 difference   groups that pass and cross: ids kept against the difference of their velocities; a chart
 
-The docstrings of scenes.py (the first three modes), velocity_difference.py, recordings.py, cost.py and consistency.py
-in this folder say what the columns mean. Detections "file" and "truth" are points, "image" the tracker's own foreground
-pixels. Groups from pixels are scored in the image, all others on the ground. Intervals are 95 % intervals: of means by
-Student's t over sequences, of shares by Wilson.
+The docstrings of scenes.py (the first three modes) and velocity_difference.py say what the columns mean. Detections
+"file" and "truth" are points, "image" the tracker's own foreground pixels. Groups from pixels are scored in the image,
+all others on the ground. Intervals are 95 % intervals: of means by Student's t over sequences, of shares by Wilson.
 """
 
 from __future__ import annotations

@@ -69,9 +69,10 @@ def kalman(tracker, points, config):
     return np.array(out)
 
 
-@pytest.mark.parametrize("algorithm", ["ours", "paper"])
-def test_people_alone_have_the_kalman_filter(algorithm):
-    """Z all alone, no validity, exact association, locally optimal proposal (E2)."""
+@pytest.mark.parametrize(("algorithm", "error"), [("ours", 0.006), ("paper", 0.025)])
+def test_people_alone_have_the_kalman_filter(algorithm, error):
+    """Z all alone, no validity, exact association; ours: locally optimal proposal (E2); paper: all three people are
+    drawn from the transition and weighted together, so that few of 1000 particles count."""
     config = JointConfig(
         particles=1000,
         partitions=1,
@@ -87,7 +88,7 @@ def test_people_alone_have_the_kalman_filter(algorithm):
     for person in range(3):
         exact = kalman(Joint(config), [p[person] for p in points], config)
         found = np.mean([[t.pos[person] for t in run[-len(exact) :]] for run in runs], axis=0)
-        assert np.sqrt(np.mean((found - exact[:, :2]) ** 2)) < 0.006
+        assert np.sqrt(np.mean((found - exact[:, :2]) ** 2)) < error
         assert np.sqrt(np.mean((exact[1:, :2] - [p[person] for p in points[-len(exact) + 1 :]]) ** 2)) > 0.03
 
 
