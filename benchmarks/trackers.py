@@ -29,7 +29,7 @@ def print_ranking(title: str, options: ScoreOptions) -> None:
     source = OpenedAs(options.truth, images=False)
     found = ranking(options, source, source.open()).data
     by, rows = found["by"], found["ranking"]
-    keys = [key for key in COLUMNS if any(math.isfinite(one["scores"][key]) for one in rows)]
+    keys = [key for key in COLUMNS if key != by and any(math.isfinite(one["scores"][key]) for one in rows)]
     print(f"\n{title}, mean of {len(found['sequences'])} sequences\n")
     head(["rank", "tracker", by, *keys])
     for one in rows:
@@ -51,10 +51,10 @@ def main() -> None:
         data, runs = Path(folder) / "data", Path(folder) / "runs"
         generate([given.suite], given.seeds, data, workers=WorkerOptions(given.workers), streams=())
         for name in tracker_registry.names():
-            track(TrackOptions(name, data, out=runs / name, detections="file", workers=given.workers))
+            track(TrackOptions(tracker=name, source=data, out=runs / name, detections="file", workers=given.workers))
         for kind, names in sorted(inputs.items()):
             title = f"From {kind}, suite `{given.suite}`, seeds {seeds_text(given.seeds)}"
-            print_ranking(title, ScoreOptions(data, [str(runs / n) for n in names], workers=given.workers))
+            print_ranking(title, ScoreOptions(truth=data, tracks=[str(runs / n) for n in names], workers=given.workers))
 
 
 if __name__ == "__main__":
