@@ -9,9 +9,9 @@
 docs/results/tables.toml names each table and the benchmark that prints it. The table is stored in
 docs/results/NAME.json with command, date, versions and a hash of the sources that decide it, and is shown between
 `<!-- results: NAME -->` and `<!-- end -->` in any page. The sources of a table are the modules that its benchmark
-imports, by their syntax trees without docstrings, and all scenario files; `trackers` leaves out those of other
-trackers. A table is stale if its sources have changed. --quick compares tables of few seeds with those of the same
-seeds when the table was made. If they agree, the hash of the present sources is stored, too: the table is confirmed.
+imports, without docstrings and comment lines, and all scenario files; `trackers` leaves out those of other trackers. A
+table is stale if its sources have changed. --quick compares tables of few seeds with those of the same seeds when the
+table was made. If they agree, the hash of the present sources is stored, too: the table is confirmed.
 """
 
 from __future__ import annotations
@@ -115,21 +115,23 @@ def _module_files() -> dict[str, Path]:
 
 @cache
 def _module_facts(name: str) -> tuple[str, frozenset[str]]:
-    """Returns a module's syntax tree without docstrings, as text, and the names of our modules that it uses."""
-    tree = ast.parse(_module_files()[name].read_text(encoding="utf-8"))
-    used = set()
+    """Returns a module's lines without docstrings, comments and blank lines, and the names of our modules it uses."""
+    text = _module_files()[name].read_text(encoding="utf-8")
+    tree, used, left_out = ast.parse(text), set(), set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             first = node.body[0] if node.body else None
             if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
-                first.value.value = ""
+                left_out.update(range(first.lineno, (first.end_lineno or 0) + 1))
         if isinstance(node, ast.Import):
             used |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             used |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             used.add(node.value.partition(":")[0])  # as in the registry of trackers
-    return ast.dump(tree), frozenset(used & _module_files().keys())
+    lines = (line.strip() for k, line in enumerate(text.splitlines(), 1) if k not in left_out)
+    code = "\n".join(line for line in lines if line and not line.startswith("#"))
+    return code, frozenset(used & _module_files().keys())
 
 
 def sources_of(table: Table) -> list[str]:

@@ -61,7 +61,7 @@ def test_sources_are_what_the_benchmark_imports_without_docstrings(tmp_path, mon
     first = now()
     assert results.sources_of(table) == ["benchmarks.one", "sim.a", "tracking.t"]
     (tmp_path / "benchmarks" / "one.py").write_text(
-        '"""Other."""\nfrom sim.a import f  # why\nTRACKER = "tracking.t:T"\n'
+        '"""Other."""\n# why\nfrom sim.a import f\nTRACKER = "tracking.t:T"\n'
     )
     (tmp_path / "sim" / "b.py").write_text("x = 1\n")
     assert now() == first
