@@ -4,7 +4,7 @@
     python -m benchmarks.scenario_check difficulty [--seeds 20000:20020] [--rule baseline,present] [--without queue]
                                                    [scenario, suite or file …]
 
-orders: one line per scenario: seeds on which an order failed (with reasons beneath), orders that came true, number of
+orders: one row per scenario: seeds on which an order failed (with reasons on stderr), orders that came true, number of
 people, pace, and number and onset (mean ± standard deviation, s) of each kind of measured event. Pace is a person's
 greatest speed over any 0.8 s from the firing of an order until it has come true (10 s later at most), divided by the
 person's own speed: the greater of the speeds that their group has before and after the order. Quantiles 50, 99, 100 %;
@@ -21,6 +21,7 @@ Without a scenario the whole catalogue is played.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections import defaultdict
 from collections.abc import Sequence
 
@@ -42,7 +43,7 @@ from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.scoring import evaluate
 from tracking.scoring.evaluation import Scores
-from tracking.stats import mean_interval, wilson
+from tracking.stats import mean_interval
 
 WINDOW = 0.8  # s
 RULES = {
@@ -82,7 +83,7 @@ def paces(scenario: Scenario, motion: Motion, truth: Truth) -> Array:
 
 
 def orders(entry: Entry, seeds: range) -> None:
-    """Prints the line of one scenario."""
+    """Prints the row of one scenario."""
     failed: list[str] = []
     onsets: dict[str, list[float]] = defaultdict(list)
     count, pace, people = 0, [np.zeros(0)], []
@@ -99,15 +100,11 @@ def orders(entry: Entry, seeds: range) -> None:
         pace.append(paces(entry.scenario, motion, truth))
         for event in truth.events or ():
             onsets[event.kind].append((event.start - 1) / truth.fps)
-    _, low, high = wilson(len(failed), len(seeds))
-    text = [f"{entry.name}: {len(failed)} of {len(seeds)} seeds failed ({low:.1%} to {high:.1%} of all)"]
-    text.append(f"{count} orders came true")
-    if people:
-        text.append(f"{min(people)} to {max(people)} people")
-    if count:
-        text.append("pace " + ", ".join(f"{np.quantile(np.concatenate(pace), q):.2f}" for q in (0.5, 0.99, 1)))
-    text += [f"{k} {len(v)} at {np.mean(v):.1f} ± {np.std(v):.1f} s" for k, v in sorted(onsets.items())]
-    print("; ".join(text), *failed, sep="\n    ", flush=True)
+    speeds = ", ".join(f"{np.quantile(np.concatenate(pace), q):.2f}" for q in (0.5, 0.99, 1)) if count else "–"
+    events = "; ".join(f"{len(v)} {k} at {np.mean(v):.1f} ± {np.std(v):.1f} s" for k, v in sorted(onsets.items()))
+    crowd = f"{min(people)}–{max(people)}" if people else "–"
+    row([entry.name, f"{len(failed)} of {len(seeds)}", str(count), crowd, speeds, events])
+    print(*failed, sep="\n", end="\n" * bool(failed), file=sys.stderr)
 
 
 def rule_scores(entry: Entry, seeds: range, rules: Sequence[str]) -> dict[str, list[Scores]]:
@@ -167,6 +164,7 @@ def main() -> None:
     if args.without:
         chosen = {title: [e for e in entries if args.without not in e.name] for title, entries in chosen.items()}
     if args.mode == "orders":
+        head(["scenario", "seeds failed", "orders that came true", "people", "pace (50, 99, 100 %)", "events"])
         for entry in [e for entries in chosen.values() for e in entries]:
             orders(entry, args.seeds or range(100))
         return
