@@ -262,7 +262,8 @@ def confirm(table: Table) -> list[str]:
     content = stored(table)
     if not content:
         return ["not made yet"]
-    found = [] if table.timing else outside(content["quick"] or content["tables"], made(table, quick=True), content["tables"])
+    before = content["quick"] or content["tables"]
+    found = [] if table.timing else outside(before, made(table, quick=True), content["tables"])
     if not found:
         content["confirmed"] = sources_hash(table)
         table.file.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
