@@ -93,6 +93,11 @@ def stored(table: Table) -> dict[str, Any]:
     return json.loads(table.file.read_text(encoding="utf-8")) if table.file.is_file() else {}
 
 
+def store(table: Table, content: dict[str, Any]) -> None:
+    """Writes the file of a table."""
+    table.file.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
 def lacks(table: Table) -> str:
     """Returns the environment variable that the command needs and that is not set, "" if there is none."""
     return next((word for word in table.words() if os.path.expandvars(word).startswith("$")), "")
@@ -196,7 +201,7 @@ def make(table: Table) -> None:
         "date": datetime.date.today().isoformat(), "minutes": round((time.monotonic() - begun) / 60, 1),
         "versions": versions(drawn=True), "sources": before,
     }  # fmt: skip
-    table.file.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    store(table, content)
 
 
 def markdown(content: dict[str, Any]) -> str:
@@ -265,8 +270,7 @@ def confirm(table: Table) -> list[str]:
     before = content["quick"] or content["tables"]
     found = [] if table.timing else outside(before, made(table, quick=True), content["tables"])
     if not found:
-        content["confirmed"] = sources_hash(table)
-        table.file.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        store(table, content | {"confirmed": sources_hash(table)})
     return found
 
 

@@ -8,7 +8,6 @@ no sure difference.
 
 from __future__ import annotations
 
-import math
 import tempfile
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from benchmarks.support.tables import head, row
 from sim.dataset.generate import generate
 from sim.workers.start import WorkerOptions
 from tracking.app.command_options import ScoreOptions, TrackOptions
-from tracking.app.commands.score_ranking import COLUMNS, rank_words, ranking
+from tracking.app.commands.score_ranking import rank_words, ranking, shown_columns
 from tracking.app.commands.score_tables import number
 from tracking.app.commands.track import track
 from tracking.app.sequence_workers import OpenedAs
@@ -29,7 +28,7 @@ def print_ranking(title: str, options: ScoreOptions) -> None:
     source = OpenedAs(options.truth, images=False)
     found = ranking(options, source, source.open()).data
     by, rows = found["by"], found["ranking"]
-    keys = [key for key in COLUMNS if key != by and any(math.isfinite(one["scores"][key]) for one in rows)]
+    keys = shown_columns([one["scores"] for one in rows], by)
     print(f"\n{title}, mean of {len(found['sequences'])} sequences\n")
     head(["rank", "tracker", by, *keys])
     for one in rows:

@@ -22,7 +22,7 @@ ENGINE = 5
 
 
 def canonical_hash(value: Any) -> str:
-    """Return the SHA-256 of a value as 64 hex digits; equal content gives the same hash on any machine.
+    """Returns the SHA-256 of a value as 64 hex digits; equal content gives the same hash on any machine.
 
     The value may be None, bool, int, float, str, bytes, an array of numbers or bools, or a tuple, list, dict or
     dataclass of such values. A tuple and a list with equal items have the same hash, and so have a dataclass and the
@@ -36,12 +36,12 @@ def canonical_hash(value: Any) -> str:
 
 
 def file_hash(content: bytes) -> str:
-    """Return the SHA-256 of `content`, the bytes of a file, as 64 hex digits."""
+    """Returns the SHA-256 of `content`, the bytes of a file, as 64 hex digits."""
     return hashlib.sha256(content).hexdigest()
 
 
 def scenario_hash(text: str) -> str:
-    """Return the SHA-256 (64 hex digits) that names a scenario.
+    """Returns the SHA-256 (64 hex digits) that names a scenario.
 
     text: TOML of the resolved scenario as `dump` of scenarios.loading writes it; other text of equal meaning has
     another hash.
@@ -50,7 +50,7 @@ def scenario_hash(text: str) -> str:
 
 
 def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> str:
-    """Return the SHA-256 (64 hex digits) of a scenario, seed, repeat and truth; it does not depend on what is rendered.
+    """Returns the SHA-256 (64 hex digits) of a scenario, seed, repeat and truth; what is rendered does not matter.
 
     scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies. All fields
     of the truth count except its name, camera and scene, and what is left out of the scores. truth None (a sequence
@@ -62,7 +62,7 @@ def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> st
 
 
 def labels_hash(truth: Truth) -> str:
-    """Return the SHA-256 (64 hex digits) of a recording's labels as read: frame rate, length, and of each row frame,
+    """Returns the SHA-256 (64 hex digits) of a recording's labels as read: frame rate, length, and of each row frame,
     id, group, position and box.
 
     All else is left out, as the name, the image scale (an option), visibility, events, and what is computed from the
@@ -73,7 +73,7 @@ def labels_hash(truth: Truth) -> str:
 
 
 def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None = None) -> str:
-    """Return the SHA-256 (64 hex digits) of a whole sequence: its truth, its detections, and the raw pixels of its
+    """Returns the SHA-256 (64 hex digits) of a whole sequence: its truth, its detections, and the raw pixels of its
     streams.
 
     truth: the sequence's truth_hash. detections: list of Detections, one per frame, empty without a detector. pixels:
@@ -84,7 +84,7 @@ def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None =
 
 
 def dataset_hash(contents: Mapping[str, str]) -> str:
-    """Return the SHA-256 (64 hex digits) of a dataset.
+    """Returns the SHA-256 (64 hex digits) of a dataset.
 
     contents: content_hash of each sequence by its name <split>/<sequence>; the order does not count.
     """
@@ -109,7 +109,7 @@ class PixelHash:
         _array(self._h, picture)
 
     def hex(self) -> str:
-        """Return the SHA-256 (64 hex digits) of all pictures added so far, in their order; without pictures that of no
+        """Returns the SHA-256 (64 hex digits) of all pictures added so far, in their order; without pictures that of no
         bytes.
         """
         return self._h.hexdigest()

@@ -52,8 +52,8 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
     mode: DetectionMode = given.get("detections") or ("file" if sequence.has_detections else "truth")
     info = {"tracker": "oracle", "detections": mode, "sensor": given.get("sensor") or {}}
     if mode == "image":
-        visible = _visible_places if given.get("input") == "stereo" else _visible_boxes
-        seen = (visible(truth, index) for index in range(1, truth.length + 1))
+        places = given.get("input") == "stereo"
+        seen = (_visible(truth, index, places) for index in range(1, truth.length + 1))
         return TrackingRun(tuple(_with_events(t, truth) for t in seen), info)
     seed = (given.get("seed") or 0) if given.get("sensor") else 0  # without errors it only shuffles the detections
     boxes = given.get("input") == "boxes" and sequence.camera is not None  # without a camera boxes have no foot points
@@ -81,26 +81,24 @@ def _named(t: Tracks, id: Ints, group: Ints, row: Ints) -> Tracks:
     )  # fmt: skip
 
 
-def _visible_places(truth: Truth, index: int) -> Tracks:
-    assert truth.pos is not None, "people before a calibrated pair have places"
+def _visible(truth: Truth, index: int, places: bool) -> Tracks:
+    """Returns the people of a frame who are visible at all: their true places, or the boxes of what is visible."""
     rows = np.arange(len(truth.id))[truth.rows(index)]
     rows = rows[truth.visibility[rows] > 0]
-    none = np.full((len(rows), 2), np.nan)
-    who = (truth.id[rows], truth.group[rows])
+    box = None
+    if places:
+        assert truth.pos is not None, "people before a calibrated pair have places"
+        pos = truth.pos[rows]
+    else:
+        boxes = truth.box if truth.visible_box is None else truth.visible_box
+        assert boxes is not None, "people in pictures have boxes"
+        rows = rows[np.isfinite(boxes[rows]).all(axis=1)]
+        box = boxes[rows]
+        pos = box[:, :2] + box[:, 2:] / 2
+    who, none = (truth.id[rows], truth.group[rows]), np.full((len(rows), 2), np.nan)
     cov, score = np.full((len(rows), 4, 4), np.nan), np.ones(len(rows))
-    return Tracks(index, (index - 1) / truth.fps, "ground", "person", *who, truth.pos[rows], none, cov, None, score)
-
-
-def _visible_boxes(truth: Truth, index: int) -> Tracks:
-    box = truth.box if truth.visible_box is None else truth.visible_box
-    assert box is not None, "people in pictures have boxes"
-    rows = np.arange(len(truth.id))[truth.rows(index)]
-    rows = rows[np.isfinite(box[rows]).all(axis=1) & (truth.visibility[rows] > 0)]
-    none = np.full((len(rows), 2), np.nan)
-    cov, score = np.full((len(rows), 4, 4), np.nan), np.ones(len(rows))
-    middle = box[rows, :2] + box[rows, 2:] / 2
-    who = (truth.id[rows], truth.group[rows])
-    return Tracks(index, (index - 1) / truth.fps, "image", "person", *who, middle, none, cov, box[rows], score)
+    plane = "ground" if places else "image"
+    return Tracks(index, (index - 1) / truth.fps, plane, "person", *who, pos, none, cov, box, score)
 
 
 def _with_events(t: Tracks, truth: Truth) -> Tracks:

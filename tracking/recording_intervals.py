@@ -32,13 +32,6 @@ SCALES = tuple(map(scale_of, ALL))
 """The scale of every score, in the order of the catalogue."""
 
 
-def recording_intervals(
-    truth: Truth, score: Callable[[Array], Array], draws: int = DRAWS
-) -> tuple[Array, Array, Array]:
-    """Returns the scores (K,) of one recording, and the low and the high ends (K,) of their 95 % intervals."""
-    return block_intervals(score, truth.length, truth.fps, _presence(truth), draws, SCALES)
-
-
 def recording_differences(
     truth: Truth, first: Callable[[Array], Array], second: Callable[[Array], Array], draws: int = DRAWS
 ) -> tuple[Array, Array, Array]:

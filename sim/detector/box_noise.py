@@ -25,7 +25,7 @@ GRID, FURTHEST = 1 / 64, 8.3125  # of the table of `heavy_tailed`
 
 
 def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> Array:
-    """Return boxes (R, 4), left, top, width, height in px, moved by random errors; the boxes given are not changed.
+    """Returns boxes (R, 4), left, top, width, height in px, moved by random errors; the boxes given are not changed.
 
     n (R, 4): standard normals for the errors of the middle (to the right), the foot (downwards), the top (downwards),
     all in box heights, and of the logarithm of the width. An error is mean + standard deviation × n; `noise` holds this
@@ -52,7 +52,7 @@ def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> A
 
 
 def move_edges(box: Array, move: Array) -> Array:
-    """Return boxes (R, 4), left, top, width, height in px, whose edges are moved by move (R, 4) px; `box` is not
+    """Returns boxes (R, 4), left, top, width, height in px, whose edges are moved by move (R, 4) px; `box` is not
     changed.
 
     Columns of move: left edge, top edge, right edge, lower edge; positive is to the right or downwards. Width and
@@ -64,7 +64,7 @@ def move_edges(box: Array, move: Array) -> Array:
 
 
 def heavy_tailed(n: Array, excess_kurtosis: float) -> Array:
-    """Return standard normals n, of any shape, mapped to Student's t of variance 1 and this excess kurtosis (0 or
+    """Returns standard normals n, of any shape, mapped to Student's t of variance 1 and this excess kurtosis (0 or
     more).
 
     Quantiles are mapped to quantiles, with 4 + 6 / kurtosis degrees of freedom, to 0.1 % up to n = 5; n beyond 8.3
@@ -85,7 +85,7 @@ def heavy_tailed(n: Array, excess_kurtosis: float) -> Array:
 
 @cache
 def _t_of_normal(freedom: float) -> tuple[Array, Array]:
-    """Return Student's t at the quantiles of standard normals 0, GRID, 2 GRID, … FURTHEST, and its slopes there.
+    """Returns Student's t at the quantiles of standard normals 0, GRID, 2 GRID, … FURTHEST, and its slopes there.
 
     t(n) obeys dt/dn = phi(n) / f(t) with the two densities; it is integrated by Runge and Kutta's method of order 4.
     """
@@ -108,7 +108,7 @@ def _t_of_normal(freedom: float) -> tuple[Array, Array]:
 
 
 def box_errors(box: Array, true: Array) -> Array:
-    """Return the errors (R, 4) of boxes (R, 4) against the true boxes (R, 4), both left, top, width, height in px.
+    """Returns the errors (R, 4) of boxes (R, 4) against the true boxes (R, 4), both left, top, width, height in px.
 
     Columns: middle to the right, foot downwards, top downwards, each divided by the true height; and the logarithm of
     width over true width. These are the errors that `perturb_boxes` adds. A true height or width of 0 gives inf or nan,
@@ -122,7 +122,7 @@ def box_errors(box: Array, true: Array) -> Array:
 
 
 def seen_shift(box: Array, whole: Array, z: Array, camera: Camera) -> Array:
-    """Return by how many m (R, 2), along x and y, a person's foot point is displaced by what hides the person.
+    """Returns by how many m (R, 2), along x and y, a person's foot point is displaced by what hides the person.
 
     It is the foot point of the box of the visible part, box (R, 4), less that of the box of the whole body, whole (R,
     4), both left, top, width, height in px; see `foot_points`, also for z (R,) m. A foot of a visible part above

@@ -34,7 +34,7 @@ def false_alarms(
     image_size: tuple[int, int] | None,
     repeat: int = 0,
 ) -> Readings:
-    """Return the false alarms of all frames 1 to truth.length as Readings; their number per frame is Poisson.
+    """Returns the false alarms of all frames 1 to truth.length as Readings; their number per frame is Poisson.
 
     With a camera, their feet are spread evenly over the part of the image that shows ground, and each is as large as a
     person standing there. Without a camera, boxes have the sizes of labelled boxes and are spread evenly over the image
@@ -72,7 +72,7 @@ def false_alarms(
 
 
 def false_alarm_counts(rate: float, length: int, seed: int, repeat: int = 0) -> Ints:
-    """Return the number of false alarms of each frame 1 to `length`, (length,) int64, Poisson with mean `rate` per
+    """Returns the number of false alarms of each frame 1 to `length`, (length,) int64, Poisson with mean `rate` per
     frame.
 
     seed, repeat (number of the suite entry's copy, 0 without copies): name the random stream; for fixed ones a higher
@@ -82,7 +82,7 @@ def false_alarm_counts(rate: float, length: int, seed: int, repeat: int = 0) -> 
 
 
 def _placed_by_camera(camera: Camera, u: Array) -> tuple[Array, Array]:
-    """Return ground points (N, 2) in m and boxes (N, 4), left, top, width, height in px, of N false alarms in the
+    """Returns ground points (N, 2) in m and boxes (N, 4), left, top, width, height in px, of N false alarms in the
     image.
 
     Each is a person 1.5 to 1.95 m tall. The feet are even over the image; for a pinhole camera only below the row
@@ -104,7 +104,7 @@ def _placed_by_camera(camera: Camera, u: Array) -> tuple[Array, Array]:
 
 
 def _placed_by_labels(truth: Truth, image_size: tuple[int, int] | None, u: Array) -> tuple[Array, Array | None]:
-    """Return points (N, 2) in m over the labelled area, and boxes (N, 4), left, top, width, height in px, of labelled
+    """Returns points (N, 2) in m over the labelled area, and boxes (N, 4), left, top, width, height in px, of labelled
     sizes.
 
     u (N, 6): uniforms in (0, 1], columns ACROSS, DOWN (place), HEIGHT (which labelled box gives the size), HEADING,

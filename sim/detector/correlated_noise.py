@@ -27,7 +27,7 @@ CLOCK = 50.0  # Hz, of what lasts in the simulated detector: errors, misses, fal
 def correlated_normals(
     fresh: Array, memory: Sequence[Memory], first: int, fps: float, seed: int, *keys: int, repeat: int = 0
 ) -> Array:
-    """Return standard normals (F, D), correlated over time, of frames `first` to `first` + F - 1 (frames from 1 on).
+    """Returns standard normals (F, D), correlated over time, of frames `first` to `first` + F - 1 (frames from 1 on).
 
     fresh (F, D): standard normals, used as the white part, which has the variance that no part of the memory takes.
     memory: share of the variance and time constant (s) of each AR(1) part; the shares must not add up to more than 1,
@@ -49,5 +49,5 @@ def correlated_normals(
 
 
 def ticks(frame: Ints, fps: float) -> Ints:
-    """Return the ticks (F,) of the detector's clock, from 0 on, that are nearest to the times of frames (F,)."""
+    """Returns the ticks (F,) of the detector's clock, from 0 on, that are nearest to the times of frames (F,)."""
     return np.asarray(np.floor((frame - 1) / fps * CLOCK + 0.5), np.int64)

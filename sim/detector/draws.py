@@ -20,7 +20,7 @@ HIGHEST_FALSE_SCORE = 0.7  # of a false alarm whose detector has no measured sco
 
 
 def frame_uniforms(generator: np.random.Generator, first: int, frames: int, per_frame: int) -> Array:
-    """Return uniforms, (frames, per_frame), for frames `first` to `first` + frames - 1 (frames from 1 on).
+    """Returns uniforms, (frames, per_frame), for frames `first` to `first` + frames - 1 (frames from 1 on).
 
     They are above 0 and at most 1; a value may round to 1. The generator must be new, and is advanced: past the numbers
     of the frames before `first` and those returned. It spends `per_frame` numbers on each frame, so that a frame's
@@ -32,7 +32,7 @@ def frame_uniforms(generator: np.random.Generator, first: int, frames: int, per_
 
 
 def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
-    """Return the quantiles (N,) at u (N,), 0 to 1, of a distribution given by evenly spaced quantiles, linear between
+    """Returns the quantiles (N,) at u (N,), 0 to 1, of a distribution given by evenly spaced quantiles, linear between
     them.
 
     curve: the quantiles from u = 0 to u = 1, at least one number, in ascending order; a single one is the result for
@@ -47,7 +47,7 @@ def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
 
 
 def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:
-    """Return the scores (N,) in [0, 1] of N true detections at uniforms u (N,), 0 to 1, by their visibility (N,), 0 to
+    """Returns the scores (N,) in [0, 1] of N true detections at uniforms u (N,), 0 to 1, by their visibility (N,), 0 to
     1.
 
     If `sensor.true_scores` is given, they are its quantiles at u, whatever the visibility. Else they are 1 for a
@@ -62,7 +62,7 @@ def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:
 
 
 def false_scores(u: Array, sensor: Sensor) -> Array:
-    """Return the scores (N,) in [0, 1] of N false alarms at uniforms u (N,), 0 to 1.
+    """Returns the scores (N,) in [0, 1] of N false alarms at uniforms u (N,), 0 to 1.
 
     They are the quantiles of `sensor.false_scores` at u if given, else 0.7 u², with a mean of 0.23.
     """

@@ -61,7 +61,7 @@ class Births:
 def persistent_false_alarms(
     truth: Truth, sensor: Sensor, seed: int, camera: Camera | None, size: Array | None, repeat: int
 ) -> Readings:
-    """Return the false alarms of all frames 1 to truth.length as Readings, where alarms last several frames.
+    """Returns the false alarms of all frames 1 to truth.length as Readings, where alarms last several frames.
 
     `sensor.false_alarms` holds their settings and must be given (else AssertionError). size (2,): width, height of the
     image in px, None if unknown. camera None: places and sizes come from the labels. seed, repeat (number of the suite
@@ -93,7 +93,7 @@ def persistent_false_alarms(
 
 
 def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int) -> Births:
-    """Return all alarms of a sequence, with the uniforms that draw them, as Births.
+    """Returns all alarms of a sequence, with the uniforms that draw them, as Births.
 
     The first tick starts with the stationary number of living alarms, as if some had begun earlier. truth: gives the
     frame rate and the number of frames. rate: mean number of alarms reported per frame. An alarm's life has the mean
@@ -130,7 +130,7 @@ def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repea
 
 
 def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, seed: int, repeat: int) -> AlarmRows:
-    """Return row k of `born`, one alarm, as its frames (L,), rows (L, 6) and uniforms in those frames (L, 7).
+    """Returns row k of `born`, one alarm, as its frames (L,), rows (L, 6) and uniforms in those frames (L, 7).
 
     Frames count from 1. Rows are left, top, width, height in px of the box, then x, y in m of the point. Columns of the
     uniforms: SHOWN (whether it is reported), four edges, SCORE, ORDER. With probability `model.near` the alarm goes
@@ -156,7 +156,7 @@ def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, 
 
 
 def _draw_person(ids: Ints, seed: int, name: Ints, repeat: int) -> int:
-    """Return the id of the person with whom an alarm goes: the one of `ids` with the highest random draw.
+    """Returns the id of the person with whom an alarm goes: the one of `ids` with the highest random draw.
 
     name (2,): of the alarm, as in Births. Each draw has a random stream of its own, named by seed, repeat (number of
     the suite entry's copy), the alarm and the person's id. One person more therefore changes few alarms. Raises
@@ -168,7 +168,7 @@ def _draw_person(ids: Ints, seed: int, name: Ints, repeat: int) -> int:
 
 
 def _rows_of_person(truth: Truth, id: int, frame: Ints) -> tuple[Ints, Bools]:
-    """Return the rows (M,) of the truth in which person `id` is present, and a mask (L,) of the frames to which they
+    """Returns the rows (M,) of the truth in which person `id` is present, and a mask (L,) of the frames to which they
     belong.
 
     frame (L,): consecutive frame numbers, from 1 on. The rows run from the first of these frames until the person is
@@ -182,7 +182,7 @@ def _rows_of_person(truth: Truth, id: int, frame: Ints) -> tuple[Ints, Bools]:
 
 
 def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Array) -> tuple[Array, Array]:
-    """Return boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that goes with a person.
+    """Returns boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm beside a person.
 
     row (L,): the person's rows of the truth. n (9,): standard normals, columns as `at_birth` of Births. `model` gives
     pairs (mean, standard deviation): across and foot, the shift of the middle to the right and of the lower edge
@@ -207,7 +207,7 @@ def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Ar
 def _boxes_alone(
     model: FalseAlarms, ground: VisibleGround, age: Array, at_birth: Array, n: Array
 ) -> tuple[Array, Array]:
-    """Return boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that stands or drifts
+    """Returns boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that stands or drifts
     alone.
 
     age (L,): time since its birth in each frame, s. at_birth (9,): its uniforms, columns as `at_birth` of Births; n
@@ -232,7 +232,7 @@ def _boxes_alone(
 
 
 def _boxes_on_feet(middle: Array, foot: Array, tall: Array, model: FalseAlarms, n: Array) -> Array:
-    """Return boxes (L, 4), left, top, width, height in px, that stand on given feet.
+    """Returns boxes (L, 4), left, top, width, height in px, that stand on given feet.
 
     middle (L,) or one number: column of the middle. foot (L,) or one number: row of the feet. tall (L,): height. All
     are in px. The width is the same share of the height in all rows: its logarithm has the mean and standard deviation

@@ -30,7 +30,7 @@ class Readings:
 
 
 def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[Detections]:
-    """Return a list of truth.length Detections, for frames 1 on: true detections and false alarms mixed, in random
+    """Returns a list of truth.length Detections, for frames 1 on: true detections and false alarms mixed, in random
     order.
 
     A frame without any has empty Detections. The plane is "ground" (positions in m) if the truth has positions, else

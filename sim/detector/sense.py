@@ -48,7 +48,7 @@ def sense(
     repeat: int = 0,
     people: Mapping[str, tuple[int, ...]] | None = None,
 ) -> list[Detections]:
-    """Return a list of truth.length Detections, for frames 1 on: what the simulated detector reports, false alarms
+    """Returns a list of truth.length Detections, for frames 1 on: what the simulated detector reports, false alarms
     included.
 
     If the truth has positions, `pos` is the ground point (m), with the box beside it if boxes are known. Else `pos` is
@@ -102,7 +102,7 @@ def _true_detections(
 def _displaced(
     pos: Array, sensed: Array, box: Array, truth: Truth, seen: Bools, sensor: Sensor, camera: Camera
 ) -> Array:
-    """Return the points (N, 2) in m that the detector reports, by `sensor.points`, given points with errors pos (N, 2).
+    """Returns the points (N, 2) in m that the detector reports, by `sensor.points`, of points with errors pos (N, 2).
 
     "own": pos itself. "seen": pos displaced as the foot of the person's sensed box is. "foot": the place on the ground
     at the foot of the reported box, or pos where that shows no ground. sensed, box (N, 4): boxes before and after
@@ -119,7 +119,7 @@ def _displaced(
 
 
 def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> tuple[Array, Array]:
-    """Return the random numbers of each of the R rows of the truth, keyed by the person and the frame.
+    """Returns the random numbers of each of the R rows of the truth, keyed by the person and the frame.
 
     Standard normals (R, 7): DETECT (a person is missed from the quantile of the detection probability on), four box
     edges, two point coordinates. Uniforms (R, 2) in (0, 1]: SCORE, ORDER (place in the frame's list).
@@ -154,7 +154,7 @@ def _one_person(id: int, frame: Ints, seed: int, repeat: int, sensor: Sensor, fp
 
 
 def _kept(persistence: float, count: int, r: np.random.Generator) -> Array:
-    """Return standard normals (count,) at ticks of the detector's clock; each is that of the tick before with a
+    """Returns standard normals (count,) at ticks of the detector's clock; each is that of the tick before with a
     probability that leaves the share `persistence` after PERSISTENCE_STEP."""
     drawn = uniforms(r, (count, 2))
     fresh = drawn[:, 0] >= power(persistence, 1.0 / (CLOCK * PERSISTENCE_STEP))
@@ -163,7 +163,7 @@ def _kept(persistence: float, count: int, r: np.random.Generator) -> Array:
 
 
 def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = None) -> Array:
-    """Return the probability (R,), 0 to 1, that each row of the truth is detected; `sensor.hide` is not considered.
+    """Returns the probability (R,), 0 to 1, that each row of the truth is detected; `sensor.hide` is not considered.
 
     It is detect_prob times the factor of visibility times min(1, size / (2 small_px)), and 0 where the visibility is
     below min_visibility or nan; these names are settings of the sensor. The factor is visibility^occlusion_power, or
@@ -181,7 +181,7 @@ def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = 
 
 
 def _visibility_factor(visible: Array, sensor: Sensor) -> Array:
-    """Return the factor (R,), 0 to 1, by which the visibilities `visible` (R,), 0 to 1, lower the probability of
+    """Returns the factor (R,), 0 to 1, by which the visibilities `visible` (R,), 0 to 1, lower the probability of
     detection.
 
     It is visibility^occlusion_power. If `sensor.by_visibility` is given, it is that curve instead: values at evenly
@@ -193,7 +193,7 @@ def _visibility_factor(visible: Array, sensor: Sensor) -> Array:
 
 
 def _artificially_hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]]) -> Bools:
-    """Return True (R,) for the rows of the truth that an entry of `sensor.hide` covers: start <= t < end, in s.
+    """Returns True (R,) for the rows of the truth that an entry of `sensor.hide` covers: start <= t < end, in s.
 
     t is 0 in frame 1. people: ids of the people of each group that the script names. An entry without a group hides
     everybody; without entries all are False. Raises InputError if an entry names a group that is not in `people`.
@@ -213,7 +213,7 @@ def _artificially_hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tupl
 
 
 def _sensed_boxes(truth: Truth, sensor: Sensor) -> Array | None:
-    """Return the boxes (R, 4), left, top, width, height in px, that the detector measures, before errors are added.
+    """Returns the boxes (R, 4), left, top, width, height in px, that the detector measures, before errors are added.
 
     They are the boxes of the visible parts; a number that is nan there, as nothing is visible, is taken from the amodal
     box (that of the whole person). If `sensor.box` is "amodal" or the truth has no visible boxes, they are the amodal

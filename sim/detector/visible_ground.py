@@ -48,7 +48,7 @@ class VisibleGround:
                 self.low, self.high = np.array([0.0, _furthest_labelled_row(self.line, float(size[1]))]), np.array(size)
 
     def image_point(self, x: float, y: float) -> tuple[float, float]:
-        """Return the image point (u, v) px at share x (0 to 1) of the width and share y of the height of the ground
+        """Returns the image point (u, v) px at share x (0 to 1) of the width and share y of the height of the ground
         part.
 
         (0, 0) is its upper left corner. Shares outside 0 to 1 give points outside the part.
@@ -57,7 +57,7 @@ class VisibleGround:
         return float(u), float(v)
 
     def usual_height(self, u: float, v: float) -> float:
-        """Return the height in px of the box of a standard person (1.7 m) whose feet are at image point (u, v) px.
+        """Returns the height in px of the box of a standard person (1.7 m) whose feet are at image point (u, v) px.
 
         With a camera it is that of the person's projection. Where the camera gives no box, as right under it or where
         no ground is seen, it is 1.7 m at a depth that equals the camera's height, at least 1 m. Without a camera it is
@@ -74,7 +74,7 @@ class VisibleGround:
         return float(tall)
 
     def ground_points(self, u: Array, v: Array, otherwise: Array) -> Array:
-        """Return the ground points (L, 2), x and y in m, seen at image points u, v (L,) px.
+        """Returns the ground points (L, 2), x and y in m, seen at image points u, v (L,) px.
 
         Walls and stairs are ignored. Points from `otherwise` (L, 2) replace those where no ground is seen. `otherwise`
         itself is returned if there is no camera. Image points above the ground part are moved down to its upper edge;
@@ -87,7 +87,7 @@ class VisibleGround:
         return np.where(np.isfinite(pos), pos, otherwise)
 
     def labelled_point(self, x: float, y: float) -> Array:
-        """Return the point (2,) in m at shares x, y (0 to 1) of the rectangle round all labelled positions.
+        """Returns the point (2,) in m at shares x, y (0 to 1) of the rectangle round all labelled positions.
 
         (0, 0) is the corner of least x and y. Shares outside 0 to 1 give points outside the rectangle. Without labelled
         positions the result is zeros; if a labelled position is nan, it is nan.
@@ -100,7 +100,7 @@ class VisibleGround:
 
 
 def furthest_row(camera: Camera) -> float:
-    """Return the uppermost image row (px, from 0 at the top) at which people have at least 0.25 of their height in the
+    """Returns the uppermost image row (px, from 0 at the top) at which people have at least 0.25 of their height in the
     middle.
 
     For pinhole cameras. A person is 1.7 m tall, and the height is that seen in px. 241 rows from the top to the bottom
@@ -118,7 +118,7 @@ def furthest_row(camera: Camera) -> float:
 
 
 def _furthest_labelled_row(line: Array, rows: float) -> float:
-    """Return the row (px) at which people have 0.25 of the height of people at the middle row of the image.
+    """Returns the row (px) at which people have 0.25 of the height of people at the middle row of the image.
 
     line (2,): a, b of the height a + b v at row v, see `height_line`. rows: height of the image in px. The result is
     kept between 0 and rows / 2; it is 0 if heights do not grow downwards.
@@ -128,7 +128,7 @@ def _furthest_labelled_row(line: Array, rows: float) -> float:
 
 
 def height_line(foot: Array, height: Array) -> Array:
-    """Return (a, b) of the least-squares line height = a + b foot through box heights (N,) and rows of the feet (N,),
+    """Returns (a, b) of the least-squares line height = a + b foot through box heights (N,) and rows of the feet (N,),
     px.
 
     If all feet are in one row, b is 0 and a the mean height. Without boxes (N = 0) the result is (nan, 0), with a numpy
@@ -141,7 +141,7 @@ def height_line(foot: Array, height: Array) -> Array:
 
 
 def clip_boxes(box: Array, image_size: tuple[int, int]) -> Array:
-    """Return the parts (N, 4) of boxes (N, 4) that lie in the image, both left, top, width, height in px.
+    """Returns the parts (N, 4) of boxes (N, 4) that lie in the image, both left, top, width, height in px.
 
     image_size: width, height in px. A box outside has width or height 0. A nan box stays nan.
     """

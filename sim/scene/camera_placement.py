@@ -32,7 +32,7 @@ TOLERANCE = 1e-6
 
 
 def place_camera(spec: CameraSpec, motion: Motion) -> Camera:
-    """Return the Camera of a scenario; what its settings leave out is solved: yaw, position, height, and px_per_m for
+    """Returns the Camera of a scenario; what its settings leave out is solved: yaw, position, height, and px_per_m for
     kind "top".
 
     It is placed so that the bodies of all frames are in view and as large as possible, with a margin of 2 % of the
@@ -63,7 +63,7 @@ def _select(bodies: RecordedBodies, keep: Bools) -> RecordedBodies:
 
 
 def _bodies_to_fit(bodies: RecordedBodies, motion: Motion, crop: bool) -> RecordedBodies:
-    """Return the bodies to keep in view: all of `bodies` or, with `crop`, those whose feet are in the world's
+    """Returns the bodies to keep in view: all of `bodies` or, with `crop`, those whose feet are in the world's
     rectangle, edges included.
 
     If there are none, the result is four bodies of standard people (1.7 m) in the world's corners, with frame 0 and id
@@ -81,7 +81,7 @@ def _bodies_to_fit(bodies: RecordedBodies, motion: Motion, crop: bool) -> Record
 
 
 def _reach(bodies: RecordedBodies, normals: Array) -> Array:
-    """Return how far each of B bodies reaches against each of K normals, (B, K): the least n·X over its points X, in m.
+    """Returns how far each of B bodies reaches against each of K normals, (B, K) m: the least n·X over its points X.
 
     normals (K, 3). For an ellipsoid (centre c, shape S) it is n·c - sqrt(nᵀ S n); the smaller of body and head counts.
     """
@@ -91,7 +91,7 @@ def _reach(bodies: RecordedBodies, normals: Array) -> Array:
 
 
 def _slopes(spec: CameraSpec, margin: float) -> tuple[float, float]:
-    """Return half the width and half the height of the view, in m per m of depth, less `margin` px on each side.
+    """Returns half the width and half the height of the view, in m per m of depth, less `margin` px on each side.
 
     spec: gives the image size and focal length, both in px.
     """
@@ -99,7 +99,7 @@ def _slopes(spec: CameraSpec, margin: float) -> tuple[float, float]:
 
 
 def _edges(rotation: Array, slopes: tuple[float, float]) -> Array:
-    """Return the inward normals (4, 3), in the world, of the planes through the left, right, upper and lower image
+    """Returns the inward normals (4, 3), in the world, of the planes through the left, right, upper and lower image
     edge.
 
     rotation (3, 3): world to camera. slopes: half the view's width and half its height, in m per m of depth. The
@@ -110,13 +110,13 @@ def _edges(rotation: Array, slopes: tuple[float, float]) -> Array:
 
 
 def _each_second(bodies: RecordedBodies, fps: float) -> RecordedBodies:
-    """Return the bodies of the first frame of each second; all bodies if there are none in these frames."""
+    """Returns the bodies of the first frame of each second; all bodies if there are none in these frames."""
     first = np.floor((bodies.frame - 1) / fps) > np.floor((bodies.frame - 2) / fps)
     return _select(bodies, first) if first.any() else bodies
 
 
 def _yaw(spec: CameraSpec, bodies: RecordedBodies) -> float:
-    """Return the yaw of a pinhole camera in degrees: the given one; 0 if height or position is given; else the one of
+    """Returns the yaw of a pinhole camera in degrees: the given one; 0 if height or position is given; else the one of
     YAWS in which a person of 1.7 m in the place of each body is highest in the median, the first of equals.
     """
     if spec.yaw_deg is not None:
@@ -134,7 +134,7 @@ def _yaw(spec: CameraSpec, bodies: RecordedBodies) -> float:
 
 
 def _pinhole(spec: CameraSpec, bodies: RecordedBodies, yaw: float) -> Camera:
-    """Return a pinhole camera with all bodies in view: at the given position or height, else at the closest place.
+    """Returns a pinhole camera with all bodies in view: at the given position or height, else at the closest place.
 
     spec: camera settings; its tilt, focal length and image size are used as they are. yaw: degrees. A margin of 2 % of
     the image's shorter side is kept free. A solved height is at least 0.3 m. If the given values leave no such place,
@@ -162,7 +162,7 @@ def _camera(spec: CameraSpec, centre: Array, rotation: Array, baseline: float = 
 
 
 def _closest(rotation: Array, slopes: tuple[float, float], b: Array) -> Array:
-    """Return the camera centre (3,) in m, in the world, that is furthest forward with all bodies in view.
+    """Returns the camera centre (3,) in m, in the world, that is furthest forward with all bodies in view.
 
     rotation (3, 3): world to camera. slopes: half the view's width and half its height per m of depth. b (4,): least
     reach (n·X over all their points X) of the bodies against the left, right, upper and lower edge's inward normal n,
@@ -174,7 +174,7 @@ def _closest(rotation: Array, slopes: tuple[float, float], b: Array) -> Array:
 
 
 def _at_height(height: float, rotation: Array, slopes: tuple[float, float], b: Array) -> Array:
-    """Return the camera centre (3,) in m at this height (m), as far ahead over the ground as the image edges allow.
+    """Returns the camera centre (3,) in m at this height (m), as far ahead over the ground as the image edges allow.
 
     rotation (3, 3): world to camera. slopes: half the view's width and half its height per m of depth. b (4,): least
     reach (n·X over all their points X) of the bodies against the left, right, upper and lower edge's inward normal n,
@@ -196,7 +196,7 @@ def _at_height(height: float, rotation: Array, slopes: tuple[float, float], b: A
 
 
 def _largest(limits: list[tuple[float, float]]) -> float:
-    """Return the largest g with a g <= c for all pairs (a, c) of limits.
+    """Returns the largest g with a g <= c for all pairs (a, c) of limits.
 
     If none exists, it is the middle between the least upper and the greatest lower limit. Without an upper limit it is
     the greatest lower limit; without any limit 0. Pairs with |a| <= 1e-6 are ignored.
@@ -209,7 +209,7 @@ def _largest(limits: list[tuple[float, float]]) -> float:
 
 
 def _height_at_position(spec: CameraSpec, normals: Array, b: Array) -> float:
-    """Return the camera's height in m: the given one, or the lowest at the given position with all bodies in view.
+    """Returns the camera's height in m: the given one, or the lowest at the given position with all bodies in view.
 
     spec: camera settings with a position. normals (4, 3), b (4,): inward normals n of the left, right, upper and lower
     image edge, and the bodies' least reach (n·X over all their points X) against each, m. A solved height is at least
@@ -223,7 +223,7 @@ def _height_at_position(spec: CameraSpec, normals: Array, b: Array) -> float:
 
 
 def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
-    """Return a camera of kind "top": over the middle of the bodies' extent, at the largest scale that shows all bodies.
+    """Returns a camera of kind "top": over the middle of the bodies' extent, at the largest scale that shows all.
 
     A margin of 2 % of the image's shorter side is kept free. Half the extent counts as at least 0.1 m. spec: camera
     settings; a given position (x, y in the world, m), px_per_m or height is used as it is. yaw turns the picture, 0 if
@@ -242,7 +242,7 @@ def _top(spec: CameraSpec, bodies: RecordedBodies) -> Camera:
 
 
 def _check_all_in_view(camera: Camera, spec: CameraSpec, bodies: RecordedBodies, motion: Motion) -> None:
-    """Return nothing; raise InputError, naming the first body (by frame, then id) that is not wholly inside the image,
+    """Returns nothing; raise InputError, naming the first body (by frame, then id) that is not wholly inside the image,
     if there is one.
 
     A body may reach out of the view by at most 1e-6 m. Without bodies nothing is raised. spec: camera settings, for the

@@ -32,7 +32,7 @@ CLIPPED = 255
 def classify(
     i0: Image, i1: Image, i2: Image, E: Floats, V: Floats, s: Floats, b: Floats, g: Floats, limits: Floats, out: Image
 ) -> None:
-    """Write the class of each of N pixels into `out` (N,) uint8. Returns nothing.
+    """Writes the class of each of N pixels into `out` (N,) uint8. Returns nothing.
 
     Classes: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. i0, i1, i2 (N,) uint8: the
     frame's colour planes in the order of E. E, V (3, N) float32: mean colour at gain 1 in grey levels, and variance

@@ -130,7 +130,7 @@ def moments(runs: Labels, region: Ints, area: Ints) -> tuple[Array, Array]:
 
 @njit(cache=True)
 def write_labels(runs: Labels, region: Ints, label: Labels) -> None:
-    """Write region + 1 into the pixels of each run in `label` (H, W), in place; other pixels are not changed.
+    """Writes region + 1 into the pixels of each run in `label` (H, W), in place; other pixels are not changed.
 
     runs (R, 3): row, first column, last column + 1. region (R,): region of each run, from 0; a run with a negative
     region is left out.

@@ -29,7 +29,7 @@ ROUNDS = 5
 
 
 def divided(found: Blobs, people: Array, size: PersonSize) -> Array:
-    """Return the boxes (N, 4), left, top, width, height, px, of the people in the blobs of a frame."""
+    """Returns the boxes (N, 4), left, top, width, height, px, of the people in the blobs of a frame."""
     boxes = [np.zeros((0, 4))]
     centre = people[:, :2] + people[:, 2:] / 2
     foot = found.box[:, :2] + found.box[:, 2:] * np.array([0.5, 1.0])

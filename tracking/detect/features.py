@@ -62,14 +62,14 @@ class SpacePoints:
         return len(self.pos)
 
     def at(self, rows: Ints | Bools) -> SpacePoints:
-        """Return the points of some rows: indices, or flags (M,)."""
+        """Returns the points of some rows: indices, or flags (M,)."""
         return SpacePoints(
             self.id[rows], self.pos[rows], self.cov[rows], self.vel[rows], self.vel_cov[rows], self.lag[rows]
         )
 
     @classmethod
     def none(cls) -> SpacePoints:
-        """Return M = 0 points."""
+        """Returns M = 0 points."""
         two, three = np.zeros((0, 3)), np.zeros((0, 3, 3))
         return cls(no_ids(), two, three, two, three, np.zeros(0))
 
@@ -189,7 +189,7 @@ class Features:
 
 
 def slopes(points: Array, known: Bools, times: Array) -> tuple[Array, Array, Array]:
-    """Return the velocities (M, 3) of least squares of M points over K frames, sum (t - mean t)^2 (M,), s^2, and the
+    """Returns the velocities (M, 3) of least squares of M points over K frames, sum (t - mean t)^2 (M,), s^2, and the
     last time less mean t (M,), s."""
     mean = known @ times / np.maximum(known.sum(1), 1)
     t = np.where(known, times - mean[:, None], 0.0)

@@ -47,7 +47,7 @@ class ForegroundBlobs:
         self.foreground.follow(settings)
 
     def detections(self, frame: Frame, people: Array) -> Detections | None:
-        """Return the blobs of the frame's picture as detections; None without a picture, or if too much of it is
+        """Returns the blobs of the frame's picture as detections; None without a picture, or if too much of it is
         foreground."""
         if frame.image is None:
             return None

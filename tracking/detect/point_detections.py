@@ -15,7 +15,7 @@ BOX_TIME = 0.5
 
 
 def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array | None]:
-    """Return places (M, 2), m, and sizes of boxes (M, 2): width, height, px, None on the ground or without boxes."""
+    """Returns places (M, 2), m, and sizes of boxes (M, 2): width, height, px, None on the ground or without boxes."""
     order = np.lexsort(detections.pos[:, 1::-1].T)
     sizes = None
     if detections.plane == "image" and detections.box is not None:
@@ -24,10 +24,10 @@ def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array | 
 
 
 def followed_sizes(old: Array, new: Array, dt: Array | float) -> Array:
-    """Return the sizes of boxes (N, 2), px, after boxes of sizes `new` (N, 2) were measured."""
+    """Returns the sizes of boxes (N, 2), px, after boxes of sizes `new` (N, 2) were measured."""
     return np.asarray(np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt / BOX_TIME)))
 
 
 def boxes_at(pos: Array, size: Array) -> Array | None:
-    """Return boxes (N, 4) left, top, width, height in px with the centres pos (N, 2) px; None if a size is unknown."""
+    """Returns boxes (N, 4) left, top, width, height in px with the centres pos (N, 2) px; None if a size is unknown."""
     return np.concatenate([pos - size / 2, size], axis=1) if np.isfinite(size).all() else None

@@ -40,7 +40,7 @@ class PersonLimits:
 
 
 def person_mask(blobs: Blobs, disparity: Disparities, camera: Camera, limits: PersonLimits) -> Bools:
-    """Return the foreground (H, W) bool of the regions that may be people."""
+    """Returns the foreground (H, W) bool of the regions that may be people."""
     height, width, error = sizes(blobs, disparity, camera, limits.deviations)
     small = (height < limits.least_height) | (width < limits.least_width)
     keep = np.isfinite(height) & (height**2 - error**2 <= limits.most_height**2) & (~small | blobs.cut())
@@ -50,7 +50,7 @@ def person_mask(blobs: Blobs, disparity: Disparities, camera: Camera, limits: Pe
 def sizes(
     blobs: Blobs, disparity: Disparities, camera: Camera, deviations: tuple[float, float, float]
 ) -> tuple[Array, Array, Array]:
-    """Return height, width and the height that errors alone would give, (M,) each, m, of M foreground regions."""
+    """Returns height, width and the height that errors alone would give, (M,) each, m, of M foreground regions."""
     found = np.full((3, len(blobs)), np.nan)
     row, column = np.nonzero((blobs.label > 0) & ~np.isnan(disparity))
     blob = blobs.label[row, column] - 1

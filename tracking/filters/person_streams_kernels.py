@@ -41,7 +41,7 @@ def mix_in(key: Any, values: Any) -> None:
 
 @njit(cache=True)
 def fill_uniforms(begin: Any, key: Any, out: Array) -> None:
-    """Write uniform numbers in [0, 1) into out (A, K, C); begin (1,): uint64, of all; key (K,): uint64, of each."""
+    """Writes uniform numbers in [0, 1) into out (A, K, C); begin (1,): uint64, of all; key (K,): uint64, of each."""
     rows, people, columns = out.shape
     bits = np.empty(rows * columns, np.uint64)
     values = bits.view(np.float64)
@@ -55,7 +55,7 @@ def fill_uniforms(begin: Any, key: Any, out: Array) -> None:
 
 @njit(cache=True)
 def fill_normals(begin: Any, key: Any, out: Array) -> None:
-    """Write standard normal numbers into out (A, K, C); arguments as of fill_uniforms."""
+    """Writes standard normal numbers into out (A, K, C); arguments as of fill_uniforms."""
     rows, people, columns = out.shape
     bits, normals = np.empty(rows * columns, np.uint64), np.empty(rows * columns)
     values = bits.view(np.float64)

@@ -8,13 +8,6 @@ from sim.truth.identity import Identities
 from sim.types import Groups, Ints
 
 
-def group_ids(identities: Identities, frame: int, ids: Ints, groups: list[Ints]) -> Ints:
-    """Returns the id of each person's group, (N,), -1 for a person alone; `identities` goes on to this frame."""
-    parts = [frozenset(ids[rows].tolist()) for rows in groups]
-    identities.step(frame, frozenset(ids.tolist()), parts)
-    return known_groups(identities, ids)
-
-
 def known_groups(identities: Identities, ids: Ints) -> Ints:
     """Returns the id of each person's group, (N,), as `identities` has it, -1 for a person alone; ids (N,)."""
     group_of = {person: group for group, people in identities.groups.items() for person in people}

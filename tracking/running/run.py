@@ -58,7 +58,7 @@ class TrackingRun(SequenceOf[Tracks]):
         return len(self.tracks)
 
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
-        """Store the tracks in the folder as `flockscope track` does, and return the folder."""
+        """Stores the tracks in the folder as `flockscope track` does, and return the folder."""
         from sim.io.store.run_seal import tracked_hash
         from sim.io.store.track_files import write_tracks
         from sim.io.store.track_tables import pair_table

@@ -1,4 +1,4 @@
-"""Write H.264 videos that browsers can play and seek: mp4, yuv420p, a key frame each second, the index in front.
+"""Writes H.264 videos that browsers can play and seek: mp4, yuv420p, a key frame each second, the index in front.
 
 One thread is used and no date is written, so the same pictures give the same bytes. libav ignores a write that fails
 or takes only a part, as on a full disk. So the file that it writes to keeps account, and the pictures of the finished

@@ -58,6 +58,7 @@ class RankedRuns:
     table: list[dict[str, Any]]  # rows of `ComparedRuns.to_arrow`, the oracles first
     pairs: list[dict[str, Any]]  # the difference of each pair of runs, the better one first
     scenarios: Mapping[str, list[int]]  # indices of its sequences by scenario
+    by_scenario: Mapping[str, Ranking]  # by the score, of the sequences of each scenario
     settings: list[dict[str, Any]]  # in what the runs differ
     notes: list[str]
 
@@ -150,7 +151,8 @@ def _ranked(
     for name, other in _pairs(comparison, own):
         scores = {each: _difference(rankings[each], comparison.runs, name, other) for each in CATALOGUE}
         pairs.append({"run": name, "minus": other, **scores[key], "scores": scores})
-    return RankedRuns(comparison, key, own, table, pairs, scenarios, settings, notes)
+    by_scenario = {name: comparison.ranking(key, rows) for name, rows in scenarios.items()}
+    return RankedRuns(comparison, key, own, table, pairs, scenarios, by_scenario, settings, notes)
 
 
 def _pairs(comparison: ComparedRuns, ranking: Ranking) -> list[tuple[str, str]]:
@@ -165,10 +167,6 @@ def _difference(ranking: Ranking, runs: tuple[str, ...], first: str, second: str
     ends = (ranking.less, ranking.less_low, ranking.less_high)
     mean, low, high = (float(part[i, j]) for part in ends)
     return {"mean": mean, "low": low, "high": high, "sure": sure}
-
-
-def _by_scenario(every: RankedRuns) -> dict[str, Ranking]:
-    return {name: every.comparison.ranking(every.key, rows) for name, rows in every.scenarios.items()}
 
 
 def _data(every: RankedRuns) -> dict[str, Any]:
@@ -186,7 +184,7 @@ def _data(every: RankedRuns) -> dict[str, Any]:
         "settings": every.settings,
         "scenarios": {
             name: {c.runs[k]: float(m) for k, m in zip(found.order.tolist(), found.mean, strict=True)}
-            for name, found in _by_scenario(every).items()
+            for name, found in every.by_scenario.items()
         },
         "scores": {
             run: {name: dict(one) for name, one in zip(c.sequences, row, strict=True) if one is not None}
@@ -269,7 +267,7 @@ def _scenario_table(every: RankedRuns) -> Any:
         title = printable(shortened(name, LONGEST_INPUT))
         table.add_column(title, justify="left" if name == "scenario" else "right", no_wrap=True)
     scores = c.rows()
-    for scenario, found in _by_scenario(every).items():
+    for scenario, found in every.by_scenario.items():
         rows = every.scenarios[scenario]
         means = {c.runs[k]: m for k, m in zip(found.order.tolist(), found.mean.tolist(), strict=True)}
         for name in shown[: len(c.oracles)]:

@@ -54,13 +54,13 @@ class Associated:
 
 
 def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:
-    """Return the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2)."""
+    """Returns the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2)."""
     wider = np.square(scaled.scale * (SPLIT_SPEED if scaled.config.corrections else 0.0) * bank.null_time)
     return np.asarray(bank.extent + bank.P[:, :2, :2] + (scaled.point_sd**2 + wider)[:, None, None] * np.eye(2))
 
 
 def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: ScaledParameters, t: float) -> Array:
-    """Return squared Mahalanobis distances (G, M) of the points (M, 2) from the groups, inf outside a search region
+    """Returns squared Mahalanobis distances (G, M) of the points (M, 2) from the groups, inf outside a search region
     (eq. 2.2)."""
     config = scaled.config
     lost = bank.confirmed & (t - bank.last_seen > max(config.coast_time, scaled.dt) + 1e-9)
@@ -74,7 +74,7 @@ def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: Scale
 
 
 def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters) -> Ints:
-    """Return for each point (M,) the row of the group that it is attached to, or -1 (ours)."""
+    """Returns for each point (M,) the row of the group that it is attached to, or -1 (ours)."""
     link, owner = scaled.constraint.link, np.full(len(points), -1)
     taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)
     if taken.all() or not taken.any():
@@ -99,12 +99,12 @@ def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters
 
 
 def walking_reach(scaled: ScaledParameters, elapsed: Array) -> Array:
-    """Return how far (K,), in the unit of the points, a member may be from its predicted place."""
+    """Returns how far (K,), in the unit of the points, a member may be from its predicted place."""
     return np.asarray(scaled.scale * FASTEST * np.maximum(elapsed, scaled.dt) + 3 * scaled.point_sd)
 
 
 def claimed(points: Array, weights: Array, d2: Array, owner: Ints, t: float) -> PointClaims:
-    """Return the claims on the points (M, 2) of the frame at time t, s: who may have each point."""
+    """Returns the claims on the points (M, 2) of the frame at time t, s: who may have each point."""
     claimants = np.where(owner >= 0, 1, np.isfinite(d2).sum(0))
     return PointClaims(points, weights, np.full(len(points), t), d2, owner, claimants)
 
@@ -139,7 +139,7 @@ def associate(
 
 
 def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio: Array) -> Array:
-    """Return the log of N_g N(y; xi_g, S_g) times the colour ratio (G, M) of each point y and group g, without its
+    """Returns the log of N_g N(y; xi_g, S_g) times the colour ratio (G, M) of each point y and group g, without its
     constant; -inf where a group may not have the point."""
     log_weight = np.log(np.maximum(size, 1e-300)) - np.log(np.linalg.det(region)) / 2
     found = log_weight[:, None] - claims.d2 / 2 + (log_ratio if log_ratio.shape[1] else 0.0)
@@ -149,8 +149,7 @@ def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio
 
 
 def shares(log_density: Array, may: Bools) -> Array:
-    """Return the probability (G, M) that each point is each group's: proportional to the density, among the groups that
-    `may` have it."""
+    """Returns the probability (G, M) that each point is each group's: by density, among groups that `may` have it."""
     share, shared = may.astype(float), np.flatnonzero(may.sum(0) > 1)
     log = np.where(may[:, shared], log_density[:, shared], -np.inf)
     density = np.exp(log - log.max(0, initial=-np.inf))

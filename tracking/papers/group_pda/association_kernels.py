@@ -50,7 +50,7 @@ INNOVATION_X, INNOVATION_Y, S_XX, S_XY, S_YY, MISS_MASS = range(6)
 
 @njit(cache=True)
 def search(points: Array, x: Array, region: Array, gate: float) -> Array:
-    """Return squared Mahalanobis distances (G, M) of points (M, 2) from groups, inf outside the search region (eq.
+    """Returns squared Mahalanobis distances (G, M) of points (M, 2) from groups, inf outside the search region (eq.
     2.2).
 
     x (G, 4): centroid x, y, velocity; region (G, 2, 2): covariance of each group's search region, in the squared unit
@@ -72,7 +72,7 @@ def search(points: Array, x: Array, region: Array, gate: float) -> Array:
 
 @njit(cache=True)
 def any_within(place: Array, points: Array, reach: float) -> Bools:
-    """Return flags (K,): True if any of the points (M, 2) is at most `reach` from the place (K, 2); all in one unit.
+    """Returns flags (K,): True if any of the points (M, 2) is at most `reach` from the place (K, 2); all in one unit.
 
     Without points all are False. reach: above 0. The points of a place's cell and of the cells around it are compared.
     """

@@ -42,7 +42,7 @@ NEWCOMERS = 0.02
 
 @njit(cache=True)
 def running_moments(points: Array, weights: Array, x: float, y: float, start: int) -> tuple[Array, Array, Array]:
-    """Return people (J,), centroid (J, 2) relative to (x, y) and covariance (J, 3) xx, xy, yy of each association's
+    """Returns people (J,), centroid (J, 2) relative to (x, y) and covariance (J, 3) xx, xy, yy of each association's
     points.
 
     points (M, 2), weights (M,): people each stands for. Association j = 0, 1, … M - start has the first start + j
@@ -67,7 +67,7 @@ def running_moments(points: Array, weights: Array, x: float, y: float, start: in
 
 @njit(cache=True)
 def running_ages(weights: Array, age: Array, start: int) -> tuple[Array, Array]:
-    """Return the people (J,) measured in this frame and the mean age (J,) in s of each association's points.
+    """Returns the people (J,) measured in this frame and the mean age (J,) in s of each association's points.
 
     weights (M,): people that each point stands for; age (M,): time since it was measured, 0 in this frame. Association
     j = 0, 1, … M - start has the first start + j points. Both are 0 for an association without points.
@@ -85,7 +85,7 @@ def running_ages(weights: Array, age: Array, start: int) -> tuple[Array, Array]:
 
 @njit(cache=True)
 def log_count(people: float, size: float, width: float) -> float:
-    """Return log m_N (sec. 4.2), the log density, per person, of seeing `people` people in a group of `size` people.
+    """Returns log m_N (sec. 4.2), the log density, per person, of seeing `people` people in a group of `size` people.
 
     It is a Gaussian about `size` with variance `width`, people^2. Departure: a small part with the density
     (size + 1) / (size + 1 + people)^2, which does not depend on the width, gives it tails, because people who join a
@@ -99,7 +99,7 @@ def log_count(people: float, size: float, width: float) -> float:
 def centroid_noise(
     counted: float, seen: float, cov: Array, extent: Array, size: float, rules: Array
 ) -> tuple[float, float, float]:
-    """Return R (xx, xy, yy), the covariance of the centroid of m = `counted` people about that of all n people there.
+    """Returns R (xx, xy, yy), the covariance of the centroid of m = `counted` people about that of all n people there.
 
     Of the people counted, `seen` > 0 were measured in this frame; the others are missed members. n = size /
     DETECT_PROB, size: people of the group that are counted on average. cov (3,): covariance xx, xy, yy of the people
@@ -131,7 +131,7 @@ def centroid_noise(
 
 @njit(cache=True)
 def log_density(dx: float, dy: float, S: Array) -> float:
-    """Return log m_d (sec. 4.2): the log of the Gaussian density N((dx, dy); 0, S), per unit of area.
+    """Returns log m_d (sec. 4.2): the log of the Gaussian density N((dx, dy); 0, S), per unit of area.
 
     S (3,): covariance xx, xy, yy, positive definite, in the squared unit of dx and dy.
     """
@@ -142,7 +142,7 @@ def log_density(dx: float, dy: float, S: Array) -> float:
 
 @njit(cache=True)
 def log_miss(weights: Array, start: int, region: Array, size: float, rules: Array) -> float:
-    """Return the log mass of the miss hypothesis (ours): no point is the group's; -inf if MISS_PROB is 0 (no
+    """Returns the log mass of the miss hypothesis (ours): no point is the group's; -inf if MISS_PROB is 0 (no
     hypothesis).
 
     The mass is the hypothesis' relative weight. weights (M,): people that each point stands for; start: number of

@@ -38,7 +38,7 @@ class ExpectedMembers:
 
 
 def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> ExpectedMembers:
-    """Return the expected members, at time t (s), of the confirmed groups that were measured lately."""
+    """Returns the expected members, at time t (s), of the confirmed groups that were measured lately."""
     recent = t - bank.last_seen <= max(scaled.config.carry_time, scaled.dt) + 1e-9
     rows = np.flatnonzero(bank.confirmed & recent).tolist()
     places = [bank.positions(r) for r in rows]

@@ -23,7 +23,7 @@ SMOOTHING = 0.05
 
 
 def colour_bins(image: Image, points: Array) -> Ints:
-    """Return the colour histogram bin (M,), 0 to 63, of the pixel at each point (M, 2) u, v in px: blue + 4 green + 16
+    """Returns the colour histogram bin (M,), 0 to 63, of the pixel at each point (M, 2) u, v in px: blue + 4 green + 16
     red, 4 levels each."""
     u, v = points.astype(np.int64).T
     level = image[v, u].astype(np.int64) * LEVELS // 256
@@ -31,7 +31,7 @@ def colour_bins(image: Image, points: Array) -> Ints:
 
 
 def colour_log_ratio(bank: GroupBank, d2: Array, bins: Ints) -> Array:
-    """Return log p(c | g) - log p(c | other groups) (G, M) of each point's colour c for each group g."""
+    """Returns log p(c | g) - log p(c | other groups) (G, M) of each point's colour c for each group g."""
     ratio, may = np.zeros(d2.shape), np.isfinite(d2)
     count = may.sum(0)
     shared = np.flatnonzero(count > 1)

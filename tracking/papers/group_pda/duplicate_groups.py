@@ -20,7 +20,7 @@ LEAST_MEASURED = 0.55
 
 
 def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
-    """Return True if so few people of the groups in rows i and j of the bank are measured that the two may be one
+    """Returns True if so few people of the groups in rows i and j of the bank are measured that the two may be one
     group."""
     return bool(LEAST_MEASURED * (bank.size[i] + bank.size[j]) > bank.own_people[i] + bank.own_people[j])
 

@@ -51,7 +51,7 @@ class PairHistory:
     moments: list[PairMoment]
 
     def merge_onset(self, merge_velocity: float) -> tuple[float, Array]:
-        """Return when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit:
+        """Returns when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit:
         half-way between the centroids."""
         t, d = np.array([m.t for m in self.moments]), np.array([m.difference for m in self.moments])
         before = (chords(t, d, MERGE_CHORD) > MERGE_CHORD_MARGIN * merge_velocity) & (t <= self.alike_since)
@@ -61,7 +61,7 @@ class PairHistory:
 
 
 def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Array:
-    """Return speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords from `half` s before to
+    """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords from `half` s before to
     after."""
     k, middle = np.arange(len(t)), t
     if full_length:
@@ -74,8 +74,8 @@ def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Arr
 def split_onset(
     recent: list[tuple[float, Array]], parts: list[Array], metres_per_unit: Array, body_cov: Array, known: float
 ) -> tuple[float, Array]:
-    """Return when, in s, a group began to divide into two parts, and its centroid (2,) at that time, in the unit of the
-    points."""
+    """Returns when, in s, a group began to divide into two parts, and its centroid (2,) at that time, in the points'
+    unit."""
     before = [(t, y * metres_per_unit) for t, y in recent if t <= known + 1e-9]
     if len(before) < 2:
         t, y = before[0] if before else (known, parts[0] * metres_per_unit)

@@ -60,21 +60,21 @@ class ForegroundPoints:
         return np.asarray(np.eye(2) * np.square(self.person / 4), np.float64)
 
     def points(self, image: Image, outlines: list[Array]) -> Array | None:
-        """Return the grid points (M, 2) u, v in px that are foreground; None if too much is foreground."""
+        """Returns the grid points (M, 2) u, v in px that are foreground; None if too much is foreground."""
         seen = self.foreground.segment(image)
         self.foreground.adapt(seen, convex_areas(self.foreground.shape, outlines))
         return grid_points(seen.mask, self.step) if seen.plausible else None
 
 
 def grid_points(mask: Bools, step: int) -> Array:
-    """Return u, v (M, 2) in px of the centres of the foreground pixels on a grid of every `step`-th pixel, by rows."""
+    """Returns u, v (M, 2) in px of the centres of the foreground pixels on a grid of every `step`-th pixel, by rows."""
     first = step // 2
     v, u = np.nonzero(mask[first::step, first::step])
     return np.asarray(np.stack([u, v], 1) * float(step) + (first + 0.5), np.float64)
 
 
 def sine_tilt(camera: Camera | None) -> float:
-    """Return the sine of the camera's downward tilt, the factor by which depth on the ground is shortened in the
+    """Returns the sine of the camera's downward tilt, the factor by which depth on the ground is shortened in the
     image."""
     return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_SINE_TILT))
 

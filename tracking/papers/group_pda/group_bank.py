@@ -65,7 +65,7 @@ class GroupBank:
 
     @classmethod
     def empty(cls, colour_bins: int = 0) -> GroupBank:
-        """Return a bank without groups; colour_bins: columns C of colour_hist, 0 without colours."""
+        """Returns a bank without groups; colour_bins: columns C of colour_hist, 0 without colours."""
         none, ids, two = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 2))
         four = np.zeros((0, 4))
         return cls(
@@ -82,7 +82,7 @@ class GroupBank:
         return np.asarray(self.id != NO_ID)
 
     def positions(self, row: int) -> Array:
-        """Return the positions (K, 2) x, y of the members of the group in `row`: last measured places, moved with its
+        """Returns the positions (K, 2) x, y of the members of the group in `row`: last measured places, moved with its
         centroid."""
         return self.members[row].offset + self.x[row, :2]
 
@@ -110,7 +110,7 @@ class GroupBank:
 
 
 def alike_velocities(difference: Array, covariance: Array, doubt: float, scaled: ScaledParameters) -> Bools:
-    """Return flags (...): True where two velocities differ by at most `merge_velocity` and `doubt` standard deviations
+    """Returns flags (...): True where two velocities differ by at most `merge_velocity` and `doubt` standard deviations
     of the difference (ours, in place of SR_v of sec. 3.1)."""
     metres = scaled.metres_per_unit
     sd = np.sqrt(np.einsum("...aa,a->...", covariance, np.square(metres)) / 2)
@@ -119,7 +119,7 @@ def alike_velocities(difference: Array, covariance: Array, doubt: float, scaled:
 
 
 def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float) -> GroupBank:
-    """Return a bank of tentative groups made from points alone (sec. 3.3), with velocity 0, in order of group
+    """Returns a bank of tentative groups made from points alone (sec. 3.3), with velocity 0, in order of group
     number."""
     count = int(group.max(initial=-1)) + 1
     if not count:

@@ -93,7 +93,7 @@ class GroupMerging:
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
-    """Return a bank of one row, the union (eq. 3.1) of the groups in `rows` (at least one); `bank` is not changed."""
+    """Returns a bank of one row, the union (eq. 3.1) of the groups in `rows` (at least one); `bank` is not changed."""
     size = np.asarray(bank.size[rows].sum())
     w = bank.size[rows] / size
     x = w @ bank.x[rows]

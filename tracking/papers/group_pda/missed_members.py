@@ -25,7 +25,7 @@ RECENT_POINTS = 64
 
 
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:
-    """Return new claims with the members missed at time t (s) appended as points that only their own group may have."""
+    """Returns new claims with the members missed at time t (s) appended as points of their own group alone."""
     has_points = np.asarray(np.isfinite(claims.d2).any(axis=1))
     has_points[claims.owner[claims.owner >= 0]] = True
     place, row, last_seen = missed_members(bank, claims.points, scaled, t)
@@ -42,7 +42,7 @@ def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledPara
 
 
 def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> tuple[Array, Ints, Array]:
-    """Return the places (K, 2), rows of the bank (K,) and last measurements (K,) in s of the members missed at time t
+    """Returns the places (K, 2), rows of the bank (K,) and last measurements (K,) in s of the members missed at time t
     (s)."""
     c, recent = scaled.config, []
     if c.carry_time > 0 and not scaled.from_pixels:
@@ -59,7 +59,7 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
 
 
 def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: ScaledParameters, t: float) -> None:
-    """Store each group's points of this frame as its members and recent points, in the bank, in place."""
+    """Stores each group's points of this frame as its members and recent points, in the bank, in place."""
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
         kept = [p for p in bank.recent_points[row] if p[0] > t - RECENT_TIME]
@@ -74,7 +74,7 @@ def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: Sca
 
 
 def thinned(points: Array) -> Array:
-    """Return at most RECENT_POINTS = 64 of the points (M, 2), selected by a hash of their coordinates."""
+    """Returns at most RECENT_POINTS = 64 of the points (M, 2), selected by a hash of their coordinates."""
     if len(points) <= RECENT_POINTS:
         return points
     scattered = np.sin(points @ np.array([12.9898, 78.233])) * 43758.5453

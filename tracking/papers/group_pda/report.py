@@ -37,7 +37,7 @@ class ReportFrame:
 def report_tracks(
     bank: GroupBank, events: list[WholeGroupEvent], scaled: ScaledParameters, frame: ReportFrame
 ) -> Tracks:
-    """Return Tracks with unit "group", sorted by id, of the confirmed groups measured within the last
+    """Returns Tracks with unit "group", sorted by id, of the confirmed groups measured within the last
     `report_coast` s."""
     rows = np.flatnonzero(bank.confirmed & (frame.t - bank.last_seen <= scaled.config.report_coast + 1e-9))
     rows = rows[np.argsort(bank.id[rows])]

@@ -63,7 +63,7 @@ class ScaledParameters:
 def scale_parameters(
     config: GroupPdaConfig, fps: float, scale: float, body_cov: Array | None = None, sine_tilt: float = 1.0
 ) -> ScaledParameters:
-    """Return the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre."""
+    """Returns the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre."""
     c, dt, pixels = config, 1 / fps, body_cov is not None
     point_sd = scale * (c.pixel_noise if pixels else c.point_noise)
     prior = (scale * c.person_spread) ** 2 * np.eye(2) if body_cov is None else body_cov
@@ -115,7 +115,7 @@ def _kernel_rules(
 
 
 def gate_factor(gate: float) -> float:
-    """Return c, below 1: Gaussian points in the plane that lie within the gate have c times the covariance of all
+    """Returns c, below 1: Gaussian points in the plane that lie within the gate have c times the covariance of all
     points."""
     tail = np.exp(-gate / 2)
     return float((1 - tail * (1 + gate / 2)) / (1 - tail))

@@ -52,7 +52,7 @@ def split(
 def children(
     bank: GroupBank, row: int, points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float
 ) -> GroupBank:
-    """Return a bank of the groups into which the group in `row` splits; `bank` is not changed."""
+    """Returns a bank of the groups into which the group in `row` splits; `bank` is not changed."""
     parts = newborn(points, weights, group, scaled, t)
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:] = bank.colour_hist[row]

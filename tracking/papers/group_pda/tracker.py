@@ -101,7 +101,7 @@ class GroupPda:
         return self.context.px_per_m
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Return the groups and events of the frame, as Tracks with unit "group"; updates all groups.
+        """Returns the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
         Order: predict; gate, associate, update, split (Fig. 1), births; duplicates; merge; confirm; remove lost groups.
         From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
@@ -153,7 +153,7 @@ class GroupPda:
         return FOOTPRINT * self.context.px_per_m if self.usual_box is None else SQUARE * self.usual_box / 2
 
     def outlines(self) -> list[Array]:
-        """Return points (V, 2) u, v in px round the places of each confirmed group: the corners of whole grid cells.
+        """Returns points (V, 2) u, v in px round the places of each confirmed group: the corners of whole grid cells.
 
         From points they are the corners of footprints or usual boxes, in the unit of the points.
         """

@@ -96,7 +96,7 @@ class JointConfig(BackgroundSettings):
         return np.array([self.merge_weights, self.split_weights])
 
     def rules(self, dt: float, lag: float) -> Array:
-        """Return the rules (5,) of events in a step of dt s, as group_events_kernels has them; lag: s, a whole number
+        """Returns the rules (5,) of events in a step of dt s, as group_events_kernels has them; lag: s, a whole number
         of frames."""
         every = self.algorithm == "paper"
         return np.array([dt / lag, self.validity_rate * lag, every, SIZE_MEAN, self.size_std])

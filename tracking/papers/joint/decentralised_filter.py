@@ -29,13 +29,13 @@ class Distributions(Protocol):
         pi(x'_k | x_k, y)."""
 
     def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
-        """Return the log (N_x, N_z) of p(X' | X, Z) / p_0(X' | X)."""
+        """Returns the log (N_x, N_z) of p(X' | X, Z) / p_0(X' | X)."""
 
     def groups(self, new: Array, x: Array, z: Ints) -> Ints:
         """Step 7: return Z' (N_x, N_z, ...) drawn from pi(Z' | X', X, Z, y)."""
 
     def energy(self, new: Array, z: Ints) -> Array:
-        """Return the log (N_x, N_z) of p(Z' | X'), the part of p(y | X', Z') of eq. 4 that depends on Z'."""
+        """Returns the log (N_x, N_z) of p(Z' | X'), the part of p(y | X', Z') of eq. 4 that depends on Z'."""
 
 
 @dataclass
@@ -54,26 +54,26 @@ class Nested:
 
     @classmethod
     def empty(cls, shape: tuple[int, int], size: int) -> Nested:
-        """Return particles of no component; shape: N_x, N_z; size: D."""
+        """Returns particles of no component; shape: N_x, N_z; size: D."""
         log_q = np.full(shape, -np.log(shape[1]))
         x, z, log_w = np.zeros((shape[0], 0, size)), np.zeros((*shape, 0), np.int64), np.zeros((shape[0], 0))
         return cls(x, z, log_q, log_w, np.zeros(shape[0]))
 
     def weights(self) -> Array:
-        """Return the weights w of step 1, (N_x,), sum 1."""
+        """Returns the weights w of step 1, (N_x,), sum 1."""
         return normalised(self.log_w.sum(axis=1) + self.log_rest)
 
     def rest_weights(self) -> Array:
-        """Return the weights of what X as a whole adds, (N_x,), sum 1."""
+        """Returns the weights of what X as a whole adds, (N_x,), sum 1."""
         return normalised(self.log_rest)
 
     def component_weights(self) -> Array:
-        """Return the weights of each component alone, (N_x, K), sum 1 for each component."""
+        """Returns the weights of each component alone, (N_x, K), sum 1 for each component."""
         return normalised(self.log_w.T).T
 
 
 def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
-    """Return the particles of the next frame: steps 4 to 7, then 1 and 3. `old` is as after step 2."""
+    """Returns the particles of the next frame: steps 4 to 7, then 1 and 3. `old` is as after step 2."""
     new, log_w = model.individuals(old.x)  # step 4
     log_q = old.log_q + model.dynamics(new, old.x, old.z)  # step 5
     log_dynamics = log_sum(log_q)  # p_{N_z}(X' | X) / p_0(X' | X)
@@ -86,24 +86,24 @@ def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
 
 
 def joint_indices(nested: Nested, uniform: float) -> Ints:
-    """Return the indices (N_x,) of step 2 by the weights of step 1."""
+    """Returns the indices (N_x,) of step 2 by the weights of step 1."""
     return np.asarray(systematic_resample_rows(nested.weights()[None], np.array([uniform]))[0])
 
 
 def component_indices(nested: Nested, uniforms: Array) -> tuple[Ints, Ints]:
-    """Return the indices of step 2 in two stages (ours): (N_x, K) of each component alone, then (N_x,) of the rest."""
+    """Returns the indices of step 2 in two stages (ours): (N_x, K) of each component alone, then (N_x,) of the rest."""
     single = systematic_resample_rows(nested.component_weights().T, uniforms[:-1]).T
     rest = systematic_resample_rows(nested.rest_weights()[None], uniforms[-1:])[0]
     return single, rest
 
 
 def effective_share(weights: Array) -> float:
-    """Return the effective number of particles as a share of them; weights (N,), sum 1."""
+    """Returns the effective number of particles as a share of them; weights (N,), sum 1."""
     return effective_number(weights) / len(weights)
 
 
 def log_sum(values: Array) -> Array:
-    """Return log(sum(exp(values))) over the last axis; -inf where all are."""
+    """Returns log(sum(exp(values))) over the last axis; -inf where all are."""
     top = values.max(axis=-1, keepdims=True)
     top = np.where(np.isfinite(top), top, 0.0)
     with np.errstate(divide="ignore"):
@@ -111,6 +111,6 @@ def log_sum(values: Array) -> Array:
 
 
 def normalised(log_weights: Array) -> Array:
-    """Return weights that sum to 1 over the last axis."""
+    """Returns weights that sum to 1 over the last axis."""
     weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))
     return np.asarray(weights / weights.sum(axis=-1, keepdims=True))

@@ -120,13 +120,13 @@ class FrameModel:
 
 
 def newest(x: Array) -> Array:
-    """Return the newest states of X, (N_x, K, 4), contiguous."""
+    """Returns the newest states of X, (N_x, K, 4), contiguous."""
     return np.ascontiguousarray(x[..., :STATE])
 
 
 @cache
 def stam_cumulated(people: int) -> Array:
-    """Return the cumulated probabilities of m = 1, 2, ... boxes in Stam's sampler of partitions: m^K / m!, sum 1."""
+    """Returns the cumulated probabilities of m = 1, 2, ... boxes in Stam's sampler of partitions: m^K / m!, sum 1."""
     m = np.arange(1, 4 * people + 40)
     log_p = people * np.log(m) - np.array([math.lgamma(k + 1) for k in m.tolist()])
     p = np.exp(log_p - log_p.max())

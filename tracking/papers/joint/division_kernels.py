@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sim.compiler import njit
+from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
 from tracking.filters.cell_list_kernels import empty_list, grid_of, insert, nearest_place, remove
 from tracking.papers.joint.partition_kernels import APART, SCATTER, validity_of
@@ -61,7 +62,7 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
 
 @njit(cache=True)
 def members_of(cluster: Ints, g: int) -> Ints:
-    """Return the people (n,) of cluster g, ascending; cluster (K,)."""
+    """Returns the people (n,) of cluster g, ascending; cluster (K,)."""
     n = 0
     out = np.empty(len(cluster), np.int64)
     for k in range(len(cluster)):
@@ -72,19 +73,8 @@ def members_of(cluster: Ints, g: int) -> Ints:
 
 
 @njit(cache=True)
-def rank(values: Array, n: int, out: Ints) -> None:
-    """Write the order of the first n values, ascending, equal ones as they come, into out (n or more,)."""
-    for k in range(n):
-        at = k
-        while at > 0 and values[out[at - 1]] > values[k]:
-            out[at] = out[at - 1]
-            at -= 1
-        out[at] = k
-
-
-@njit(cache=True)
 def candidates(points: Array) -> Ints:
-    """Return the candidate divisions of n points (n, D), (C, n): the side of each point, 0 or 1; both sides occur."""
+    """Returns the candidate divisions of n points (n, D), (C, n): the side of each point, 0 or 1; both sides occur."""
     n, dims = points.shape
     if n <= MOST_LISTED:
         count = 2 ** (n - 1) - 1
@@ -118,11 +108,12 @@ def candidates(points: Array) -> Ints:
             length += new[d] ** 2
         for d in range(dims):
             axis[d] = new[d] / max(math.sqrt(length), 1e-12)
+    ranked = np.empty(n, np.int64)
     for k in range(n):
+        ranked[k] = k
         for d in range(dims):
             along[k] += away[k, d] * axis[d]
-    ranked = np.empty(n, np.int64)
-    rank(along, n, ranked)
+    sort_by(along, ranked)
     for cut in range(1, n):
         for k in range(cut):
             sides[n + cut - 1, ranked[k]] = 1

@@ -9,14 +9,14 @@ from tracking.papers.joint import partition_kernels
 
 
 def moments(state: Array, weights: Array) -> tuple[Array, Array]:
-    """Return means (K, 4) and covariances (K, 4, 4) of states (N_x, K, 4); weights (N_x, K): sum 1 for each person."""
+    """Returns means (K, 4) and covariances (K, 4, 4) of states (N_x, K, 4); weights (N_x, K): sum 1 for each person."""
     mean = np.einsum("ik,ikd->kd", weights, state)
     away = state - mean
     return mean, np.einsum("ik,ikd,ike->kde", weights, away, away)
 
 
 def kept_while_missed(now: Array, id: Ints, seen: Bools, before: Array, before_id: Ints) -> Array:
-    """Return the probability that each pair is in one group, (K, K), which stays while one of the two is not measured
+    """Returns the probability that each pair is in one group, (K, K), which stays while one of the two is not measured
     (ours)."""
     out = now.copy()
     _, new, old = np.intersect1d(id, before_id, assume_unique=True, return_indices=True)
@@ -26,7 +26,7 @@ def kept_while_missed(now: Array, id: Ints, seen: Bools, before: Array, before_i
 
 
 def binder_partition(together: Array, label: Ints, before: Ints) -> list[Ints]:
-    """Return the groups of two or more people, as arrays of rows: the partition of least expected Binder loss
+    """Returns the groups of two or more people, as arrays of rows: the partition of least expected Binder loss
     (ours)."""
     gain = together - 0.5
     sampled = np.empty(len(together), np.int64)
@@ -37,14 +37,14 @@ def binder_partition(together: Array, label: Ints, before: Ints) -> list[Ints]:
 
 
 def histogram_partition(label: Ints, weights: Array) -> list[Ints]:
-    """Return the groups of two or more people by the histogram of Fig. 3: each person has the label of most weight."""
+    """Returns the groups of two or more people by the histogram of Fig. 3: each person has the label of most weight."""
     votes = np.empty((label.shape[2], label.shape[2]))
     partition_kernels.head_votes(label, weights, votes)
     return groups_of(votes.argmax(axis=1))
 
 
 def groups_of(label: Ints) -> list[Ints]:
-    """Return the rows of each label (K,) that two or more people carry."""
+    """Returns the rows of each label (K,) that two or more people carry."""
     found = (np.flatnonzero(label == g) for g in np.unique(label))
     return [rows for rows in found if len(rows) > 1]
 

@@ -12,9 +12,10 @@ import math
 import numpy as np
 
 from sim.compiler import njit
+from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
 from tracking.filters.cell_list_kernels import nearest_places
-from tracking.papers.joint.division_kernels import divide, rank
+from tracking.papers.joint.division_kernels import divide
 from tracking.papers.joint.partition_kernels import clusters, same_row
 
 SIZE, X, Y, VX, VY, XX, XY, YY, SPREAD = range(9)
@@ -37,7 +38,7 @@ ORDER, EVENT, PARTS = range(3)
 
 @njit(cache=True)
 def moments_of(state: Array, cluster: Ints, count: int, out: Array) -> None:
-    """Write the moments (G, 9) of the clusters of people: state (K, 4), cluster (K,), count G."""
+    """Writes the moments (G, 9) of the clusters of people: state (K, 4), cluster (K,), count G."""
     n = len(cluster)
     out[:count] = 0.0
     for k in range(n):
@@ -64,7 +65,7 @@ def moments_of(state: Array, cluster: Ints, count: int, out: Array) -> None:
 
 @njit(cache=True)
 def log_symmetric_kl(a: Array, b: Array) -> float:
-    """Return log(1 + d_KL) of two rows of moments, at most LOG_KL_MOST; d_KL is the sum of both directions.
+    """Returns log(1 + d_KL) of two rows of moments, at most LOG_KL_MOST; d_KL is the sum of both directions.
 
     With covariances A, B and difference d of the means: (tr(A^-1 B) + tr(B^-1 A) - 4 + d' (A^-1 + B^-1) d) / 2.
     """
@@ -78,7 +79,7 @@ def log_symmetric_kl(a: Array, b: Array) -> float:
 
 @njit(cache=True)
 def features_of(early: Array, late: Array, g: int, other: int, out: Array) -> None:
-    """Write the six features of cluster g and its nearest cluster `other` (-1: none); early, late: moments
+    """Writes the six features of cluster g and its nearest cluster `other` (-1: none); early, late: moments
     (G, 9)."""
     for k in range(2):
         moments = early if k == 0 else late
@@ -92,7 +93,7 @@ def features_of(early: Array, late: Array, g: int, other: int, out: Array) -> No
 
 @njit(cache=True)
 def partition_features(early: Array, late: Array, label: Ints, features: Array, nearest: Ints, head: Ints) -> int:
-    """Write features (G, 6), nearest cluster and head of each cluster of one partition; return G.
+    """Writes features (G, 6), nearest cluster and head of each cluster of one partition; return G.
 
     early, late (K, 4): states at both times; label (K,): the partition.
     """
@@ -112,7 +113,7 @@ def partition_features(early: Array, late: Array, label: Ints, features: Array, 
 def event_probabilities(
     features: Array, size: float, other: float, weights: Array, rules: Array
 ) -> tuple[float, float]:
-    """Return the probabilities of Merge and Split of a group in a step: pi(e | X, g, g'), eq. 7.
+    """Returns the probabilities of Merge and Split of a group in a step: pi(e | X, g, g'), eq. 7.
 
     features (6,); size, other: people in g and g', other = 0 if a merge is excluded; weights (2, 7): of Merge and
     Split, the constant last; rules: as RATIO and the following. The classifier gives probabilities over the lag,
@@ -185,10 +186,11 @@ def propose(
             for g in range(count):
                 order[g] = uniforms[i, j, head[g], ORDER]
                 changed[g] = visited[g] = False
+                visits[g] = g
                 happens = happens or uniforms[i, j, head[g], EVENT] < merge[g] + split[g]
             if not happens:
                 continue
-            rank(order, count, visits)
+            sort_by(order, visits[:count])
             for g in visits[:count]:
                 if changed[g]:
                     continue

@@ -16,20 +16,20 @@ from tracking.papers.joint.individuals_kernels import CROSS, PLACE, RATE, own_dy
 
 
 def process_noise(place: float, velocity: float, dt: float) -> Array:
-    """Return Sigma of one axis, (3,): white acceleration of root density `velocity`, m/s^1.5, and jitter of the place
+    """Returns Sigma of one axis, (3,): white acceleration of root density `velocity`, m/s^1.5, and jitter of the place
     of root density `place`, m/s^0.5, over dt s."""
     density = velocity**2
     return np.array([density * dt**3 / 3 + place**2 * dt, density * dt**2 / 2, density * dt])
 
 
 def precision_of(cov: Array) -> tuple[Array, float]:
-    """Return the precision (3,) of one axis and the log density at the mean of both axes together; cov (3,)."""
+    """Returns the precision (3,) of one axis and the log density at the mean of both axes together; cov (3,)."""
     det = cov[PLACE] * cov[RATE] - cov[CROSS] ** 2
     return np.array([cov[RATE], -cov[CROSS], cov[PLACE]]) / det, float(-2 * np.log(2 * np.pi) - np.log(det))
 
 
 def log_density(x: Array, mean: Array, cov: Array) -> Array:
-    """Return log N(x; mean, Sigma) of states (N, K, 4) with Sigma of one axis cov (3,), (N, K)."""
+    """Returns log N(x; mean, Sigma) of states (N, K, 4) with Sigma of one axis cov (3,), (N, K)."""
     precision, scale = precision_of(cov)
     out = np.empty(x.shape[:2])
     own_dynamics(np.ascontiguousarray(x), np.ascontiguousarray(mean), precision, scale, 0.0, out)
@@ -37,7 +37,7 @@ def log_density(x: Array, mean: Array, cov: Array) -> Array:
 
 
 def moved(state: Array, dt: float) -> Array:
-    """Return A x: states (..., 4) that went on for dt s."""
+    """Returns A x: states (..., 4) that went on for dt s."""
     out = state.copy()
     out[..., :2] += dt * state[..., 2:]
     return out
@@ -59,7 +59,7 @@ class Proposal:
     informed: bool
 
     def draw(self, state: Array, z: Array, normals: Array, uniforms: Array) -> tuple[Array, Array]:
-        """Return new states (N, K, 4) and (N, K): log of p(y | x') N(x'; A x, Sigma) / pi(x')."""
+        """Returns new states (N, K, 4) and (N, K): log of p(y | x') N(x'; A x, Sigma) / pi(x')."""
         mean = moved(state, self.dt)
         seen = np.isfinite(z[:, 0])
         target, cov = self.detected(mean, np.where(seen[:, None], z, 0.0))
@@ -74,7 +74,7 @@ class Proposal:
         return new, np.where(seen, log_seen, 0.0)
 
     def detected(self, mean: Array, z: Array) -> tuple[Array, Array]:
-        """Return mean (N, K, 4) and covariance (3,) of pi_det; mean: A x; z (K, 2)."""
+        """Returns mean (N, K, 4) and covariance (3,) of pi_det; mean: A x; z (K, 2)."""
         target = mean.copy()
         if not self.informed:
             target[..., :2] = z
@@ -87,7 +87,7 @@ class Proposal:
         return target, np.array([a - gain[PLACE] * a, b - gain[PLACE] * b, c - gain[CROSS] * b])
 
     def log_likelihood(self, state: Array, z: Array) -> Array:
-        """Return log p(y | x) (N, K), normal about the place: exp(-lambda d) with the squared distance as d (ours)."""
+        """Returns log p(y | x) (N, K), normal about the place: exp(-lambda d) with the squared distance as d (ours)."""
         square = ((z - state[..., :2]) ** 2).sum(axis=-1)
         return np.asarray(-square / (2 * self.noise**2) - np.log(2 * np.pi * self.noise**2))
 

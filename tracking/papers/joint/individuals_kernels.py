@@ -14,7 +14,7 @@ PLACE, CROSS, RATE = range(3)
 
 @njit(cache=True)
 def log_normal(residual: Array, precision: Array, log_scale: float) -> float:
-    """Return log N(residual; 0, Sigma) of a state's residual (4,) x, y, vx, vy; log_scale: of the density at 0."""
+    """Returns log N(residual; 0, Sigma) of a state's residual (4,) x, y, vx, vy; log_scale: of the density at 0."""
     total = 0.0
     for d in range(2):
         place, rate = residual[d], residual[d + 2]
@@ -26,7 +26,7 @@ def log_normal(residual: Array, precision: Array, log_scale: float) -> float:
 def group_dynamics(
     new: Array, old: Array, label: Ints, precision: Array, log_scale: float, dt: float, share: float, out: Array
 ) -> None:
-    """Write log p(X_{t+1} | X_t, Z_t) of each partition, (N_x, N_z), eq. 5: N(x + B g, Sigma) for each person.
+    """Writes log p(X_{t+1} | X_t, Z_t) of each partition, (N_x, N_z), eq. 5: N(x + B g, Sigma) for each person.
 
     new, old (N_x, K, 4): states; label (N_x, N_z, K); precision (3,): as PLACE, CROSS, RATE; dt: s. g is the mean of
     the person's group; only places move with its velocity. g of a person alone is the own state, not that of all
@@ -61,7 +61,7 @@ def group_dynamics(
 
 @njit(cache=True)
 def own_dynamics(new: Array, old: Array, precision: Array, log_scale: float, dt: float, out: Array) -> None:
-    """Write log N(x_{t+1}; A x_t, Sigma) of each person, (N_x, K), eq. 3; dt = 0: the person stands still."""
+    """Writes log N(x_{t+1}; A x_t, Sigma) of each person, (N_x, K), eq. 3; dt = 0: the person stands still."""
     particles, n, _ = new.shape
     residual = np.empty(4)
     for i in range(particles):

@@ -52,7 +52,7 @@ class ParticleHealth:
         self.ancestor = self.ancestor[:, rows]
 
     def summary(self) -> dict[str, float | None]:
-        """Return means over frames: shares of effective particles and of distinct ancestors; None without frames."""
+        """Returns means over frames: shares of effective particles and of distinct ancestors; None without frames."""
         frames = self.frames
         return {
             "effective_particles": self.effective / frames if frames else None,

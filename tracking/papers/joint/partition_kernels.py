@@ -21,7 +21,7 @@ SCATTER, APART = range(2)
 
 @njit(cache=True)
 def same_row(a: Ints, b: Ints) -> bool:
-    """Return True if two labels (K,) are equal."""
+    """Returns True if two labels (K,) are equal."""
     k = 0
     while k < len(a) and a[k] == b[k]:
         k += 1
@@ -58,7 +58,7 @@ def relabel(label: Ints) -> None:
 
 @njit(cache=True)
 def clusters(label: Ints, cluster: Ints, head: Ints) -> int:
-    """Write the cluster of each person, (K,), numbered from 0 by their heads, and the heads; return their number G.
+    """Writes the cluster of each person, (K,), numbered from 0 by their heads, and the heads; return their number G.
 
     head (K,): the first G entries are the least person of each cluster.
     """
@@ -75,7 +75,7 @@ def clusters(label: Ints, cluster: Ints, head: Ints) -> int:
 
 @njit(cache=True)
 def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre: Array, scatter: Array) -> float:
-    """Return d_cl(Z, X) of one partition: the Davies-Bouldin index with a prior scatter (ours).
+    """Returns d_cl(Z, X) of one partition: the Davies-Bouldin index with a prior scatter (ours).
 
     points (K, D): the data that are clustered; the tracker gives the paper's X: states x, y, m, and vx, vy, m/s.
     cluster (K,): number of each person's cluster, below `count`; scales: as SCATTER, APART. centre (K, D), scatter
@@ -144,7 +144,7 @@ def _worst_near(centre, scatter, scales, worst):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def validities(points: Array, label: Ints, scales: Array, out: Array) -> None:
-    """Write d_cl(Z, X) of each partition, (N_x, N_z); points (N_x, K, D); label (N_x, N_z, K).
+    """Writes d_cl(Z, X) of each partition, (N_x, N_z); points (N_x, K, D); label (N_x, N_z, K).
 
     points: as validity_of.
     """
@@ -162,7 +162,7 @@ def validities(points: Array, label: Ints, scales: Array, out: Array) -> None:
 
 @njit(cache=True)
 def next_member(k: int, label: Ints, last: Ints, following: Ints) -> int:
-    """Return the first member of person k's group who is before k, -1 without one, and add k to the members.
+    """Returns the first member of person k's group who is before k, -1 without one, and add k to the members.
 
     To be called for k = 0, 1, ... of a label (K,). following (K,): the next member of the group, up to k; last (K,):
     the last one so far, by heads. A loop over members costs no more the more other people there are.
@@ -189,7 +189,7 @@ def _pair_sum(worth, label, last, following):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def pair_sums(worth: Array, label: Ints, out: Array) -> None:
-    """Write the sum of worth (K, K) over the pairs in one group of each partition, (N_x, N_z); label (N_x, N_z, K)."""
+    """Writes the sum of worth (K, K) over the pairs in one group of each partition, (N_x, N_z); label (N_x, N_z, K)."""
     particles, partitions, n = label.shape
     last, following = np.empty(n, np.int64), np.empty(n, np.int64)
     for i in range(particles):
@@ -202,7 +202,7 @@ def pair_sums(worth: Array, label: Ints, out: Array) -> None:
 
 @njit(cache=True)
 def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
-    """Write partitions drawn uniformly from all partitions of K people, (N_x, N_z, K) (VAR2).
+    """Writes partitions drawn uniformly from all partitions of K people, (N_x, N_z, K) (VAR2).
 
     Stam's sampler: a number of boxes m is drawn with probabilities proportional to m^K / m!, whose cumulated values
     for m = 1, 2, ... are `cumulated`; then each person is thrown into one of m boxes. uniforms (N_x, N_z, K + 1).
@@ -218,7 +218,7 @@ def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
 
 @njit(cache=True)
 def co_membership(label: Ints, weights: Array, out: Array) -> None:
-    """Write C_kl, the sum of weights of the partitions in which k and l are in one group, (K, K); 1 on the diagonal.
+    """Writes C_kl, the sum of weights of the partitions in which k and l are in one group, (K, K); 1 on the diagonal.
 
     label (N_x, N_z, K); weights (N_x, N_z): sum 1.
     """
@@ -246,7 +246,7 @@ def co_membership(label: Ints, weights: Array, out: Array) -> None:
 
 @njit(cache=True)
 def head_votes(label: Ints, weights: Array, out: Array) -> None:
-    """Write the weighted histogram of Fig. 3 summed over i, (K, K): weight of partitions in which k's cluster has head
+    """Writes the weighted histogram of Fig. 3 summed over i, (K, K): weight of partitions in which k's cluster has head
     g. A person alone is the head of the own cluster (ours: nobody votes for group 0)."""
     particles, partitions, n = label.shape
     out[:] = 0.0
@@ -292,7 +292,7 @@ def binder_moves(gain: Array, label: Ints) -> float:
 
 @njit(cache=True)
 def best_sampled(gain: Array, label: Ints, out: Ints) -> None:
-    """Write the partition (K,) of largest gain among label (N_x, N_z, K), as clusters numbered from 1; gain (K, K)."""
+    """Writes the partition (K,) of largest gain among label (N_x, N_z, K), as clusters numbered from 1; gain (K, K)."""
     particles, partitions, n = label.shape
     cluster, head = np.empty(n, np.int64), np.empty(n, np.int64)
     last, following = np.empty(n, np.int64), np.empty(n, np.int64)

@@ -56,7 +56,7 @@ class People:
             self.size[rows] = followed_sizes(self.size[rows], sizes, dt)
 
     def absence(self, group: Ints) -> Array:
-        """Return for how long each person has been missed, s, (K,); in a group of whom nobody was measured, the sum
+        """Returns for how long each person has been missed, s, (K,); in a group of whom nobody was measured, the sum
         over its members."""
         same = ((group[:, None] == group) & (group >= 0)) | np.eye(len(group), dtype=bool)
         measured = (same & (self.missed == 0)).any(axis=1)
@@ -110,7 +110,7 @@ class Newcomers:
         self.missed, self.size, self.key = self.missed[rows], self.size[rows], self.key[rows]
 
     def draw(self, rows: Bools, normals: Array) -> Array:
-        """Return states (N, R, 4) drawn from the posteriors of the R people `rows`; normals (N, R, 4)."""
+        """Returns states (N, R, 4) drawn from the posteriors of the R people `rows`; normals (N, R, 4)."""
         place, rate, var, cross, rate_var = self.bank[:, rows]
         a = np.sqrt(var)
         b = cross / a
@@ -120,7 +120,7 @@ class Newcomers:
 
 
 def associate(mean: Array, cov: Array, points: Array, noise: float, gate: float) -> tuple[Ints, Ints]:
-    """Return rows and columns (R,) of the associated people and points: least total of d^2 + ln |S| (one to one)."""
+    """Returns rows and columns (R,) of the associated people and points: least total of d^2 + ln |S| (one to one)."""
     if not len(mean) or not len(points):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     S = cov + noise**2 * np.eye(2)

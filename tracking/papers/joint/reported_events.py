@@ -45,7 +45,7 @@ class ReportedEvents:
     def events(
         self, changes: Iterable[GroupChange], old: Members, new: Members, scale: float
     ) -> tuple[GroupEvent, ...]:
-        """Return the events of the changes of groups in the last frame added; their members are ids of people."""
+        """Returns the events of the changes of groups in the last frame added; their members are ids of people."""
         changes = list(changes)
         if not changes:
             return ()

@@ -86,7 +86,7 @@ class Joint:
         self.plane: Plane = "image" if flat else "ground"
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Return the people of the frame and their groups as Tracks; updates all particles.
+        """Returns the people of the frame and their groups as Tracks; updates all particles.
 
         From points `detections.pos` is used (x, y, finite), from pixels `frame.image`. In a frame without them (None),
         and from pixels in one with too much foreground, nobody counts as missed. Raises InputError if points are in the
@@ -265,7 +265,7 @@ class Joint:
 
 
 def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:
-    """Return the log-odds (K, K) of pairs, more for people who were in one group, and less for others."""
+    """Returns the log-odds (K, K) of pairs, more for people who were in one group, and less for others."""
     belief = default_belief()
     same = (group[:, None] >= 0) & (group[:, None] == group)
     return np.asarray(log_odds + share * np.outer(known, known) * np.where(same, belief.stay, -belief.come))

@@ -28,7 +28,7 @@ TINY = 1e-300
 
 @njit(cache=True)
 def exact_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
-    """Return the log of the sum over all mappings, -inf if it is 0, and write the marginals (n, m) of the pairs.
+    """Returns the log of the sum over all mappings, -inf if it is 0, and write the marginals (n, m) of the pairs.
 
     W (n, m), miss (n,), spare (m,): not negative. forward[i, S] is the sum over mappings of rows before i to exactly
     the columns S; backward[i, S] that of the rows from i on, S being taken. Rows are divided by their maxima, whose
@@ -96,7 +96,7 @@ def exact_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
 
 @njit(cache=True)
 def free_messages(W: Array, miss: Array, spare: Array) -> Array:
-    """Return the messages nu (n, m) of `propagated_sum`: the probability, by belief propagation, that no other row has
+    """Returns the messages nu (n, m) of `propagated_sum`: the probability, by belief propagation, that no other row has
     a column."""
     psi, mu, nu = np.zeros(W.shape), np.zeros(W.shape), np.ones(W.shape)
     _propagate(W, miss, spare, psi, mu, nu)
@@ -131,7 +131,7 @@ def _propagate(W, miss, spare, psi, mu, nu):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def propagated_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
-    """Return the Bethe approximation of the log of the sum over all mappings, and write its marginals (n, m).
+    """Returns the Bethe approximation of the log of the sum over all mappings, and write its marginals (n, m).
 
     W (n, m), miss (n,), spare (m,): not negative. Messages of Williams & Lau 2014: with psi = W / (miss spare),
     mu[i, j] = psi[i, j] / (1 + sum of psi nu over the other columns) and nu[i, j] = 1 / (1 + sum of mu over the other
@@ -163,7 +163,7 @@ def propagated_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> flo
 
 @njit(cache=True)
 def dense_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
-    """Return the log of the sum over all mappings and write the marginals (n, m): exact if n or m is at most 12, else
+    """Returns the log of the sum over all mappings and write the marginals (n, m): exact if n or m is at most 12, else
     propagated. Arguments as of `exact_sum`; subsets are those of the smaller side."""
     n, m = W.shape
     if min(n, m) > EXACT_BITS:
@@ -203,7 +203,7 @@ def linked(W, start, row_done, column_done, rows, columns):  # type: ignore[no-u
 
 @njit(cache=True)
 def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
-    """Return the log of the sum over all mappings, -inf if it is 0, and write the marginals (n, m).
+    """Returns the log of the sum over all mappings, -inf if it is 0, and write the marginals (n, m).
 
     Arguments as of `exact_sum`. Rows and columns with a pair of weight above 0 are linked; the sum is the product over
     connected components of `dense_sum`.

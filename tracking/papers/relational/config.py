@@ -94,7 +94,7 @@ class ParticleConfig(BackgroundSettings):
         return self.weights == "joint" or self.certain_sensor
 
     def speed_table(self, dt: float) -> Array:
-        """Return the speed table (5, 3) of a step of dt s, as transition_kernels has it."""
+        """Returns the speed table (5, 3) of a step of dt s, as transition_kernels has it."""
         ends, drift, diffusion = ([*self.speed_ends, np.inf], np.array(self.drift), np.array(self.diffusion))
         return np.stack([ends, drift * dt, self.noise_scale * diffusion * np.sqrt(dt)], axis=1)
 

@@ -12,7 +12,7 @@ from sim.types import Array
 def cover(
     pos: Array, weights: Array, mean: Array, exist: Array, eye: Array, body: Array, hidden: Array, cut: Array
 ) -> None:
-    """Write the probabilities (K,) that each person is hidden behind another one, and that the feet are.
+    """Writes the probabilities (K,) that each person is hidden behind another one, and that the feet are.
 
     pos (P, K, 2), m; weights (P, K): of the particles, sum 1 for each person; mean (K, 2): of the places, m; exist
     (K,): probability that each person exists; eye (3,): the camera, m. body (3,): height and half the width, m; a

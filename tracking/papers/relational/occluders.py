@@ -18,7 +18,7 @@ MIDDLE = 0.85
 
 
 def hidden_share(pos: Array, weights: Array, camera: Camera | None, scene: Scene | None) -> Array:
-    """Return the probability (K,) that each person is behind a pillar or wall."""
+    """Returns the probability (K,) that each person is behind a pillar or wall."""
     if camera is None or scene is None or camera.kind != "pinhole" or not len(scene.pillars) + len(scene.walls):
         return np.zeros(pos.shape[1])
     hidden = np.zeros(pos.shape[:2], bool)
@@ -58,7 +58,7 @@ LEAST_VISIBLE = 0.2
 
 
 def covered_by_people(particles: ParticleSet, camera: Camera | None, radius: float) -> tuple[Array, Array]:
-    """Return the probabilities (K,) that each person is hidden behind another one, and that the feet are (ours)."""
+    """Returns the probabilities (K,) that each person is hidden behind another one, and that the feet are (ours)."""
     p, hidden, cut = particles, np.zeros(particles.people), np.zeros(particles.people)
     if camera is not None and camera.kind == "pinhole" and radius > 0:
         mean = np.stack([particle_set_kernels.column_sums(p.weights, p.pos[..., d]) for d in range(2)], axis=1)

@@ -45,7 +45,7 @@ class ParticleSet:
 
     @classmethod
     def empty(cls, count: int) -> ParticleSet:
-        """Return `count` particles without people."""
+        """Returns `count` particles without people."""
         flat, two = np.zeros((count, 0)), np.zeros((count, 0, 2))
         none = np.zeros((count, 0), np.int64)
         pairs, related = np.zeros((0, 2), np.int64), np.zeros((0, count), bool)
@@ -62,13 +62,13 @@ class ParticleSet:
         return particle_set_kernels.column_sums(self.weights, self.exist)
 
     def estimates(self) -> tuple[Array, Array, Array]:
-        """Return means (K, 4) and covariances (K, 4, 4) of x, y, m, vx, vy, m/s, and the existence (K,)."""
+        """Returns means (K, 4) and covariances (K, 4, 4) of x, y, m, vx, vy, m/s, and the existence (K,)."""
         mean, cov, exist = np.zeros((self.people, 4)), np.zeros((self.people, 4, 4)), np.zeros(self.people)
         particle_set_kernels.moments(self.pos, self.vel, self.exist, self.weights, mean, cov, exist)
         return mean, cov, exist
 
     def labels(self) -> Ints:
-        """Return the group of each person in each particle, (P, K): the least slot in it."""
+        """Returns the group of each person in each particle, (P, K): the least slot in it."""
         label = np.empty(self.exist.shape, np.int64)
         particle_set_kernels.group_labels(self.pairs, self.related, label)
         return label
@@ -87,7 +87,7 @@ class ParticleSet:
         particle_set_kernels.weigh(self.weights, logs)
 
     def effective(self) -> Array:
-        """Return the effective number of particles of each slot, (K,)."""
+        """Returns the effective number of particles of each slot, (K,)."""
         return np.asarray(1 / particle_set_kernels.column_sums(self.weights, self.weights))
 
     def resample(self, share: float, width: float, draws: Draws) -> None:
@@ -198,7 +198,7 @@ class ParticleDiversity:
         self.age = 0
 
     def summary(self) -> dict[str, float | None]:
-        """Return means: shares of effective particles of the least effective person, and of particles with descendants
+        """Returns means: shares of effective particles of the least effective person, and of particles with descendants
         after SPAN s; None without people."""
         return {
             "effective_particles_of_a_person": self.effective / self.frames if self.frames else None,

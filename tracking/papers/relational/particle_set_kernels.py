@@ -16,7 +16,7 @@ from tracking.papers.relational.transition_kernels import pairs_of_people
 
 @njit(cache=True)
 def column_sums(a: Array, b: Array) -> Array:
-    """Return the sums over particles of the products of a and b (P, K), (K,).
+    """Returns the sums over particles of the products of a and b (P, K), (K,).
 
     Each column is summed in the order of the particles. In numpy the order depends on the number of columns, so that
     the last bits of a person's sum would depend on who else is there.
@@ -30,7 +30,7 @@ def column_sums(a: Array, b: Array) -> Array:
 
 @njit(cache=True)
 def pair_sums(a: Array, exist: Array, person: Ints, b: Array) -> Array:
-    """Return the sums over particles of a exist b of each pair, (N,); a, exist (P, K), b (P, N); person (N,): of each
+    """Returns the sums over particles of a exist b of each pair, (N,); a, exist (P, K), b (P, N); person (N,): of each
     pair."""
     out = np.zeros(len(person))
     for p in range(len(b)):
@@ -59,7 +59,7 @@ def weigh(weights: Array, logs: Array) -> None:
 
 @njit(cache=True)
 def group_labels(pairs: Ints, related: Bools, label: Ints) -> None:
-    """Write the group of each person in each particle, (P, K): the least number of a person in it.
+    """Writes the group of each person in each particle, (P, K): the least number of a person in it.
 
     pairs (N, 2), related (N, P): which pairs are related in each particle. Groups are connected components; a person
     alone has the own number.
@@ -105,7 +105,7 @@ def redraw_relations(pairs: Ints, related: Bools, people: Ints, chosen: Ints) ->
 
 @njit(cache=True)
 def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, cov: Array, total: Array) -> None:
-    """Write mean (K, 4) and covariance (K, 4, 4) of each person's x, y, vx, vy, and the probability of existence (K,).
+    """Writes mean (K, 4) and covariance (K, 4, 4) of each person's x, y, vx, vy, and the probability of existence (K,).
 
     Particles count by weight times existence, or by weight alone for a person who exists in none. pos, vel (P, K, 2), m
     and m/s; exist (P, K); weights (P, K), sum 1 for each person.
@@ -137,7 +137,7 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
 
 @njit(cache=True)
 def pairs_together(pairs: Ints, related: Bools, exist: Array, weights: Array, one_weight: bool) -> Array:
-    """Return the probability (K, K) that i and j walk together, given that both exist; 1 on the diagonal.
+    """Returns the probability (K, K) that i and j walk together, given that both exist; 1 on the diagonal.
 
     pairs (N, 2), related (N, P): relations; exist (P, K): probabilities of existence; weights (P, K): of the particles;
     one_weight: whether all columns are one weight, else a pair has the product. 0 for a pair that does not exist.

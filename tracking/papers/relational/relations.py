@@ -96,7 +96,7 @@ class Relational(Particle):
         return tracks
 
     def walking_together(self) -> tuple[Ints, Array]:
-        """Return ids (R,) of the people reported last, and the probability (R, R) that two of them walk together.
+        """Returns ids (R,) of the people reported last, and the probability (R, R) that two of them walk together.
 
         By their state it is the share of the weight of the particles in which the pair is related, given that both
         exist. The belief is the same in all particles, so that it is the probability itself; a share of particles would

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from sim.compiler import njit
+from sim.elementary_kernels import sort_by
 from sim.types import Array, Bools, Ints
 from tracking.papers.relational.association_sums_kernels import EXACT_BITS, free_messages, linked, sparse_sum
 
@@ -15,7 +16,7 @@ from tracking.papers.relational.association_sums_kernels import EXACT_BITS, free
 def densities(
     pos: Array, points: Array, pairs: Ints, sd: float, wide: float, share: Array, eye: Array, reach: float
 ) -> Array:
-    """Return the density of each pair's point in each particle, (P, N), 1/m^2: g = (1 - share) N(z; x, sd^2) + share
+    """Returns the density of each pair's point in each particle, (P, N), 1/m^2: g = (1 - share) N(z; x, sd^2) + share
     D(z; x).
 
     pos (P, K, 2), m: places of K people in each of P particles; points (M, 2), m; pairs (N, 2): person and point; sd:
@@ -54,7 +55,7 @@ def densities(
 
 @njit(cache=True)
 def free_detections(W: Array, miss: Array) -> Array:
-    """Return the probability that nobody else has a detection, (K, M), for each person: that of the sum over all
+    """Returns the probability that nobody else has a detection, (K, M), for each person: that of the sum over all
     mappings of the other people.
 
     W (K, M): mean weight of each person and detection; miss (K,): mean weight of the person without detection; both
@@ -64,26 +65,17 @@ def free_detections(W: Array, miss: Array) -> Array:
     """
     n, m = W.shape
     free, done = np.ones((n, m)), np.zeros(n, np.bool_)
+    level = np.zeros(max(n, m))
     rows, columns, reached = np.empty(n, np.int64), np.empty(m, np.int64), np.zeros(m, np.bool_)
     for k in range(n):
         if done[k]:
             continue
         count, width = linked(W, k, done, reached, rows, columns)
         if count > 1:
-            _sort(rows[:count])
-            _sort(columns[:width])
+            sort_by(level, rows[:count])  # of equal keys: by number
+            sort_by(level, columns[:width])
             _free_of_linked(W, miss, rows[:count], columns[:width], free)
     return free
-
-
-@njit(cache=True)
-def _sort(numbers):  # type: ignore[no-untyped-def]
-    for n in range(1, len(numbers)):
-        number, at = numbers[n], n
-        while at > 0 and numbers[at - 1] > number:
-            numbers[at] = numbers[at - 1]
-            at -= 1
-        numbers[at] = number
 
 
 @njit(cache=True)
@@ -115,7 +107,7 @@ def _free_of_linked(W, miss, rows, columns, free):  # type: ignore[no-untyped-de
 def person_sums(
     density: Array, pairs: Ints, exist: Array, detect: Array, clutter: float, free: Array, logs: Array, marginals: Array
 ) -> None:
-    """Write the log-likelihoods (P, K) of each person in each particle, all others averaged, and the marginals (P, N):
+    """Writes the log-likelihoods (P, K) of each person in each particle, all others averaged, and the marginals (P, N):
     the probability of each pair.
 
     density (P, N): of the N pairs (N, 2) of a person and a point, all others are impossible, as `densities` gives it;
@@ -145,7 +137,7 @@ def person_sums(
 def particle_sums(
     density: Array, pairs: Ints, exist: Array, detect: Array, clutter: float, count: int, logs: Array, marginals: Array
 ) -> None:
-    """Write the log-likelihoods (P, 1) of each particle, the sum over all mappings, and the marginals (P, N).
+    """Writes the log-likelihoods (P, 1) of each particle, the sum over all mappings, and the marginals (P, N).
 
     Arguments as of `person_sums`; count: M. W = exist detect g / clutter, miss = 1 - exist detect, spare = 1. Without
     clutter (the paper's sensor) W = g and mappings are complete: the smaller side is mapped wholly.
@@ -170,7 +162,7 @@ def particle_sums(
 
 @njit(cache=True)
 def measured(marginals: Array, pairs: Ints, people: int) -> Array:
-    """Return the probability that each person is measured, in each particle, (P, K): the sum of the marginals (P, N) of
+    """Returns the probability that each person is measured, in each particle, (P, K): the sum of marginals (P, N) of
     the person's pairs (N, 2)."""
     out = np.zeros((len(marginals), people))
     for p in range(len(marginals)):
@@ -181,7 +173,7 @@ def measured(marginals: Array, pairs: Ints, people: int) -> Array:
 
 @njit(cache=True)
 def near_detections(pos: Array, points: Array, most: float) -> Bools:
-    """Return which people and detections (K, M) are within reach of each other, in some particle.
+    """Returns which people and detections (K, M) are within reach of each other, in some particle.
 
     pos (P, K, 2), m; points (M, 2), m; most: reach, squared distance in m^2.
     """

@@ -126,7 +126,7 @@ class Particle:
         self.vanished, self.diversity = 0, ParticleDiversity(context.fps)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Return the people of the frame as Tracks; updates all particles.
+        """Returns the people of the frame as Tracks; updates all particles.
 
         From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
         pixels one with too much foreground, is forecast only; no detections are a frame in which everybody is missed.

@@ -107,7 +107,7 @@ def move(
 
 @njit(cache=True)
 def belonging(distance: float, difference: float, rules: Array) -> float:
-    """Return the probability that two people walk together by their states (ours); 1 if BIAS is inf.
+    """Returns the probability that two people walk together by their states (ours); 1 if BIAS is inf.
 
     distance: between them, m; difference: of their velocities, m/s; rules (4,).
     """
@@ -116,7 +116,7 @@ def belonging(distance: float, difference: float, rules: Array) -> float:
 
 @njit(cache=True)
 def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
-    """Return what the filter's uncertainty adds on average to the squared distance, m^2, and to the squared velocity
+    """Returns what the filter's uncertainty adds on average to the squared distance, m^2, and to the squared velocity
     difference, m^2/s^2, of pairs in a particle, (N, 2): twice their variances over the particles, as a particle
     deviates from the mean, and the mean from the truth (ours).
 
@@ -139,7 +139,7 @@ def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
 
 @njit(cache=True)
 def near_pairs(pos: Array, rules: Array) -> Ints:
-    """Return the pairs i < j (N, 2) that may start to walk together, in order of j, then i.
+    """Returns the pairs i < j (N, 2) that may start to walk together, in order of j, then i.
 
     pos (P, K, 2), m; rules (4,). Pairs whose boxes round all particles are so far apart that their belonging is below
     NEGLIGIBLE are left out (ours).
@@ -160,7 +160,7 @@ def near_pairs(pos: Array, rules: Array) -> Ints:
 
 @njit(cache=True)
 def pairs_of_people(pairs: Ints, people: int) -> tuple[Ints, Ints]:
-    """Return the rows of the pairs (N, 2) of each person: those of person a are rows[start[a] : start[a + 1]], in
+    """Returns the rows of the pairs (N, 2) of each person: those of person a are rows[start[a] : start[a + 1]], in
     order."""
     start, rows = np.zeros(people + 1, np.int64), np.empty(2 * len(pairs), np.int64)
     for k in range(len(pairs)):

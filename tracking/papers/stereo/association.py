@@ -22,7 +22,7 @@ from tracking.papers.stereo.space_group import SpaceGroup
 
 
 def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: StereoConfig) -> Ints:
-    """Return for each of M points the number of its group in `groups`, (M,), -1 for none (eqs 8 to 11)."""
+    """Returns for each of M points the number of its group in `groups`, (M,), -1 for none (eqs 8 to 11)."""
     if not groups or not len(points):
         return np.full(len(points), -1)
     x = np.stack([g.ekf.x[:, 0] for g in groups])

@@ -23,7 +23,7 @@ from tracking.papers.stereo.space_group import Motion3D, SpaceGroup, newborn
 
 
 def born(points: SpacePoints, group: Ints, measurement: Measurement, motion: Motion3D, t: float) -> list[SpaceGroup]:
-    """Return the tentative groups that free points form (sec. 3.4)."""
+    """Returns the tentative groups that free points form (sec. 3.4)."""
     return [newborn(points.at(group == k), measurement, motion, t) for k in range(int(group.max(initial=-1)) + 1)]
 
 
@@ -55,7 +55,7 @@ def remove_lost(groups: list[SpaceGroup], config: StereoConfig, t: float) -> lis
 
 
 def sphere_groups(pos: Array, radius: float, least: int) -> Ints:
-    """Return the group of each point, (M,), numbered 0, 1, … in the order of the groups' first points; -1 for none."""
+    """Returns the group of each point, (M,), numbered 0, 1, … in the order of the groups' first points; -1 for none."""
     M = len(pos)
     if not M:
         return np.zeros(0, np.int64)

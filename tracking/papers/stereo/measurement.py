@@ -25,15 +25,15 @@ class Measurement(Protocol):
     """What a filter measures of a position: the functions of eq. 6."""
 
     def z(self, xyz: Array) -> Array:
-        """Return the measurement (3, 1) of a position (3,), m."""
+        """Returns the measurement (3, 1) of a position (3,), m."""
         ...
 
     def jacobian(self, xyz: Array) -> Array:
-        """Return dZ/d(x, y, z) (3, 3) at a position (3,), m."""
+        """Returns dZ/d(x, y, z) (3, 3) at a position (3,), m."""
         ...
 
     def weights(self, points: SpacePoints, width: float) -> Array:
-        """Return the weights (M,) of M points in their group's mean position; width: of the kernel of density, m."""
+        """Returns the weights (M,) of M points in their group's mean position; width: of the kernel of density, m."""
         ...
 
 
@@ -44,15 +44,15 @@ class PairMeasurement:
         self.camera = camera
 
     def z(self, xyz: Array) -> Array:
-        """Return u, v, d (3, 1) in px of a position (3,), m."""
+        """Returns u, v, d (3, 1) in px of a position (3,), m."""
         return project_pair(self.camera, xyz[None]).T
 
     def jacobian(self, xyz: Array) -> Array:
-        """Return d(u, v, d)/d(x, y, z) (3, 3) in px/m."""
+        """Returns d(u, v, d)/d(x, y, z) (3, 3) in px/m."""
         return np.asarray(pair_jacobian(self.camera, xyz[None])[0])
 
     def weights(self, points: SpacePoints, width: float) -> Array:
-        """Return `inverse_densities` (M,): a person may have any number of features."""
+        """Returns `inverse_densities` (M,): a person may have any number of features."""
         return inverse_densities(points, width)
 
 
@@ -60,22 +60,22 @@ class PlaceMeasurement:
     """Z = (x, y, z) in m: points whose places are measured directly."""
 
     def z(self, xyz: Array) -> Array:
-        """Return the position (3,) as a column (3, 1), m."""
+        """Returns the position (3,) as a column (3, 1), m."""
         return xyz[:, None]
 
     def jacobian(self, xyz: Array) -> Array:
-        """Return the unit matrix (3, 3)."""
+        """Returns the unit matrix (3, 3)."""
         del xyz
         return np.eye(3)
 
     def weights(self, points: SpacePoints, width: float) -> Array:
-        """Return ones (M,): each point is a person."""
+        """Returns ones (M,): each point is a person."""
         del width
         return np.ones(len(points))
 
 
 def inverse_densities(points: SpacePoints, width: float) -> Array:
-    """Return the inverse of the density of M points on the ground at each of them, (M,), up to a factor (ours)."""
+    """Returns the inverse of the density of M points on the ground at each of them, (M,), up to a factor (ours)."""
     d = points.pos[:, None, :2] - points.pos[:, :2]
     S = points.cov[:, None, :2, :2] + points.cov[:, :2, :2]
     a, b, c = S[..., 0, 0] + width**2, S[..., 0, 1], S[..., 1, 1] + width**2
@@ -85,12 +85,12 @@ def inverse_densities(points: SpacePoints, width: float) -> Array:
 
 
 def measured_state(x: Array, measurement: Measurement) -> Array:
-    """Return f(X) (3, 1) of a state x (6, 1): eq. 6."""
+    """Returns f(X) (3, 1) of a state x (6, 1): eq. 6."""
     return measurement.z(x[POS, 0])
 
 
 def state_jacobian(x: Array, measurement: Measurement) -> Array:
-    """Return df/dX (3, 6) at a state x (6, 1); the columns of velocities are 0."""
+    """Returns df/dX (3, 6) at a state x (6, 1); the columns of velocities are 0."""
     H = np.zeros((3, 6))
     H[:, POS] = measurement.jacobian(x[POS, 0])
     return H

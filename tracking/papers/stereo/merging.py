@@ -38,7 +38,7 @@ def merge(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[Whol
 
 
 def overlap(a: SpaceGroup, b: SpaceGroup, gate: float) -> bool:
-    """Return True if the regions MR of two groups have a common point (eq. 13); gate: squared Mahalanobis radius."""
+    """Returns True if the regions MR of two groups have a common point (eq. 13); gate: squared Mahalanobis radius."""
     d = (b.ekf.x - a.ekf.x)[:, 0]
     return separation(d, a.spread, b.spread) <= gate
 
@@ -60,7 +60,7 @@ def _close_pairs(groups: Sequence[SpaceGroup], gate: float) -> list[tuple[int, i
 
 
 def pooled(states: Array, spreads: Array, counts: Array) -> tuple[Array, Array]:
-    """Return the state (D,) and Sigma (D, D) of a merged group (eqs 14, 15)."""
+    """Returns the state (D,) and Sigma (D, D) of a merged group (eqs 14, 15)."""
     n = counts / counts.sum()
     X = n @ states
     away = states - X
@@ -68,12 +68,12 @@ def pooled(states: Array, spreads: Array, counts: Array) -> tuple[Array, Array]:
 
 
 def covariance_of_mean(n: Array, P: Array) -> Array:
-    """Return the covariance (D, D) of a mean with weights n (K,), sum 1, of states with covariances P (K, D, D)."""
+    """Returns the covariance (D, D) of a mean with weights n (K,), sum 1, of states with covariances P (K, D, D)."""
     return np.asarray(np.einsum("k,kij->ij", n**2, P))
 
 
 def connected(groups: Sequence[SpaceGroup], gate: float) -> list[list[SpaceGroup]]:
-    """Return the sets I_n of two or more groups whose regions overlap directly or through others (eq. 13)."""
+    """Returns the sets I_n of two or more groups whose regions overlap directly or through others (eq. 13)."""
     pairs = [(i, j) for i, j in _close_pairs(groups, gate) if overlap(groups[i], groups[j], gate)]
     if not pairs:
         return []

@@ -52,7 +52,7 @@ class PicturePoints:
         self.stereo = SubtractionStereo(largest, block)
 
     def points(self, image: Image, right: Image) -> SpacePoints:
-        """Return the features of people as points in space, none if too much is foreground."""
+        """Returns the features of people as points in space, none if too much is foreground."""
         if right.shape != image.shape:
             expected = f"the left picture's shape {image.shape}"
             raise InputError(place="right picture", got=str(right.shape), expected=expected, remedy="give a pair")
@@ -75,7 +75,7 @@ class PicturePoints:
 
 
 def moved_away(points: SpacePoints, camera: Camera, offset: float) -> SpacePoints:
-    """Return M points moved away from the camera, horizontally, by `offset`, m."""
+    """Returns M points moved away from the camera, horizontally, by `offset`, m."""
     away = points.pos[:, :2] - camera.position[:2]
     shift = offset * away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
     pos = np.column_stack([points.pos[:, :2] + shift, points.pos[:, 2]])
@@ -83,7 +83,7 @@ def moved_away(points: SpacePoints, camera: Camera, offset: float) -> SpacePoint
 
 
 def stereo_camera(camera: Camera | None) -> Camera:
-    """Return the camera of a rectified pair unchanged."""
+    """Returns the camera of a rectified pair unchanged."""
     if camera is not None and camera.kind == "pinhole" and camera.baseline > 0 and not camera.radial:
         return camera
     got = "no camera" if camera is None else f"{camera.kind}, baseline {camera.baseline:g}, radial {camera.radial:g}"
@@ -93,5 +93,5 @@ def stereo_camera(camera: Camera | None) -> Camera:
 
 
 def grey(image: Image) -> Any:
-    """Return the grey values (H, W) uint8 of a picture (H, W, 3) BGR."""
+    """Returns the grey values (H, W) uint8 of a picture (H, W, 3) BGR."""
     return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)

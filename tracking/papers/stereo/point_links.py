@@ -33,7 +33,7 @@ class PointLinks:
         self.id, self.next_id, self.world = no_ids(), 1, np.zeros((0, 2, 3))
 
     def step(self, xyz: Array, config: StereoConfig) -> SpacePoints:
-        """Return the detections xyz (M, 3), m, of the next frame as points in space, in the same order."""
+        """Returns the detections xyz (M, 3), m, of the next frame as points in space, in the same order."""
         frames, M = max(round(config.window_time * self.fps), 1) + 1, len(xyz)
         past = self._past(frames)
         cost = np.linalg.norm(self._predicted(past)[:, None] - xyz, axis=2)

@@ -37,7 +37,7 @@ class ShownFrame:
 def space_tracks(
     groups: Sequence[SpaceGroup], events: Sequence[WholeGroupEvent], report_coast: float, shown: ShownFrame
 ) -> Tracks:
-    """Return the Tracks, with unit "group", of the confirmed groups measured within the last `report_coast` s."""
+    """Returns the Tracks, with unit "group", of the confirmed groups measured within the last `report_coast` s."""
     rows = [g for g in groups if g.confirmed and shown.t - g.last_seen <= report_coast + 1e-9]
     rows = sorted(rows, key=lambda g: g.id)
     axes = 3 if shown.plane == "space" else 2

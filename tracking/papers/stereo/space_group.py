@@ -76,7 +76,7 @@ class Motion3D:
 
 
 def motion_model(config: StereoConfig, dt: float) -> Motion3D:
-    """Return the model of motion for a step of dt s, with filterpy's Q_continuous_white_noise."""
+    """Returns the model of motion for a step of dt s, with filterpy's Q_continuous_white_noise."""
     from filterpy.common import Q_continuous_white_noise
 
     Phi = np.kron(np.eye(3), np.array([[1.0, dt], [0.0, 1.0]]))
@@ -91,7 +91,7 @@ def predict(group: SpaceGroup, motion: Motion3D) -> None:
 
 
 def newborn(points: SpacePoints, measurement: Measurement, motion: Motion3D, t: float) -> SpaceGroup:
-    """Return a tentative group of M points, M at least 1, with their mean position, velocity and covariance (sec.
+    """Returns a tentative group of M points, M at least 1, with their mean position, velocity and covariance (sec.
     3.4)."""
     from filterpy.kalman import ExtendedKalmanFilter
 
@@ -108,20 +108,20 @@ def newborn(points: SpacePoints, measurement: Measurement, motion: Motion3D, t: 
 
 
 def mean_position(points: SpacePoints, measurement: Measurement, config: StereoConfig) -> tuple[Array, Array]:
-    """Return the mean position (3,), m, of M points and their weights (M,) in it, with sum 1 (ours)."""
+    """Returns the mean position (3,), m, of M points and their weights (M,) in it, with sum 1 (ours)."""
     weights = measurement.weights(points, config.density_width)
     weights = weights / weights.sum()
     return weights @ points.pos, weights
 
 
 def mean_covariance(points: SpacePoints, weights: Array, config: StereoConfig) -> Array:
-    """Return the covariance (3, 3), m^2, of the mean of M points as a measurement of their group's position."""
+    """Returns the covariance (3, 3), m^2, of the mean of M points as a measurement of their group's position."""
     errors = np.einsum("m,mij->ij", weights**2, points.cov)
     return np.asarray(errors + config.centroid_noise**2 * np.eye(3))
 
 
 def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
-    """Return C_y (6, 6): covariance of the positions and velocities of M points, order x, x', y, y', z, z' (eq. 7)."""
+    """Returns C_y (6, 6): covariance of the positions and velocities of M points, order x, x', y, y', z, z' (eq. 7)."""
     n = len(points)
     y = np.zeros((n, 6))
     y[:, POS], y[:, VEL] = points.pos, points.vel
@@ -163,6 +163,6 @@ def _place_members(group: SpaceGroup, points: SpacePoints, config: StereoConfig)
 
 
 def expected_places(offset: Array, cov: Array, spread: Array) -> Array:
-    """Return the expected offsets (M, 3), m, of a group's points from its centroid: Sigma (Sigma + C_i)^-1 (y_i - xi)
+    """Returns the expected offsets (M, 3), m, of a group's points from its centroid: Sigma (Sigma + C_i)^-1 (y_i - xi)
     (ours)."""
     return np.asarray((spread @ np.linalg.solve(spread + cov, offset[..., None]))[..., 0])

@@ -19,7 +19,7 @@ from tracking.papers.stereo.space_group import Motion3D, SpaceGroup, newborn
 def split(
     group: SpaceGroup, points: SpacePoints, part: Ints, measurement: Measurement, motion: Motion3D, t: float
 ) -> list[SpaceGroup]:
-    """Return the children of a group whose M points have been in parts for `split_time`, [] if it does not split."""
+    """Returns the children of a group whose M points have been in parts for `split_time`, [] if it does not split."""
     count = int(part.max(initial=-1)) + 1
     if count < 2 or not motion.config.split:
         group.apart_since = float("nan")

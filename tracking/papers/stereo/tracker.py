@@ -83,7 +83,7 @@ class Stereo:
         self.scale = 1.0
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Return the groups and events of the frame, as Tracks with unit "group"; updates all groups.
+        """Returns the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
         From pictures `frame.image` and `frame.right` are used and the plane is "space"; from points `detections.pos`,
         whose plane is kept. Without them, and from pictures with too much foreground, no group is measured; groups are
