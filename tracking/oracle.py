@@ -97,8 +97,8 @@ def _visible(truth: Truth, index: int, places: bool) -> Tracks:
         pos = box[:, :2] + box[:, 2:] / 2
     who, none = (truth.id[rows], truth.group[rows]), np.full((len(rows), 2), np.nan)
     cov, score = np.full((len(rows), 4, 4), np.nan), np.ones(len(rows))
-    plane = "ground" if places else "image"
-    return Tracks(index, (index - 1) / truth.fps, plane, "person", *who, pos, none, cov, box, score)
+    t = (index - 1) / truth.fps
+    return Tracks(index, t, "ground" if places else "image", "person", *who, pos, none, cov, box, score)
 
 
 def _with_events(t: Tracks, truth: Truth) -> Tracks:
