@@ -6,10 +6,11 @@ PYTHON ?= $(shell for p in python3.12 python3.13 python3.11 python3 python; do \
 VENV := .venv
 BIN := $(VENV)/bin
 ENVIRONMENT := $(VENV)/made-from-constraints
+DOCS := $(VENV)/made-for-docs
 DEMO ?=
 TESTS ?=
 
-.PHONY: demo test test-slow lint types clean
+.PHONY: demo test test-slow lint types docs clean
 
 demo: $(ENVIRONMENT)
 	$(BIN)/flockscope demo $(DEMO)
@@ -27,6 +28,10 @@ lint: $(ENVIRONMENT)
 types: $(ENVIRONMENT)
 	$(BIN)/mypy
 
+docs: $(DOCS)
+	$(BIN)/sphinx-build -q -W --keep-going -E -b html -d build/doctrees docs build/docs
+	@echo "build/docs/index.html"
+
 clean:
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .hypothesis flockscope-demo
 	find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
@@ -39,4 +44,8 @@ $(ENVIRONMENT): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt setuptools
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt --no-build-isolation -e ".[dev]"
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt --no-deps trackeval
+	@touch $@
+
+$(DOCS): $(ENVIRONMENT)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt --no-build-isolation -e ".[docs]"
 	@touch $@

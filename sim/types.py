@@ -160,7 +160,7 @@ class Camera(Frozen):
     cy with focal_px (fx, fy), centre_px (cx, cy). kind "top": orthographic, looking straight down on `position`, scale
     px_per_m (nan for "pinhole"). image: (width, height) px. position (3,) m. rotation (3, 3), world to camera. baseline
     in m: the right camera is at +baseline along camera x; 0 without one. radial: Tsai's lens distortion, 0 for none:
-    ideal coordinates p (1 + radial |p|²) for p = ((u - cx)/fx, (v - cy)/fy) of the picture."""
+    ideal coordinates p (1 + radial p'p) for p = ((u - cx)/fx, (v - cy)/fy) of the picture."""
 
     kind: Literal["pinhole", "top"]
     image: tuple[int, int]
@@ -381,11 +381,12 @@ class Truth(Frozen):
 class Sequence:
     """A sequence of frames, simulated, stored or recorded; it can be iterated any number of times, from frame 1. fps:
     frames/s. length: number of frames, None if unknown before reading. frames(): a new iterator over Frame, with the
-    detections. bare(): the same without pictures, None if that is not quicker. has_ fields: what the frames hold.
-    image_size: (width, height) px, camera, scene: None if unknown. px_per_m: nan if unknown. Each load_ field is a
-    function, or None if there is nothing to load: load_truth() gives the Truth; load_background() pictures (K, H, W, 3)
-    of a scene to train a background model; load_people() the person ids of each group that the script names;
-    load_pixels(index) the PixelTruth of frame `index`. source: where it comes from ("kind", "path", "seed", …)."""
+    detections. bare(): the same without pictures, None if that is not quicker. has_images, has_right, has_detections:
+    what the frames hold. image_size: (width, height) px, camera, scene: None if unknown. px_per_m: nan if unknown.
+    Fields that load are functions, or None if there is nothing to load: load_truth() gives the Truth; load_background()
+    pictures (K, H, W, 3) of a scene to train a background model; load_people() the person ids of each group that the
+    script names; load_pixels(index) the PixelTruth of frame `index`. source: where it comes from ("kind", "path",
+    "seed", …)."""
 
     name: str
     fps: float

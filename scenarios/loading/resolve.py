@@ -87,7 +87,7 @@ def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
     """Loads and checks a scenario.
 
     Args:
-        name_or_path: A name of the catalogue, or a *.toml file, sought in the working folder and then in the catalogue.
+        name_or_path: A name of the catalogue, or a TOML file, sought in the working folder and then in the catalogue.
         set: Settings "key=value", applied in turn after `extends`.
 
     Returns:

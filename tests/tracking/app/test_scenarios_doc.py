@@ -1,16 +1,14 @@
-"""docs/reference/scenario-files.md lists the catalogue, the suites and every key. The example of the guide loads."""
+"""The example of docs/guides/write-a-scenario.md loads, and every key of a scenario has a meaning."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-from scenarios.loading.resolve import load, names, resolve, suite_names
-from scenarios.loading.suites import about, find_suite
+from scenarios.loading.resolve import load
 from tracking.app.commands.scenarios import list_keys
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
-DOC = (DOCS / "reference" / "scenario-files.md").read_text(encoding="utf-8")
 
 
 def test_example(tmp_path: Path) -> None:
@@ -20,18 +18,5 @@ def test_example(tmp_path: Path) -> None:
     assert [e.id for e in load(tmp_path / "example.toml").event] == ["m1", "s1"]
 
 
-def test_catalogue() -> None:
-    rows = re.findall(r"^\| `([a-z-]+)` \|", DOC, re.MULTILINE)
-    assert rows == names()
-    assert all(f"| `{name}` | {load(name).about} |" in DOC for name in rows)
-
-
-def test_suites() -> None:
-    rows = re.findall(r"^\| suite `(.+)` \| (\d+) \| (.+) \|$", DOC, re.MULTILINE)
-    suites = [(name, find_suite(name)) for name in suite_names()]
-    assert rows == [(name, str(len(resolve(f"suite:{name}"))), about(file)) for name, file in suites]
-
-
 def test_keys() -> None:
-    assert f"```\n{list_keys().text.rstrip()}\n```" in DOC, "put the output of `flockscope scenarios --schema` into it"
     assert all(row["meaning"] for row in list_keys().data["keys"])

@@ -1,36 +1,21 @@
-"""The catalogue of scores, docs/reference/metrics.md and what evaluate returns agree; see also test_evaluation."""
+"""The catalogue of scores and what evaluate returns agree; see also test_evaluation."""
 
 from __future__ import annotations
 
 import math
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 from tests.hand_made import Scene, tracks, truth
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import ALL, CATALOGUE, CORE, table
 
-ROOT = Path(__file__).resolve().parents[3]
-PAGE = ROOT / "docs" / "reference" / "metrics.md"
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
 
 
-def test_the_page_holds_the_table() -> None:
-    assert table() in PAGE.read_text(encoding="utf-8")
-
-
-def test_the_table_is_printed() -> None:
-    command = [sys.executable, "-W", "ignore", "-m", "tracking.scoring.catalogue"]
-    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=True)
-    assert said.stdout.strip() == table()
-
-
-def test_every_key_of_the_page_is_returned_and_the_other_way_round() -> None:
+def test_every_key_of_the_table_is_returned_and_the_other_way_round() -> None:
     scene = [Scene(TWO, {1: ((1, 2), None)})] * 3
     returned = set(evaluate(truth(scene), tracks(scene)))
-    rows = set(re.findall(r"^\| `([^`]+)` \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
+    rows = set(re.findall(r"^\| `([^`]+)` \|", table(), re.MULTILINE))
     assert returned == rows | {f"{key}_core" for key in rows if CATALOGUE[key].family == "groups"}
 
 

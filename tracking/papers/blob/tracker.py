@@ -15,12 +15,46 @@ blob's ellipse.
                d^2 = (z - z_pred)' S^-1 (z - z_pred) <= q      eqs 9, 10       q: the quantile `gate` of chi2 with 4
                                                                                degrees of freedom, 5 with theta
     associate  measurements and gated tracks                   sec. 4.4        track_management.associate
-    update     y, S, K, x, P                                   eqs 3 to 7      tracking.filters.kalman
-    manage     rho = sqrt|S| / asymptote: confirm, delete      secs. 4.5, 5    track_management,
-                                                                               tracking.filters.track_uncertainty
+    update     K = P C' S^-1,  x = x + K y,  P = (I - K C) P   eqs 3 to 7      tracking.filters.kalman
+    manage     rho = sqrt|S| / asymptote: confirmed if rho     secs. 4.5, 5    track_management,
+               and d^2 are low, deleted if rho is high                         tracking.filters.track_uncertainty
     pixels     five classes, cleaning, blobs, ellipses         secs. 3.2, 3.3  tracking.detect
 
-Readings of the paper and departures: docs/reference/trackers/blob.md.
+Readings: eq. 4 lacks brackets. Eq. 9 has row and column exchanged. The "Mahalanobis radius" of sec. 4.3 is the
+quantile of chi2.
+
+Departures, from boxes and from pixels. Time limits of missed tracks are values of rho; they hold in the steady state.
+
+- input: also boxes, without θ. Paper: blobs. Why: detectors report boxes.
+- noises: in m at the person and per root second. Paper: no values. Why: any scale and frame rate.
+- association: one to one, least sum of d² + ln |S| (`association`). Paper: nearest gated track. Why: a wide gate
+  must not win.
+- weak boxes: update tracks last, start none (`score_continue`). Paper: none. Why: hidden people have low scores.
+- pieces: a box in the `orphan_gate` of a measured track, or inside a confirmed track's box, starts none; fused if
+  that fits better. Paper: a measurement in a gate starts no track. Why: people near others must start tracks.
+- merged boxes: a box over several confirmed tracks, one of them missed, starts none, and updates none if its size is
+  outside the gate (`merged_time`). Paper: none. Why: the box is no single person.
+- explained misses: a track behind another, or in a merged box, survives `merged_time`. Paper: none. Why: people
+  reappear.
+- deletion: also: tentative tracks by ρ of birth or `tentative_time`; missed tracks outside the image. Paper: ρ after
+  some misses. Why: false alarms end early.
+- report: tentative ones from `report_delay`; missed ones for `report_coast`, at most `report_credit`, unless they
+  leave the view. Paper: not stated. Why: fewer false positions.
+
+Departures from pixels only:
+
+- shared blobs: once the size of a person is known, templates share the foreground: each moves to the most support,
+  confirmed tracks first; no gate (`split`). Paper: one measurement for each blob. Why: people merge in the mask.
+- misses: too little foreground under the template. Paper: no blob in the gate. Why: templates always fit somewhere.
+- noise: divided by the square of the visible share. Paper: R. Why: hidden parts are not measured.
+- births: also a lone blob inside a gate; other unexplained foreground, by templates. Paper: a blob outside all gates.
+  Why: people enter as one blob.
+- sizes: return to those of a person at that place. Paper: free. Why: templates measure none.
+- ρ: of a nominal covariance without θ. Paper: of the filter. Why: noise must not count.
+- pieces, without `split`: the ellipse of all their pixels, if in the gate. Paper: one of several measurements. Why:
+  the paper does not say how.
+- too much foreground: prediction and deletion only. Paper: none. Why: light has changed.
+- background: adapts where no confirmed track is (`background`). Paper: trained once. Why: light changes.
 """
 
 from __future__ import annotations

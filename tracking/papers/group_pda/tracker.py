@@ -4,23 +4,57 @@ Gennari & Hager, "Probabilistic data association methods in visual tracking of g
 (xi, v, Sigma, N): centroid xi and velocity v, together x with covariance P; extent Sigma of the members' positions;
 number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or section (sec.) and the module:
 
-    (F, Q: transition and process noise of x; S: covariance of a point about xi; y: a point; gamma: squared Mahalanobis
-    radius; m_d, m_N, m_g: masses by the centroid's place, the number of people and the group constraint)
+    (F, Q: transition and process noise of x; S: covariance of a point about xi, in the paper Sigma; y: a point; gamma:
+    squared Mahalanobis radius `gate`; m_d, m_N, m_g: masses by the centroid's place, the number of people and the group
+    constraint)
 
     predict    x = F x, P = F P F' + Q                                 eq. 2.3            group_bank
     gate       {y : (y - xi)' S^-1 (y - xi) < gamma}                   eq. 2.2            association
     associate  theta_j: unshared points and the j nearest shared ones  sec. 4.1           association_kernels
     masses     m_tot = m_d m_N m_g: m_d, m_N                           eq. 4.2            association_mass_kernels
-               m_g = 1 if |G_y| = 1, else 0                            eq. 4.1            filters.components_kernels
+               m_g = 1 if |G_y| = 1 (feasible), else 0                 eq. 4.1            filters.components_kernels
     update     x, P, Sigma, N as means over the associations           eq. 2.4, sec. 4.3  association_kernels
     split      a group whose associations all have m_g = 0             sec. 3.3, 4.2      splitting
     merge      R_x: overlapping regions and like velocities            sec. 3.1           merging
-               x, Sigma, N of the union                                eq. 3.1            merging
+               x, Sigma, N of the union, means weighted by N           eq. 3.1            merging
     birth      unclaimed points, grouped by G_y                        sec. 3.3           births_and_losses
 
-The grouping functions G_0, G_x, G_y of points (sec. 3.3, 4.2.1) are in tracking.filters.components.
+The grouping functions G_0, G_x, G_y of points (sec. 3.3, 4.2.1) are in tracking.filters.components: G_y links points at
+most 2 x `radius` apart, and joins linked sets whose regions overlap. A group that is not measured for `coast_time` is
+lost: it claims no points. `association = "none"` is section 5.2.1: a group takes all points in its region.
 
-Departures: docs/reference/trackers/group-pda.md.
+Departures. Those marked (c) are off with `corrections` off.
+
+- search region: Σ, P and a point's variance; (c) wider in infeasible time. Paper: Σ. Why: few points give a small Σ.
+- extents: shrunk to a prior (`spread_weight`); (c) corrected for the gate. Paper: sample covariance. Why: few people.
+- G_x: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
+- births: after `confirm_time`; until then no points of a confirmed group. Paper: at once. Why: false alarms.
+- R, (c): members keep places, some are missed. Paper: Σ / m. Why: less noise.
+- m_N: σ_n grows with N ((c)); heavy tails. Paper: normal, σ_n. Why: several join at once.
+- missed detections: (c) a miss hypothesis; missed members stand in for `carry_time`, from points. Paper: not
+  considered. Why: detectors miss people.
+- Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated.
+  Why: they would swell.
+- linked points, (c): a point outside all regions, linked to a group's, is the group's. Paper: free. Why: no births at
+  the edge.
+- pixels: each counts as a share of a person. Paper: each counts one. Why: N in people.
+- colours: a mass of shared points (`appearance`), from pixels. Paper: future work. Why: similar groups cross.
+- split: after `split_time`; measured frames count back; (c) parent's velocity. Paper: after infeasible frames, at
+  rest. Why: misses.
+- divided points: those most probably the group's. Paper: all in the region. Why: others' people stay out.
+- ids: the largest part or merged group keeps its id. Paper: none. Why: tracks need ids.
+- walking out: a new group within reach of a member is a child. Paper: none. Why: splits without shared points.
+- like velocities: difference up to `merge_velocity`. Paper: SR_v overlap. Why: P does not measure likeness.
+- near groups: those of Σ at a smaller γ, or linked; from pixels not far apart. Paper: regions overlap. Why: no merge
+  after a split.
+- merge: after `merge_time`, of confirmed, measured, feasible groups. Paper: at once. Why: crossing groups.
+- enter: no merge if at most one group is older or a child. Paper: none. Why: they came together.
+- duplicates: of two groups on the same people for `coast_time` one is lost. Paper: none. Why: hidden groups follow
+  others.
+- recapture: a newborn group takes a lost one's id (`recapture_time`). Paper: none. Why: occlusion.
+- onsets: dated back. Paper: none. Why: decisions lag.
+- depth: divided by the sine of the tilt. Paper: px. Why: oblique views.
+`association = "none"` is section 5.2.1: a group takes all points in its region.
 """
 
 from __future__ import annotations

@@ -5,13 +5,48 @@ Cattelani, Manfredotti, Messina, "Multiple object tracking with relations", ICPR
 together. z are the detections of a frame, w the weights. The steps of a frame:
 
     forecast  s^a ~ p(s^a_t | s^a_t-1, s^r_t-1)  attributes from old relations  eq. 8, sec. 3.2      transition_kernels
+              v = u - B u / |u| + C e, x = x + v dt; u the old mean velocity of the group, B and C the row of
+              |u| in Table 3, per axis, e normal
               s^r ~ p(s^r_t | s^a_t, s^r_t-1)    relations from new attributes  eq. 7                transition_kernels
     weight    w = w p(z_t | s^a_t)               sum over all mappings          eqs 6, 12, sec. 3.3  sensor
     births    x ~ N(z, .), v ~ N(0, .)           relations of newcomers         secs. 2.1.1, 3.2     tracker, relations
     estimate  means over particles                                                                   particle_set
     resample  residual sampling                                                 sec. 2.1             filters.particles
 
-Readings of the paper and departures: docs/reference/trackers/relational.md.
+Readings: eqs 2 and 8 condition on earlier states only. Eq. 14 ends with the posterior of the frame before.
+
+Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_distance` x distance -
+`relation_velocity` x difference of velocities:
+
+- speed table: from simulated people, per second, times `noise_scale`. Paper: from boxes, per frame. Why: box errors
+  are no motion.
+- relations: pairs: start and stop with hazards (`relation_rate`); a person redraws all own pairs at once. Paper: one
+  group for each person. Why: groups part in steps.
+- evidence: the belief about reported tracks (`relation_evidence`). Paper: not stated. Why: it looks back for seconds.
+- coupling: approached within `coupling_time`; partners weighted by existence and g(l), less the filter's scatter.
+  Paper: the group's mean velocity. Why: members differ.
+- noise: a shared part (`common_noise`). Paper: independent. Why: a hidden member turns, too.
+- people: slots common to all; existence is a probability. Paper: in each particle. Why: few particles would have each
+  newcomer.
+- sensor: pairs: e P_D g / λ_c, missed: 1 − e P_D, with existence e, `detect_prob`, `clutter_density`. Paper: all
+  detected, no clutter. Why: detectors err.
+- displaced points: a share `outlier_share`, away from the camera, more if feet are covered. Paper: normal. Why:
+  hidden feet.
+- misses: after a miss, detected again with `hidden_time`. Paper: all alike. Why: occlusions last.
+- occluders: behind pillars, walls and people nobody is measured or counts as missed. Paper: may lengthen the window.
+  Why: nobody is visible.
+- sums: exact up to a size, then belief propagation; unlikely pairs left out. Paper: all mappings. Why: exponential
+  cost.
+- pixels: blobs, large ones divided by k-means. Paper: none. Why: people merge in the mask.
+- births: a detection that is probably nobody's; no weight until the next frame. Paper: a new object. Why: not stated
+  when.
+- deaths, report: also below `least_existence`; from `report_existence`. Paper: after the window; all. Why: false
+  alarms.
+- newcomers: half of those near join, by distance. Paper: half join a group. Why: far groups are improbable.
+- weights: one for each person, others averaged; a missed person has the partners' (`weights`). Paper: one for a
+  particle. Why: many people, few particles.
+- resampling: of people with few effective particles, with a kernel. Paper: each frame. Why: equal particles.
+- groups: derived from the tracks. Paper: in the state. Why: pairs form no groups.
 """
 
 from __future__ import annotations

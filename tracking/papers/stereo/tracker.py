@@ -14,8 +14,46 @@ covariance of its points' positions and velocities; N, the number of its points.
     new groups: points whose spheres overlap               eq. 12              births_and_losses
     merging by the full state, weighted by N               eqs 13 to 15        merging
 
-The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in tracking.detect. Departures:
-docs/reference/trackers/stereo.md.
+C_y is the covariance of the points' positions y and velocities lambda; spheres have the radius `radius`; groups merge
+whose regions of X overlap (`merge_gate`). The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in
+tracking.detect.
+
+Readings: eq. 6 is printed with y for x, and takes world for camera coordinates; here f contains the camera's pose. A
+feature has the covariance J^-1 R J^-T, with the Jacobian J of (u, v, d) and R from `pixel_noise` and
+`disparity_noise`: its error grows with the squared depth.
+
+Departures:
+
+- subtraction: in the left picture only. Paper: not stated. Why: one background model.
+- person or not: fixed limits, by quantiles; regions cut by the edge are not too small. Paper: by height and width.
+  Why: no limits printed.
+- features: checked backwards, a least distance apart, no faint disparities. Paper: KLT. Why: wrong matches.
+- velocity of a feature: slope over `window_time`. Paper: not stated. Why: one frame is too noisy.
+- time: seconds; α_s = exp(−dt / `spread_time`). Paper: steps of a frame. Why: any frame rate.
+- γ, spheres: constants (`gate`, `radius`). Paper: tuned by scene. Why: no tuning.
+- measurement: its projection. Paper: mean of the points. Why: the mean disparity is biased in depth.
+- visible side: points moved away from the camera (`surface_offset`). Paper: none. Why: the camera sees surfaces.
+- mean: inverse density on the ground (`density_width`). Paper: all features count alike. Why: textured people have
+  more features.
+- errors of points: added in eqs 8 to 10, taken off C_y (`point_covariance`). Paper: none. Why: depth is uncertain.
+- P and Σ: P of the filter, Σ of the members; regions use both (`point_covariance`). Paper: one covariance. Why: a
+  member is no centroid.
+- Σ: shrunk to a prior (`spread_weight`). Paper: sample covariance. Why: few points in six dimensions.
+- R: of the mean of the points, and `centroid_noise`. Paper: one, not printed. Why: points come and go.
+- first P: of the points' mean position and velocity. Paper: not stated. Why: a filter needs it.
+- k_p, k_v: exponents, 1 and `velocity_weight`. Paper: factors. Why: factors have no effect.
+- merged id: that of the confirmed group with most points. Paper: a new number (Fig. 7). Why: a group keeps its
+  identity.
+- young groups: tentative ones without event; one that just arrived, no child, enters. Paper: merge. Why: no false
+  merges.
+- splits: linked parts for `split_time`, unless they would merge again (`split`). Paper: none. Why: groups part.
+- parts: start anew from their points; the largest keeps the id. Paper: none. Why: tracks need ids.
+- confirmation, deletion: `confirm_time`, `coast_time`, `report_coast`. Paper: none. Why: wrong matches.
+- too much foreground: features start anew, so nothing is measured for `window_time`; groups go on. Paper: none. Why:
+  light changes.
+- hulls: round places corrected for errors, half a footprint each. Paper: ellipses. Why: features lie all over a body.
+- background: adapts, but not where people are (`background`). Paper: not stated. Why: light changes.
+- points as input: linked between frames; used at once, one is enough. Paper: none. Why: other detectors.
 """
 
 from __future__ import annotations

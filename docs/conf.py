@@ -1,0 +1,217 @@
+"""Sphinx configuration of the site (`make docs`), and the parts of its pages that are made from the code.
+
+A page asks for such a part with the comment `<!-- generated: NAME -->` or `<!-- generated: NAME ARGUMENT -->` on a line
+of its own; PARTS has the names. `<!-- pages TITLE: a b -->` puts pages into the navigation. A code host shows neither.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+project = "flockscope"
+author = "flockscope maintainers"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+root_doc = "index"
+html_theme = "furo"
+html_title = "flockscope"
+html_show_sphinx = False
+myst_heading_anchors = 4
+myst_enable_extensions = ["colon_fence", "html_image"]
+nitpicky = True
+# Without an entry: types of other projects, tables of scenario files (their page has them), parts of results.
+nitpick_ignore_regex = [
+    ("py:.*", r"(?!(scenarios|sim|tracking)\.).*"),
+    ("py:class", r"scenarios\.schema\.(values|sensor|picture|scenario)\.(?!Scenario$|ObservationSpec$)\w+"),
+    ("py:class", r"tracking\.(tuning\.(comparison|search_plan)|grouping\.belief)\.(?!Belief$)\w+"),
+]
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_member_order = "bysource"
+napoleon_numpy_docstring = False
+
+PUBLIC = ("scenarios", "sim", "tracking", "tracking.scoring")
+"""Packages of which everything in `__all__` must stand on a page."""
+
+
+def commands() -> str:
+    """Returns a section for each command: its help, and a table of its arguments and options."""
+    root: Any = import_module("typer").main.get_command(import_module("tracking.app.cli").app)
+    return "\n".join(_section(name, command) for name, command in _commands(root, ""))
+
+
+def _commands(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _commands(command, f"{prefix}{name} ")
+        else:
+            yield f"{prefix}{name}", command
+
+
+def _section(name: str, command: Any) -> str:
+    context = command.context_class(command, info_name=name)
+    records = (parameter.get_help_record(context) for parameter in command.params)
+    rows = [f"| `{_cell(option)}` | {_cell(text)} |" for option, text in filter(None, records)]
+    return "\n".join([f"## {name}", "", command.help, "", table("argument or option", "meaning", rows=rows), ""])
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+def scenario_keys() -> str:
+    """Returns the list that `flockscope scenarios --schema` prints."""
+    return f"```text\n{import_module('tracking.app.commands.scenarios').list_keys().text.rstrip()}\n```"
+
+
+def catalogue() -> str:
+    """Returns the table of the scenarios that come with flockscope."""
+    resolve = import_module("scenarios.loading.resolve")
+    rows = []
+    for name in resolve.names():
+        scenario = resolve.load(name)
+        orders = ", ".join(sorted({order.type for order in scenario.event})) or "–"
+        rows.append(f"| `{name}` | {scenario.about} | {scenario.duration:g} | {orders} |")
+    return table("scenario", "what happens, and whose claim it tests", "s", "orders", rows=rows)
+
+
+def suites() -> str:
+    """Returns the table of the suites that come with flockscope."""
+    resolve, files = import_module("scenarios.loading.resolve"), import_module("scenarios.loading.suites")
+    rows = [
+        f"| `{name}` | {len(resolve.resolve(f'suite:{name}'))} | {files.about(files.find_suite(name))} |"
+        for name in resolve.suite_names()
+    ]
+    return table("suite", "entries", "what it is", rows=rows)
+
+
+def scores() -> str:
+    """Returns the table of all scores."""
+    return import_module("tracking.scoring.catalogue").table()
+
+
+def observations() -> str:
+    """Returns the table of the statistics that the environment observes."""
+    return import_module("tracking.environment.observation").table()
+
+
+def parameters(config: str) -> str:
+    """Returns the table of the parameters of a config class, MODULE:CLASS."""
+    module, _, name = config.partition(":")
+    return getattr(import_module(module), name).table()
+
+
+def constants(package: str) -> str:
+    """Returns the constants of a tracker's package: numbers with an upper-case name and a text after them."""
+    rows = []
+    for path in sorted((ROOT / "tracking" / "papers" / package).glob("*.py")):
+        found = _constants(ast.parse(path.read_text(encoding="utf-8")).body)
+        rows += [f"| {name} | {value:g} | `{path.stem}` | {_cell(meaning)} |" for name, value, meaning in found]
+    return table("constant", "value", "module", "meaning", rows=rows)
+
+
+def _constants(body: list[ast.stmt]) -> Iterator[tuple[str, float, str]]:
+    for statement, after in pairwise(body):
+        match statement, after:
+            case ast.Assign([target], value), ast.Expr(ast.Constant(str(text))):
+                targets = target.elts if isinstance(target, ast.Tuple) else [target]
+                values = value.elts if isinstance(value, ast.Tuple) else [value]
+                for one, number in zip(targets, values, strict=False):
+                    match one, number:
+                        case ast.Name(name), ast.Constant(int() | float() as size) if name.isupper():
+                            yield name, size, text
+
+
+def method(module: str) -> str:
+    """Returns the docstring of a module without its first paragraph."""
+    return inspect.cleandoc(import_module(module).__doc__ or "").partition("\n\n")[2]
+
+
+def changelog() -> str:
+    """Returns the CHANGELOG without its title."""
+    return _of_the_root("CHANGELOG.md")
+
+
+def contributing() -> str:
+    """Returns CONTRIBUTING.md without its title."""
+    return _of_the_root("CONTRIBUTING.md")
+
+
+def _of_the_root(name: str) -> str:
+    text = (ROOT / name).read_text(encoding="utf-8").partition("\n")[2]
+    return text.replace("](docs/", "](/")
+
+
+def table(*columns: str, rows: list[str]) -> str:
+    """Returns a Markdown table."""
+    return "\n".join([f"| {' | '.join(columns)} |", "|---" * len(columns) + "|", *rows])
+
+
+PARTS: dict[str, Callable[..., str]] = {
+    part.__name__.replace("_", "-"): part
+    for part in (
+        commands,
+        scenario_keys,
+        catalogue,
+        suites,
+        scores,
+        observations,
+        parameters,
+        constants,
+        method,
+        changelog,
+        contributing,
+    )
+}
+GENERATED = re.compile(r"^<!-- generated: (\S+) ?(\S*) -->$", re.MULTILINE)
+OUTSIDE = re.compile(r"\]\((?:\.\./)+(README|CONTRIBUTING|CHANGELOG)\.md")
+PAGE_OF = {"README": "index.md", "CONTRIBUTING": "contributing.md", "CHANGELOG": "changelog.md"}
+PAGES = re.compile(r"^<!-- pages (\w+): (.*) -->$", re.MULTILINE)
+
+
+def with_generated_parts(text: str) -> str:
+    """Returns the text of a page with all parts that are made from the code."""
+    text = OUTSIDE.sub(lambda found: f"](/{PAGE_OF[found[1]]}", text)
+    text = GENERATED.sub(lambda found: PARTS[found[1]](*filter(None, [found[2]])), text)
+    return PAGES.sub(lambda found: navigation(*found.groups()), text)
+
+
+def navigation(title: str, pages: str) -> str:
+    """Returns a table of contents that only the navigation shows."""
+    return "\n".join(["```{toctree}", ":hidden:", f":caption: {title}", "", *pages.split(), "```"])
+
+
+def undocumented() -> list[str]:
+    """Returns the public names that no page documents."""
+    text = "\n".join(page.read_text(encoding="utf-8") for page in ROOT.glob("docs/**/*.md"))
+    names = [f"{package}.{name}" for package in PUBLIC for name in import_module(package).__all__]
+    return [name for name in names if not re.search(rf"^\.\. auto\w+:: {re.escape(name)}$", text, re.MULTILINE)]
+
+
+def options_as_list(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+    """Makes a list of the lines `name=default: text` below a line `Options:`."""
+    if "Options:" in lines:
+        start = lines.index("Options:") + 1
+        lines[start:] = [re.sub(r"^(\w+\S*): ", r"- ``\1``: ", line.replace("*", r"\*")) for line in lines[start:]]
+
+
+def setup(app: Any) -> None:
+    """Sphinx calls this."""
+    if missing := undocumented():
+        raise RuntimeError(f"docs/reference/python.md: no entry of {', '.join(missing)}")
+
+    def read(_app: Any, _name: str, source: list[str]) -> None:
+        source[0] = with_generated_parts(source[0])
+
+    app.connect("source-read", read)
+    app.connect("autodoc-process-docstring", options_as_list)
