@@ -7,11 +7,11 @@ import socket
 import numpy as np
 import pytest
 
-from benchmarks.fuzz.readers import FILES, READERS
-from benchmarks.fuzz.specimens import TEXTS, write_texts
 from scenarios.errors import InputError
 from scenarios.reading import read_regular
 from sim.io.source import open_source
+from tests.damaged.readers import FILES, READERS
+from tests.damaged.specimens import TEXTS, write_texts
 
 FILE_KINDS = sorted(set(READERS) & set(TEXTS) - set(FILES) - {"setting", "tracker setting"})
 

@@ -156,10 +156,10 @@ def _truth(folder: Path) -> None:
 
 
 def _study(folder: Path) -> None:
-    from benchmarks.fuzz.specimens import study_plan
+    from tests.damaged.specimens import study_plan
     from tracking.tuning.study import open_study
 
-    with open_study(study_plan(), folder / "study.journal", "fuzz") as study:
+    with open_study(study_plan(), folder / "study.journal", "damaged") as study:
         study.records()
         study.finished()
 
