@@ -171,10 +171,7 @@ def test_ranges_that_cross_or_are_empty(tmp_path, simulate, seeds):
 
 def test_wrong_requests_make_nothing(tmp_path, simulate):
     x = Entry("x", scenario())
-    for entries, more, word in (
-        ([x, x], {}, "twice"),
-        ([x], {"workers": WorkerOptions(0)}, "workers"),
-    ):
+    for entries, more, word in (([x, x], {}, "twice"), ([x], {"workers": WorkerOptions(0)}, "workers")):
         with pytest.raises(InputError, match=word):
             generate(entries, range(2), tmp_path / "new", **more)
     (tmp_path / "file").write_text("x")

@@ -105,11 +105,7 @@ NEVER = MERGE.replace("time = 1.0", "distance_lt = 0.1")
 # what only a simulation can tell: the file's text, the exit code, and what the line must say.
 WORLDS = {
     "out of view": (f"camera = {{ height = 2, position = [4, 1] }}\ngroup = [{GROUP}]", 2, ["camera.height", "view"]),
-    "a place that is taken": (
-        f"group = [{GROUP}, {SAME}]",
-        2,
-        ["group.b.start", "another group"],
-    ),
+    "a place that is taken": (f"group = [{GROUP}, {SAME}]", 2, ["group.b.start", "another group"]),
     "always in a wall": (
         f"world = {{ walls = [[4, 0, 4, 9]] }}\ngroup = [{DRAWN}]",
         2,

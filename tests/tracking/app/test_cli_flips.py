@@ -350,12 +350,7 @@ def seen_scene():
     from sim.sequence import observe
 
     size = ["camera.image=[320,240]", "camera.tilt_deg=25", "duration=10", "camera.fps=8"]
-    light = [
-        "light.shadow=0.5",
-        "light.drift=0.1",
-        "light.drift_time=4.0",
-        "light.switch=[{ at = 5.0, gain = 0.8 }]",
-    ]
+    light = ["light.shadow=0.5", "light.drift=0.1", "light.drift_time=4.0", "light.switch=[{ at = 5.0, gain = 0.8 }]"]
     scene = load("cross", ["group.passers.repeat=6", *size, *light])
     sequence = observe(scene, simulate(scene, 11), check=False, streams=("left",))
     return with_a_covered_picture(sequence)

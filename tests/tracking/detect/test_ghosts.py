@@ -26,8 +26,7 @@ def picture(people, seed, look="colour"):
 def made(people, look="colour", fps=10.0, **settings):
     sample = np.stack([picture(people, seed, look) for seed in range(20)])
     return Foreground(
-        Context(fps, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample),
-        BackgroundSettings(**settings),
+        Context(fps, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample), BackgroundSettings(**settings)
     )
 
 

@@ -217,8 +217,7 @@ def test_parameters_of_joining(changed, told):
 
 
 @pytest.mark.parametrize(
-    ("changed", "told"),
-    [(LinkRule(apart=2.0), 103), (LinkRule(patience=1.0), 106), (LinkRule(diverge=0.3), 91)],
+    ("changed", "told"), [(LinkRule(apart=2.0), 103), (LinkRule(patience=1.0), 106), (LinkRule(diverge=0.3), 91)]
 )
 def test_parameters_of_parting(changed, told):
     assert [e[0] for e in events(derive(tracks(leaving()), FPS, rule=changed))] == [told]
