@@ -18,6 +18,7 @@ from sim.io.source import open_source
 from sim.io.store.manifest import with_hash
 from sim.io.store.validate import validate
 from sim.workers.start import WorkerOptions
+from tests.small_disks import small_disk
 from tests.fake_simulator import content, scenario
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -302,35 +303,19 @@ def test_killed_in_the_middle_and_resumed(tmp_path, whole, kill_after):
     assert content(tmp_path / "out") == whole
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 64 kB; may(size) makes it so large."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-
-    def may(size, *more):
-        return subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}{''.join(more)}", "tmpfs", folder],
-                              capture_output=True, check=False).returncode == 0  # fmt: skip
-
-    if not may("64k"):
-        pytest.skip("no right to mount a file system")
-    yield folder, may
-    subprocess.run(["umount", folder], check=True)
-
-
 @pytest.mark.slow
-def test_a_disk_fills_up_under_two_workers(tmp_path, whole, small_disk):
-    folder, may = small_disk
-    done = run_program(tmp_path, folder / "out", 2)
-    assert done.returncode == 1
-    assert b"No space left" in done.stderr.splitlines()[-1]
-    there = open_all(folder / "out")
-    assert len(there) < 6
-    assert all(validate(p) == [] for p in there)
-    assert list(folder.rglob(f"{atomic.PARTIAL}*")) == []
-    assert may("10m", ",remount")
-    assert run_program(tmp_path, folder / "out", 2).returncode == 0
-    assert content(folder / "out") == whole
+def test_a_disk_fills_up_under_two_workers(tmp_path, whole):
+    with small_disk(tmp_path / "disk", "size=64k") as folder:
+        done = run_program(tmp_path, folder / "out", 2)
+        assert done.returncode == 1
+        assert b"No space left" in done.stderr.splitlines()[-1]
+        there = open_all(folder / "out")
+        assert len(there) < 6
+        assert all(validate(p) == [] for p in there)
+        assert list(folder.rglob(f"{atomic.PARTIAL}*")) == []
+        subprocess.run(["mount", "-o", "remount,size=10m", folder], check=True)
+        assert run_program(tmp_path, folder / "out", 2).returncode == 0
+        assert content(folder / "out") == whole
 
 
 def open_all(out: Path) -> list[Path]:

@@ -10,14 +10,14 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from scenarios.errors import WorkError
+from tests.small_disks import small_disk
 from tracking.app.cli import run
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -317,6 +317,7 @@ def _leaves(group):
         ("generate merge --seeds 0:2 --out y --workers 0", "invalid value for '--workers'"),
         ("scenarios --out x.svg", "--out without a scenario to explain"),
         ("export coc", "no such command 'coc'"),
+        ("export", "missing command"),
     ],
 )
 def test_usage(line, got, as_json, capsys):
@@ -356,47 +357,6 @@ def test_an_unwritable_out_is_named_as_given(place, line, folder, capsys):
     assert shown.startswith(f"error: {words(line, place)[-1]}: ")
     assert ".partial" not in shown
     assert len(shown.splitlines()) == 1
-
-
-def test_one_warning_for_many_recordings(tmp_path, capsys):
-    for name in ("a", "b", "c"):
-        (tmp_path / "data" / name / "gt").mkdir(parents=True)
-        (tmp_path / "data" / name / "gt" / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
-    for _ in range(2):
-        assert run(["view", str(tmp_path / "data"), "--out", str(tmp_path / "pages")]) == 0
-        assert len(capsys.readouterr().err.splitlines()) == 1
-
-
-def test_visible_boxes_of_a_recording_without_any(tmp_path, capsys):
-    (tmp_path / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
-    line = ["track", "blob", str(tmp_path / "gt.txt"), "--fps", "10", "--detections", "truth", "--out"]
-    for box in ("visible", "amodal"):
-        assert run([*line, str(tmp_path / box), "--set", f"sensor.box={box}"]) == 0
-    assert not capsys.readouterr().err
-
-
-def test_a_tracker_on_the_ground_is_scored_there(place, tmp_path, capsys):
-    """The truth as tracks without boxes: projected ones in the text are no measurement."""
-    from sim.io.source import open_source
-    from sim.io.store.track_files import write_tracks
-    from sim.types import Tracks
-
-    (sequence,) = open_source(place.one)
-    found = [sequence.truth.at(k) for k in range(1, sequence.length + 1)]
-    answers = [
-        Tracks(t.index, t.t, "ground", "person", t.id, t.group, t.pos, t.vel, np.zeros((len(t.id), 4, 4)))
-        for t in found
-    ]
-    seen = {"camera": sequence.camera, "scene": sequence.scene}
-    write_tracks(tmp_path / "t", answers, fps=sequence.fps, info={"sequence": sequence.name}, **seen)
-    assert run(["score", str(place.one), str(tmp_path / "t"), "--json"]) == 0
-    (shown,) = json.loads(capsys.readouterr().out)["sequences"]
-    assert (shown["similarity"], shown["HOTA"], shown["MOTA"]) == ("ground", 1.0, 1.0)
-
-
-def test_a_family_of_commands_alone_is_refused(capsys):
-    assert run(["export"]) == 2
-    assert "missing command" in capsys.readouterr().err
 
 
 def test_without_arguments_it_explains_itself(capsys):
@@ -455,36 +415,10 @@ def test_ctrl_c_in_a_real_process(place, workers):
     assert all(run(["validate", str(p)]) == 0 for p in sequences)
 
 
-@contextmanager
-def small_disk(folder, size):
-    """A file system of this size, as mount wants it; the test is skipped where mounting is not allowed."""
-    folder.mkdir(parents=True)
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], capture_output=True, check=False
-    )
-    if mounted.returncode:
-        pytest.skip("no right to mount a small disk")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", folder], check=True)
-
-
-@pytest.mark.slow
-def test_a_full_disk_of_its_own(place, tmp_path):
-    """A file system of 200 kB: exit code 1, one line, and every sequence there is whole."""
-    with small_disk(tmp_path / "disk", "200k") as disk:
-        assert run(words(f"generate {{scene}} --seeds 0:10 --out {disk}/out", place)) == 1
-        assert not list(disk.rglob(".partial-*"))
-        sequences = list(disk.glob("out/flockscope-train/*"))
-        assert len(sequences) < 10
-        assert all(run(["validate", str(p)]) == 0 for p in sequences)
-
-
 @pytest.fixture
 def tiny_disk(tmp_path):
     """A file system of 12 kB, less than any command writes; for commands with a folder, their first file fits."""
-    with small_disk(tmp_path / "tiny", "12k") as disk:
+    with small_disk(tmp_path / "tiny", "size=12k") as disk:
         yield disk
 
 

@@ -161,9 +161,3 @@ def test_a_background_for_a_tracker_that_needs_none(tmp_path, capsys):
     line = ["track", "blob", str(folder), "--fps", "10", "--out", str(tmp_path / "out")]
     assert run([*line, "--detections", "truth", "--background", "first:10"]) == 2
     assert "leave --background out" in capsys.readouterr().err
-
-
-def test_an_overlay_of_what_has_no_pictures(tmp_path, capsys):
-    (tmp_path / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
-    assert run(["overlay", str(tmp_path / "gt.txt"), "--fps", "10", "--out", str(tmp_path / "o.mp4")]) == 2
-    assert "without pictures" in capsys.readouterr().err

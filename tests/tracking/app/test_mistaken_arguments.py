@@ -52,19 +52,3 @@ def test_a_mistaken_argument_is_named(line: str, place: Path, capsys: pytest.Cap
     assert shown.count("\n") == 1
     for words in MISTAKES[line]:
         assert words.format(place) in shown, shown
-
-
-@pytest.mark.parametrize("seeds", ["5", "5:7"])
-def test_one_is_no_plural(seeds: str, place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    line = ["generate", str(place / "scene.toml"), "--streams", "none", "--out", str(tmp_path / "data")]
-    assert run([*line, "--seeds", seeds]) == 0
-    number = "1 sequence" if seeds == "5" else "2 sequences"
-    assert capsys.readouterr().out.startswith(f"{number} in ")
-    assert run(["export", "webdataset", str(tmp_path / "data"), "--out", str(tmp_path / "shards")]) == 0
-    assert capsys.readouterr().out.startswith(f"{number} in 1 shard, ")
-
-
-def test_other_settings_are_named(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    line = ["generate", str(place / "scene.toml"), "--seeds", "0", "--streams", "none", "--out", str(place / "data")]
-    assert run([*line, "--set", "camera.fps=10"]) == 2
-    assert "another sequence (stored → asked for: camera.fps 5 → 10)" in capsys.readouterr().err

@@ -7,18 +7,14 @@ import shutil
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.hashing import file_hash
 from sim.io.files.atomic import lock_folder
 from sim.io.source import open_source
-from sim.io.store import seal
 from sim.io.store.run_seal import read_run
 from sim.io.store.validate import validate
 from tests.refusals import refused
-from tests.sealing import seal_again
 from tracking.app.cli import run
 from tracking.running.run import track
 
@@ -138,15 +134,6 @@ def recording(folder: Path, rows: str) -> Path:
     return folder
 
 
-def test_another_recording_of_that_name(tmp_path, capsys):
-    one, two = (recording(tmp_path / k / "walk", rows) for k, rows in (("1", ROWS), ("2", ROWS.replace("12,", "13,"))))
-    options = ["--detections", "truth", "--fps", "5", "--out"]
-    assert run(["track", "blob", str(one), *options, str(tmp_path / "t")]) == 0
-    assert run(["score", str(one), str(tmp_path / "t"), "--fps", "5"]) == 0
-    assert run(["score", str(one), str(tmp_path / "t"), "--fps", "5", "--px-per-m", "30"]) == 0
-    assert "tracks of another walk" in refused(capsys, "score", two, tmp_path / "t", "--fps", "5")
-
-
 def test_python_stores_what_was_tracked(tmp_path, capsys):
     """The same run.json as the command's, so that tracks of another recording are refused."""
     walk = recording(tmp_path / "walk", ROWS)
@@ -160,15 +147,6 @@ def test_python_stores_what_was_tracked(tmp_path, capsys):
     assert "truth_hash" not in made.info, "labels are not read while tracking"
     (walk / "gt" / "gt.txt").write_text(ROWS.replace("12,", "13,"))
     assert "tracks of another walk" in refused(capsys, "score", walk, tmp_path / "t", "--fps", "5")
-
-
-def test_score_hashes_each_file_once(made, capsys, monkeypatch):
-    hashed = []
-    monkeypatch.setattr(seal, "_hash_of", lambda path: hashed.append(path) or file_hash(path.read_bytes()))
-    assert run(["score", str(made / "data"), str(made / "blob")]) == 0
-    capsys.readouterr()
-    files = [path for path in hashed if path.is_relative_to(made / "blob")]
-    assert sorted(files) == sorted(p for p in (made / "blob").rglob("*.*") if p.name != "run.json")
 
 
 def test_what_was_tracked_before_anybody_labelled_it(tmp_path):
@@ -193,21 +171,6 @@ def test_labels_that_cannot_be_read_stop_track_before_the_first_frame(tmp_path, 
     assert not (tmp_path / "t").exists()
 
 
-def test_a_text_of_others_is_what_it_was(made, tmp_path, capsys):
-    """A folder of texts, one text, and a folder with a tracks.txt alone; none has a run.json."""
-    texts = tmp_path / "texts"
-    texts.mkdir()
-    for folder in (made / "blob").iterdir():
-        shutil.copy(folder / "tracks.mot.txt", texts / f"{folder.name}.txt")
-        (tmp_path / "folders" / folder.name).mkdir(parents=True)
-        shutil.copy(folder / "tracks.txt", tmp_path / "folders" / folder.name / "tracks.txt")
-    assert run(["score", str(made / "data"), str(texts)]) == 0
-    assert run(["score", str(made / "data"), str(tmp_path / "folders")]) == 0
-    (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())
-    assert run(["score", str(one), str(texts / "scene-s40001.txt")]) == 0
-    capsys.readouterr()
-
-
 def test_validate_says_whether_a_run_is_whole(made, tracks, capsys):
     assert run(["validate", str(tracks), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"status": "ok", "problems": [], "content_hash": None}
@@ -222,20 +185,6 @@ def test_validate_says_whether_a_run_is_whole(made, tracks, capsys):
     assert f"{path}: got truncated" in lines[0]
     assert "scene-s40001: got tracks without run.json" in lines[1]
     assert run(["validate", str(made)]) in (0, 1)  # data and tracks together
-
-
-def test_a_sealed_fault_is_named_with_its_frame(made, tracks, tmp_path, capsys, monkeypatch):
-    """NaN in a table with right hashes, as a broken writer could make it."""
-    from sim.io.store.track_files import read_tracks, write_tracks
-
-    folder = tracks / "scene-s40000"
-    info = json.loads((folder / "run.json").read_text())
-    wrong = [t.replace(pos=t.pos * (np.nan if t.index == 7 else 1.0)) for t in read_tracks(folder)]
-    with monkeypatch.context() as patch:
-        patch.setattr("sim.io.store.track_tables.RunRows.reject_faults", lambda *_: None)
-        write_tracks(folder, wrong, fps=5.0, info=info)
-    seal_again(folder)
-    assert "tracks.parquet: frame 7, id " in refused(capsys, "score", made / "data", tracks)
 
 
 def test_one_run_at_a_time_writes_to_a_folder(made, tmp_path, capsys):
@@ -254,26 +203,6 @@ def test_one_run_at_a_time_writes_to_a_folder(made, tmp_path, capsys):
         tracked.write(tmp_path / "out", sequence)
     assert validate(tmp_path / "out") == []
     assert run(line) == 0
-
-
-def test_writers_of_one_folder_leave_a_whole_run(made, tmp_path):
-    """Each writer ends with success or with one clear error, and those with success leave a run."""
-    pytest.importorskip("fcntl")
-    (sequence,) = open_source(next((made / "data").rglob("*-s40000")))
-    tracked = track("blob", sequence, detections="file")
-
-    def write(_):
-        try:
-            tracked.write(tmp_path / "out", sequence)
-        except InputError as error:
-            return str(error).partition(": ")[2].partition(";")[0]
-        return "done"
-
-    with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(write, range(60)))
-    assert set(found) <= {"got another run that writes here", "done"}
-    assert "done" in found
-    assert validate(tmp_path / "out") == []
 
 
 @pytest.mark.parametrize("below", ["", "tracks"])

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 import typer
 
-from tests.short_scene import write_short_scene
 from tracking.app.cli import app, run
 
 ARABIC = str.maketrans("0123456789", "٠١٢٣٤٥٦٧٨٩")
@@ -73,21 +72,6 @@ def test_a_key_given_twice_is_refused(line: str, tmp_path: Path, capsys, monkeyp
     key, values = TWICE[line]
     assert run(line.split()) == 2
     assert f"error: --set {key}: got it twice: {values};" in capsys.readouterr().err
-
-
-def test_a_setting_may_replace_one_of_the_profile(tmp_path: Path, capsys) -> None:
-    """--sensor is a file of keys; --set is stronger."""
-    write_short_scene(tmp_path, "0:1")
-    profile = tmp_path / "sensor.toml"
-    profile.write_text("[sensor]\nclutter_rate = 1.5\nnoise_m = 3\n")
-    options = ["--sensor", str(profile), "--set", "sensor.clutter_rate=0.5", "--streams", "none"]
-    line = ["generate", str(tmp_path / "scene.toml"), "--seeds", "7", "--out", str(tmp_path / "data"), *options]
-    assert run(line) == 0
-    text = next((tmp_path / "data").glob("*/*-s00007/scenario.toml"))
-    assert "clutter_rate = 0.5" in text.read_text()
-    assert "noise_m = 3" in text.read_text()
-    tracked = ["track", "blob", str(tmp_path / "data"), "--out", str(tmp_path / "run"), "--detections", "truth"]
-    assert run([*tracked, *options[:4]]) == 0, capsys.readouterr().err
 
 
 NUMBERS = {

@@ -10,7 +10,7 @@ import pytest
 
 from sim.types import Detections, Frame, GroupEvent, Groups, Tracks
 from tracking.environment import observation
-from tracking.environment.observation import NAMES, STATISTICS, Observer, Statistic, squashed, table
+from tracking.environment.observation import NAMES, STATISTICS, Observer, Statistic, squashed
 from tracking.environment.observation_window import track_rows
 
 FPS = 10.0
@@ -173,12 +173,6 @@ def test_squashed():
     assert [squashed(statistic, v) for v in (0, 2, 6, np.inf, -1)] == [0, 0.5, 0.75, 1, 0]
     assert squashed(statistic, np.nan) == 0
     assert [squashed(Statistic("x", None, "", ""), v) for v in (-0.1, 0.5, 1.5)] == [0, 0.5, 1]
-
-
-def test_the_docs_have_the_table():
-    docs = Path(__file__).resolve().parents[3] / "docs" / "reference" / "environment.md"
-    assert table() in docs.read_text(encoding="utf-8")
-    assert len(set(NAMES)) == len(NAMES)
 
 
 def test_it_knows_nothing_of_the_truth():

@@ -17,10 +17,6 @@ PAGE = ROOT / "docs" / "reference" / "metrics.md"
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
 
 
-def test_the_page_holds_the_table() -> None:
-    assert table() in PAGE.read_text(encoding="utf-8")
-
-
 def test_the_table_is_printed() -> None:
     command = [sys.executable, "-W", "ignore", "-m", "tracking.scoring.catalogue"]
     said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=True)

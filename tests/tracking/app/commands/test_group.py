@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
@@ -221,26 +220,6 @@ def test_probabilities(walk, tmp_path, capsys):
     assert not (tmp_path / "g" / "pairs.parquet").exists()
 
 
-def test_probabilities_know_nothing_later(tmp_path, capsys):
-    found = []
-    for frames in (200, 120):
-        (tmp_path / "walk.txt").write_text(text(frames))
-        line = ["group", tmp_path / "walk.txt", "--fps", 10, "--probabilities"]
-        done(capsys, *line, "--out", tmp_path / str(frames))
-        table = pq.read_table(tmp_path / str(frames) / "pairs.parquet")
-        found.append(table.filter(pc.less_equal(table["frame"], 120)))
-    assert found[0].equals(found[1])
-
-
-def test_a_dataset(tmp_path, capsys):
-    write_short_scene(tmp_path, "40000:40002")
-    assert run(["group", str(tmp_path / "data"), "--out", str(tmp_path / "g")]) == 0
-    assert "all" in capsys.readouterr().out
-    found = done(capsys, "score", tmp_path / "data", tmp_path / "g")
-    assert found["mean"]["HOTA"]["mean"] == 1
-    assert {check_run(tmp_path / "g" / f"scene-s4000{k}")["tracker"] for k in (0, 1)} == {"group"}
-
-
 def test_texts_of_a_folder(tmp_path, capsys):
     """As trackers write them: one text for each sequence."""
     for name in ("a", "b"):
@@ -383,24 +362,6 @@ def test_a_run_in_the_image_without_scale(tmp_path, capsys):
     seal_again(tmp_path / "mine", px_per_m=40.0)
     (row,) = done(capsys, *line)["runs"]
     assert row["px_per_m"] == 40
-
-
-def test_keys_of_run_json(walk, tmp_path, capsys):
-    """Those of a tracker's run, but its speeds; and always the grouping."""
-    done(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
-    done(capsys, "track", "group-pda", walk, "--fps", 10, "--out", tmp_path / "t")
-    mine, theirs = (check_run(tmp_path / name).keys() for name in "gt")
-    assert theirs - mine == {"frames_per_second", "whole_frames_per_second"}
-    assert mine - theirs == {"grouping"}
-
-
-def test_recorded_people(shared_data, tmp_path, capsys):
-    """The street that all figures are about, by one line each."""
-    folder = shared_data / "biwi" / "seq_hotel"
-    done(capsys, "group", folder, "--out", tmp_path / "g")
-    (row,) = done(capsys, "score", folder, tmp_path / "g")["sequences"]
-    assert row["pairwise_F1"] > 0.6
-    assert open_source(folder)[0].name == row["name"]
 
 
 LOW_CAMERA = [f"camera.{setting}" for setting in ("tilt_deg=0", "height=2.5", "position=[12,12]", "crop=true")]

@@ -73,19 +73,6 @@ def test_files_are_memory_for_groups_as_wholes(made: Path, scene: Sequence, tmp_
             assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
 
 
-def test_tables_of_a_tracker_of_groups(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
-    """There is no table of people; the objective is in the table of groups."""
-    folder = tmp_path / "merge-s00005"
-    write_tracks(folder, wholes(scene, "ground"), fps=scene.fps)
-    capsys.readouterr()
-    assert run(["score", str(made / "data" / "flockscope-train" / "merge-s00005"), str(folder)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].strip() == "groups, strict"
-    assert lines[1].split()[:3] == ["sequence", "objective", "1-FP"]
-    assert "people are not tracked" in lines
-    assert not any("DetA" in line for line in lines)
-
-
 def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, capsys) -> None:
     """A seed tracked from its sensor's boxes, one from labels, one from noisy ones, one as a text without run.json."""
     line = ["generate", "merge", "--seeds", "3:7", "--streams", "none", "--out", str(tmp_path / "data")]
@@ -108,23 +95,6 @@ def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, 
     for words in ("file", "truth", "truth (box_noise.scale = 2)", "unknown (no run.json)"):
         assert f"1 of 4 sequences, detections {words}\n" in text
     assert "95 % low" not in text
-
-
-@pytest.mark.slow
-def test_files_are_memory_from_pixels(tmp_path: Path, capsys) -> None:
-    """Through pictures without loss."""
-    settings = ["camera.fps=5", "camera.image=[320,240]"]
-    data, tracks = tmp_path / "data", tmp_path / "tracks"
-    line = ["generate", "merge", "--seeds", "3", "--images", "png", "--out", str(data)]
-    assert run([*line, *(word for text in settings for word in ("--set", text))]) == 0
-    assert run(["track", "blob", str(data), "--out", str(tracks)]) == 0
-    (row,) = scored(capsys, data, tracks)["sequences"]
-    sequence = simulate(load("merge", settings), 3)
-    answers = track("blob", sequence)
-    assert answers.info["detections"] == "image"
-    assert sum(len(t.id) for t in answers) > 100
-    for key, value in evaluate(sequence.truth, answers).items():
-        assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
 
 
 def test_the_mean_has_every_key_and_an_interval(made: Path, capsys) -> None:
@@ -260,11 +230,3 @@ def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:
     output = capsys.readouterr().out
     assert "groups are not labelled" in output
     assert "strict" not in output
-
-
-def test_lengths_are_printed_with_their_unit(made: Path, tmp_path: Path, capsys) -> None:
-    (tmp_path / "S.txt").write_text("1,1,10,20,40,100,1\n2,1,12,20,40,100,1\n")
-    assert run(["score", str(tmp_path / "S.txt"), str(tmp_path / "S.txt"), "--fps", "10"]) == 0
-    assert "GOSPA (px)" in capsys.readouterr().out
-    assert run(["score", str(made / "data"), str(made / "truth")]) == 0
-    assert "GOSPA (m)" in capsys.readouterr().out

@@ -58,16 +58,6 @@ def test_the_ranking_is_that_of_compare(made: Path, capsys) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_text_of_the_same_tracks_ties(made: Path, capsys) -> None:
-    found = ranked(capsys, made, str(made / "good"), str(made / "texts"), "--by", "HOTA")
-    (pair,) = found["differences"]
-    assert pair["mean"] == pytest.approx(0, abs=0.01)
-    assert {r["run"]: r["input"] for r in found["ranking"]} == {
-        "oracle from boxes (file)": "boxes (file)", "good": "boxes (file)", "texts": "unknown",
-    }  # fmt: skip
-
-
-@pytest.mark.filterwarnings("ignore::UserWarning")
 def test_what_is_shown_and_stored(made: Path, tmp_path: Path, capsys) -> None:
     words = ["score", str(made / "data"), str(made / "good"), str(made / "bad")]
     assert run([*words, "--csv", str(tmp_path / "all.csv")]) == 0

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from scenarios.errors import InputError
 from sim.types import GroupEvent, Sequence, Truth
 from tracking.app.pictures.contact_sheet import choose_frames, write_sheet
-from tracking.drawing.canvas import FLOOR, Canvas, colour
-from tracking.drawing.plan_view import draw_ids
+from tracking.drawing.canvas import FLOOR, colour
 
 
 def bare(length: int, starts: dict[int, str]) -> Truth:
@@ -30,17 +29,6 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
     assert len(set(chosen)) == 8
     assert max(np.diff([1, *chosen, 200])) < 45
     assert chosen == sorted(chosen)
-
-
-def test_fuller_frames_fill_the_gaps(truth: Truth) -> None:
-    few = truth.replace(frame=np.array([70, 70, 71]), id=np.array([1, 2, 1]), events=())
-    assert choose_frames(few, 1) == [70]
-
-
-def test_onsets_close_to_one_another_share_a_picture() -> None:
-    chosen = choose_frames(bare(200, {50: "cross", 55: "cross", 58: "merge", 120: "cross"}), 4)
-    assert {58, 120} <= set(chosen)
-    assert not {50, 55} & set(chosen)
 
 
 def test_the_part_of_the_world_where_people_are_is_shown(sequence: Sequence, truth: Truth) -> None:
@@ -65,20 +53,6 @@ def test_a_ring_holds_all_whom_an_event_concerns(truth: Truth) -> None:
     assert 0.5 < radius - apart[np.isin(truth.id[rows], merge.members)].max() < 1
 
 
-def test_names_stand_clear_of_discs_and_of_one_another() -> None:
-    """Five in a huddle: no name covers a disc (a covered one would lose its colour), and all are there."""
-    view = Canvas.fit(np.full((300, 300, 3), 255, np.uint8), np.zeros(2), np.array([10.0, 10.0]), upwards=True)
-    ids, places = np.arange(1, 6), np.array([[5, 5], [5.9, 5], [4.1, 5], [5, 5.9], [5, 4.1]])
-    for identity, at in zip(ids.tolist(), places, strict=True):
-        view.disc(at, 7, colour(identity))
-    before = view.image.copy()
-    draw_ids(view, ids, places, 7)
-    for identity, at in zip(ids.tolist(), places, strict=True):
-        x, y = view.map(at)[0].astype(int)
-        np.testing.assert_array_equal(view.image[y, x], before[y, x])
-        assert (np.abs(view.image.astype(int) - colour(identity)).max(axis=2) < 12).sum() > 150
-
-
 def test_merges_and_splits_outrank_the_rest() -> None:
     events = dict.fromkeys(range(10, 100, 10), "form") | {5: "merge", 150: "split"}
     assert {5, 150} <= set(choose_frames(bare(200, events), 3))
@@ -97,12 +71,6 @@ def test_frames_are_distinct_and_inside(length: int, frames: int, starts: dict[i
     assert chosen[-1] <= length
 
 
-def test_a_plan_puts_y_up_and_keeps_the_aspect() -> None:
-    view = Canvas.fit(np.zeros((100, 300, 3), np.uint8), np.zeros(2), np.array([20.0, 10.0]), upwards=True)
-    assert view.scale == 10
-    np.testing.assert_allclose(view.map(np.array([[0, 0], [20, 10], [10, 5]])), [[50, 100], [250, 0], [150, 50]])
-
-
 def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
     from tracking.app.pictures.contact_sheet import HEAD, TITLE, WIDTH, sheet_area
 
@@ -116,12 +84,6 @@ def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_p
     u, v = 10 + (x - low[0]) * scale, (HEAD + TITLE) / 2 + (high[1] - y) * scale
     np.testing.assert_allclose(picture[round(v), round(u)], colour(7), atol=12)
     np.testing.assert_allclose(picture[round(v) + 30, round(u) + 30], FLOOR, atol=12)
-
-
-@pytest.mark.parametrize("frames", [1, 3, 8, 11])
-def test_size_follows_the_number_of_frames(sequence: Sequence, tmp_path: Path, frames: int) -> None:
-    picture = cv2.imread(str(write_sheet(sequence, tmp_path / "sheet.png", frames=frames)))
-    assert picture.shape[1] == 10 + min(frames, 4) * 450
 
 
 def test_the_same_sequence_gives_the_same_bytes(sequence: Sequence, tmp_path: Path) -> None:
@@ -139,9 +101,3 @@ def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) ->
         with pytest.raises(InputError, match="no labelled people"):
             write_sheet(Sequence("none", 10.0, 10, sequence.frames, load), tmp_path / "none.png")
     assert not (tmp_path / "none.png").exists()
-
-
-def test_an_unwritable_place_is_one_clear_line(sequence: Sequence, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="choose another --out"):
-        write_sheet(sequence, tmp_path / "file" / "sheet.png", frames=1)

@@ -15,7 +15,7 @@ from sim.scene.camera import project
 from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tests.coded_pictures import SIZE, coded, number, sequence
 from tests.groups_as_wholes import wholes
-from tracking.app.pictures.overlay import banner_words, overlay_pictures, write_overlay
+from tracking.app.pictures.overlay import overlay_pictures, write_overlay
 from tracking.drawing.canvas import colour
 from tracking.drawing.layer_painting import LayerStyle
 from tracking.drawing.layers import layer_of_tracks, plan_layer_of_tracks
@@ -134,16 +134,6 @@ def test_people_on_the_ground_stand_upright_in_the_picture(sequence: Sequence, t
     assert np.isnan(layer_of_tracks(plain, None, None).at(1).box).all()
 
 
-def test_groups_without_people_show_their_hulls() -> None:
-    square = np.array([[10.0, 10], [30, 10], [30, 30], [10, 30]])
-    one, two = np.array([4]), np.zeros((1, 2))
-    groups = Groups(one, (np.zeros(0, np.int64),), two, two, np.zeros((1, 2, 2)), np.array([3.0]), (square,))
-    output = Tracks(1, 0.0, "image", "group", one, one, two, two, np.full((1, 4, 4), np.nan), groups=groups)
-    (region,) = layer_of_tracks([output], None, None).at(1).groups
-    assert (region.id, region.size) == (4, 3.0)
-    np.testing.assert_array_equal(region.hull, square)
-
-
 def test_events_stand_for_a_while_from_when_they_are_known() -> None:
     merge = GroupEvent("merge", 2, 4, 6, (1, 2), (1,), (1, 2), (0.0, 0.0))
     enter = GroupEvent("enter", 6, 6, 6, (), (1,), (1,), (0.0, 0.0))
@@ -205,13 +195,6 @@ def without_velocity(group: Tracks) -> Tracks:
     return group.replace(vel=np.full((1, 2), np.nan), groups=None)
 
 
-def test_a_group_of_unknown_velocity_has_its_place_and_no_arrow() -> None:
-    side = layer_of_tracks([without_velocity(a_group((40, 30)))], None, None)
-    assert side.at(1).at.tolist() == [[40, 30]]
-    (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
-    assert len(coloured(picture, 4)) > 20
-
-
 def test_a_group_of_unknown_velocity_has_its_place_on_the_ground(sequence: Sequence) -> None:
     given = a_group((8.0, 5.0), "ground")
     known, unknown = (layer_of_tracks([g], sequence.camera, None).at(1).at for g in (given, without_velocity(given)))
@@ -219,24 +202,3 @@ def test_a_group_of_unknown_velocity_has_its_place_on_the_ground(sequence: Seque
     np.testing.assert_array_equal(unknown, known)
     (region,) = plan_layer_of_tracks([without_velocity(given)]).at(1).groups
     assert region.motion.tolist() == [[8.0, 5.0]]
-
-
-def test_what_is_unknown_of_a_group_is_left_out() -> None:
-    plain = a_group((40, 30))
-    unknown = plain.groups.replace(hull=(), extent=np.full((1, 2, 2), np.nan), size=np.array([np.nan]))
-    for given in (plain.replace(groups=None), plain.replace(groups=unknown)):
-        side = layer_of_tracks([given], None, None)
-        (region,) = side.at(1).groups
-        assert (len(region.hull), len(region.extent), np.isnan(region.size)) == (0, 0, True)
-        (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
-        assert len(coloured(picture, 4)) > 20
-
-
-def test_groups_that_are_tracked_are_counted_as_such() -> None:
-    assert overlay_words([a_group((40, 30))]) == "coded   frame 1 of 1   0.00 s   tracked 1 groups"
-
-
-def overlay_words(tracks: list[Tracks]) -> str:
-    case = sequence(1)
-    side = layer_of_tracks(tracks, None, None)
-    return banner_words(case, next(iter(case)), [[(side, LayerStyle())]])

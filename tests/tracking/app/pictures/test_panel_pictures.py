@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from sim.types import PixelTruth, Sequence, Truth
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.pictures.contact_sheet import (
@@ -51,11 +50,6 @@ def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
     top = (HEAD + TITLE) // 2
     first = cv2.resize(read[top : top + round(SIZE[1] * shrunk), 10 : 10 + WIDTH // 2], SIZE)
     assert number(first) == chosen[0]
-
-
-def test_what_has_neither_pictures_nor_labels_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no labelled people and no pictures"):
-        write_sheet(Sequence("bare", 10.0, 5, lambda: iter(())), tmp_path / "s.png")
 
 
 def test_pictures_stand_above_the_plan(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:

@@ -7,9 +7,7 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from scenarios.errors import InputError
 from sim.types import Groups, Sequence, Tracks, Truth
 from tracking.app.replay_page import page_rows
 from tracking.app.replay_page.page import page_data, write_page
@@ -76,12 +74,6 @@ def test_tracks_come_back(sequence: Sequence, tracks: list[Tracks]) -> None:
     bars = page_data(sequence, tracks)["tracks"]["bars"]
     assert sorted(bar[0] for bar in bars) == [0, 7, 8]
     assert page_data(sequence, tracks)["tracks"]["links"] == [[54, 7, 0], [114, 0, 8]]
-
-
-def test_whoever_leaves_and_returns_has_two_stints() -> None:
-    frame, ids = np.array([1, 2, 4, 5, 2, 3]), np.array([7, 7, 7, 7, 8, 8])
-    assert page_rows.stints(ids, frame) == [[7, 1, 2], [7, 4, 2], [8, 2, 2]]
-    assert page_rows.stints(ids[:0], frame[:0]) == []
 
 
 def test_detections_come_back(sequence: Sequence) -> None:
@@ -153,28 +145,3 @@ def test_nobody_anywhere(sequence: Sequence) -> None:
     assert data["truth"]["x"] == data["tracks"]["x"] == []
     assert data["truth"]["bars"] == []
     assert page_data(Sequence("bare", 10.0, None, lambda: iter(())), None)["length"] == 1
-
-
-def test_a_track_without_box_in_one_frame_stays_without(sequence: Sequence, tracks: list[Tracks]) -> None:
-    answers = [t.replace(box=None) if t.index == 3 else t for t in tracks]
-    side = decode(page_data(sequence, answers)["tracks"])
-    assert np.isnan(side["box"][side["frame"] == 3]).all()
-    assert np.isfinite(side["box"][side["frame"] != 3]).all()
-
-
-def test_a_long_crowded_recording_stays_small(tmp_path: Path) -> None:
-    t, people = 1000, 50
-    rng = np.random.default_rng(0)
-    pos = np.cumsum(rng.normal(0, 0.03, (t, people, 2)), axis=0) + rng.uniform(0, 30, (people, 2))
-    frame, ids = np.repeat(np.arange(1, t + 1), people), np.tile(np.arange(1, people + 1), t)
-    flat = pos.reshape(-1, 2)
-    box = np.c_[flat * 20, np.full((len(flat), 2), [18.0, 50.0])] + rng.normal(0, 1, (len(flat), 4))
-    truth = Truth("big", 10.0, t, 50.0, frame, ids, np.full(len(flat), -1), flat, flat, box, np.ones(len(flat)))
-    path = write_page(Sequence("big", 10.0, t, lambda: iter(()), lambda: truth), None, tmp_path / "big.html")
-    assert path.stat().st_size < 1.6e6
-
-
-def test_an_unwritable_place_is_one_clear_line(sequence: Sequence, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="choose another --out"):
-        write_page(sequence, None, tmp_path / "file" / "page.html")

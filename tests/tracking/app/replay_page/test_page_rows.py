@@ -93,19 +93,6 @@ def test_what_a_tracker_of_groups_leaves_out(sequence: Sequence) -> None:
     assert (side["plane"], side["wholes"]["size"], side["bars"]) == ("image", [], [])
 
 
-def test_the_page_shows_all_of_their_hulls(sequence: Sequence) -> None:
-    """The sizes of plan and image follow from the tracks alone."""
-    alone = Sequence("alone", 10.0, 160, lambda: iter(()))
-    corners = np.concatenate([h for t in wholes(sequence, "ground") for h in t.groups.hull])
-    x0, y0, x1, y1 = page_data(alone, wholes(sequence, "ground"))["bounds"]
-    assert (corners >= [x0, y0]).all()
-    assert (corners <= [x1, y1]).all()
-    data = page_data(alone, wholes(sequence, "image"))
-    corners = np.concatenate([h for t in wholes(sequence, "image") for h in t.groups.hull])
-    assert data["bounds"] is None
-    np.testing.assert_allclose(data["image"], np.ceil(corners.max(axis=0)))
-
-
 @given(st.lists(st.tuples(st.floats(0, 8), st.floats(0, 8)), min_size=1, max_size=9))
 def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) -> None:
     """Never outside, no more than two steps of tolerance inside, in their order."""
@@ -118,12 +105,6 @@ def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) ->
     normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.hypot(*edge.T)[:, None]
     beyond = ((hull[:, None] - less[None]) * normal[None]).sum(axis=2).max(axis=1)
     assert beyond.max() <= 0.0401
-
-
-def test_a_hull_of_few_corners_stays() -> None:
-    for n in range(4):
-        corners = np.array([[0, 0], [1e-4, 0], [0, 1e-4]])[:n]
-        np.testing.assert_array_equal(page_rows.simplified(corners, 1.0), corners)
 
 
 def test_a_long_recording_of_groups_stays_small(tmp_path) -> None:
@@ -141,10 +122,3 @@ def test_a_long_recording_of_groups_stays_small(tmp_path) -> None:
         answers.append(Tracks(k, k / 10, "ground", "group", names, names, groups.pos, groups.vel, cov, groups=groups))
     alone = Sequence("alone", 10.0, 1000, lambda: iter(()))
     assert write_page(alone, answers, tmp_path / "page.html").stat().st_size < 1.1e6
-
-
-def test_events_of_groups_are_told(sequence: Sequence) -> None:
-    events = page_data(sequence, wholes(sequence, "ground"))["tracks"]["events"]
-    assert [(e[0], list(e[4]), list(e[5]), e[6]) for e in events] == [
-        ("merge", [1, 2], [1], ()), ("split", [1], [1, 3], ()),
-    ]  # fmt: skip
