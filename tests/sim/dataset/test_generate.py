@@ -18,8 +18,8 @@ from sim.io.source import open_source
 from sim.io.store.manifest import with_hash
 from sim.io.store.validate import validate
 from sim.workers.start import WorkerOptions
-from tests.small_disks import small_disk
 from tests.fake_simulator import content, scenario
+from tests.small_disks import small_disk
 
 ROOT = Path(__file__).resolve().parents[3]
 

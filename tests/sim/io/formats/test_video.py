@@ -13,7 +13,6 @@ from tests.small_videos import SIZE, cut, damage, disc, picture, write_jpegs, wr
 KINDS = {
     "x264.mp4": {},
     "long-groups.mp4": {"options": {"g": "250", "bf": "3"}},
-    "h264.mkv": {},
     "h264-in.avi": {},
     "mpeg4.avi": {"codec": "mpeg4"},
     "jpegs.avi": {"codec": "mjpeg", "pix_fmt": "yuvj420p"},
@@ -21,13 +20,10 @@ KINDS = {
     "transport.ts": {"rate": 25},
     "bare.h264": {"rate": 25},
     "bare.y4m": {"codec": "wrapped_avframe"},
-    "phone.3gp": {"codec": "mpeg4"},
     "media.wmv": {"codec": "wmv2"},
     "vp9.webm": {"codec": "libvpx-vp9"},
-    "vp8.webm": {"codec": "libvpx"},
     "quick.mov": {"audio": True},
     "grey.mkv": {"codec": "ffv1", "pix_fmt": "gray"},
-    "16-bit.mkv": {"codec": "ffv1", "pix_fmt": "gray16le"},
     "10-bit.mkv": {"codec": "ffv1", "pix_fmt": "yuv420p10le"},
 }
 
@@ -113,15 +109,6 @@ def test_a_video_cut_off_ends_there_with_a_warning(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert len(list(sequence)) == sequence.length
-
-
-def test_a_matroska_that_breaks_off_is_told(tmp_path):
-    """Its header says how many seconds, not how many frames."""
-    whole = write_video(tmp_path / "a.mkv", [picture(k) for k in range(40)], options={"g": "10", "bf": "0"})
-    one(whole)  # warnings are errors
-    with pytest.warns(UserWarning, match=r"a.mkv: ends after 2\.\d of the 4\.0 s it promises"):
-        sequence = one(cut(whole, 0.7))
-    assert 20 <= sequence.length < 30
 
 
 def test_a_container_that_breaks_within_is_told(tmp_path):
@@ -257,7 +244,7 @@ def test_pictures_of_another_size_are_one_line(tmp_path):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("name", ["x264.mp4", "long-groups.mp4", "h264-in.avi", "mpeg2.mpg", "vp8.webm"])
+@pytest.mark.parametrize("name", ["long-groups.mp4", "mpeg2.mpg"])
 @pytest.mark.parametrize(
     ("asked", "wanted", "words"),
     [
@@ -272,22 +259,6 @@ def test_the_background_sample(tmp_path, name, asked, wanted, words):
     frames = [f.image for f in sequence]
     assert sequence.source["background"] == words
     assert np.array_equal(sequence.background(), np.stack([frames[k - 1] for k in wanted]))
-
-
-def test_the_sample_decodes_the_groups_it_needs(tmp_path, monkeypatch):
-    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(60)], options={"g": "5", "bf": "2"})
-    some, count = video_decoding._decode_packet, 0
-
-    def counted(stream, packet):
-        nonlocal count
-        found = some(stream, packet)
-        count += len(found)
-        return found
-
-    sequence = one(path, background="spread:2")
-    monkeypatch.setattr(video_decoding, "_decode_packet", counted)
-    assert len(sequence.background()) == 2
-    assert count < 20
 
 
 @pytest.mark.parametrize("wanted", [[5, 30, 45], [1, 60], [10, 11], [4, 5, 6], [60], [1]])

@@ -2,7 +2,6 @@
 
 import errno
 import io
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,11 +9,10 @@ import av
 import numpy as np
 import pytest
 
-from tests.small_disks import small_disk
-
 from scenarios.errors import InputError, WorkError
 from sim.io.pictures import video_encoding
 from sim.io.pictures.video_encoding import BT601, NARROW, write_video
+from tests.small_disks import small_disk
 from tests.small_videos import SIZE, picture
 
 
