@@ -137,16 +137,6 @@ def imports_numba(text: str) -> bool:
     )
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["import numba", "import os, numba as nb", "from numba import njit", "from numba.core import types",
-     "import numba.typed", "def f():\n    from numba import njit", "if True:\n    import numba"],
-)  # fmt: skip
-def test_each_form_of_import_is_seen(text):
-    assert imports_numba(text)
-    assert not imports_numba(text.replace("numba", "numbat"))
-
-
 def test_every_kernel_is_compiled_here():
     """numba's own njit ends with an error where its cache has no place."""
     modules = [p for folder in ("scenarios", "sim", "tracking") for p in (ROOT / folder).rglob("*.py")]

@@ -54,15 +54,6 @@ def test_labels_are_those_of_a_camera_with_this_frame_rate(stride: int, fps: flo
     assert kept.orders == slow.orders
 
 
-def test_events_are_within_half_a_frame() -> None:
-    every = simulate(load("merge"), 5, streams=()).truth
-    for stride in (2, 5, 13):
-        kept = simulate(load("merge"), 5, streams=(), stride=stride).truth
-        assert [e.kind for e in every.events] == [e.kind for e in kept.events]
-        for e, k in zip(every.events, kept.events, strict=True):
-            assert abs((e.start - 1) / every.fps - (k.start - 1) / kept.fps) <= 0.5 / kept.fps + 1e-9
-
-
 @pytest.mark.parametrize("stride", [0, -1, 1001, 2.0])
 def test_a_stride_without_frames_is_refused(stride: int, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"--stride: got .*; expected a whole number from 1 to 1000 at 10 frames/s"):
@@ -110,15 +101,6 @@ def test_pictures_of_common_frames_have_the_same_bytes(made: dict[int | None, Pa
     assert visible[0].tolist() == visible[1].tolist()
 
 
-def test_the_folder_says_its_frame_rate_and_stride(made: dict[int | None, Path]) -> None:
-    manifest = json.loads((made[4] / "manifest.json").read_text())
-    assert (manifest["stride"], manifest["sequence"]["fps"], manifest["sequence"]["length"]) == (4, 2.5, 20)
-    assert "stride" not in json.loads((made[1] / "manifest.json").read_text())
-    assert "frameRate=2.5\nseqLength=20\n" in (made[4] / "seqinfo.ini").read_text()
-    (found,) = open_source(made[4])
-    assert (found.fps, found.length, found.source["stride"]) == (2.5, 20, 4)
-
-
 def test_a_stored_sequence_of_another_stride_is_refused(made: dict[int | None, Path], capsys) -> None:
     for stored, asked in ((1, 4), (4, 1), (4, 2)):
         with pytest.raises(InputError, match=f"another sequence .*: stride {stored} → {asked}\\)"):
@@ -147,10 +129,3 @@ def test_every_command_takes_a_folder_with_a_stride(made: dict[int | None, Path]
         assert (row["frames_scored"], row["label_step"]) == (20, 1)
     assert row["HOTA"] > 0.5
     assert run(["track", "stereo", str(data), "--out", str(tmp_path / "stereo")]) == 0
-
-
-def test_a_video_with_a_stride(tmp_path: Path) -> None:
-    folders = generate(["pass-by"], range(5, 6), tmp_path, set=SMALL, images="mp4", stride=10)
-    (found,) = open_source(folders[0])
-    assert (found.fps, found.length) == (1, 8)
-    assert sum(frame.image is not None for frame in found) == 8

@@ -43,18 +43,6 @@ def test_zero_switches_everything_off() -> None:
     np.testing.assert_allclose(motion.vel[:, 0, 0], 1.34, atol=1e-9)
 
 
-def test_the_sway_turns_with_the_way() -> None:
-    a, b = walk(sway=0.03).pos[:, 0] - [20, 10], walk(sway=0.03, goal=(20, 40)).pos[:, 0] - [20, 10]
-    np.testing.assert_allclose(b, np.stack([-a[:, 1], a[:, 0]], axis=1), atol=1e-6)
-
-
-def test_everybody_has_an_own_sway() -> None:
-    one, two = (walk(size=n, sway={"normal": [0.024, 0.007]}) for n in (1, 2))
-    sides = two.pos[:, :, 1] - two.pos[:, :, 1].mean(axis=0)
-    assert np.ptp(one.pos[:, 0, 1]) == pytest.approx(np.ptp(sides[:, 0]), rel=0.15)
-    assert abs(np.corrcoef(sides.T)[0, 1]) < 0.99
-
-
 def test_places_fluctuate_and_the_group_does_not() -> None:
     motion = walk(size=3, place_noise=[0.2, 0.1])
     middle = motion.pos.mean(axis=1)
@@ -68,8 +56,3 @@ def test_the_velocity_fluctuates_along_and_across_the_way() -> None:
     np.testing.assert_allclose(along.pos[:, 0, 1], 10, atol=1e-6)
     assert along.vel[:, 0, 0].std() > 0.03
     assert across.vel[:, 0, 1].std() > 0.03
-
-
-def test_who_stands_stands_still() -> None:
-    motion = walk(goal=(20, 10), size=2, sway=0.03, velocity_noise=[0.1, 0.1], place_noise=[0.2, 0.1])
-    assert np.abs(motion.vel).max() < 0.03

@@ -29,12 +29,6 @@ def test_all_go_through_a_door_by_its_middle_and_straight(start):
     np.testing.assert_allclose(back, [[10, 6], [10 - BEHIND, 6], start])
 
 
-def test_a_free_way_is_straight():
-    points, narrow = Navigator(ROOM).way(np.array([2.0, 2.0]), np.array([8.0, 10.0]))
-    np.testing.assert_allclose(points, [[8, 10]])
-    assert not narrow.any()
-
-
 def test_round_the_end_of_a_wall():
     wall = Scene(size=np.array([20.0, 12.0]), walls=np.array([[[10, 3], [10, 12]]], float))
     points, narrow = Navigator(wall).way(np.array([8.0, 6.0]), np.array([12.0, 6.0]))

@@ -77,14 +77,6 @@ def test_a_merge_as_a_parent_arrives_keeps_the_places_of_the_new_group(tmp_path)
         assert sorted(kept.tolist()) == sorted(standing(4, world.groups.spacing[g]).tolist()), t
 
 
-def test_a_way_may_have_many_points(tmp_path):
-    via = ", ".join(f"[{3 + 0.25 * k}, {4 + k % 2}]" for k in range(40))
-    path = tmp_path / "scene.toml"
-    path.write_text(HEAD)
-    motion = run(load(path, set=[f"group.a.via=[{via}]", "duration=40"]), 0)
-    assert np.linalg.norm(motion.pos[-1, :2] - [14, 4], axis=1).max() < 1.0
-
-
 @pytest.mark.parametrize("place", ["joined", "coming"])
 def test_a_queue_forgets_a_group(place):
     queue = ServiceQueue(np.zeros(2), np.array([1.0, 0.0]), 1.0, {0: 1.0, 1: 1.0}, busy_until=5.0)

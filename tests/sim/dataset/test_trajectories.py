@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
 
-from sim.dataset.trajectories import GAP, LIMIT, nearest_row, resample, smoothing_spline
+from sim.dataset.trajectories import GAP, LIMIT, resample, smoothing_spline
 
 RATE = 2.5
 
@@ -68,13 +68,6 @@ def test_people_come_and_go_and_long_gaps_are_absence() -> None:
     assert np.isfinite(made.vel[made.present]).all()
 
 
-@pytest.mark.parametrize("labels", [2, 3, 4, 5])
-def test_few_labels_are_enough(labels: int) -> None:
-    made = resample(*rows({1: curve(labels)}), RATE, 10.0, 0.0, (labels - 1) / RATE)
-    assert made.pos[0, 0] == pytest.approx(curve(labels)[0], abs=0.02)
-    assert made.pos[-1, 0] == pytest.approx(curve(labels)[-1], abs=0.02)
-
-
 def test_a_part_is_the_part_of_the_whole() -> None:
     labels = rows({1: curve(40), 2: curve(20)}, {2: 15})
     whole = resample(*labels, RATE, 10.0, 0.0, 39 / RATE)
@@ -92,10 +85,3 @@ def test_smoothing_is_that_of_scipy(weight: float) -> None:
     assert np.array_equal(smoothing_spline(t[:2], y[:2], weight), y[:2])
     line = np.stack([t, 2.0 - t], axis=1)
     assert smoothing_spline(t, line, weight) == pytest.approx(line)
-
-
-def test_nearest_rows() -> None:
-    frame, id, _ = rows({1: curve(3), 7: curve(1)}, {7: 2})
-    found = nearest_row(frame, id, np.array([1, 7]), RATE, np.array([-1.0, 0.1, 0.3, 0.79, 5.0]))
-    assert frame[found[:, 0]].tolist() == [1, 1, 2, 3, 3]
-    assert (id[found[:, 1]] == 7).all()

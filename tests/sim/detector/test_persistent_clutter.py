@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.schema.sensor import FalseAlarms, Sensor
 from sim.detector.sense import sense
-from sim.scene.camera import foot_points, project
+from sim.scene.camera import foot_points
 from sim.truth.label import bodies
 from sim.types import Detections, Truth
 from tests.reference_sense import above, crowd, pinhole
@@ -56,16 +56,6 @@ def test_those_beside_people_keep_their_place_and_size() -> None:
     assert np.abs(box[:, None] - wanted).max(axis=2).min(axis=1).max() < 1e-6
 
 
-def test_the_others_are_of_a_person_s_size_where_they_stand() -> None:
-    box = everything(alarms(people(), height=(0.0, 0.0), aspect=(-1.0, 0.0)), "box")
-    pos = everything(alarms(people(), height=(0.0, 0.0), aspect=(-1.0, 0.0)), "pos")
-    head, _ = project(CAMERA, np.column_stack([pos, np.full(len(pos), 1.7)]))
-    foot, _ = project(CAMERA, np.column_stack([pos, np.zeros(len(pos))]))
-    assert box[:, 1] + box[:, 3] == pytest.approx(foot[:, 1])
-    assert box[:, 3] == pytest.approx(foot[:, 1] - head[:, 1], rel=0.15)  # bodies are no lines: seen from above
-    assert np.log(box[:, 2] / box[:, 3]) == pytest.approx(np.full(len(box), -1.0))
-
-
 @pytest.mark.parametrize("near", [0.0, 1.0])
 def test_points_are_where_people_with_these_boxes_stand(near: float) -> None:
     """Also from straight above, where a person stands in the middle of the box."""
@@ -75,15 +65,6 @@ def test_points_are_where_people_with_these_boxes_stand(near: float) -> None:
         box, pos = everything(found, "box"), everything(found, "pos")
         assert len(pos) > 50
         assert pos == pytest.approx(foot_points(box, np.zeros(len(box)), camera))
-
-
-def test_places_jitter_and_drift() -> None:
-    at = ((0.25, 0.5), (0.75, 0.9))
-    box = everything(alarms(people(), at=at, height=(0.0, 0.0)), "box")
-    u = (box[:, 0] + box[:, 2] / 2) / SIZE[0]
-    near = np.abs(u[:, None] - [0.25, 0.75]).min(axis=1)
-    assert near.std() < 0.05
-    assert (np.abs(u - 0.25) < 0.15).mean() == pytest.approx(0.5, abs=0.1)
 
 
 def test_who_stays_stands_drifts_or_shakes() -> None:
@@ -110,12 +91,6 @@ def test_drift_has_the_sd_asked_for_along_both_axes() -> None:
             ways.append(way[:2] / first[0, 3])  # in 1 s
     assert len(ways) > 30
     assert np.std(ways, axis=0) == pytest.approx([0.4, 0.4], rel=0.3)
-
-
-def test_a_higher_rate_keeps_those_that_were_there() -> None:
-    few, many = (alarms(people(80), rate, life=0.5, near=0.5) for rate in (1.0, 3.0))
-    for a, b in zip(few, many, strict=True):
-        assert {tuple(r) for r in a.box} <= {tuple(r) for r in b.box}  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("camera", [pinhole(), pinhole(10, 0, (8, -6, 2)), above(), None])

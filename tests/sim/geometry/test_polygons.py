@@ -6,7 +6,6 @@ from sim.geometry.polygons import (
     area,
     contains,
     convex_hull,
-    edge_distance_pairs,
     gap_pairs,
     intersection_pairs,
     iou_matrix,
@@ -61,35 +60,6 @@ def test_squares(moved, common):
     assert iou_pairs(a, b, zero, zero)[0] == pytest.approx(common / (2 - common), abs=1e-9)
 
 
-def test_contained_turned_and_far_from_the_origin():
-    diamond = np.array([[0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]])
-    assert iou_matrix([SQUARE], [diamond])[0, 0] == pytest.approx(0.5)
-    assert iou_matrix([SQUARE + 1e6], [diamond + 1e6])[0, 0] == pytest.approx(0.5, abs=1e-9)
-    assert iou_matrix([SQUARE * 1e-3], [diamond * 1e-3])[0, 0] == pytest.approx(0.5)
-
-
-def test_same_hull_is_exactly_one_and_order_of_sides_is_nothing():
-    some = polygons(2, 30)
-    got = iou_matrix(some, some)
-    assert (np.diag(got) == 1.0).all()
-    np.testing.assert_allclose(got, got.T, atol=1e-14)
-    assert ((got >= 0) & (got <= 1)).all()
-
-
-def test_shared_edges_of_footprints():
-    """Hulls of {a, b, c} and {a, b}: their common part is the smaller."""
-    r = np.random.default_rng(3)
-    for _ in range(50):
-        places = r.uniform(0, 2, (3, 2))
-        whole, part = footprint_hull(places), footprint_hull(places[:2])
-        assert iou_matrix([whole], [part])[0, 0] == pytest.approx(area(part) / area(whole), abs=1e-9)
-        assert iou_matrix([part], [whole])[0, 0] == pytest.approx(area(part) / area(whole), abs=1e-9)
-    line = np.array([[0.0, 0], [0.7, 0.7], [1.4, 1.4]])
-    assert iou_matrix([footprint_hull(line)], [footprint_hull(line[:2])])[0, 0] == pytest.approx(
-        area(footprint_hull(line[:2])) / area(footprint_hull(line)), abs=1e-9
-    )
-
-
 def test_no_area_no_overlap():
     none = np.zeros((0, 2))
     assert iou_matrix([none, SQUARE[:1], SQUARE[:2]], [SQUARE, none]).tolist() == [[0, 0]] * 3
@@ -135,12 +105,6 @@ def test_footprint_hull_is_the_hull_of_all_footprints(kind):
         assert contains(hull, places).all()
 
 
-def test_one_person_is_the_16_gon():
-    hull = footprint_hull(np.array([[3.0, 4]]))
-    assert len(hull) == 16
-    np.testing.assert_allclose(np.hypot(*(hull - [3, 4]).T), 0.25)
-
-
 def test_footprints_of_many_groups_at_once():
     r = np.random.default_rng(5)
     count = np.array([2, 1, 3, 2, 5])
@@ -166,11 +130,6 @@ def test_gap_of_one_inside_another_and_against_samples():
         sampled = np.hypot(*np.moveaxis(rims[0][:, None] - rims[1], -1, 0)).min()
         overlap = iou_matrix([a], [b])[0, 0] > 0
         assert polygon_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
-
-
-def test_edge_distance_of_lines_in_a_row():
-    a, b = np.array([[0.0, 0], [1, 0]]), np.array([[3.0, 0], [4, 0]])
-    assert edge_distance_pairs(pack([a]), pack([b]), *np.zeros((2, 1), np.int64))[0] == pytest.approx(2)
 
 
 def test_points_in_a_dilated_hull():

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim.scene.body import BODY, HEAD, contour, ellipsoids, occlusion_distance, outlines, person_boxes
+from sim.scene.body import BODY, HEAD, contour, ellipsoids, outlines, person_boxes
 from sim.scene.camera import project
 from sim.scene.terrain import height_at
 from sim.types import Camera, Scene, Stairs
@@ -38,12 +38,6 @@ def test_a_person_is_as_tall_and_wide_as_the_contract_says() -> None:
     assert np.sqrt(shapes.shape[0, 0, 1, 1]) == pytest.approx(0.135 * 1.7)  # across the heading
 
 
-def test_turning_a_person_by_half_changes_nothing() -> None:
-    pos3 = np.array([[6.0, 4.0, 0.0]])
-    a = person_boxes(pinhole(), pos3, np.array([0.4]), np.array([1.7]))
-    assert person_boxes(pinhole(), pos3, np.array([0.4 + np.pi]), np.array([1.7])) == pytest.approx(a)
-
-
 def test_contours_touch_the_boxes() -> None:
     pos3 = np.array([[6.0, 4.0, 0.0], [9.0, 7.0, 0.0]])
     heading, height = np.array([0.3, 2.0]), np.array([1.6, 1.9])
@@ -60,14 +54,6 @@ def test_who_is_behind_the_camera_has_no_box() -> None:
 
 def test_nobody_has_no_boxes() -> None:
     assert person_boxes(pinhole(), np.zeros((0, 3)), np.zeros(0), np.zeros(0)).shape == (0, 4)
-
-
-def test_near_is_near() -> None:
-    pos3 = np.array([[8.0, 2.0, 0.0], [8.0, 4.0, 0.0]])
-    near, far = occlusion_distance(pinhole(), pos3, np.full(2, 1.7))
-    assert near < far
-    tall, small = occlusion_distance(above(), pos3, np.array([1.9, 1.6]))
-    assert tall < small
 
 
 def stairs(steps: int = 10) -> Scene:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.scene.boxes import BOXES, image_size_of_boxes, scale_of_first_boxes, with_visibility
+from sim.scene.boxes import BOXES, scale_of_first_boxes, with_visibility
 from sim.truth.label import bodies
 from sim.types import Truth
 from tests.reference_sense import crowd, pinhole
@@ -26,16 +26,6 @@ def test_few_boxes_all_count_and_unknown_ones_do_not():
     scale, last = scale_of_first_boxes(frame, np.full(4, np.nan))
     assert np.isnan(scale)
     assert last == 0
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_later_frames_change_nothing(seed):
-    draw = np.random.default_rng(seed)
-    frame = np.sort(draw.integers(1, 200, 400))
-    height = draw.uniform(10, 200, 400)
-    scale, last = scale_of_first_boxes(frame, height)
-    for end in (last, last + 1, 150, 200):
-        assert scale_of_first_boxes(frame[frame <= end], height[frame <= end]) == (scale, last)
 
 
 def stripped(truth: Truth) -> Truth:
@@ -64,9 +54,3 @@ def test_what_is_labelled_is_kept() -> None:
     assert found.visible_box is not None
     points = truth.replace(box=None, visible_box=None)
     assert with_visibility(points, None) is points
-
-
-def test_an_image_of_unknown_size_holds_all_boxes() -> None:
-    box = np.array([[10.0, 20.0, 30.2, 40.0], [100.0, 5.0, 10.0, 10.0]])
-    assert image_size_of_boxes(box) == (110, 60)
-    assert image_size_of_boxes(np.zeros((0, 4))) == image_size_of_boxes() == (1, 1)

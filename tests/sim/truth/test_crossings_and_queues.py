@@ -58,22 +58,6 @@ def test_cross_begins_when_hulls_are_within_a_metre():
     assert event.emitted is None
 
 
-def test_cross_at_a_right_angle():
-    other = [np.array([5 + x, 0]) + straight(0, 1) for x in (-0.35, 0.35)]
-    assert [row[2:] for row in crossed(pair((0, 5), straight(1)) + other)] == [((1, 2), (1, 2), (1, 2, 3, 4))]
-
-
-def test_politely_round_is_a_cross_where_paths_cross():
-    """At a right angle, one 2.4 s behind the other, hulls never overlapping, the middles' paths cross at (5, 5)."""
-    late = [np.array([5 + x, -2.4]) + straight(0, 1) for x in (-0.35, 0.35)]
-    assert [row[2:4] for row in crossed(pair((0, 5), straight(1)) + late)] == [((1, 2), (1, 2))]
-    # the same encounter, but the other turns away before their paths meet
-    turned = np.concatenate([straight(0, 1)[:50], np.tile(straight(0, 1)[50:51], (70, 1))])
-    turned[50:, 1] -= (T[50:, 0] - T[50, 0]) * 1.0
-    away = [np.array([5 + x, -2.4]) + turned for x in (-0.35, 0.35)]
-    assert crossed(pair((0, 5), straight(1)) + away) == []
-
-
 def test_across_and_back_is_no_cross():
     """A pair steps over the way of the other (y = 5) 3 m ahead of it, at 5.1 s; then back again at 5.9 s, or on."""
 
@@ -125,11 +109,6 @@ def test_cross_needs_equal_memberships_before_and_after():
     assert crossed(joined, grown) == []
 
 
-def test_people_alone_do_not_cross():
-    assert crossed(HEAD_ON, groups(1, 1, -1, -1)) == []
-    assert crossed(HEAD_ON, groups(1, 1, 2, -1)) == []
-
-
 def test_who_leaves_after_a_cross_has_crossed():
     paths = [p.copy() for p in HEAD_ON]
     paths[0][62:] = paths[1][65:] = np.nan
@@ -139,15 +118,6 @@ def test_who_leaves_after_a_cross_has_crossed():
     assert len(crossed(paths, alone)) == 1, "the one who is left is no group, and yet stays who he was"
     stays = [p.copy() for p in HEAD_ON]
     assert crossed(stays, alone) == [], "but where nobody left the scene, the group fell apart"
-
-
-def test_crossings_are_the_same_in_portions(monkeypatch):
-    paths = [p + np.array([0, 20.0 * k]) for k in range(5) for p in HEAD_ON]
-    numbers = groups(*(2 * k + side for k in range(5) for side in (1, 1, 2, 2)))
-    whole = crossed(paths, numbers)
-    assert len(whole) == 5
-    monkeypatch.setattr("sim.truth.crossing_events.ROWS", 100)
-    assert crossed(paths, numbers) == whole
 
 
 def waiting(k, arrive=3.0, leave=9.0, spacing=0.8, at=(5.0, 3.0), step=(0.0, 1.2)):
@@ -165,14 +135,6 @@ def test_queue_starts_at_its_onset_and_ends_below_two():
     speed = np.hypot(*np.moveaxis(crowd(paths)[1], -1, 0)) < 0.4
     assert event.start == np.flatnonzero(speed.all(axis=1))[0] + 1 == 32
     assert event.end == np.flatnonzero(speed.sum(axis=1) >= 2)[-1] + 1
-
-
-def test_queue_names_groups_before_and_after():
-    """One alone, a pair and one alone line up; the first is served and away when less than two are left."""
-    paths = [waiting(k, leave=9 + 0.9 * k) for k in range(4)]
-    paths[0] = np.where(T < 10, paths[0], np.nan)
-    (event,) = queued(paths, [-1, 7, 7, -1])
-    assert (event.before, event.after) == ((-1, -1, 7), (-1, 7))
 
 
 def test_queue_of_two_or_for_less_than_three_seconds_is_none():
@@ -212,14 +174,6 @@ def test_first_in_first_out_means_from_one_end(leavers, fifo):
     assert line.fifo == fifo
 
 
-def test_two_served_together_leave_in_order():
-    """The first two of five leave at once, then the third; were it the fourth, one would have been passed over."""
-    for third, fifo in ((2, True), (3, False)):
-        late = {0: 7.0, 1: 7.0, third: 8.5}
-        (line,) = detect_queues(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
-        assert (set(line.left), line.fifo) == ({0, 1, third}, fifo)
-
-
 @pytest.mark.parametrize("name", ["queue", "mixed"])
 def test_simulated_queues_are_first_in_first_out(name):
     for seed in range(3):
@@ -247,25 +201,9 @@ def test_walking_in_file_or_shuffling_abreast_is_not_a_queue():
     assert len(queued([np.array([0.8 * k, 0]) + straight(0.3, 0) for k in range(4)])) == 1
 
 
-def test_two_queues_at_once():
-    first, second = ([waiting(k, at=(5.0, y)) for k in range(3)] for y in (3.0, 8.0))
-    assert sorted(e.members for e in queued(first + second)) == [(1, 2, 3), (4, 5, 6)]
-
-
 def found(pos, vel, there, group):
     events = crossings(pos, vel, there, group, FPS) + queues(pos, vel, there, group, FPS)
     return [(e.kind, e.start, e.end, set(e.members)) for e in events]
-
-
-def test_place_turn_and_order_of_people_change_nothing():
-    turn, order = np.array([[0.6, -0.8], [0.8, 0.6]]), np.array([3, 0, 4, 2, 1])
-    for paths in (served(), [*HEAD_ON, np.array([50.0, 50]) + straight(0)]):
-        (pos, vel, there), group = crowd(paths), groups(1, 1, 2, 2, -1)
-        expected = found(pos, vel, there, group)
-        assert len(expected) == 1
-        assert found(pos @ turn + [9, -4], vel @ turn, there, group) == expected
-        mixed = found(pos[:, order], vel[:, order], there, group[:, order])
-        assert [(*e[:3], {int(order[m - 1]) + 1 for m in e[3]}) for e in mixed] == expected
 
 
 def test_nobody():

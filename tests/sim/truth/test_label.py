@@ -5,7 +5,7 @@ from sim.geometry.polygons import area, convex_hull
 from sim.scene.body import Ellipsoids, contour, ellipsoids, outlines, person_boxes
 from sim.scene.camera import project
 from sim.truth.label import POINTS, bodies, hulls, image_groups, image_velocities, label
-from sim.types import Array, Groups, Motion, Scene, Stairs
+from sim.types import Array, Groups, Motion
 from tests.reference_sense import above, crowd, pinhole, walkers
 
 
@@ -60,18 +60,6 @@ def test_groups_keep_ids_and_members_and_get_places_in_the_image() -> None:
     assert inside(found[2].hull[1], middle[3:]).min() > 0
 
 
-def test_who_is_behind_the_camera_leaves_no_hull() -> None:
-    pos3 = np.array([[8.0, 9.0, 0.0], [8.0, -9.0, 0.0], [8.0, 8.0, 0.0]])
-    shapes = ellipsoids(pos3, np.zeros(3), np.full(3, 1.7))
-    split, whole = hulls(outlines(pinhole(0, 0, (8, -6, 1.5)), shapes), np.array([0, 2, 3]))
-    assert split.shape == (0, 2)
-    assert len(whole) > 2
-
-
-def test_no_groups() -> None:
-    assert hulls(outlines(pinhole(), some(3, 0)), np.array([0])) == []
-
-
 @pytest.mark.parametrize("camera", [pinhole(), above(20)])
 def test_image_velocities_are_differences_of_places(camera) -> None:  # type: ignore[no-untyped-def]
     r = np.random.default_rng(0)
@@ -108,32 +96,12 @@ def test_rows_are_sorted_and_say_what_the_motion_says() -> None:
     assert now.id.tolist() == (np.flatnonzero(motion.present[6]) + 1).tolist()
 
 
-def test_people_on_stairs_stand_on_them() -> None:
-    stairs = (Stairs(np.array([4.0, 5.0]), np.array([8.0, 5.0]), 3.0, 1.6, 8, 4.0),)
-    scene = Scene(np.array([16.0, 10.0]), stairs=stairs)
-    still = walkers([[9.0, 5.0], [9.0, 8.0]], [[0, 0], [0, 0]], frames=1, scene=scene)
-    truth = bodies(still, pinhole())
-    assert truth.z == pytest.approx([1.6, 0.0])
-    level = bodies(still.replace(scene=Scene(np.array([16.0, 10.0]))), pinhole())
-    assert truth.box is not None
-    assert level.box is not None
-    assert truth.box[0, 1] < level.box[0, 1] - 20  # higher up in the image
-    assert truth.box[1] == pytest.approx(level.box[1])
-
-
 def test_without_a_camera_there_are_no_boxes() -> None:
     truth = bodies(crowd(0), None)
     assert truth.box is None
     assert truth.visible_box is None
     assert (truth.visibility == 1).all()
     assert np.isnan(truth.px_per_m)
-
-
-def test_nobody_is_no_error() -> None:
-    truth = bodies(walkers([[8, 5]], [[0, 0]], present=np.zeros((40, 1), bool)), pinhole())
-    assert len(truth.id) == 0
-    assert truth.box is not None
-    assert truth.box.shape == (0, 4)
 
 
 def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> None:

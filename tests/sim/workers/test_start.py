@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from sim.workers.pool import MAX_LOSSES, THREAD_VARIABLES, RemoteTraceback, process_pool
+from sim.workers.pool import MAX_LOSSES, THREAD_VARIABLES, process_pool
 from sim.workers.start import results_in_order, start_workers
 from tests.errands import complain, fall, fall_at_first, hide, process, refuse, root_of, told
 
@@ -82,25 +82,6 @@ def test_an_item_that_kills_all_its_workers_is_one_clear_error() -> None:
         list(run(fall, [0, 3, 2]))
 
 
-def test_or_has_a_result_of_its_own_and_the_others_theirs() -> None:
-    with process_pool(2) as run:
-        found = dict(run(fall, range(4), on_loss=lambda item, error: -item if "killed" in str(error) else 0))
-    assert found == {0: 0, 1: -1, 2: 2, 3: -3}
-
-
-def test_workers_that_only_die_are_not_started_for_ever() -> None:
-    with pytest.raises(WorkError, match="killed"), process_pool(1) as run:
-        list(run(fall, range(1, 99, 2), on_loss=lambda item, error: 0))
-
-
-def test_an_error_ends_what_the_others_are_at() -> None:
-    """Half an hour of it, here; a negative time is refused at once."""
-    with pytest.raises(ValueError, match="non-negative") as caught, process_pool(2) as run:
-        list(run(time.sleep, [1800.0, -1.0]))
-    assert isinstance(caught.value.__cause__, RemoteTraceback)
-    assert "Traceback" in str(caught.value.__cause__)
-
-
 def test_who_stops_looking_can_run_again() -> None:
     with process_pool(2) as run:
         for _ in run(time.sleep, [0.0, 1800.0]):
@@ -114,17 +95,6 @@ def test_results_in_the_order_of_the_items_whoever_was_first(workers: int, tmp_p
     with start_workers(workers) as run:
         assert list(results_in_order(run, told, items)) == ["0", "1", "2", "3"]
         assert list(results_in_order(run, told, [])) == []
-
-
-def test_once_the_taker_stops_what_is_under_way_ends_and_nothing_more_begins(tmp_path: Path) -> None:
-    items = [(tmp_path / str(k), 0.3) for k in range(20)]
-    with process_pool(2) as run:
-        coming = results_in_order(run, told, items)
-        next(coming)
-        coming.close()
-        found = [marker.read_text() for marker, _ in items if marker.exists()]
-    assert 2 <= len(found) <= 4
-    assert set(found) == {"done"}
 
 
 def test_what_cannot_be_sent_back_is_an_error_not_a_death() -> None:

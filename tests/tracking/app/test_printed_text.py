@@ -72,20 +72,6 @@ def test_json_holds_names_whole_and_as_escapes(name, capsys):
     assert line.isprintable()
 
 
-def test_a_name_of_a_recording_is_no_markup(tmp_path, capsys):
-    """`score` crashed for "[/red]", and "[door]" was not shown."""
-    for k, name in enumerate(NAMES[:3]):
-        folder = tmp_path / "data" / str(k)
-        (folder / "gt").mkdir(parents=True)
-        (folder / "seqinfo.ini").write_text(f"[Sequence]\nname={name}\nframeRate=10\nseqLength=2\n")
-        (folder / "gt" / "gt.txt").write_text("1,1,1,1,10,20,1,1,1\n2,1,2,1,10,20,1,1,1\n")
-    assert run(["track", "blob", str(tmp_path / "data"), "--detections", "truth", "--out", str(tmp_path / "out")]) == 0
-    assert all(name in capsys.readouterr().out for name in ("x[door]y",))
-    assert run(["score", str(tmp_path / "data"), str(tmp_path / "out")]) == 0
-    shown = capsys.readouterr().out
-    assert all(name in shown for name in NAMES[:3])
-
-
 @pytest.fixture(scope="module")
 def broken_name(tmp_path_factory) -> Path:
     """A dataset of four sequences, one with line breaks in the name that its manifest states; its tracks."""
@@ -156,15 +142,3 @@ def test_a_closed_stream(closed):
     assert done.returncode == (1 if " >" in closed or closed[0] == ">" else 0)
     assert ("crossing" in done.stdout) == (closed in ("<&-", "2>&-"))
     assert done.stderr.startswith("error: stdout: got ") == (closed == ">&-")
-
-
-def test_an_error_goes_nowhere_else_without_stderr():
-    line = f"{sys.executable} -m tracking.app.cli scenarios nothing 2>&-"
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(line, shell=True, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (2, "")
-
-
-def test_a_long_warning_is_cut(capsys):
-    _print_warnings_once()(UserWarning("9" * 1_000_000))
-    assert len(capsys.readouterr().err) <= 420

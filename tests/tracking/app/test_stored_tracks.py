@@ -161,16 +161,6 @@ def test_what_was_tracked_before_anybody_labelled_it(tmp_path):
     assert run(["score", str(walk), str(tmp_path / "t"), "--fps", "5"]) == 0
 
 
-def test_labels_that_cannot_be_read_stop_track_before_the_first_frame(tmp_path, capsys):
-    walk = recording(tmp_path / "walk", ROWS + "3,1,x,10,20,40,1,1,1\n")
-    (walk / "seqinfo.ini").write_text("[Sequence]\nseqLength=8\nframeRate=5\n")
-    (walk / "det").mkdir()
-    (walk / "det" / "det.txt").write_text("1,-1,10,10,20,40,1\n")
-    text = refused(capsys, "track", "blob", walk, "--px-per-m", "24", "--out", tmp_path / "t")
-    assert "gt.txt: line 17" in text
-    assert not (tmp_path / "t").exists()
-
-
 def test_validate_says_whether_a_run_is_whole(made, tracks, capsys):
     assert run(["validate", str(tracks), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"status": "ok", "problems": [], "content_hash": None}

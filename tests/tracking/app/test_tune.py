@@ -54,16 +54,6 @@ def test_the_same_again_as_one_object_with_more_trials(line, tmp_path, capsys):
     assert "tests/nothing" in capsys.readouterr().err
 
 
-def test_settings_of_scenes_detector_and_tracker(line, tmp_path, capsys):
-    (tmp_path / "sensor.toml").write_text("[sensor]\ndetect_prob = 0.9\n")
-    more = ["--set", "scenario.duration=3", "--set", "skip=1", "--sensor", str(tmp_path / "sensor.toml")]
-    assert run([*changed(line, "--check", "none"), *more, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert set(told["settings"]["set"]) == {"sensor.detect_prob=0.9", "duration=3"}
-    assert told["params"]["skip"] == 1
-    assert told["settings"]["check"] is None
-
-
 @pytest.mark.parametrize(
     ("more", "words"),
     [
@@ -90,12 +80,3 @@ def test_wrong_options_are_one_line(line, more, words, capsys):
     assert printed.out == ""
     assert len(printed.err.splitlines()) == 1
     assert words in printed.err
-
-
-def test_another_search_on_the_same_study_is_one_line(line, capsys):
-    assert run(line) == 0
-    capsys.readouterr()
-    assert run([*line, "--seed", "4"]) == 2
-    told = capsys.readouterr().err
-    assert "another search: seed differ" in told
-    assert len(told.splitlines()) == 1

@@ -38,18 +38,6 @@ def test_no_label_leaves_the_folder(label: str, ending: str) -> None:
     check(Path("/some/folder"), label, ending)
 
 
-@pytest.mark.parametrize("label", EVIL)
-def test_every_such_file_can_be_made(tmp_path: Path, label: str) -> None:
-    path = output_path(tmp_path, label, ".html")
-    path.write_text("x")
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]
-
-
-@pytest.mark.parametrize("label", ["merge-s00003", "seq_hotel", "Über 1 (b)", "a.b", "A-1", "PETS09-S2L1", "日本"])
-def test_harmless_labels_are_file_names(label: str) -> None:
-    assert file_name(label) == label
-
-
 @given(st.lists(labels, max_size=5))
 def test_no_two_labels_share_a_path(names: list[str]) -> None:
     try:

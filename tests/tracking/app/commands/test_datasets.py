@@ -42,16 +42,6 @@ def test_replay_track_score_and_look(walk: Path, tmp_path: Path, capsys: pytest.
     assert answer(capsys, "sheet", made["sequences"][0], "--out", tmp_path / "s.png")["code"] == 0  # type: ignore[index]
 
 
-def test_settings_go_on_top_of_the_file(walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    profile = tmp_path / "mine.toml"
-    profile.write_text("[sensor]\ndetect_prob = 0.5\nclutter_rate = 2.0\n")
-    words = ["replay", walk, "--camera", tmp_path / "view.toml", "--sensor", profile, "--streams", "none"]
-    made = answer(capsys, *words, "--set", "sensor.clutter_rate=3.0", "--set", "camera.fps=4", "--out", tmp_path / "d")
-    text = (Path(made["sequences"][0]) / "scenario.toml").read_text()  # type: ignore[index]
-    for line in ("detect_prob = 0.5", "clutter_rate = 3.0", "fps = 4.0", "shadow = 0.0"):
-        assert line in text
-
-
 @pytest.mark.parametrize(
     ("words", "place", "got"),
     [

@@ -50,24 +50,6 @@ def test_fit_generate_and_track_with_it(made: Path, tmp_path: Path, capsys: pyte
     assert "--sensor" in refused["error"]["place"]  # type: ignore[index]
 
 
-def test_real_detectors(shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Boxes of PETS that are a third too wide, false alarms that stay; several recordings pooled."""
-    profile = tmp_path / "pets.toml"
-    folder = shared_data / "mot" / "PETS09-S2L1-first200"
-    output = answer(capsys, "fit", "sensor", folder, "--out", profile)
-    assert output["sensor"]["box_noise"]["width"][0] == pytest.approx(0.27, abs=0.05)  # type: ignore[index]
-    assert output["sensor"]["false_alarms"]["life"] > 0.5  # type: ignore[index]
-    # Eight people whose luck lasts for seconds: the share that a draw misses spreads by 0.08.
-    for name, error in (("missed", 0.09), ("overlap, 50% quantile", 0.03), ("error foot: sd", 0.01)):
-        assert output["measured"][name] == pytest.approx(output["drawn"][name], abs=error)  # type: ignore[index]
-    both = answer(capsys, "fit", "sensor", folder, shared_data / "mot/TUD-Campus", "--out", profile)
-    assert both["code"] == 0
-    tracked = answer(
-        capsys, "track", "blob", folder, "--detections", "truth", "--sensor", profile, "--out", tmp_path / "t"
-    )
-    assert tracked["code"] == 0
-
-
 @pytest.mark.parametrize(
     ("words", "place", "got"),
     [

@@ -220,14 +220,6 @@ def test_probabilities(walk, tmp_path, capsys):
     assert not (tmp_path / "g" / "pairs.parquet").exists()
 
 
-def test_texts_of_a_folder(tmp_path, capsys):
-    """As trackers write them: one text for each sequence."""
-    for name in ("a", "b"):
-        (tmp_path / f"{name}.txt").write_text(text(30))
-    found = done(capsys, "group", tmp_path, "--fps", 10, "--out", tmp_path / "out" / "g")
-    assert [row["sequence"] for row in found["runs"]] == ["a", "b"]
-
-
 def test_boxes(tmp_path, capsys):
     """In the image by the scale that is given, or that of the first boxes; on the ground by a camera."""
     (tmp_path / "walk.txt").write_text(boxes())
@@ -366,16 +358,6 @@ def test_a_run_in_the_image_without_scale(tmp_path, capsys):
 
 LOW_CAMERA = [f"camera.{setting}" for setting in ("tilt_deg=0", "height=2.5", "position=[12,12]", "crop=true")]
 """Settings of a camera among the people, with the horizon in the middle of the picture of 640 × 480."""
-
-
-def test_people_behind_the_camera(tmp_path, capsys):
-    """Their boxes are unknown, their positions are not."""
-    sequence = simulate(load("merge", LOW_CAMERA), 90001)
-    assert not np.isfinite(sequence.truth.box).all()
-    made = group(sequence)
-    assert sum(len(t.id) for t in made) == len(sequence.truth.id)
-    made.write(tmp_path / "g", sequence)
-    assert run(["group", str(tmp_path / "g"), "--out", str(tmp_path / "again")]) == 0
 
 
 def test_boxes_above_the_horizon_of_a_camera(tmp_path, capsys):

@@ -154,12 +154,6 @@ def test_a_short_recording_is_an_indication_only(made: Path, capsys, monkeypatch
     assert "indicative" not in capsys.readouterr().out
 
 
-def test_blocks_are_for_a_single_recording(made: Path, capsys) -> None:
-    for runs in ([made / "file"], [made / "file", made / "truth"]):
-        assert run(["score", str(made / "data"), *map(str, runs), "--blocks", "5"]) == 2
-        assert "2 sequences" in capsys.readouterr().err
-
-
 def test_two_runs_of_one_recording(made: Path, capsys) -> None:
     """Resampled frames were joined, and each join was a switch: IDSW 24 had the interval [46, 76]."""
     one = made / "data" / "flockscope-train" / "merge-s00005"
@@ -203,20 +197,6 @@ def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, 
     error = capsys.readouterr().err
     assert "runs in the image (px), and one on the ground (m) with groups without people" in error
     assert run(["score", str(data), str(folder), str(made / "file")]) == 0
-
-
-def test_tables(made: Path, capsys) -> None:
-    capsys.readouterr()
-    assert run(["score", str(made / "data"), str(made / "file")]) == 0
-    output = capsys.readouterr().out
-    for words in (
-        "groups, strict", "groups, core", "\nmembers\n", "\nevents\n",
-        "people compared by 1 - distance / 2 m on the ground",
-        "groups compared by overlap (IoU) of hulls (group_F1: common members), on the ground, m",
-        "FP ↓", "↓ lower is better",
-    ):  # fmt: skip
-        assert words in output
-    assert max(map(len, output.splitlines())) <= 160
 
 
 def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:

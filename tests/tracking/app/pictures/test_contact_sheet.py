@@ -43,16 +43,6 @@ def test_the_part_of_the_world_where_people_are_is_shown(sequence: Sequence, tru
     assert (high <= sequence.scene.size + 1).all()
 
 
-def test_a_ring_holds_all_whom_an_event_concerns(truth: Truth) -> None:
-    from tracking.app.pictures.contact_sheet import event_ring
-
-    merge = next(event for event in truth.events if event.kind == "merge")
-    rows = truth.rows(merge.start)
-    centre, radius = event_ring(merge, truth.id[rows], truth.pos[rows])
-    apart = np.linalg.norm(truth.pos[rows] - centre, axis=1)
-    assert 0.5 < radius - apart[np.isin(truth.id[rows], merge.members)].max() < 1
-
-
 def test_merges_and_splits_outrank_the_rest() -> None:
     events = dict.fromkeys(range(10, 100, 10), "form") | {5: "merge", 150: "split"}
     assert {5, 150} <= set(choose_frames(bare(200, events), 3))
@@ -89,11 +79,6 @@ def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_p
 def test_the_same_sequence_gives_the_same_bytes(sequence: Sequence, tmp_path: Path) -> None:
     a, b = write_sheet(sequence, tmp_path / "a.png"), write_sheet(sequence, tmp_path / "b.png")
     assert a.read_bytes() == b.read_bytes()
-
-
-def test_boxes_alone_are_drawn_in_the_image(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
-    boxes = Sequence("boxes", 10.0, truth.length, sequence.frames, lambda: truth.replace(pos=None, vel=None))
-    assert write_sheet(boxes, tmp_path / "boxes.png").stat().st_size > 5000
 
 
 def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from tests.groups_as_wholes import wholes
 from tracking.app.pictures.overlay import overlay_pictures, write_overlay
 from tracking.drawing.canvas import colour
 from tracking.drawing.layer_painting import LayerStyle
-from tracking.drawing.layers import layer_of_tracks, plan_layer_of_tracks
+from tracking.drawing.layers import layer_of_tracks
 
 STRIP = 32
 
@@ -108,15 +108,6 @@ def test_what_a_frame_lacks_is_told() -> None:
     assert [number(p, STRIP, 2) for p in made] == [1, 1, 3]
 
 
-def test_trails_end_at_a_gap() -> None:
-    tracks = [answer(k, {1: [k, 0, 2, 4], 2: [k, 20, 2, 4]} if k != 5 else {1: [k, 0, 2, 4]}) for k in range(1, 9)]
-    side = layer_of_tracks(tracks, None, None)
-    found = dict(side.trails(8, 100))
-    np.testing.assert_array_equal(found[1][:, 0], np.arange(8, 0, -1) + 1)
-    np.testing.assert_array_equal(found[2][:, 0], [9, 8, 7])
-    assert dict(side.trails(8, 2))[1].shape == (3, 2)
-
-
 def test_ellipses_hold_95_percent() -> None:
     ring = layer_of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None).at(1).ellipse[0]
     offset = ring - [45, 40]
@@ -189,16 +180,3 @@ def test_groups_on_the_ground_lie_there_in_the_picture(sequence: Sequence) -> No
     assert not any(len(part) for r in blind.groups for part in (r.hull, r.extent, r.motion))
     behind = layer_of_tracks([a_group((8.0, -40.0), "ground")], sequence.camera, None).at(1)
     assert not any(len(part) for r in behind.groups for part in (r.hull, r.extent, r.motion))
-
-
-def without_velocity(group: Tracks) -> Tracks:
-    return group.replace(vel=np.full((1, 2), np.nan), groups=None)
-
-
-def test_a_group_of_unknown_velocity_has_its_place_on_the_ground(sequence: Sequence) -> None:
-    given = a_group((8.0, 5.0), "ground")
-    known, unknown = (layer_of_tracks([g], sequence.camera, None).at(1).at for g in (given, without_velocity(given)))
-    assert np.isfinite(known).all()
-    np.testing.assert_array_equal(unknown, known)
-    (region,) = plan_layer_of_tracks([without_velocity(given)]).at(1).groups
-    assert region.motion.tolist() == [[8.0, 5.0]]

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.geometry.footprints import footprint_hull, footprint_hulls
+from sim.geometry.footprints import footprint_hull
 from sim.geometry.polygons import area, convex_hull
 from sim.types import Groups, Sequence, Tracks
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page import page_rows
-from tracking.app.replay_page.page import page_data, write_page
+from tracking.app.replay_page.page import page_data
 from tracking.app.replay_page.page_rows import NIL
 
 
@@ -105,20 +105,3 @@ def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) ->
     normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.hypot(*edge.T)[:, None]
     beyond = ((hull[:, None] - less[None]) * normal[None]).sum(axis=2).max(axis=1)
     assert beyond.max() <= 0.0401
-
-
-def test_a_long_recording_of_groups_stays_small(tmp_path) -> None:
-    """1000 frames with ten groups, in bytes for each row."""
-    rng, names = np.random.default_rng(0), np.arange(1, 11)
-    place = rng.uniform(0, 20, (10, 1, 2)) + rng.normal(0, 0.6, (10, 4, 2))
-    cov = np.tile(np.eye(4), (10, 1, 1))
-    answers = []
-    for k in range(1, 1001):
-        place = place + rng.normal(0, 0.03, place.shape)
-        off = place - place.mean(axis=1, keepdims=True)
-        extent = np.einsum("gmi,gmj->gij", off, off) / 4
-        hull = tuple(footprint_hulls(place.reshape(-1, 2), np.full(10, 4)))
-        groups = Groups(names, (), place.mean(axis=1), rng.normal(size=(10, 2)), extent, rng.normal(4, 0.2, 10), hull)
-        answers.append(Tracks(k, k / 10, "ground", "group", names, names, groups.pos, groups.vel, cov, groups=groups))
-    alone = Sequence("alone", 10.0, 1000, lambda: iter(()))
-    assert write_page(alone, answers, tmp_path / "page.html").stat().st_size < 1.1e6
