@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -22,9 +20,7 @@ from sim.types import Truth
 from tests.toy_tracker import Toy
 from tracking.config import Config, param
 from tracking.environment.env import OBSERVATIONS, TuningEnv
-from tracking.environment.observation import NAMES
 from tracking.parameter_space import decode, encode
-from tracking.running.run import TrackingRun
 from tracking.running.tracker_registry import names
 
 ID = "flockscope/Tuning-v0"
@@ -119,13 +115,6 @@ def test_a_refused_reset_leaves_the_episode_as_it_was():
     assert info["frame"] == 15
 
 
-def test_a_step_needs_an_episode():
-    for every in (None, 5):
-        env = make(decision_every=every).unwrapped
-        with pytest.raises(InputError, match=r"call reset\(\) first"):
-            env.step(np.zeros(env.action_space.shape, np.float32))
-
-
 def test_options_choose_the_source_and_the_parameters():
     env = make()
     options = {"scenario": "pass-by", "seed": 1, "params": {"report_delay": 3.0, "association": "nearest"}}
@@ -137,14 +126,6 @@ def test_options_choose_the_source_and_the_parameters():
     assert np.array_equal(first[1], again[1])
     plain = played(env, encode(env.unwrapped.space, env.unwrapped.defaults), options={"scenario": "pass-by", "seed": 1})
     assert first[1] != plain[1]
-
-
-def test_unseeded_resets_draw_sources_and_seeded_ones_differ():
-    env = make(seeds=range(5))
-    env.reset(seed=0)
-    drawn = {(i["scenario"], i["seed"]) for i in (env.reset()[1] for _ in range(15))}
-    assert len(drawn) > 4
-    assert {name for name, _ in drawn} == {"cross", "pass-by"}
 
 
 def test_the_truth_is_for_the_score_alone(monkeypatch):
@@ -200,38 +181,6 @@ def test_stored_sequences_and_lists(tmp_path):
     assert {s.name for s in mixed.unwrapped.sources} == {"cross-s00007", "cross-s00008", "pass-by", "split"}
 
 
-def test_all_episodes_have_detections_of_one_kind():
-    """That which the recorded ones have; where they have none in common, it is said at once."""
-    whole = simulate(load("pass-by", SHORT), 1, 0, ())
-    bare, boxed = replace(whole, name="bare", has_detections=False), replace(whole, name="boxed", load_truth=None)
-    for mixed in (["cross", bare], [bare, "cross"]):
-        env = make("group-pda", mixed).unwrapped
-        assert env.mode == "truth"
-        for seed in range(6):
-            played(env, seed=seed)
-    with pytest.raises(InputError, match="bare with truth"):
-        make("group-pda", ["cross", boxed, bare])
-
-
-@pytest.mark.parametrize("decision_every", [None, 10])
-def test_people_are_compared_as_asked(decision_every):
-    """The reward is the score of this similarity; without one it is that of the data, here the ground."""
-    found = {}
-    for similarity in (None, "ground", "image"):
-        env = make(similarity=similarity, decision_every=decision_every)
-        _, rewards, info = played(env, seed=1)
-        rollout = env.unwrapped.rollout
-        run = TrackingRun(tuple(rollout.tracks), {"detections": "file"})
-        expected = tracking.evaluate(rollout.truth, run, similarity=similarity)
-        assert rewards.sum() == pytest.approx(expected["objective"], abs=1e-12)
-        found[similarity] = info["scores"]["HOTA"]
-    assert found[None] == found["ground"] != found["image"]
-    with pytest.raises(InputError, match="similarity"):
-        make(similarity="volume")
-    with pytest.raises(InputError, match="no boxes to compare"):
-        played(make(TOY, similarity="boxes"), seed=1)
-
-
 def test_from_pixels():
     tiny = ["camera.fps=5", "duration=2", "camera.image=[160,120]"]
     env = make("group-pda", "cross", set=tiny, detections="image", decision_every=5, render_mode="rgb_array")
@@ -243,18 +192,6 @@ def test_from_pixels():
     assert "pixel_radius" in info["names"]
     assert "radius" not in info["names"]
     assert env.render().shape == (152, 160, 3)
-
-
-def test_from_pixels_detections_that_came_with_the_pictures_are_not_there():
-    """Neither for the tracker nor in what is observed: blob's tracks and a camera's sensor are both on the ground."""
-    tiny = ["camera.fps=5", "duration=2", "camera.image=[320,240]"]
-    env = make("blob", "cross", set=tiny, detections="image", decision_every=5)
-    held = env.unwrapped.cache.open(env.unwrapped.sources[0], ("left",))
-    assert any(len(frame.detections.pos) for frame in held.sequence)
-    seen, _, _ = played(env, seed=1)
-    assert env.unwrapped.rollout.last.detections is None
-    named = dict(zip(env.unwrapped.observation_names, seen[-1], strict=True))
-    assert {named[key] for key in NAMES[NAMES.index("seen") : NAMES.index("brightness")]} == {0.0}
 
 
 def test_which_parameters_an_action_sets():
@@ -354,13 +291,6 @@ def test_a_tracker_that_keeps_no_config_cannot_change_between_frames():
         TuningEnv(Deaf, "cross", set=SHORT, decision_every=5).reset()
 
 
-def test_actions_of_another_shape_are_named():
-    env = make().unwrapped
-    env.reset(seed=0)
-    with pytest.raises(InputError, match="action"):
-        env.step(np.zeros(3, np.float32))
-
-
 def test_wrappers():
     env = make(decision_every=6)
     env = RecordEpisodeStatistics(FlattenObservation(RescaleAction(TimeLimit(env, 3), np.float32(0), np.float32(1))))
@@ -389,15 +319,6 @@ def test_vectorised(mode):
         )
 
 
-@pytest.mark.parametrize(("every", "rate"), [(None, 5), (2, 2), (10, 1)])
-def test_a_video_takes_as_long_as_what_it_shows(every, rate):
-    """RecordVideo asks before the first reset."""
-    env = make(decision_every=every, render_mode="rgb_array")
-    assert env.metadata["render_fps"] == rate
-    env.reset(seed=1)
-    assert env.metadata["render_fps"] == rate
-
-
 def test_video(tmp_path):
     pytest.importorskip("moviepy", reason="RecordVideo writes with moviepy")
     from gymnasium.wrappers import RecordVideo
@@ -411,9 +332,3 @@ def test_video(tmp_path):
     video = cv2.VideoCapture(str(film))
     assert int(video.get(cv2.CAP_PROP_FRAME_COUNT)) >= 10
     assert (video.get(cv2.CAP_PROP_FRAME_WIDTH), video.get(cv2.CAP_PROP_FRAME_HEIGHT)) == (640, 512)
-
-
-def test_what_it_says_can_be_written_down():
-    _, _, info = played(make("group-pda", decision_every=15), seed=1)
-    assert json.loads(json.dumps(info))["objective"] == info["objective"]
-    assert set(info["scores"]) == {"objective", "group_F1"}

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-import weakref
-
 import numpy as np
 import pytest
 
@@ -56,34 +53,3 @@ def test_bytes_of_arrays():
         return b
 
     assert array_bytes(closes_over) == 80
-
-
-def test_bytes_of_a_held_source_are_those_of_motion_truth_and_detections():
-    cache = SourceCache()
-    held = cache.open(SOURCES[0])
-    motion = sum(a.nbytes for a in (held.truth.pos, held.truth.vel))
-    before = cache.bytes
-    play("blob", SOURCES[0], cache=cache)
-    assert motion < before < cache.bytes < 2_000_000
-
-
-def test_the_sample_of_the_background_counts():
-    small = sources("cross", [1], ["camera.fps=5", "duration=1", "camera.image=[80,60]"])[0]
-    cache = SourceCache()
-    play("group-pda", small, detections="image", cache=cache)
-    assert cache.bytes > 50 * 80 * 60 * 3
-    before = cache.open(small, ("left", "background")).sequence.background()
-    assert before is cache.open(small, ("left", "background")).sequence.background()
-
-
-def test_what_is_dropped_is_gone():
-
-    cache = SourceCache(0)
-    gc.disable()
-    try:
-        first = weakref.ref(cache.open(SOURCES[0]))
-        play("blob", SOURCES[0], cache=cache)
-        play("blob", SOURCES[1], cache=cache)
-        assert first() is None
-    finally:
-        gc.enable()

@@ -10,8 +10,7 @@ import pytest
 
 from sim.types import Detections, Frame, GroupEvent, Groups, Tracks
 from tracking.environment import observation
-from tracking.environment.observation import NAMES, STATISTICS, Observer, Statistic, squashed
-from tracking.environment.observation_window import track_rows
+from tracking.environment.observation import NAMES, STATISTICS, Observer
 
 FPS = 10.0
 
@@ -81,15 +80,6 @@ def test_what_is_off_is_measured():
     assert seen["births"] == seen["deaths"] == 0
 
 
-def test_births_and_deaths_across_a_decision():
-    observer = Observer(FPS)
-    looked([(frame(1), tracks(1, walk(1, 3), ids=[4, 5, 6]))], observer=observer)
-    seen = looked([(frame(k), tracks(k, walk(k, 2), ids=[5, 7])) for k in (2, 3)], observer=observer)
-    assert seen["deaths"] == pytest.approx(2 / 0.2)
-    assert seen["births"] == pytest.approx(1 / 0.2)
-    assert seen["age"] == pytest.approx(0.15)  # median of 0.2 (5) and 0.1 (7)
-
-
 def test_in_the_image_lengths_are_metres_and_unknown_without_a_scale():
     places = [[100, 100], [300, 100]]
     pairs = [(frame(k, places, "image"), tracks(k, places, (100, 0), plane="image")) for k in (1, 2)]
@@ -108,15 +98,6 @@ def test_groups_that_the_tracker_names():
     assert (seen["grouped"], seen["group_size"]) == (0.5, pytest.approx(2))
     assert seen["merges"] == pytest.approx(600)
     assert seen["splits"] == 0
-
-
-@pytest.mark.parametrize("scale", [1.0, 50.0])
-def test_reach_of_whole_groups_is_in_metres(scale):
-    two, none = np.array([[0.0, 0.0], [9.0, 0.0]]) * scale, (np.zeros(0, np.int64),) * 2
-    extent, hull = np.tile(np.eye(2) * 0.25 * scale**2, (2, 1, 1)), (np.zeros((0, 2)),) * 2
-    groups = Groups(np.arange(2), none, two, two * 0, extent, np.array([3.0, 1.0]), hull)
-    made = tracks(1, two.tolist(), (0, 0), group=[0, 1], groups=groups).replace(unit="group")
-    assert track_rows([made], scale).reach == pytest.approx([2.0, 2.0])
 
 
 def test_groups_as_wholes_reach_as_far_as_they_are_wide():
@@ -166,13 +147,6 @@ def test_bounds_and_kind():
             assert seen.dtype == np.float32
             assert seen.shape == (len(STATISTICS),)
             assert ((seen >= 0) & (seen <= 1)).all()
-
-
-def test_squashed():
-    statistic = Statistic("x", 2.0, "m", "")
-    assert [squashed(statistic, v) for v in (0, 2, 6, np.inf, -1)] == [0, 0.5, 0.75, 1, 0]
-    assert squashed(statistic, np.nan) == 0
-    assert [squashed(Statistic("x", None, "", ""), v) for v in (-0.1, 0.5, 1.5)] == [0, 0.5, 1]
 
 
 def test_it_knows_nothing_of_the_truth():

@@ -35,19 +35,6 @@ def test_it_is_known(lines):
     run(*lines)
 
 
-def test_importing_again_adds_nothing():
-    run(
-        "import importlib, tracking",
-        "before = len(sys.meta_path)",
-        "importlib.reload(tracking)",
-        "assert len(sys.meta_path) == before",
-        "import gymnasium",
-        "assert len(sys.meta_path) == before - 1",
-        "importlib.reload(tracking)",
-        KNOWN,
-    )
-
-
 def test_without_gymnasium_the_rest_goes_on():
     run(
         "class Gone:",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import permutations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,7 +15,6 @@ from tracking.filters.components import Constraint, linked, partition, prefixes
 
 LINK = 1.5
 RULE = Constraint(LINK, 9.21, 0.09 * np.eye(2), 3.0)
-SMALL = Constraint(LINK, 9.21, 0.0025 * np.eye(2), 0.5)  # overlaps are rare: the links decide
 
 
 def same(label, expected):
@@ -116,18 +113,6 @@ def test_units_change_nothing(seed: int, scale: float) -> None:
     assert same(prefixes(scale * points, weights, 0, other), prefixes(points, weights, 0, rule))
 
 
-@pytest.mark.parametrize("link", [5.0, 1.25, 640.0])  # all of these numbers are exact
-@pytest.mark.parametrize("towards", [(5, 0), (0, -5), (3, 4), (-4, 3), (4, -3)])
-def test_linked_at_exactly_twice_the_radius(towards: tuple[float, float], link: float) -> None:
-    rule = Constraint(link, 1e-9, 1e-9 * np.eye(2), 3.0)  # regions so small that only links join
-    points = link / 5 * np.array([(-7, 2), np.add((-7, 2), towards)], float)
-    assert linked(points, link).tolist() == partition(points, np.ones(2), rule).tolist() == [0, 0]
-    assert prefixes(points, np.ones(2), 2, rule).tolist() == [True]
-    shorter = Constraint(np.nextafter(link, 0), 1e-9, 1e-9 * np.eye(2), 3.0)
-    assert linked(points, shorter.link).tolist() == partition(points, np.ones(2), shorter).tolist() == [0, 1]
-    assert prefixes(points, np.ones(2), 2, shorter).tolist() == [False]
-
-
 def disc(x, y, count=80, sd=0.5):
     """Points on a circle whose 1/N covariance is sd^2 I."""
     t = np.arange(count) * 2 * np.pi / count
@@ -149,20 +134,6 @@ def test_closure() -> None:
     assert same(verdicts, [reference.is_group(points[:n], np.ones(n), rule) for n in range(160, 241)])
 
 
-@pytest.mark.parametrize("order", list(permutations(range(3))))
-def test_closure_in_any_order(order: tuple[int, ...]) -> None:
-    parts = [disc(0, 0), disc(3, 0), disc(1.5, 2.9)]
-    points = np.concatenate([parts[k] for k in order])
-    assert not partition(points, np.ones(len(points)), Constraint(0.2, 9.21, np.eye(2), 1e-6)).any()
-
-
-def test_regions_join_what_links_do_not() -> None:
-    points = np.array([[0.0, 0.0], [1.55, 0.0], [9.0, 0.0]])
-    assert linked(points, LINK).tolist() == [0, 1, 2]
-    assert partition(points, np.ones(3), RULE).tolist() == [0, 0, 1]
-    assert prefixes(points, np.ones(3), 0, RULE).tolist() == [False, True, True, False]
-
-
 def test_nobody_one_and_all_at_the_same_place() -> None:
     none = np.zeros((0, 2))
     assert linked(none, LINK).shape == partition(none, np.zeros(0), RULE).shape == (0,)
@@ -171,31 +142,6 @@ def test_nobody_one_and_all_at_the_same_place() -> None:
     assert prefixes(np.ones((1, 2)), np.ones(1), 1, RULE).tolist() == [True]
     assert not partition(np.ones((50, 2)), np.ones(50), RULE).any()
     assert prefixes(np.ones((50, 2)), np.ones(50), 0, RULE).tolist() == [False] + 50 * [True]
-
-
-def test_light_components_are_noise() -> None:
-    points = np.array([[0.0, 0.0], [9.0, 0.0], [0.5, 0.0], [1.0, 0.0], [9.5, 0.0], [9.9, 0.0]])
-    rule = Constraint(LINK, 9.21, RULE.prior, 3.0, least=2.5)
-    assert partition(points, np.ones(6), rule).tolist() == [0, 1, 0, 0, 1, 1]
-    assert partition(points[:5], np.ones(5), rule).tolist() == [0, -1, 0, 0, -1]
-    assert partition(points[:3], np.ones(3), rule).tolist() == [-1, -1, -1]
-    #                                              light ones alone     heavy and light  both heavy
-    assert prefixes(points, np.ones(6), 1, rule).tolist() == [False, False, False, True, True, False]
-    weights = np.array([1.0, 2, 1, 1, 1, 1])  # the second is heavy by himself, from the fifth on
-    assert prefixes(points, weights, 1, rule).tolist() == [False, False, False, True, False, False]
-
-
-@pytest.mark.parametrize(("far", "where"), [(1e3, 0), (1e3, 3), (1e6, 0), (1e6, 3), (1e9, 0), (1e9, 3)])
-def test_one_far_away(far: float, where: int) -> None:
-    """However far and whenever he comes: the others are as without him."""
-    r = np.random.default_rng(1)
-    points = np.concatenate([r.normal(0, 0.4, (12, 2)), r.normal((12, 0), 0.4, (12, 2))])
-    group = partition(points, np.ones(24), RULE)
-    assert group.max() == 1
-    with_him = np.insert(points, where, [far, -far], axis=0)
-    told = partition(with_him, np.ones(25), RULE)
-    assert (told == told[where]).sum() == 1
-    assert same(reference.by_first(np.delete(told, where)), group)
 
 
 points_of = arrays(float, st.tuples(st.integers(1, 12), st.just(2)), elements=st.floats(-6, 6, width=32))
@@ -210,15 +156,6 @@ def test_links_of_any_points(points) -> None:
     assert same(linked(points, LINK), reference.linked(points, LINK))
 
 
-@settings(max_examples=200, deadline=None)
-@given(points_of, st.floats(-50, 50), st.floats(-50, 50))
-def test_a_group_moved_is_a_group(points, x, y) -> None:
-    d2 = np.square(points[:, None] - points).sum(2)
-    if (np.abs(d2 - LINK**2) < 1e-6).any():
-        return
-    assert same(linked(points + np.array([x, y]), LINK), linked(points, LINK))
-
-
 def work(points, least=0.0, start=1):
     return kernels.prefixes(points, np.ones(len(points)), start, LINK, 9.21, RULE.prior_entries, 3.0, least)[1]
 
@@ -231,42 +168,6 @@ def outwards(points):
 def round_clump(r, n, radius):
     t, q = r.uniform(0, 2 * np.pi, n), radius * np.sqrt(r.uniform(0, 1, n))
     return np.stack([q * np.cos(t), q * np.sin(t)], axis=1)
-
-
-def two_clumps(r, n, radius, towards):
-    """Just further apart than the link, point by point in any order."""
-    away = (2 * radius + 1.001 * LINK) * np.array(towards)
-    return r.permutation(np.concatenate([round_clump(r, n // 2, radius), round_clump(r, n // 2, radius) + away]))
-
-
-def slanted_gap(r, n):
-    """Two halves of a square on either side of a diagonal strip just wider than the link."""
-    points = r.uniform(-4, 4, (3 * n, 2))
-    return points[np.abs(points.sum(axis=1)) > np.sqrt(0.5) * 1.001 * LINK][:n]
-
-
-SHAPES = {
-    "constant density, outwards": lambda r, n: outwards(r.uniform(0, np.sqrt(n / 4), (n, 2))),
-    "constant area, outwards": lambda r, n: outwards(r.uniform(0, 10, (n, 2))),
-    "constant area, any order": lambda r, n: r.uniform(0, 5, (n, 2)),
-    "one clump, growing": lambda r, n: outwards(round_clump(r, n, np.sqrt(n) / 20)),
-    "one clump, denser": lambda r, n: round_clump(r, n, 2.0),
-    "two clumps, growing": lambda r, n: two_clumps(r, n, np.sqrt(n) / 20, (1, 0)),
-    "two clumps, denser": lambda r, n: two_clumps(r, n, 2.0, (1, 0)),
-    "two clumps, denser, aslant": lambda r, n: two_clumps(r, n, 2.0, (np.sqrt(0.5), np.sqrt(0.5))),
-    "slanted gap, denser": slanted_gap,
-}
-QUADRATIC = pytest.mark.xfail(
-    reason="boxes of cells reach over a slanted gap: all their points are looked at", strict=True
-)
-
-
-@pytest.mark.parametrize("shape", [pytest.param(s, marks=[QUADRATIC] if "gap" in s else []) for s in SHAPES])
-def test_work_grows_with_the_number_of_points(shape: str) -> None:
-    """Operations for 5000 and 10000 points, means of a few draws: doubling costs little more than twice."""
-    few, many = (np.mean([work(SHAPES[shape](np.random.default_rng(k), n)) for k in range(4)]) for n in (5_000, 10_000))
-    assert few > 5_000  # each point is looked at
-    assert many / few <= 2.3
 
 
 def test_clutter_is_bounded_by_the_least_weight() -> None:

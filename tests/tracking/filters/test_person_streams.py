@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sim.elementary import normal_quantile
 from tracking.filters.person_streams import NOBODY, PersonStreams, birth_keys
 
 PLACES = np.random.default_rng(0).uniform(-50, 50, (400, 2))
@@ -35,16 +34,6 @@ def test_numbers_differ_by_seed_role_frame_person_and_index():
     assert np.array_equal(copy.deepcopy(later).normals(0, keys, 5, 1), later.normals(0, keys, 5, 1))
 
 
-def test_keys_are_those_of_the_place_to_a_millimetre():
-    keys = birth_keys(PLACES, 3)
-    assert len(np.unique(keys)) == len(keys)
-    assert np.array_equal(birth_keys(PLACES[::-1], 3)[::-1], keys)
-    assert np.array_equal(birth_keys(np.round(PLACES, 3), 3), keys)
-    assert not np.isin(birth_keys(PLACES, 4), keys).any()
-    assert not np.isin(birth_keys(PLACES + np.array([0, 0.001]), 3), keys).any()
-    assert not np.isin(birth_keys(PLACES[:, ::-1], 3), keys).any()
-
-
 def test_people_at_one_place_have_different_keys():
     twice = birth_keys(np.repeat(PLACES[:3], 2, axis=0), 3)
     assert len(np.unique(twice)) == 6
@@ -52,14 +41,6 @@ def test_people_at_one_place_have_different_keys():
         np.sort(twice)[np.isin(np.sort(twice), birth_keys(PLACES[:3], 3))], np.sort(birth_keys(PLACES[:3], 3))
     )
     assert len(birth_keys(np.zeros((0, 2)), 3)) == 0
-
-
-def test_normals_are_the_quantiles_of_uniforms():
-    """The bits of both are the same, but that normals are taken in the middle of a step."""
-    streams, keys = PersonStreams(1), birth_keys(PLACES, 1)
-    u, z = streams.uniforms(0, keys, 500, 2), streams.normals(0, keys, 500, 2)
-    np.testing.assert_allclose(z, normal_quantile(u + 2.0**-53), rtol=1e-12, atol=1e-15)
-    assert np.abs(z).max() > 4.5
 
 
 @pytest.mark.parametrize("of", ["people", "rows", "frames", "roles"])

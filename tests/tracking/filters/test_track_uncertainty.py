@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from filterpy.common import Q_discrete_white_noise, kinematic_kf
 
 from scenarios.errors import InputError
 from tracking.filters import kalman, track_uncertainty
@@ -34,34 +33,6 @@ def test_steady_state_in_closed_form():
         kalman.update(state, np.array([0]), np.zeros((1, 4)), MADE.noise)
     assert np.allclose(state[2:], MADE.steady()[2:], rtol=1e-9)
     assert track_uncertainty.after_misses(MADE, 0) == pytest.approx(1.0, rel=1e-12)
-
-
-def filterpy_rho(pattern):
-    """rho at each prediction of a new track, from one filterpy filter per coordinate; pattern of hits."""
-    filters = []
-    for sigma, noise, rate_var in zip(MADE.sigma, MADE.noise, MADE.birth_rate_var, strict=True):
-        f = kinematic_kf(1, 1, MADE.dt)
-        f.Q, f.R = Q_discrete_white_noise(2, MADE.dt, sigma**2), np.array([[noise]])
-        f.P = np.diag([noise, rate_var])
-        filters.append(f)
-    found = []
-    for hit in pattern:
-        for f in filters:
-            f.predict()
-        s = np.array([(f.H @ f.P @ f.H.T + f.R)[0, 0] for f in filters])
-        found.append(np.sqrt(np.prod(s / MADE.asymptote)))
-        if hit:
-            for f in filters:
-                f.update(np.zeros((1, 1)))
-    return np.array(found)
-
-
-def test_thresholds_are_those_of_filterpys_filters():
-    assert filterpy_rho([True])[0] == pytest.approx(track_uncertainty.at_birth(MADE), rel=1e-12)
-    steady = filterpy_rho([True] * 400 + [False] * 10)
-    assert [track_uncertainty.after_misses(MADE, k) for k in range(10)] == pytest.approx(steady[400:], rel=1e-9)
-    hits = track_uncertainty.hits_to_confirm(MADE, 1.25)
-    assert np.flatnonzero(filterpy_rho([True] * 50) <= 1.25)[0] + 2 == hits
 
 
 def test_rho_falls_with_hits_and_rises_with_misses():

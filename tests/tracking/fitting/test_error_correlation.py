@@ -57,12 +57,6 @@ def test_correlations_of_errors_and_of_what_is_behind_misses() -> None:
     assert behind.rho == pytest.approx(wanted(behind.lag), abs=0.12)
 
 
-def test_only_rows_that_are_meant_count() -> None:
-    truth = people(4, 60)
-    keep = truth.frame % 2 == 0
-    assert (np.round(correlations(truth, np.ones((len(keep), 1)), keep).lag * 10) % 2 == 0).all()
-
-
 def test_exponentials_come_back() -> None:
     lag = np.geomspace(0.1, 10.0, 14)
     found = fit_memory([Correlations(lag, wanted(lag), np.full(14, 1000.0))])
@@ -79,8 +73,3 @@ def test_shares_stay_below_one_and_noise_has_no_memory() -> None:
     assert sum(m.share for m in fit_memory([Correlations(lag, noise, np.full(14, 1000.0))])) < 0.05
     assert fit_memory([]) == ()
     assert fit_memory([Correlations(np.zeros(0), np.zeros(0), np.zeros(0))]) == ()
-
-
-def test_a_short_recording_says_nothing_of_long_times() -> None:
-    lag = np.array([0.1, 0.2, 0.4])
-    assert all(m.time <= 0.8 for m in fit_memory([Correlations(lag, np.full(3, 0.9), np.full(3, 100.0))]))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading.resolve import load, resolve
+from scenarios.loading.resolve import resolve
 from sim.sequence import simulate
 from tests.short_scene import SCENE
 from tracking.app.cli import run
@@ -24,7 +24,6 @@ from tracking.fitting.joint_events import (
     partition_rows,
 )
 from tracking.papers.joint.config import FITTED, JointConfig
-from tracking.papers.joint.group_events_kernels import event_probabilities
 
 
 def state(pos):
@@ -81,29 +80,6 @@ def test_the_classifier_beats_the_frequencies_on_unseen_scenes():
     assert true["merges"] > 10
     assert true["log_loss"] < 0.8 * true["prior_log_loss"]
     assert both["log_loss"] < both["prior_log_loss"]
-
-
-def test_rates_of_events_do_not_depend_on_the_frame_rate(monkeypatch):
-    """E8: a sequence of which every second frame is left out has as many expected events per minute."""
-    monkeypatch.setattr("tracking.fitting.joint_events.PLACE_ERROR", 0.0)
-    monkeypatch.setattr("tracking.fitting.joint_events.VELOCITY_ERROR", 0.0)
-    truth = simulate(load("cross", ["duration=8"]), 30_300, 0, ()).truth
-    odd = truth.frame % 2 == 1
-    halved = truth.replace(
-        length=(truth.length + 1) // 2, fps=truth.fps / 2, labelled=None, frame=(truth.frame[odd] + 1) // 2,
-        **{k: getattr(truth, k)[odd] for k in ("id", "group", "pos", "vel")},
-    )  # fmt: skip
-    config, rates = JointConfig(), []
-    for one in (truth, halved):
-        rows = event_rows(one, config.lag, 0, wrong=False)
-        assert (rows.event == NONE).all()
-        p = [
-            sum(event_probabilities(f, 1.0 + splits, float(merges), config.classifier, config.rules(1 / one.fps, 0.4)))
-            for f, (merges, splits, _) in zip(rows.features, rows.possible, strict=True)
-        ]
-        rates.append(sum(p) * one.fps / len(p))
-    assert rates[0] == pytest.approx(rates[1], rel=0.2)
-    assert 0 < rates[0] < 0.05
 
 
 def test_the_command_writes_weights(tmp_path, capsys):

@@ -118,37 +118,12 @@ def test_false_alarms_come_back() -> None:
     near(found.jitter, 0.02, 0.006)
 
 
-def test_places_of_false_alarms_come_back() -> None:
-    left = KNOWN.false_alarms.model_copy(update={"near": 0.0, "at": ((0.2, 0.3), (0.3, 0.7)), "drift": 0.0})
-    found = fit_false_alarms(seen(KNOWN.model_copy(update={"false_alarms": left})))[1]
-    assert found is not None
-    assert found.at is not None
-    near(np.mean([x for x, _ in found.at]), 0.25, 0.04)
-    near(np.mean([y for _, y in found.at]), 0.5, 0.12)
-    assert found.near < 0.15
-
-
 def test_scores_come_back() -> None:
     found = fitted()
     assert found.true_scores is not None
     assert found.false_scores is not None
     near(np.array(found.true_scores)[[1, 5, 9]], (0.4, 0.8, 0.96), 0.03)
     near(np.array(found.false_scores)[[1, 5, 9]], (0.22, 0.3, 0.54), 0.06)
-
-
-def test_small_people_and_tails_and_visible_parts_are_told() -> None:
-    truth = scenes()[0][0]
-    assert truth.box is not None
-    small = float(np.quantile(truth.box[:, 3], 0.5)) / 2 * 1.3
-    noise = BoxNoise(foot=(0.0, 0.05), top=(0.0, 0.05), across=(0.0, 0.03), width=(0.0, 0.1), tails=6.0)
-    other = Sensor(detect_prob=0.95, clutter_rate=0.0, box="visible", small_px=small, min_visibility=0.0,
-                   by_visibility=(0.3, 0.5, 0.7, 0.9, 1.0), box_noise=noise)  # fmt: skip
-    found = fit_matched(seen(other))
-    assert found.small_px == pytest.approx(small, rel=0.25)
-    assert found.box == "visible"
-    assert 3.0 <= found.box_noise.tails <= 14.0
-    assert found.miss_memory is None or correlation(found.miss_memory, 0.3) < 0.1
-    assert found.false_alarms is None or found.clutter_rate < 0.1
 
 
 @pytest.mark.parametrize(("points", "box"), [("own", "visible"), ("seen", "visible"), ("foot", "amodal")])
@@ -190,13 +165,6 @@ def as_sequence(truth: Truth, camera: Any, sensor: Sensor, **changes: Any) -> Se
     frames = lambda: iter([Frame(d.index, d.t, detections=d) for d in found])  # noqa: E731
     made = Sequence("made", truth.fps, truth.length, frames, lambda: truth, camera.image, camera, has_detections=True)
     return replace(made, **changes)
-
-
-def test_sequences_are_taken_one_or_many() -> None:
-    truth, camera = scenes()[0]
-    one = as_sequence(truth, camera, KNOWN)
-    assert fit_sensor(one) == fit_sensor([one])
-    near(fit_sensor([one, one]).detect_prob, fit_sensor(one).detect_prob, 0.01)
 
 
 def test_what_cannot_be_fitted_is_refused() -> None:

@@ -14,7 +14,6 @@ from sim.sequence import simulate
 from sim.types import Context, Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.tracker import Blob
 from tracking.running.prepare import prepare
 from tracking.running.run import TrackingRun, track
 
@@ -133,10 +132,6 @@ def test_hiding_a_group_by_its_name(tmp_path):
         )
 
 
-def test_default_is_truth_where_there_is_nothing_else():
-    assert prepare("blob", source(has_detections=False, load_truth=truth)).mode == "truth"
-
-
 def test_image_mode_hides_the_files_detections():
     class Eyes(Stranger):
         needs = ("pixels", "boxes")
@@ -167,14 +162,6 @@ def test_params_by_config_values_and_file(tmp_path):
         track(Stranger, source(), params={"gate": 0.9})
 
 
-def test_strangers_by_class_and_instance():
-    for stranger in (Stranger, Stranger()):
-        run = track(stranger, source())
-        assert run.info["tracker"] == "Stranger"
-        assert run[0].score.tolist() == [1.0, 1.0]
-    assert track(Blob(BlobConfig(gate=0.9)), source()).info["config"]["gate"] == 0.9
-
-
 def test_a_strangers_wrong_answer_is_named():
     with pytest.raises(WorkError, match="Wrong: frame 3: got vel of shape"):
         track(Wrong, source())
@@ -195,11 +182,6 @@ def test_a_stranger_that_raises_is_named_in_one_line(method, words):
     with pytest.raises(WorkError, match=words) as caught:
         track(type("Raises", (Stranger,), {method: boo}), source())
     assert "\n" not in str(caught.value)
-
-
-def test_a_class_that_is_no_tracker_is_refused():
-    with pytest.raises(InputError, match="no needs, reset, step"):
-        track(dict, source())
 
 
 def test_combinations_that_cannot_work():
@@ -225,12 +207,6 @@ def test_empty_sequences():
     assert len(track("blob", Sequence("none", FPS, 0, lambda: iter(()), has_detections=True))) == 0
     bare = Sequence("bare", FPS, 3, lambda: (Frame(k, k / FPS) for k in (1, 2, 3)), has_detections=True)
     assert [len(t.id) for t in track("blob", bare)] == [0, 0, 0]
-
-
-def test_slices_and_repetition():
-    run, again = track("blob", source()), track("blob", source())
-    assert len(run[3:7]) == 4
-    assert all(a.pos.tobytes() == b.pos.tobytes() for a, b in zip(run, again, strict=True))
 
 
 class Placed(Stranger):
@@ -351,17 +327,6 @@ def test_groups_named_late_are_replaced_with_a_warning():
         run = track(Naming, standing(90))
     assert run[40].group.tolist() == run[80].group.tolist() == [1, 1]
     assert "grouping" in run.info
-
-
-def test_groups_named_from_the_first_frame_are_kept(recwarn):
-    run = track(NamingAlways, standing(90))
-    assert run[40].group.tolist() == [-1, -1]
-    assert run[80].group.tolist() == [7, 7]
-    assert not recwarn.list
-
-
-def test_events_of_declared_kinds_are_not_derived():
-    assert [(e.kind, e.emitted) for t in track(NamingDeclared, standing(90)) for e in t.events] == [("merge", 60)]
 
 
 def scored(score):

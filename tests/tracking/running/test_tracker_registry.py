@@ -79,14 +79,6 @@ def test_a_file_is_loaded_anew_where_it_has_changed(tmp_path):
     assert tracker_registry.find(f"{path}:Mine").needs == ("boxes",)
 
 
-def test_from_file_under_a_private_name(tmp_path):
-    path = tmp_path / "numpy.py"
-    path.write_text(STRANGER)
-    found = tracker_registry.find(f"{path}:Mine")
-    assert found.__module__.startswith("_flockscope_numpy_")
-    assert tracker_registry.find(f"{path}:Mine").needs == ("points",)
-
-
 @pytest.mark.parametrize(
     ("spec", "words"),
     [
@@ -122,14 +114,6 @@ def test_wrong_trackers_are_one_line(tmp_path, spec, words):
     assert "\n" not in str(caught.value)
 
 
-def test_signatures_that_can_be_called_pass(tmp_path):
-    (tmp_path / "mine.py").write_text(STRANGER)
-    assert [tracker_registry.find(f"{tmp_path}/mine.py:{name}").__name__ for name in ("Static", "Loose")] == [
-        "Static",
-        "Loose",
-    ]
-
-
 NEIGHBOUR = """
 from dataclasses import dataclass
 from wE_neighbour import REACH
@@ -153,12 +137,6 @@ def test_a_file_imports_the_files_beside_it(tmp_path, monkeypatch):
     assert sys.path[-1] == str(tmp_path)
     tracker_registry.find(f"{tmp_path}/mine.py:Mine")
     assert sys.path.count(str(tmp_path)) == 1
-
-
-def test_a_missing_neighbour_is_named(tmp_path):
-    (tmp_path / "mine.py").write_text("import wE_missing")
-    with pytest.raises(InputError, match=r"No module named 'wE_missing'; .*put its file beside the tracker's"):
-        tracker_registry.find(f"{tmp_path}/mine.py:Mine")
 
 
 def test_workers_in_another_folder_find_the_file(tmp_path, monkeypatch):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import WorkError
-from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks
-from tracking.running.run import track
+from sim.types import GroupEvent, Groups, Tracks
 from tracking.running.tracks_check import ReportHistory, check_tracks
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1]])
@@ -68,14 +67,6 @@ def test_wrong_groups(changes, words):
     refused(answer(groups=group(**changes)), words)
 
 
-def test_the_same_group_twice_and_no_groups_type():
-    two = np.zeros((2, 2))
-    refused(
-        answer(groups=Groups(np.array([5, 5]), (), two, two, np.zeros((2, 2, 2)), np.zeros(2), ())), "same group id"
-    )
-    refused(answer(groups=[5]), "groups of type list")
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -96,11 +87,6 @@ def test_the_same_group_twice_and_no_groups_type():
 )
 def test_wrong_events(changes, words):
     refused(answer(events=(event(**changes),)), words)
-
-
-def test_what_is_no_event():
-    refused(answer(events=("merge",)), "an event of type str")
-    refused(answer(events="merge"), "events of type str")
 
 
 def test_when_an_event_was_told_is_filled_in():
@@ -149,12 +135,6 @@ def test_trackers_of_groups():
 def test_ids_are_int64(kind):
     refused(answer(id=np.array([1, 2]).astype(kind)), "ids of type|id of type")
     refused(answer(group=np.array([3, 3]).astype(kind)), "groups of type|group of type")
-
-
-def test_no_arrays():
-    refused(answer(pos=[[0.0, 0.0], [0.0, 0.0]]), "pos of type list")
-    refused(answer(id=np.zeros((2, 2), np.int64)), "id of shape")
-    refused(answer(group=np.array([-2, 3])), "group -2")
 
 
 def tracks(n=2, **changes):
@@ -206,23 +186,3 @@ def test_a_tracker_may_use_its_arrays_again():
         assert type(array) is np.ndarray
         assert array.base is None
         assert not array.flags.writeable
-
-
-class Reusing:
-    """Reports one and the same arrays in every frame."""
-
-    needs = ("points",)
-
-    def reset(self, context, seed):
-        self.id, self.pos = np.arange(1), np.zeros((1, 2))
-
-    def step(self, frame, detections):
-        self.pos[:] = frame.index
-        zero = np.zeros((1, 2))
-        return Tracks(frame.index, frame.t, "ground", "person", self.id, self.id, self.pos, zero, np.zeros((1, 4, 4)))
-
-
-def test_a_run_of_a_tracker_that_reuses_its_arrays():
-    frames = [Frame(k, k / 10, detections=Detections(k, k / 10, "ground", np.zeros((0, 2)))) for k in (1, 2, 3)]
-    sequence = Sequence("s", 10.0, 3, lambda: iter(frames), has_detections=True)
-    assert [t.pos[0, 0] for t in track(Reusing, sequence)] == [1.0, 2.0, 3.0]

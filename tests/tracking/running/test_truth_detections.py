@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Sequence, Tracks
@@ -62,20 +61,6 @@ def test_the_number_of_a_row_is_worth_no_more_than_chance(merge, mode):
     assert rows["IDF1"] < chance["IDF1"] + 0.02
 
 
-def test_rows_of_one_group_do_not_stand_together(merge):
-    """The mean number of rows between two members of a group is that of a random order, (n + 1) / 3 for n rows."""
-    apart, expected = [], []
-    for index, found in enumerate(from_truth(merge, {}, 0), 1):
-        now = merge.truth.at(index)
-        at = [int(np.flatnonzero((now.pos == p).all(1))[0]) for p in found.pos]
-        group = now.group[at]
-        for g in set(group[group >= 0].tolist()):
-            members = np.flatnonzero(group == g)
-            apart += [abs(a - b) for k, a in enumerate(members) for b in members[:k]]
-            expected += [(len(group) + 1) / 3] * (len(members) * (len(members) - 1) // 2)
-    assert np.mean(apart) == pytest.approx(np.mean(expected), rel=0.15)
-
-
 def test_the_order_depends_on_seed_and_frame_alone(merge):
     first, again, other = (list(from_truth(merge, {}, seed)) for seed in (3, 3, 4))
     assert all(np.array_equal(a.pos, b.pos) for a, b in zip(first, again, strict=True))
@@ -106,19 +91,6 @@ def test_what_a_tracker_writes_reaches_neither_truth_nor_the_next_run(merge, mod
     assert np.array_equal(merge.truth.pos, before[0])
     assert np.array_equal(merge.truth.box, before[1])
     assert all(np.array_equal(a.pos, b.pos) for a, b in zip(clean, again, strict=True))
-
-
-def test_settings_with_dots_are_keys_of_a_table(merge):
-    """One key of box_noise brings its defaults; without any, boxes are exact."""
-    exact, whole, dotted = (
-        [d.box for d in from_truth(merge, sensor, 0)]
-        for sensor in ({"noise_m": 0.1}, {"box_noise": {"scale": 2.0}}, {"box_noise.scale": 2.0})
-    )
-    assert all(map(np.array_equal, whole, dotted))
-    assert not any(map(np.array_equal, whole, exact))
-    for sensor, words in (({"noise_px": 3}, "set box_noise.scale"), ({"noise_m.x": 3}, "sensor.noise_m")):
-        with pytest.raises(InputError, match=words):
-            from_truth(merge, sensor, 0)
 
 
 def test_people_without_a_box_are_not_detected(merge):

@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 from tests.hand_made import Scene, tracks, truth
 from tracking.scoring import evaluate
-from tracking.scoring.catalogue import ALL, CATALOGUE, CORE, table
+from tracking.scoring.catalogue import ALL, CATALOGUE, CORE
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = ROOT / "docs" / "reference" / "metrics.md"
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
-
-
-def test_the_table_is_printed() -> None:
-    command = [sys.executable, "-W", "ignore", "-m", "tracking.scoring.catalogue"]
-    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=True)
-    assert said.stdout.strip() == table()
 
 
 def test_every_key_of_the_page_is_returned_and_the_other_way_round() -> None:

@@ -78,16 +78,6 @@ def test_equal_to_trackeval(tmp_path: Path, name: str, seed: int) -> None:
     assert weighted[list(found).index("MOTA")] == pytest.approx(expected["MOTA"], abs=1e-9)
 
 
-def test_without_other_classes_nothing_is_left_out(tmp_path: Path) -> None:
-    gt, told = crowded(5, top=1)
-    source, tracks = written(tmp_path, gt, told, "MOT17-99")
-    expected = theirs(tmp_path, "MOT17-99", "MOT17", preprocessing=False)
-    truth, found = ours(source, tracks)
-    assert truth.unscored is None
-    for key, value in expected.items():
-        assert found[key] == pytest.approx(value, abs=1e-9), key
-
-
 def test_a_vehicle_without_motor_is_a_distractor_in_mot20_alone(tmp_path: Path) -> None:
     gt = np.array([[1, 1, 0, 0, 40, 100, 1, 1, 1], [1, 2, 500, 0, 40, 100, 0, 6, 1]])
     for name, false in (("MOT17-01", 1), ("MOT20-01", 0)):

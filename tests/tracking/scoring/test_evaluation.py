@@ -70,25 +70,6 @@ def assert_perfect(found: Scores, without: Set[str] = frozenset()) -> None:
             assert value == pytest.approx(best, abs=1e-6), (key, found.surface, found.group_match)
 
 
-@pytest.mark.filterwarnings("ignore:CAVIAR's recordings are taken at 25 fps")
-@pytest.mark.parametrize(("place", "plane"), [("biwi/seq_hotel", "ground"), ("caviar/mwt1gt.xml", "image")])
-def test_labels_of_recordings_as_tracks_are_perfect(shared_data: Path, place: str, plane: str) -> None:
-    (sequence,) = open_source(shared_data / place)
-    for by in ("hull", "members"):
-        found = evaluate(sequence.truth, truth_as_tracks(sequence.truth, plane), group_match=by)
-        assert found["objective"] == found["group_F1"] == found["pairwise_F1"] == 1
-        assert_perfect(found)
-
-
-@pytest.mark.parametrize("name", ["merge", "split"])
-def test_a_second_late_is_not_perfect_but_the_core_is(name: str) -> None:
-    true = simulate(load(name), 5).truth
-    found = evaluate(true, truth_as_tracks(true, late=round(true.fps)))
-    assert found["group_GDSR"] < 0.99
-    assert found["group_F1"] < 0.99
-    assert found["group_F1_core"] == found["group_GDSR2_core"] == found["group_MOTA_core"] == 1
-
-
 @pytest.mark.parametrize("detections", ["file", "truth"])
 def test_files_are_memory(tmp_path: Path, detections: str) -> None:
     sequence = simulate(load("party"), 5, streams=())
@@ -161,27 +142,6 @@ def test_a_beginning_is_not_told_what_comes_later() -> None:
         found, expected = evaluate(true, bare, frames=last), evaluate(true, bare[:last], frames=last)
         assert found["cross_TP"] == 1
         assert dict(found) == pytest.approx(dict(expected), abs=1e-12, nan_ok=True)
-
-
-def test_errors_of_places() -> None:
-    # Four frames. Person 1 is told 0.3 m off, person 2 0.4 m off in two of them and in none of the others, where
-    # somebody 9 m away is told instead once. RMSE² = (4 x 0.09 + 2 x 0.16)/6. GOSPA² = that sum / 4 frames + 2 missed
-    # and 1 false at 2²/2 each / 4.
-    near = Scene({1: (0.3, 0.0), 2: (1.0, 0.4)})
-    est = [near, near, Scene({1: (0.0, 0.3)}), Scene({1: (0.0, 0.3), 2: (9.0, 0.0)})]
-    found = evaluate(truth([Scene(TWO)] * 4), tracks(est))
-    assert found["RMSE_pos"] == pytest.approx((0.68 / 6) ** 0.5, abs=1e-12)
-    assert found["RMSE_vel"] == 0
-    assert found["GOSPA_localisation"] == pytest.approx((0.68 / 4) ** 0.5, abs=1e-12)
-    assert found["GOSPA_missed"] == pytest.approx(1, abs=1e-12)
-    assert found["GOSPA_false"] == pytest.approx(0.5**0.5, abs=1e-12)
-    assert found["GOSPA"] == pytest.approx((0.17 + 1 + 0.5) ** 0.5, abs=1e-12)
-
-
-def test_frames_without_an_answer_are_empty() -> None:
-    scene = [Scene(TWO, {1: ((1, 2), None)})] * 4
-    found = evaluate(truth(scene), [t for t in tracks(scene) if t.index != 2])
-    assert (found["FN"], found["group_FN"], found["group_1-FN"]) == (2, 1, 0.75)
 
 
 def test_nothing_said_and_nothing_there() -> None:

@@ -64,31 +64,6 @@ def test_frames_of_weight_n_count_n_times(weight: list[int]) -> None:
         assert found[key] == pytest.approx(expected[key], abs=1e-12, nan_ok=True), key
 
 
-def test_a_switch_has_the_weight_of_its_frame() -> None:
-    """The old resampling joined frames, and each join of an early with a late block was a switch."""
-    answers = [FOUND] * 50 + [Scene({1: (0.0, 0.0), 5: (1.0, 0.0)}, {4: ((1, 5), None)})] * 50
-    true = truth([FOUND] * 100)
-    weights = np.ones(100)
-    assert scored(true, tracks(answers), weights)["IDSW"] == 1
-    weights[[10, 90]] = 0, 2
-    assert scored(true, tracks(answers), weights)["IDSW"] == 1
-    weights[50] = 3
-    found = scored(true, tracks(answers), weights)
-    assert (found["IDSW"], found["group_IDSW"]) == (3, 3)
-
-
-def test_events_have_the_weight_of_their_start() -> None:
-    true = truth([FOUND] * 60, [event("merge", 10, (1, 2)), event("merge", 40, (1, 2))])
-    told = [event("merge", 12, (1, 2), emitted=15), event("merge", 25, (1, 2), emitted=26)]
-    answers = tracks([FOUND] * 60, told)
-    weights = np.ones(60)
-    weights[[9, 11, 24, 39]] = 2, 7, 3, 5  # the true start counts, not that of the matched report
-    found = scored(true, answers, weights)
-    assert (found["merge_TP"], found["merge_FP"], found["merge_FN"]) == (2, 3, 5)
-    assert found["merge_F1"] == pytest.approx(4 / 12)
-    assert found["merge_latency"] == pytest.approx(0.5)
-
-
 def test_no_weight_where_a_score_is_defined_makes_it_unknown() -> None:
     true = truth([FOUND] * 20, [event("merge", 10, (1, 2))])
     weights = np.ones(20)
@@ -97,14 +72,3 @@ def test_no_weight_where_a_score_is_defined_makes_it_unknown() -> None:
     nothing = scored(true, tracks([FOUND] * 20), np.zeros(20))
     assert np.isnan([nothing["group_F1"], nothing["GOSPA"], nothing["RMSE_pos"]]).all()
     assert nothing["HOTA"] == 0
-
-
-def test_each_draw_is_by_itself() -> None:
-    true, answers = simulated()
-    r = np.random.default_rng(0)
-    weights = r.exponential(1.0, (3, true.length))
-    score = weighted_scorers(true, [answers["people"]])[0]
-    together = score(weights)
-    for row, expected in zip(weights, together, strict=True):
-        assert np.allclose(score(row[None])[0], expected, rtol=1e-12, atol=1e-12, equal_nan=True)
-    assert score(np.zeros((0, true.length))).shape == (0, len(CATALOGUE))

@@ -120,16 +120,6 @@ def test_for_some_frames_hulls_may_hold_others() -> None:
     assert accuracy(scenes(30, covering(20)), merge(30, 30, (1, 2), (1,))) == 1
 
 
-def test_people_must_be_in_a_hull_for_most_of_its_life() -> None:
-    """The second hull lies elsewhere until just before."""
-
-    def elsewhere(frames: int) -> Callable[[int], dict[int, tuple[float, float]]]:
-        return lambda k: {2: (30.0, 31.0)} if k < 30 - frames else {}
-
-    assert accuracy(scenes(30, elsewhere(11)), merge(30, 30, (1, 2), (1,))) == 1
-    assert accuracy(scenes(30, elsewhere(10)), merge(30, 30, (1, 2), (1,))) == 0
-
-
 def test_told_late_it_is_the_groups_before_the_start() -> None:
     """Groups change in frame 30, it is told in 40: parents as they were until 29. Is one of them younger than the
     claimed start, they are those before it was told."""

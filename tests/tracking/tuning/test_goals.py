@@ -8,15 +8,11 @@ import pytest
 
 from scenarios.errors import InputError
 from tracking.environment.episodes import Episode
-from tracking.tuning.goals import SPEED, Goal, finite_mean, goals_of
+from tracking.tuning.goals import Goal, finite_mean, goals_of
 
 
 def episode(seconds: float = 1.0, frames: int = 10, **scores: float) -> Episode:
     return Episode("x", 0, scores.get("objective", math.nan), scores, frames, seconds, 0.0)
-
-
-def test_directions_come_from_the_catalogue():
-    assert goals_of(["HOTA", "GOSPA", SPEED]) == (Goal("HOTA"), Goal("GOSPA", False), Goal(SPEED))
 
 
 def test_gain_is_positive_where_the_second_is_better():
@@ -29,11 +25,6 @@ def test_unknown_scores_are_left_out_of_the_mean():
     assert goal.mean([episode(event_F1=0.5), episode(), episode(event_F1=1.0)]) == 0.75
     assert math.isnan(goal.mean([episode()]))
     assert math.isnan(finite_mean([]))
-
-
-def test_speed_is_frames_over_seconds_of_all():
-    assert Goal(SPEED).mean([episode(1.0, 10), episode(3.0, 10)]) == 5.0
-    assert math.isnan(Goal(SPEED).of(episode(0.0)))
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,7 @@ from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
 from tracking.environment.episodes import SourceCache, sources
 from tracking.grouping.grouped_tracks import derive
-from tracking.grouping.grouping_choice import default_grouping
 from tracking.grouping.link_rule import LinkRule
-from tracking.running.run import track
 from tracking.scoring import evaluate
 from tracking.tuning import tune
 from tracking.tuning.grouping_episodes import (
@@ -108,12 +106,6 @@ def test_filmed_people_are_grouped_in_the_image():
     assert evaluate(truth, derive(answers, truth.fps, truth.px_per_m), similarity="image").surface == "image"
 
 
-def test_a_rule_that_links_nobody_scores_nothing(source):
-    """The pair walks 0.75 m apart: at half a metre nobody is together."""
-    assert play_rule(source, LinkRule(), SourceCache()).scores["pairwise_F1"] > 0.5
-    assert play_rule(source, LinkRule(near=0.5), SourceCache()).scores["pairwise_F1"] == 0.0
-
-
 def test_the_rule_is_tuned_like_a_tracker(tmp_path):
     """From a rule that asks for too much at the start."""
     one, _ = write_scenes(tmp_path)
@@ -124,18 +116,6 @@ def test_the_rule_is_tuned_like_a_tracker(tmp_path):
     assert found.plan.goals[0].key == "pairwise_F1"
     assert "near" not in found.trials[0].params
     assert LinkRule.from_toml(tmp_path / "rule.toml") == found.config
-
-
-def test_a_rule_of_ones_own_groups_what_is_tracked(source, tmp_path):
-    """From Python, from a file; run.json says which; who says nothing gets the usual one."""
-    rule = LinkRule(near=0.5)
-    (tmp_path / "rule.toml").write_text(rule.to_toml())
-    sequence = source.open()
-    usual, own, read = (track("blob", sequence, grouping=g) for g in (None, rule, str(tmp_path / "rule.toml")))
-    assert any((t.group >= 0).any() for t in usual)
-    assert not any((t.group >= 0).any() for t in own)
-    assert own.info["grouping"] == read.info["grouping"] == rule.as_dict()
-    assert usual.info["grouping"] == default_grouping().as_dict()
 
 
 def test_a_rule_on_the_command_line(source, tmp_path, capsys):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from scenarios.errors import InputError
@@ -44,11 +42,6 @@ def test_seeds_of_another_range_are_refused(tmp_path, option, seeds):
     assert "\n" not in str(caught.value)
 
 
-def test_one_number_is_no_range(tmp_path):
-    with pytest.raises(InputError, match=r"--seeds: got 5; expected a range of seeds; .* range\(0, 4\)"):
-        toy_plan(tmp_path, seeds=5)
-
-
 def test_the_three_sets_share_no_source(tmp_path):
     made = toy_plan(tmp_path)
     sets = [made.training, made.validation, *made.tests.values()]
@@ -64,13 +57,6 @@ def test_a_recording_is_never_tuned_on(tmp_path):
         with pytest.raises(InputError, match="nothing is tuned on what was recorded") as caught:
             toy_plan(tmp_path, **{option: str(folder)})
         assert f"--{option}" in str(caught.value)
-
-
-@pytest.mark.filterwarnings("ignore:CAVIAR's recordings are taken at 25 fps")
-def test_real_recordings_are_never_tuned_on(tmp_path, shared_data):
-    for name in ("mot/TUD-Campus", "biwi/seq_hotel", "caviar/mwt1gt.xml"):
-        with pytest.raises(InputError, match="nothing is tuned on what was recorded"):
-            toy_plan(tmp_path, suite=str(shared_data / name))
 
 
 def test_unknown_scenes_are_named(tmp_path):
@@ -110,21 +96,6 @@ def test_settings_reach_the_scenes(tmp_path):
     assert (unused.duration, unused.sensor.detect_prob) == (4.0, 0.5), "the detector is the same everywhere"
     assert made.base.skip == 2
     assert "skip" not in made.defaults
-
-
-def test_two_suites_of_one_name(tmp_path):
-    """In different folders: both are tested on, and no name tells the folder."""
-    one, two = write_scenes(tmp_path)
-    other = (tmp_path / "other" / "one.toml").resolve()
-    other.parent.mkdir()
-    other.write_text(Path(two).read_text())
-    made = toy_plan(tmp_path, suite=one, check=str(other))
-    assert list(made.tests) == ["one.toml", made.check_name] == ["one.toml", "one.toml (--check)"]
-
-
-def test_scene_with_a_wrong_setting(tmp_path):
-    with pytest.raises(InputError, match="duratoin"):
-        toy_plan(tmp_path, set=["scenario.duratoin=5"])
 
 
 @pytest.mark.parametrize(
