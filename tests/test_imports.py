@@ -62,10 +62,6 @@ def test_scoring_alone_is_numpy_and_scipy():
     assert found.isdisjoint(HEAVY - {"numpy", "scipy"})
 
 
-def test_data_types_need_numpy_only():
-    assert loaded("import sim.types").isdisjoint(HEAVY - {"numpy"})
-
-
 @pytest.mark.parametrize(
     ("package", "names"),
     [
@@ -81,17 +77,3 @@ def test_lazy_names(package, names):
         assert callable(getattr(module, name)), f"{package}.{name}"
     with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'nothing'"):
         _ = module.nothing
-
-
-def test_lazy_names_after_their_modules_were_imported():
-    """A submodule becomes an attribute of its package: none may take the place of a function."""
-    code = "\n".join(
-        [
-            "import pkgutil, importlib, scenarios, sim, tracking",
-            "for package in (scenarios, sim, tracking):",
-            "    for found in pkgutil.iter_modules(package.__path__):",
-            "        importlib.import_module(f'{package.__name__}.{found.name}')",
-            "    assert all(callable(getattr(package, name)) for name in package.__all__), package",
-        ]
-    )
-    loaded(code)

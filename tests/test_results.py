@@ -27,19 +27,6 @@ def test_a_headline_is_not_older_than_the_code(name):
     assert not results.is_stale(TABLES[name]), f"python -m benchmarks results {name}"
 
 
-def test_printed_tables_are_read_with_their_titles():
-    text = "seeds 0:3\n\n| a | b |\n|---|---|\n| x | 1 |\nmore\n| c |\n|---|\n| – |\n"
-    first, second = results.printed_tables(text)
-    assert first == {"title": "seeds 0:3", "columns": ["a", "b"], "rows": [["x", "1"]]}
-    assert second == {"title": "more", "columns": ["c"], "rows": [["–"]]}
-
-
-def test_options_for_few_seeds_replace_those_of_the_table():
-    table = results.Table("t", "relational hidden --seeds 0:9 --chart {chart}", quick="--seeds 0:1 --counts 5")
-    assert table.words() == ["relational", "hidden", "--seeds", "0:9", "--chart", "docs/results/t.svg"]
-    assert table.words(quick=True)[2:] == ["--chart", "docs/results/t.svg", "--seeds", "0:1", "--counts", "5"]
-
-
 def test_sources_are_what_the_benchmark_imports_without_docstrings(tmp_path, monkeypatch):
     (tmp_path / "benchmarks").mkdir()
     (tmp_path / "sim").mkdir()
@@ -82,13 +69,6 @@ def test_few_seeds_leave_their_bands():
         "blob, score: 0.75 is now 0.86",
         "blob, count: 10 is now 11",
     ]
-
-
-def test_a_failing_benchmark_stores_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(results, "FOLDER", tmp_path)
-    with pytest.raises(SystemExit, match="exit code"):
-        results.make(results.Table("t", "golden --nonsense"))
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_block_without_a_table_stays_empty(tmp_path, monkeypatch):

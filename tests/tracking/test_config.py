@@ -87,12 +87,6 @@ def test_missing_file(tmp_path):
         Small.from_toml(tmp_path / "none.toml")
 
 
-def test_table_has_every_parameter():
-    table = BlobConfig.table()
-    assert all(f"| `{name}` |" in table for name in BlobConfig.params())
-    assert all(p.meaning and p.default == getattr(BlobConfig(), p.name) for p in BlobConfig.params().values())
-
-
 WITH_PRESETS = [find(name).config_class for name in names()]
 
 
@@ -105,15 +99,6 @@ def test_the_paper_preset_names_every_parameter_that_is_ours(kind):
     assert not ours - given.keys(), "give them their off values in tracking/presets/paper"
     paper = kind.preset("paper")
     assert all(getattr(paper, name) == value for name, value in given.items())
-
-
-def test_ours_is_read_from_the_meaning():
-    def meaning(text):
-        return dataclasses.replace(Small.params()["rate"], meaning=text).ours
-
-    assert meaning("a rate (ours)")
-    assert meaning("a rate (ours, in place of R)")
-    assert not meaning("hours of colours")
 
 
 def test_a_preset_is_found_by_name_beside_files(tmp_path, monkeypatch):
@@ -129,14 +114,6 @@ def test_a_preset_is_found_by_name_beside_files(tmp_path, monkeypatch):
         Small.preset("paper")
     with pytest.raises(InputError, match="No such file"):
         Small.load("paper2")
-
-
-def test_the_table_shows_what_a_preset_changes():
-    rows = [row.split("|") for row in BlobConfig.table().splitlines()]
-    assert rows[0][3].strip() == "preset `paper`"
-    cells = {row[1].strip(): row[3].strip() for row in rows[2:]}
-    assert (cells["`association`"], cells["`gate`"]) == ("nearest", "")
-    assert Small.table().startswith("| parameter | default | range |")
 
 
 def test_a_vector_has_as_many_numbers_as_its_default():

@@ -86,13 +86,6 @@ def changed(config, p):
 
 
 @pytest.mark.parametrize("name", names())
-def test_an_equal_config_changes_nothing(name, points):
-    config = find(name).config_class()
-    plain = answers(name, points, "file", {})
-    same(plain, answers(name, points, "file", {k: dataclasses.replace(config) for k in (1, 7, 10)}))
-
-
-@pytest.mark.parametrize("name", names())
 def test_each_parameter_changed_after_the_reset_is_as_if_reset_with(name, points):
     kind = find(name).config_class
     counted, plain = 0, answers(name, points, "file", {})

@@ -8,11 +8,6 @@ import pytest
 from tracking.stats import block_intervals, block_length, block_weights, mean_interval, paired, wilson
 
 
-def test_interval_of_what_does_not_vary() -> None:
-    mean, low, high = mean_interval(np.tile([0.25, -3.0], (5, 1)))
-    assert mean.tolist() == low.tolist() == high.tolist() == [0.25, -3.0]
-
-
 def test_interval_of_two_numbers_is_students() -> None:
     """12.706 is the quantile for one degree of freedom."""
     mean, low, high = mean_interval(np.array([[0.0], [1.0]]))
@@ -56,12 +51,6 @@ def test_wilson_as_in_tables(hits: int, count: int, low: float, high: float) -> 
     assert wilson(hits, count) == pytest.approx((hits / count, low, high), abs=5e-5)
 
 
-def test_wilson_of_nothing() -> None:
-    share, low, high = wilson(0, 0)
-    assert np.isnan(share)
-    assert (low, high) == (0.0, 1.0)
-
-
 @pytest.mark.parametrize(
     ("frames", "fps", "likeness", "expected"),
     [
@@ -103,22 +92,6 @@ def test_intervals_hold_their_score_and_keep_to_its_range() -> None:
     assert low[[0, 1, 3]].min() >= 0
     assert high[[0, 2]].max() < 1
     assert high[0] - whole[0] < whole[0] - low[0]
-
-
-def test_no_interval_where_none_can_be_believed() -> None:
-    x = np.arange(100.0)
-
-    def scores(weights: np.ndarray) -> np.ndarray:
-        seen = weights[:, 0] > 0
-        often, never = np.where(seen, x @ weights.T, np.nan), np.full(len(weights), np.nan)
-        return np.column_stack([never, often, np.ones(len(weights)), x @ weights.T])
-
-    whole, low, high = block_intervals(scores, 100, 10.0, draws=200)
-    assert np.isnan(low[:3]).all()
-    assert np.isnan(high[:3]).all()
-    assert low[3] < whole[3] < high[3]
-    assert np.isnan(block_intervals(mean_of(np.arange(4.0)), 4, 25.0)[1]).all(), "one block"
-    assert np.isnan(block_intervals(lambda w: np.full((len(w), 1), np.nan), 0, 10.0)[1]).all()
 
 
 def test_intervals_hold_the_truth_where_frames_resemble_their_neighbours() -> None:

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import dump, load, names, resolve
-from scenarios.loading.toml_files import merge
-from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, SplitOrder
+from scenarios.schema.scenario import MergeOrder, QueueOrder, SplitOrder
 
 
 def write(path: Path, text: str) -> Path:
@@ -80,18 +79,6 @@ def test_extends_merges_tables_and_rows_by_id(path: Path) -> None:
     assert scenario.event[2].when.after == "s1"
 
 
-def test_a_distribution_replaces_whole() -> None:
-    below = {"speed": {"normal": [1, 2], "clip": [0, 3]}, "camera": {"fps": 10, "kind": "top"}}
-    assert merge(below, {"speed": {"uniform": [1, 2]}})["speed"] == {"uniform": [1, 2]}
-    assert merge(below, {"camera": {"fps": 5}})["camera"] == {"fps": 5, "kind": "top"}
-
-
-def test_merge_changes_neither_side() -> None:
-    below, above = {"group": [{"id": "a", "x": 1}]}, {"group": [{"id": "a", "x": 2}, {"id": "b"}]}
-    assert merge(below, above) == {"group": [{"id": "a", "x": 2}, {"id": "b"}]}
-    assert below == {"group": [{"id": "a", "x": 1}]}
-
-
 def test_extends_chain_and_circle(path: Path) -> None:
     folder = path.parent
     write(folder / "one.toml", 'extends = "tour.toml"\nduration = 40.0')
@@ -143,16 +130,6 @@ def test_set(path: Path, setting: str, value) -> None:  # type: ignore[no-untype
     assert value(load(path, settings))
 
 
-def test_later_settings_win_and_the_file_stays(path: Path) -> None:
-    assert load(path, ["duration=25", "duration=26"]).duration == 26
-    assert load(path).duration == 30
-
-
-def test_an_id_with_a_dot_can_be_set(path: Path) -> None:
-    path.write_text(path.read_text().replace('id = "w"', 'id = "w.x"').replace("w-*", "w.x-*"))
-    assert load(path, ["group.w.x.repeat=4"]).group[2].repeat == 4
-
-
 @pytest.mark.parametrize(
     ("setting", "place", "got", "expected", "remedy"),
     [
@@ -195,15 +172,6 @@ def test_the_place_is_the_key_where_the_file_is_wrong(path: Path) -> None:
     assert "'size'" in error.remedy
 
 
-def test_every_key_of_the_form_is_known_to_itself(path: Path) -> None:
-    """An unknown key beside any table names that table's keys."""
-    table = load(path).model_dump(by_alias=True, exclude_none=True)
-    assert set(table) <= {f.alias or n for n, f in Scenario.model_fields.items()}
-    for key in ("world", "camera", "sensor", "crowd"):
-        known = next(iter(table[key]))
-        assert repr(known) in error_of(path, f"{key}.{known}x=1").remedy
-
-
 def test_syntax_error_has_its_line(tmp_path: Path) -> None:
     error = error_of(write(tmp_path / "bad.toml", "schema = 1\nduration = = 3\n"))
     assert "line 2" in error.place
@@ -212,11 +180,6 @@ def test_syntax_error_has_its_line(tmp_path: Path) -> None:
     assert "no such file" in error_of(tmp_path / "none.toml").got
     (tmp_path / "folder.toml").mkdir()
     error_of(tmp_path / "folder.toml")
-
-
-def test_the_files_name_must_serve_as_a_name(path: Path) -> None:
-    error = error_of(path.rename(path.with_name("2 tours.toml")))
-    assert error.place == "name"
 
 
 def test_unknown_names_are_answered_with_near_ones() -> None:

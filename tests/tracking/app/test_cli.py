@@ -321,7 +321,7 @@ def _leaves(group):
     ],
 )
 def test_usage(line, got, as_json, capsys):
-    assert run(line.split() + ["--json"] * as_json) == 2
+    assert run(["--json"] * as_json + line.split()) == 2
     printed = capsys.readouterr()
     text = json.loads(printed.out)["error"]["got"] if as_json else printed.err
     assert got in text

@@ -25,8 +25,3 @@ def test_values_between_nodes_are_the_slow_way(n):
     at = r.uniform(-3, 11, (n, 2))
     at[: n // 10, 0], at[n // 5 : n // 4] = np.nan, (np.inf, -np.inf)
     assert np.array_equal(look_up(table, at), slow(table, at), equal_nan=True)
-
-
-def test_at_a_node_is_its_own_value():
-    table = np.arange(2.0 * 5 * 7).reshape(2, 5, 7)
-    assert np.array_equal(look_up(table, np.array([[3.0, 2.0]])), table[:, 2, 3][None])

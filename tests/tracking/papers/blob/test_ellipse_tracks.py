@@ -46,19 +46,6 @@ def test_what_is_expected_of_a_size_is_no_new_evidence_in_each_frame():
     assert one.bank[kalman.PLACE, 0, :2] == pytest.approx([100, 100])
 
 
-def test_settling_takes_as_long_at_any_frame_rate():
-    left = []
-    for fps in (5.0, 25.0):
-        settings = BlobConfig()
-        one = TrackedEllipses(settings, settings.dynamics(fps), Context(fps, SCALE))
-        one.start_tracks(np.array([[100.0, 100, 90, 40, UP]]), np.ones(1), 0.0)
-        for _ in range(int(fps)):
-            one.relax_axes(np.array([0]), np.array([[68.0, 24.0]]), 0.02)
-        left.append(one.bank[kalman.PLACE, 0, 2] - 68)
-    assert left[0] == pytest.approx(left[1])
-    assert 0 < left[0] < 0.2 * (90 - 68)
-
-
 @pytest.mark.parametrize(("x", "wide", "hidden"), [(123, 34, True), (100, 16, False)])
 def test_who_lies_behind_somebody_is_excused_by_the_boxes_round_the_ellipses(x, wide, hidden):
     """Of 68 px of his length 28 are behind a wide person beside him, 16 behind a slim one in front."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from tests import painted
 from tests.painted import TALL, box, overlap, track
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.person_template import ExplainedForeground
 
 
 def walk(x, foot, step, frames):
@@ -73,27 +71,6 @@ def test_pieces_of_a_person_lie_in_the_gate_and_start_no_track(config, broken):
     assert known[-1] == 1
 
 
-@pytest.mark.parametrize("scale", [0.0, -1.0])
-def test_a_scale_that_is_none_is_refused(scale):
-    sample = painted.sample(np.random.default_rng(0))
-    with pytest.raises(InputError, match=r"context\.px_per_m"):
-        painted.Blob().reset(painted.Context(painted.FPS, scale, background=sample), 0)
-
-
-def test_a_ghost_that_is_pruned_hides_nobody():
-    """The template of a track that is lost, before one person: he is measured as wholly seen."""
-    last = []
-    track([[p] for p in walk(60, 180, 4, 20)], watch=lambda tracker, _: last.append(tracker))
-    people, updater = last[-1].people, last[-1].updater
-    x, y, h, w = people.upright_boxes()[0]
-    people.start_tracks(np.array([[x + 0.3 * w, y + 2, h, w, np.pi / 2]]), np.ones(1), 2.0)
-    people.confirmed[:] = True
-    scene = ExplainedForeground(painted.shape((x, y + h / 2, h)))
-    made = updater._measure_by_templates(scene, people.upright_boxes(), np.zeros(0, np.int64), True)
-    assert len(made.rows) == 1
-    assert made.noise[0, :2] == pytest.approx(people.noise[:2], rel=0.1)
-
-
 def two_tracks_at_one_blob(first_var, second_var):
     """A tracker with two confirmed steady tracks, and a blob between them, nearer to the first in px. Variances are
     those of the filters' places, m^2."""
@@ -107,17 +84,6 @@ def two_tracks_at_one_blob(first_var, second_var):
     people.bank[kalman.VAR, 0, :2], people.bank[kalman.VAR, 1, :2] = first_var, second_var
     people.bank[kalman.VAR, 1, 2:] = people.bank[kalman.VAR, 0, 2:]
     return last[-1], np.array([[x + 10, y, h, w, people.angle[0, 0]]])
-
-
-def test_a_blob_goes_to_the_likelier_track_not_to_the_vaguer():
-    """d^2 + ln |S|: rho is the same for both, but the second was measured by a template, with more noise."""
-    tracker, z = two_tracks_at_one_blob(0.003, 0.09)
-    people, angle_var = tracker.people, np.array([0.01])
-    d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)[:, 0]
-    assert d2[1] < d2[0]
-    assert d2[0] + np.log(0.003 + 0.0081) * 2 < d2[1] + np.log(0.09 + 0.0081) * 2
-    made, columns, _ = tracker.updater._associate(z, angle_var)
-    assert (made.rows.tolist(), columns.tolist()) == ([0], [0])
 
 
 @pytest.mark.parametrize("directed", [True, False])
@@ -175,20 +141,6 @@ def test_two_who_cross_in_one_blob_keep_who_they_are():
     assert both(made) > both(unsplit)
 
 
-def test_two_side_by_side_in_one_blob_are_two_when_their_size_is_known():
-    pair = [[(80 + 4 * k, 180, TALL), (98 + 4 * k, 181, TALL)] for k in range(30)]
-    made = track(pair)
-    assert [len(t.id) for t in made[3:]] == [2] * 27
-    assert len(ids(made)) == 2
-    assert all(mine(t, a) and mine(t, b) for t, (a, b) in zip(made[5:], pair[5:], strict=True))
-    assert len(ids(track(pair, people=()))) == 1  # nobody was ever seen alone: the blob is taken for one person
-
-
-def test_a_wide_sample_of_others_leaves_one_person_one():
-    """Seen at the pair's place alone: no second track out of thin air."""
-    assert len(ids(track([[(80 + 4 * k, 180, TALL)] for k in range(30)]))) == 1
-
-
 @pytest.mark.parametrize(("dark", "moved"), [(0.4, False), (1.0, True)])
 def test_shadows_move_the_centroid_only_where_they_are_foreground(dark, moved):
     """With `dark` at 1 whatever is darker than the ground is dark foreground: there is no class of shadows."""
@@ -214,16 +166,6 @@ def test_a_track_that_lies_stands_up_where_templates_measure_it():
         assert mine(t, b) == mine(made[11], pair[11][1])
 
 
-def test_windows_follow_the_image_while_nobody_was_seen():
-    scales = []
-    for k in (1, 3):
-        sample = np.stack([painted.picture([], np.random.default_rng(0))] * 12).repeat(k, 1).repeat(k, 2)
-        tracker = painted.Blob()
-        tracker.reset(painted.Context(painted.FPS, float("nan"), background=sample), 0)
-        scales.append(tracker.people.context.px_per_m)
-    assert scales[1] == pytest.approx(3 * scales[0])
-
-
 def test_a_lost_frame_only_predicts():
     way, state = walk(60, 180, 4, 20), []
     frames = [[p] for p in way]
@@ -243,10 +185,6 @@ def test_a_light_that_is_switched_starts_no_flood():
     known = []
     track(frames, BlobConfig(), watch=lambda tracker, _: known.append(tracker.people.next_id))
     assert known[-1] <= 4
-
-
-def test_empty_frames_and_nobody():
-    assert all(not len(t.id) for t in track([[]] * 10))
 
 
 def test_a_confirmed_person_who_stands_is_not_learned_as_background(monkeypatch):

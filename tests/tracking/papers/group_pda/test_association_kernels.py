@@ -9,19 +9,16 @@ from itertools import combinations
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
-from scipy.stats import chi2
 
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association import PointClaims, point_log_density, shares
-from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.merging import GroupMerging, merged
-from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
+from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.splitting import split
 
 STATES = ["nothing", "null", "measured"]
@@ -131,41 +128,6 @@ def test_four_hundred_random_cases() -> None:
     options = [n for key, n in seen.items() if isinstance(key, tuple)]
     assert len(options) == 4 * (3 * 4 + 1)  # without group constraint there is neither miss nor freezing
     assert min(seen[k] for k in ("nothing", "null", "measured", "missed", "moved", "shared", "carried")) > 5, seen
-
-
-def test_whose_a_shared_point_is() -> None:
-    """By N_g N(y; xi_g, S_g), so that a large diffuse group has no claim on all that lies near a compact one."""
-    for seed in range(100):
-        _, case, region = random_case(seed)
-        points, weights, d2, own, hits, _, x, _, _, size, _ = case
-        claims = PointClaims(points, weights, np.zeros(len(points)), d2, own, hits)
-        log_density = point_log_density(size, region, claims, d2[:, :0])
-        may = np.isfinite(log_density) & (np.random.default_rng(seed).random(d2.shape) < 0.8)
-        found = shares(log_density, may)
-        np.testing.assert_allclose(found, reference.shares(points, x, region, size, own, may), rtol=1e-9, atol=1e-12)
-    region, d2 = np.array([4.0, 0.25])[:, None, None] * np.eye(2), np.array([[1.0], [1.2]])
-    claims = PointClaims(np.zeros((1, 2)), np.ones(1), np.zeros(1), d2, np.full(1, -1), np.full(1, 2))
-    log_density = point_log_density(np.full(2, 2.0), region, claims, d2[:, :0])
-    assert shares(log_density, d2 > 0)[1] > 0.9  # the nearer by d2 is the diffuse one
-    colours = point_log_density(np.full(2, 2.0), region, claims, np.array([[2.0], [-2.0]]))
-    assert shares(colours, d2 > 0)[0] > 0.7
-
-
-def test_search_regions() -> None:
-    for seed in range(50):
-        rules, (points, _, _, _, _, _, x, *_), region = random_case(seed)
-        found = kernels.search(points, x, region, rules.constraint.gate)
-        np.testing.assert_allclose(found, reference.search(points, x, region, rules.constraint.gate), rtol=1e-9)
-
-
-def test_covariances_stay_covariances() -> None:
-    for seed in range(200):
-        rules, case, region = random_case(seed)
-        *_, P, extent, size = kernel(case, rules, region)
-        assert np.array_equal(P, P.transpose(0, 2, 1))
-        assert (np.linalg.eigvalsh(P) > 0).all()
-        assert (np.linalg.eigvalsh(extent) > 0).all()
-        assert (size > 0).all()
 
 
 def test_groups_are_updated_each_by_itself() -> None:
@@ -312,18 +274,6 @@ def test_what_the_gate_cuts_off(gate: float, correct: bool, extent: float, insid
     assert found[1] == pytest.approx(inside, abs=0.01)
 
 
-def test_a_narrow_gate_collapses() -> None:
-    assert settled(3.0, False)[0] < 0.01
-
-
-def test_gate_factor() -> None:
-    for gate in (1.0, 3.0, 6.0, 9.21, 20.0):
-        assert gate_factor(gate) == pytest.approx(reference.truncation(gate), rel=1e-12)
-    points = gaussian(100_000)
-    inside = points[np.square(points).sum(1) < 6.0]
-    assert np.var(inside, axis=0) == pytest.approx(gate_factor(6.0), rel=1e-3)
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_places_of_missed_members(seed: int) -> None:
     """What a centroid with carried places has measured is H x, H = [I, -a I], with R: over many frames, in its spread.
@@ -370,34 +320,6 @@ def test_centroid_of_some_members(seen: int) -> None:
     np.testing.assert_allclose(noisy.T @ noisy / len(noisy), found, atol=0.03 * np.trace(found))
 
 
-def test_centroid_of_members_drawn_anew() -> None:
-    """(2.1) read literally: as many, but new ones in each frame."""
-    r = np.random.default_rng(0)
-    extent = np.array([[0.5, 0.2], [0.2, 0.3]])  # of measured places
-    y = r.multivariate_normal([0, 0], extent, (20_000, 5))
-    found = noise_of(5, extent, 6, replace(PLAIN, noise=0.3, redrawn=True))
-    np.testing.assert_allclose(np.cov(y.mean(axis=1).T), found, atol=0.03 * np.trace(found))
-
-
-def test_unseen_members_are_there() -> None:
-    """Of n people measured with probability p, N = p n are on average: all of N seen is not all of n."""
-    extent, rules = np.eye(2), replace(PLAIN, noise=0.1, detect=0.75)
-    some = noise_of(6, extent, 6, rules)  # 6 of 8
-    np.testing.assert_allclose(some, noise_of(6, extent, 8, replace(rules, detect=1.0)))
-    assert some[0, 0] == pytest.approx(0.01 / 6 + (8 - 6) / 7 / 6 * 0.99)
-
-
-def test_centroid_with_strangers() -> None:
-    """Nine are seen, six of whom are the group: its centroid is that of any six of them."""
-    r = np.random.default_rng(0)
-    y = r.normal(0, [1.0, 0.5], (9, 2))
-    found = noise_of(9, np.eye(2), 6, replace(PLAIN, noise=0.0), np.cov(y.T, bias=True))
-    means = np.array([y[list(c)].mean(axis=0) for c in combinations(range(9), 6)]) - y.mean(axis=0)
-    np.testing.assert_allclose(found, means.T @ means / len(means), rtol=1e-10)
-    measured = noise_of(9, np.eye(2), 6, replace(PLAIN, noise=0.3), np.cov(y.T, bias=True))
-    np.testing.assert_allclose(measured, found + 0.09 / 6 * np.eye(2))
-
-
 def bank(**given):
     """Groups, of which only some things are said."""
     n, made = len(given["size"]), GroupBank.empty()
@@ -440,43 +362,6 @@ def test_merging_pools_moments(seed: int) -> None:
     assert np.array_equal(seen, np.repeat(np.arange(4.0), [len(y) for y in points]))
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_merging_in_any_order(seed: int) -> None:
-    r = np.random.default_rng(seed)
-    _, groups = samples(r, 4)
-    one, other = merged(groups, np.arange(4)), merged(groups, r.permutation(4))
-    step = merged(groups, np.array([0, 1]))
-    for k in (2, 3):
-        step.add(merged(groups, np.array([k])))
-        step = merged(step, np.array([0, 1]))
-    for again in (other, step):
-        for name in ("x", "P", "extent", "size"):
-            np.testing.assert_allclose(getattr(again, name), getattr(one, name), rtol=1e-12, atol=1e-12)
-        assert again.first_seen[0] == one.first_seen[0] == 0
-    assert other.id[0] == one.id[0]
-    assert groups.size[one.id[0]] == groups.size.max()
-
-
-def test_merged_groups_are_as_sure_as_they_say() -> None:
-    """E2: normalised squared errors over 500 merges average to 1; not so with the centroids' spread in P."""
-    r = np.random.default_rng(0)
-    errors, spread = [], []
-    for _ in range(500):
-        count = int(r.integers(2, 5))
-        P, size = np.array([positive(r, 4, 0.2) for _ in range(count)]), r.uniform(1, 9, count)
-        true = np.hstack([r.uniform(0, 6, (count, 2)), r.normal(0, 1, (count, 2))])
-        x = true + np.array([r.multivariate_normal(np.zeros(4), C) for C in P])
-        one = merged(bank(x=x, P=P, size=size), np.arange(count))
-        w = size / size.sum()
-        d, apart = one.x[0] - w @ true, x - one.x[0]
-        errors.append(d @ np.linalg.solve(one.P[0], d))
-        wide = np.einsum("k,kij->ij", w, P + apart[:, :, None] * apart[:, None, :])
-        spread.append(d @ np.linalg.solve(wide, d))
-    low, high = chi2.ppf([0.005, 0.995], 4 * 500) / (4 * 500)
-    assert low < np.mean(errors) / 4 < high
-    assert not low < np.mean(spread) / 4 < high
-
-
 @pytest.mark.parametrize("pixels", [False, True])
 def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
     """E5: groups made of measurements cannot be merged back (3.3), even if merging needs no time at all."""
@@ -496,12 +381,3 @@ def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
         assert found is None or len(one) == len(found.after) > 1
         assert not list(GroupMerging().step(one, rules, 1.0)), seed
     assert splits > 50
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_near_is_that_of_all_pairs(seed: int) -> None:
-    r = np.random.default_rng(seed)
-    place, points = (np.round(r.uniform(0, 5, (int(r.integers(0, 20)), 2)), 1) for _ in range(2))
-    reach = float(r.choice([0.05, 0.5, 2.0]))
-    squared = np.square(place[:, None] - points).sum(2) <= reach**2
-    np.testing.assert_array_equal(any_within(place, points, reach), squared.any(1))

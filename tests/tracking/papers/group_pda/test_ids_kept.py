@@ -75,28 +75,6 @@ def test_passing(names: Callable[[int], dict[int, tuple[int, ...]]], fate: Outco
     assert outcomes(true(), said(names, unit=unit)) == [fate]
 
 
-@pytest.mark.parametrize(("names", "kept"), [(right, True), (swapped, False)])
-def test_side_by_side_from_the_first_to_the_last_frame(
-    names: Callable[[int], dict[int, tuple[int, ...]]], kept: bool
-) -> None:
-    assert outcomes(true(still=True), said(names, still=True)) == [Outcome(kept, merged=False)]
-
-
-def test_told_late_it_is_the_first_second_in_which_both_are_told() -> None:
-    late = said(lambda frame: {7: A, 8: B} if frame > 60 else {}, still=True)
-    assert outcomes(true(still=True), late) == [Outcome(kept=True, merged=False)]
-    assert outcomes(true(), late) == [Outcome(kept=False, merged=False)]
-
-
-def test_one_id_for_both_is_not_kept() -> None:
-    both = said(lambda frame: {7: (*A, *B)}, still=True)
-    assert outcomes(true(still=True), both) == [Outcome(kept=False, merged=True)]
-
-
-def test_nobody_told() -> None:
-    assert outcomes(true(), []) == [Outcome(kept=False, merged=False)]
-
-
 def test_crossings_are_what_counts_where_there_are_any() -> None:
     crossing = GroupEvent("cross", 45, 50, None, (1, 2), (1, 2), (1, 2, 3, 4), (0.0, 0.0))
     frames = tuple(range(1, LENGTH + 1))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -138,16 +137,6 @@ def test_groups_that_walk_through_each_other_keep_ids_and_sizes(ranks: tuple[int
         assert sizes(after) == pytest.approx(sizes(before), rel=0.1)
 
 
-def test_all_points_in_the_region_make_each_group_both() -> None:
-    config = GroupPdaConfig(association="none", extent_time=0.05)
-    made = track(crossing(0), config)
-    meeting = slice(35, 40)
-    assert sizes(made[15]) == pytest.approx([4, 4])
-    assert np.array([sizes(t) for t in made[meeting]]) == pytest.approx(np.full((5, 2), 8.0), rel=0.05)
-    kept = track(crossing(0), replace(config, association="pda"))[meeting]
-    assert np.array([sizes(t) for t in kept]) == pytest.approx(np.full((5, 2), 4.0), rel=0.1)
-
-
 TURN = np.array([[0.8, -0.6], [0.6, 0.8]])
 
 
@@ -164,25 +153,6 @@ def test_in_the_image_it_is_the_same_at_any_scale(seed: int) -> None:
     frames, shift = busy(seed), np.array([500.0, 20.0])
     moved = [40 * p @ TURN.T + shift for p in frames]
     same(track(frames), track(moved, plane="image", context=Context(FPS, 40.0)), 40 * TURN, shift)
-
-
-def test_the_order_of_points_is_nothing() -> None:
-    frames, r = busy(0), np.random.default_rng(1)
-    same(track(frames), track([p[r.permutation(len(p))] for p in frames]))
-
-
-def test_somebody_far_away_is_nothing_to_the_others() -> None:
-    alone, among = track(busy(0)), track(busy(0, block(2, 2, (200, 200))))
-    far = 6
-    assert alone[40].id.tolist() == [i for i in among[40].id.tolist() if i != far]
-    for x, y in zip(alone, among, strict=True):
-        others = y.pos[:, 0] < 100
-        assert x.pos.tobytes() == y.pos[others].tobytes()
-        assert x.cov.tobytes() == y.cov[others].tobytes()
-    shifted = [
-        (kind, start, *(tuple(i - (i > far) for i in side) for side in sides)) for kind, start, *sides in changes(among)
-    ]
-    assert shifted == changes(alone)
 
 
 def missed(seed: int, speed: float, share: float = 0.8, frames: int = 120) -> tuple[list[Array], Array]:
@@ -263,12 +233,6 @@ def test_a_lost_first_frame_does_not_decide_on_the_plane(plane: str) -> None:
         np.testing.assert_allclose(y.cov, x.cov, atol=1e-6)
 
 
-@pytest.mark.parametrize(("plane", "context"), [("ground", GROUND), ("image", Context(FPS, 40.0))])
-def test_nothing_at_all(plane: str, context: Context) -> None:
-    made = track([None] * 5, context=context) + track([np.zeros((0, 2))] * 5, plane=plane, context=context)
-    assert all(t.plane == plane and t.unit == "group" and not len(t.id) and not t.events for t in made)
-
-
 @pytest.mark.parametrize("first", [[], [None]])
 def test_the_image_needs_a_scale(first: list[Points]) -> None:
     with pytest.raises(InputError) as told:
@@ -287,12 +251,6 @@ def test_reset_is_a_fresh_start_and_the_input_stays_as_it_is() -> None:
     assert bytes_of(track(frames, tracker=tracker)) == first
     assert bytes_of(track(kept)) == first
     assert all(p.tobytes() == q.tobytes() for p, q in zip(frames, kept, strict=True))
-
-
-def test_what_was_told_stays_as_it_was() -> None:
-    told: list[tuple[bytes, ...]] = []
-    made = track(busy(0), watch=lambda _, t: told.extend(bytes_of([t])))
-    assert bytes_of(made) == told
 
 
 def test_no_id_is_used_twice_and_events_speak_of_known_ones() -> None:
@@ -323,17 +281,3 @@ def clouds(seed: int, speed: float, count: int = 40) -> list[Array]:
     a, b = r.normal(0, 0.36, (2, count, 2))
     way = np.array([1.0, 0.0])
     return [noisy([a + s * way, b - s * way], r) for s in np.arange(-3, 3, speed / FPS) / 2]
-
-
-def test_clouds_that_fly_through_each_other_need_the_masses() -> None:
-    """Each point is in both regions for seconds: neither nearness nor the group constraint tells them apart."""
-    kept = dict.fromkeys(("pda", "nearest", "all", "none"), 0)
-    for seed in range(4):
-        for association in kept:
-            made = track(clouds(seed, 1.6), GroupPdaConfig(association=association))
-            before, after = made[12], made[-1]
-            same_ids = before.id.tolist() == after.id.tolist() == [1, 2]
-            kept[association] += same_ids and (np.sign(after.vel[:, 0]) == np.sign(before.vel[:, 0])).all()
-    assert kept["pda"] == 4
-    assert max(kept["nearest"], kept["all"]) <= 2
-    assert kept["none"] == 0

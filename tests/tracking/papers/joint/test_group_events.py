@@ -62,16 +62,6 @@ def test_the_rate_of_events_does_not_depend_on_the_frame_rate():
     assert quiet[0] == pytest.approx(quiet[1])
 
 
-def test_over_a_lag_the_probabilities_are_the_classifiers():
-    features, table = np.array([2.0, 0.3, 0.5, 1.5, 0.2, 0.6]), JointConfig().classifier
-    scores = np.append(table[:, :6] @ features + table[:, 6], 0.0)
-    expected = np.exp(scores) / np.exp(scores).sum()
-    assert events.event_probabilities(features, 2.0, 1.0, table, rules(ratio=1.0)) == pytest.approx(expected[:2])
-    no_merge = np.exp(scores[1]) / np.exp(scores[1:]).sum()
-    assert events.event_probabilities(features, 2.0, 0.0, table, rules(ratio=1.0)) == pytest.approx((0.0, no_merge))
-    assert events.event_probabilities(features, 1.0, 0.0, table, rules(ratio=1.0)) == (0.0, 0.0)
-
-
 def test_the_size_prior_acts_on_merges_or_on_all_events():
     features, table = np.zeros(8), weights(0.0, 0.0)
 
@@ -108,11 +98,6 @@ def test_of_a_large_group_the_cut_between_two_clumps_is_found():
     drawn = proposed(pos[order], np.ones(9), weights(split=100.0), rules(ratio=1.0, sharpness=50.0), count=500)
     true = label_of([np.flatnonzero(order < 5).tolist(), np.flatnonzero(order >= 5).tolist()])
     assert share(drawn, true) > 0.9
-
-
-def test_parts_of_one_person_are_alone():
-    drawn = proposed([[0, 0], [1, 0]], [1, 1], weights(split=100.0), rules(ratio=1.0), count=20)
-    assert not drawn.any()
 
 
 def test_a_group_takes_part_in_one_event_of_a_frame():
@@ -168,20 +153,6 @@ def test_a_newcomer_joins_the_nearest_person_by_the_validity(away):
     expected = np.exp(-8 * together) / (np.exp(-8 * together) + np.exp(-8 * apart))
     assert share(placed(points, [0, 0]), [1, 1]) == pytest.approx(expected, abs=0.025)
     assert (expected > 0.5) == (away < 1.5) or away == 1.5
-
-
-def test_a_newcomer_joins_a_whole_group_and_nobody_else_changes():
-    drawn = placed([[0, 0], [0.7, 0], [9, 9], [0.9, 1.0]], [1, 1, 0, 0])
-    assert {tuple(d) for d in drawn.tolist()} == {(1, 1, 0, 0), (1, 1, 0, 1)}
-    assert share(drawn, [1, 1, 0, 1]) > 0.5
-    assert not placed([[1, 1]], [0]).any()
-
-
-def test_a_newcomer_who_was_joined_by_another_stays():
-    """The second of two newcomers is in a group already where the first one has joined; it leaves nobody behind."""
-    label = [1, 1, 0, 4, 4]
-    drawn = placed([[0, 0], [0.7, 0], [9, 9], [0.2, 0.8], [0.5, 0.5]], label, count=200)
-    assert (drawn == label).all()
 
 
 def placed_slowly(points, label, uniforms):

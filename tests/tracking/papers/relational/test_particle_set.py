@@ -32,23 +32,6 @@ def test_shares_of_effective_particles_and_of_ancestors():
     assert np.array_equal(particles.ancestor, np.arange(100)[:, None] * [1, 1])
 
 
-def test_ancestors_of_people_who_come_and_go():
-    particles = two(50)
-    particles.weights[:, 1] = np.arange(50) == 7
-    particles.resample(0.5, 0.0, drawn(particles, np.random.default_rng(0)))
-    particles.keep(np.array([False, True]))
-    particles.add(np.zeros((50, 1, 2)), np.zeros((50, 1, 2)), 1.0)
-    assert (particles.ancestor[:, 0] == 7).all()
-    assert particles.ancestor[:, 1].tolist() == list(range(50))
-
-
-def test_nobody_has_no_diversity():
-    found = ParticleDiversity(1.0)
-    found.weigh(ParticleSet.empty(10))
-    found.resample(ParticleSet.empty(10))
-    assert set(found.summary().values()) == {None}
-
-
 def test_probabilities_of_pairs_are_those_of_the_reported_people():
     """Two people side by side, and a third far away; the matrix is symmetric with ones on the diagonal."""
     tracker = Relational()
