@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -111,21 +110,3 @@ def test_a_stored_sequence_of_another_stride_is_refused(made: dict[int | None, P
     before = (made[4] / "manifest.json").stat().st_mtime_ns
     generate(["pass-by"], range(5, 6), made[4].parents[1], set=PAIR, streams=STREAMS, images="png", stride=4)
     assert (made[4] / "manifest.json").stat().st_mtime_ns == before
-
-
-def test_every_command_takes_a_folder_with_a_stride(made: dict[int | None, Path], tmp_path: Path, capsys) -> None:
-    data = made[4].parents[1]
-    assert run(["validate", str(data)]) == 0
-    assert run(["export", "coco", str(data), "--out", str(tmp_path / "coco.json")]) == 0
-    assert len(json.loads((tmp_path / "coco.json").read_text())["images"]) == 20
-    assert run(["export", "kitti", str(data), "--out", str(tmp_path / "kitti")]) == 0
-    assert run(["export", "webdataset", str(data), "--out", str(tmp_path / "shards")]) == 0
-    for detections in ("image", "file", "truth"):
-        run_folder = str(tmp_path / detections)
-        assert run(["track", "blob", str(data), "--detections", detections, "--out", run_folder]) == 0
-        capsys.readouterr()
-        assert run(["score", str(data), run_folder, "--json"]) == 0
-        (row,) = json.loads(capsys.readouterr().out)["sequences"]
-        assert (row["frames_scored"], row["label_step"]) == (20, 1)
-    assert row["HOTA"] > 0.5
-    assert run(["track", "stereo", str(data), "--out", str(tmp_path / "stereo")]) == 0

@@ -3,16 +3,12 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate
-from sim.io.files.tables import read_table
-from sim.io.source import open_source
 from sim.io.store.validate import validate
-from sim.sequence import simulate
 from sim.workers.start import WorkerOptions
 
 pytestmark = pytest.mark.slow
@@ -53,23 +49,3 @@ def test_one_content_in_every_kind(tmp_path):
 @pytest.mark.parametrize("images", ["jpg", "mp4"])
 def test_any_number_of_workers(tmp_path, images):
     assert made(tmp_path / "1", images=images)[1] == made(tmp_path / "2", images=images, workers=2)[1]
-
-
-def test_stored_is_what_was_drawn(tmp_path):
-    made(tmp_path, images="png")
-    live = simulate(SCENARIO, 0, 0, ALL)
-    (stored,) = open_source(tmp_path / "flockscope-train" / "x-s00000")
-    for a, b in zip(live, stored, strict=True):
-        assert np.array_equal(a.image, b.image)
-        assert np.array_equal(a.right, b.right)
-    assert np.array_equal(live.background(), stored.background())
-    for index in (1, live.length):
-        a, b = live.load_pixels(index), stored.load_pixels(index)
-        assert np.array_equal(a.ids, b.ids)
-        assert np.array_equal(np.isnan(a.disparity), np.isnan(b.disparity))
-        assert np.nanmax(np.abs(a.disparity - b.disparity)) <= 1 / 128
-        assert np.array_equal(a.box, b.box, equal_nan=True)
-    table = read_table(tmp_path / "flockscope-train/x-s00000/gt/pixels.parquet")
-    share = table.floats("visibility_px")
-    assert ((share >= 0) & (share <= 1)).all()
-    assert np.abs(share - stored.truth.visibility).mean() < 0.1

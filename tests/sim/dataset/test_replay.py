@@ -153,18 +153,3 @@ def test_boxes_alone_want_a_calibration(tmp_path: Path) -> None:
     shift = np.array(made.source["origin"]["shift"])
     away = made.truth.pos[made.truth.rows(51)] - shift - truth.pos[truth.rows(51)]  # type: ignore[index]
     assert np.abs(away).max() < 0.3  # a box's lower edge is the near side of the feet
-
-
-@pytest.mark.filterwarnings("ignore:CAVIAR's recordings are taken at 25 fps")
-@pytest.mark.parametrize("name", ["biwi/seq_hotel", "caviar/mwt1gt.xml", "mot/PETS09-S2L1-first200"])
-def test_real_recordings(shared_data: Path, name: str) -> None:
-    made = replay(shared_data / name, ObservationSpec(), cut=Cut(5.0, 20.0), streams=())
-    truth = made.truth
-    assert truth is not None
-    assert truth.vel is not None
-    assert made.length == 200
-    assert (truth.visibility > 0).mean() > 0.95
-    speed = np.linalg.norm(truth.vel, axis=1)
-    assert 0.2 < np.median(speed) < 1.8
-    assert (truth.groups is None) == name.startswith("mot")
-    assert is_real(made)

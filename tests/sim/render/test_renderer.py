@@ -210,27 +210,6 @@ def test_a_misaligned_right_camera_turns_and_moves_its_picture_only() -> None:
     assert np.median(off) < 0.4 * np.median(np.abs(plain.right.astype(float) - wrong.right)[inside])
 
 
-@pytest.mark.parametrize("samples", [1, 3])
-def test_a_matcher_finds_the_true_disparity(samples: int) -> None:
-    import cv2
-
-    motion = crowd(3, people=14, frames=3)
-    camera = pinhole(40.0).replace(baseline=0.3)
-    made = make_renderer(motion, camera, Light(), Picture(samples=samples))
-    shown = made.draw(2, right=True, pixels=True, disparity=True)
-    assert shown.pixels is not None
-    assert shown.pixels.disparity is not None
-    matcher = cv2.StereoSGBM_create(0, 48, 5, 8 * 75, 32 * 75, 1, 31, 5, 0, 0)
-    found = matcher.compute(shown.image, shown.right) / 16.0
-    known = np.isfinite(shown.pixels.disparity) & (found > 0)
-    known[:, :48] = False
-    off = np.abs(found - shown.pixels.disparity)
-    for part, least in ((shown.pixels.ids == 0, 0.8), (shown.pixels.ids > 0, 0.6)):
-        assert (known & part)[:, 48:].sum() > least * part[:, 48:].sum()
-        assert np.median(off[known & part]) < 0.5
-        assert (off[known & part] < 1.0).mean() > 0.8
-
-
 @pytest.mark.parametrize("scene", SCENES)
 def test_geometric_visibility_is_that_of_the_pixels(scene: str) -> None:
     motion, camera = crowd(5, people=14, frames=3, scene=SCENES[scene]), pinhole(25.0, at=(8.0, -6.0, 4.5))

@@ -99,22 +99,6 @@ def test_a_seed_repeats_everything(tracker, every):
         assert run[2] == first[2]
 
 
-def test_a_refused_reset_leaves_the_episode_as_it_was():
-    env = make(decision_every=5)
-    env.reset(seed=0, options={"scenario": "cross"})
-    by_tracker = {"confirm_ratio": 2.0, "speed_prior": 0.1, "accel_noise": 10.0}
-    for wrong in (
-        {"scenario": "pass-by", "params": {"gate": 7}},
-        {"scenario": "pass-by", "params": by_tracker},
-        {"scenario": "cros"},
-    ):
-        with pytest.raises(InputError):
-            env.reset(options=wrong)
-        *_, info = env.step(np.zeros(env.action_space.shape, np.float32))
-        assert info["scenario"] == env.unwrapped.rollout.source.name == "cross"
-    assert info["frame"] == 15
-
-
 def test_options_choose_the_source_and_the_parameters():
     env = make()
     options = {"scenario": "pass-by", "seed": 1, "params": {"report_delay": 3.0, "association": "nearest"}}
@@ -216,22 +200,6 @@ def test_whatever_the_action_an_episode_comes_of_it():
                 assert rewards.sum() == pytest.approx(info["objective"], abs=1e-9)
 
 
-def test_parameters_that_the_tracker_refuses_are_left_as_they_were():
-    """At any frame rate newborn tracks of blob must start above confirm_ratio."""
-    env = make(decision_every=5).unwrapped
-    env.reset(seed=1)
-    wrong = dataclasses.replace(env.defaults, confirm_ratio=2.0, speed_prior=0.1, accel_noise=10.0)
-    _, _, _, _, info = env.step(encode(env.space, wrong).astype(np.float32))
-    assert "confirm_ratio" in info["refused"]
-    assert info["params"] == env.defaults.as_dict()
-    _, _, _, _, info = env.step(encode(env.space, env.defaults).astype(np.float32))
-    assert info["refused"] == ""
-    once = make().unwrapped
-    once.reset(seed=1)
-    *_, info = once.step(encode(once.space, wrong).astype(np.float32))
-    assert 1.5 <= info["params"]["confirm_ratio"] < 2.0
-
-
 class Deaf(Toy):
     """Does not keep its config."""
 
@@ -317,18 +285,3 @@ def test_vectorised(mode):
         assert played(make(suite="cross", seeds=range(3), decision_every=15), seed=seed)[1] == pytest.approx(
             rewards[:, k]
         )
-
-
-def test_video(tmp_path):
-    pytest.importorskip("moviepy", reason="RecordVideo writes with moviepy")
-    from gymnasium.wrappers import RecordVideo
-
-    env = RecordVideo(make(decision_every=3, render_mode="rgb_array"), str(tmp_path / "films"), lambda episode: True)
-    played(env, seed=1)
-    env.close()
-    (film,) = tmp_path.glob("films/*.mp4")
-    import cv2
-
-    video = cv2.VideoCapture(str(film))
-    assert int(video.get(cv2.CAP_PROP_FRAME_COUNT)) >= 10
-    assert (video.get(cv2.CAP_PROP_FRAME_WIDTH), video.get(cv2.CAP_PROP_FRAME_HEIGHT)) == (640, 512)

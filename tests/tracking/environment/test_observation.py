@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.types import Detections, Frame, GroupEvent, Groups, Tracks
+from sim.types import Detections, Frame, GroupEvent, Tracks
 from tracking.environment import observation
 from tracking.environment.observation import NAMES, STATISTICS, Observer
 
@@ -98,23 +98,6 @@ def test_groups_that_the_tracker_names():
     assert (seen["grouped"], seen["group_size"]) == (0.5, pytest.approx(2))
     assert seen["merges"] == pytest.approx(600)
     assert seen["splits"] == 0
-
-
-def test_groups_as_wholes_reach_as_far_as_they_are_wide():
-    places, size, extent = [[0.0, 0.0], [9.0, 0.0]], np.array([3.0, 1.0]), np.tile(np.eye(2) * 0.25, (2, 1, 1))
-    two, hull = np.array(places), (np.zeros((0, 2)),) * 2
-    shapes = Groups(np.arange(2), (np.zeros(0, np.int64),) * 2, two, two * 0, extent, size, hull)
-
-    def answer(index):
-        made = tracks(index, places, (0, 0), group=[0, 1], groups=shapes)
-        return made.replace(unit="group")
-
-    found = [[1.8, 0], [-1.8, 0], [9, 2.2]]
-    seen = looked([(frame(1), answer(1)), (frame(2, found), answer(2))])
-    assert (seen["grouped"], seen["group_size"]) == (0.5, pytest.approx(2))
-    assert seen["orphans"] == pytest.approx(1 / 3)
-    assert seen["innovation"] == pytest.approx(0, abs=1e-9)
-    assert seen["missed"] == 0.5
 
 
 def test_pictures():

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tests import reference_components as reference
-from tracking.filters import components_kernels as kernels
 from tracking.filters.component_regions_kernels import FEW
 from tracking.filters.components import Constraint, linked, partition, prefixes
 
@@ -154,36 +153,3 @@ def test_links_of_any_points(points) -> None:
     if (np.abs(d2 - LINK**2) < 1e-9).any():
         return
     assert same(linked(points, LINK), reference.linked(points, LINK))
-
-
-def work(points, least=0.0, start=1):
-    return kernels.prefixes(points, np.ones(len(points)), start, LINK, 9.21, RULE.prior_entries, 3.0, least)[1]
-
-
-def outwards(points):
-    """In the order of their distance from the middle, as shared points come (4.1)."""
-    return points[np.argsort(np.square(points - points.mean(axis=0)).sum(axis=1))]
-
-
-def round_clump(r, n, radius):
-    t, q = r.uniform(0, 2 * np.pi, n), radius * np.sqrt(r.uniform(0, 1, n))
-    return np.stack([q * np.cos(t), q * np.sin(t)], axis=1)
-
-
-def test_clutter_is_bounded_by_the_least_weight() -> None:
-    """Scattered points are components each; light ones are only counted. Heavy regions far from each other
-    cost a comparison of the last one with each; regions joined in several rounds cost less than all pairs."""
-
-    def lattice(n):
-        side = int(np.sqrt(n))
-        return 4.0 * np.stack(np.divmod(np.arange(side * side), side), axis=1)
-
-    def scattered(n):
-        return np.random.default_rng(0).uniform(0, np.sqrt(2 * n) * LINK, (n, 2))
-
-    for n in (100, 400, 1_600):
-        assert work(lattice(n), least=2.0) <= 2 * n
-        assert work(lattice(n)) <= n * (n + 5) / 2
-        assert work(scattered(n)) <= n**2.5
-    clump = np.concatenate([outwards(round_clump(np.random.default_rng(0), 400, 2.0)), lattice(400) + 20.0])
-    assert prefixes(clump, np.ones(800), 1, Constraint(LINK, 9.21, RULE.prior, 3.0, least=2.0))[10:].all()

@@ -91,23 +91,6 @@ def test_gate_holds_its_share(p):
     assert abs(share - p) < 3 * np.sqrt(p * (1 - p) / n)
 
 
-def test_distances_know_no_unit_and_no_origin():
-    r = np.random.default_rng(2)
-    bank, z, noise = kalman.born(r.normal(0, 5, (6, 4)), 0.5, 1.0), r.normal(0, 5, (9, 4)), r.uniform(0.1, 1, 4)
-    d2 = kalman.distances(bank, z, noise)
-    large = bank.copy()
-    large[:, :, 0] *= np.array([10, 10, 100, 100, 100])[:, None]
-    factor = np.array([10.0, 1, 1, 1])
-    assert np.allclose(kalman.distances(large, z * factor, noise * factor**2), d2, rtol=1e-9)
-    moved = bank.copy()
-    moved[kalman.PLACE] += 5000.0
-    assert np.allclose(kalman.distances(moved, z + 5000.0, noise), d2, rtol=1e-9, atol=1e-9)
-    assert np.allclose(kalman.distances(bank, z, np.tile(noise, (9, 1))), d2, rtol=1e-9, atol=1e-9)
-    scaled = bank.copy()
-    scaled[kalman.PLACE] *= 7
-    assert np.allclose(kalman.distances(scaled, z * 7, noise, np.full(6, 7.0)), d2, rtol=1e-9, atol=1e-9)
-
-
 @pytest.mark.parametrize("flip", [0.0, np.pi])
 def test_angle_follows_an_ellipse_round(flip):
     sigma, noise = np.radians(10.0), np.radians(2.0) ** 2

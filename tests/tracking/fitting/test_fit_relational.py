@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from tests.short_scene import SCENE
-from tracking.app.cli import run
 from tracking.fitting.relational import fit_relational, logistic
 from tracking.papers.relational.config import RelationalConfig
 
@@ -33,17 +31,3 @@ def test_pairs_that_a_line_separates_have_finite_weights():
 def test_without_scenes_nothing_is_fitted():
     with pytest.raises(InputError, match="0 changes of velocity"):
         fit_relational([], ENDS)
-
-
-def test_the_command_writes_parameters(tmp_path, capsys):
-    crowd = SCENE.replace("duration = 2.0", "duration = 12.0").replace("size = 2", "size = 3")
-    people = '{ id = "a", size = 3, start = [4, 4], goal = [12, 4] }, { id = "b", start = [12, 6], goal = [4, 6] }'
-    other = f"\ngroup = [{people}]"
-    scene = tmp_path / "scene.toml"
-    scene.write_text(crowd[: crowd.index("\ngroup")] + other)
-    out = tmp_path / "fitted.toml"
-    assert run(["fit", "relational", str(scene), "--seeds", "30000:30006", "--out", str(out)]) == 0
-    fitted = RelationalConfig.from_toml(out)
-    assert fitted.relation_distance > 0
-    assert 0 < fitted.diffusion[4] < 1
-    assert "--params" in capsys.readouterr().out

@@ -10,8 +10,6 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import resolve
 from sim.sequence import simulate
-from tests.short_scene import SCENE
-from tracking.app.cli import run
 from tracking.fitting.joint_events import (
     MERGE,
     NONE,
@@ -80,35 +78,3 @@ def test_the_classifier_beats_the_frequencies_on_unseen_scenes():
     assert true["merges"] > 10
     assert true["log_loss"] < 0.8 * true["prior_log_loss"]
     assert both["log_loss"] < both["prior_log_loss"]
-
-
-def test_the_command_writes_weights(tmp_path, capsys):
-    script = """
-[[event]]
-id = "m"
-type = "merge"
-groups = ["a", "b"]
-into = "ab"
-goal = [8, 6]
-when = { time = 0.5 }
-
-[[event]]
-id = "p"
-type = "split"
-group = "ab"
-when = { after = "m", delay = 3.0 }
-parts = [{ id = "c", size = 2, goal = [3, 10] }, { id = "d", goal = [13, 10] }]
-"""
-    people = (
-        '{ id = "a", size = 2, start = [5, 5], goal = [12, 4] }, { id = "b", size = 1, start = [9, 5], goal = [4, 6] }'
-    )
-    crowd = SCENE.replace("duration = 2.0", "duration = 16.0")
-    scene, out = tmp_path / "scene.toml", tmp_path / "fitted.toml"
-    scene.write_text(crowd[: crowd.index("\ngroup")] + f"\ngroup = [{people}]\n{script}")
-    line = ["fit", "joint", str(scene), "--seeds", "30000:30014", "--check", "30020:30022"]
-    assert run([*line, "--out", str(out)]) == 0
-    fitted = JointConfig.from_toml(out)
-    assert fitted.merge_weights != JointConfig().merge_weights
-    assert out.read_text().startswith("# flockscope fit joint")
-    assert "checked, seeds 30020:30022" in out.read_text()
-    assert "--params" in capsys.readouterr().out

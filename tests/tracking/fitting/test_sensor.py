@@ -134,21 +134,6 @@ def test_points_are_told(points: Any, box: Any) -> None:
     near(found.noise_m, Sensor().noise_m if points == "foot" else 0.1, 0.01)
 
 
-def test_who_never_errs_has_a_clean_profile() -> None:
-    perfect = Sensor(detect_prob=1.0, clutter_rate=0.0, box_noise=BoxNoise(scale=0.0), noise_m=0.0, box="amodal",
-                     occlusion_power=0.0, min_visibility=0.0, small_px=0.0)  # fmt: skip
-    found = fit_matched(seen(perfect))
-    assert found.detect_prob > 0.999
-    assert min(found.by_visibility or (0.0,)) > 0.97
-    assert found.clutter_rate == 0.0
-    assert found.false_alarms is None
-    assert found.miss_memory is None
-    assert max(abs(x) for name in ("across", "foot", "top", "width") for x in getattr(found.box_noise, name)) < 1e-6
-    assert found.box_noise.floor_px == 0.0
-    assert found.noise_m == 0.0
-    assert found.points == "own"
-
-
 def test_synthetic_errors_look_like_those_they_were_fitted_to() -> None:
     """Statistics of new draws of the fitted sensor lie among those of new draws of the true one."""
     first = seen(KNOWN)[:2]

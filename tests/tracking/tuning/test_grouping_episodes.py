@@ -74,29 +74,6 @@ def test_labels_err_for_a_while_and_do_not_change_who_is_there():
         assert other.tobytes() != here.tobytes()
 
 
-def test_one_person_more_moves_nobody_elses_errors():
-    truth = sources("crossing", (0,))[0].open().truth
-    others = truth.id != truth.id[0]
-    rows = (
-        "frame",
-        "id",
-        "group",
-        "pos",
-        "vel",
-        "box",
-        "visibility",
-        "z",
-        "heading",
-        "height",
-        "truncation",
-        "visible_box",
-    )
-    fewer = truth.replace(**{name: a[others] for name in rows if (a := getattr(truth, name)) is not None})
-    every, rest = (with_label_errors(t, SURVEYED, 7).pos for t in (truth, fewer))
-    assert every[others].tobytes() == rest.tobytes()
-    assert with_label_errors(truth, SURVEYED, 7, repeat=2).pos.tobytes() != every.tobytes()
-
-
 def test_filmed_people_are_grouped_in_the_image():
     """Boxes alone, at one scale: those who walk behind each other look nearer than they are."""
     truth = sources("crossing", (0,))[0].open().truth

@@ -14,9 +14,8 @@ from tracking.environment.episodes import Episode
 from tracking.tuning import tune
 from tracking.tuning.comparison import Candidate, compare_episodes, pareto_front
 from tracking.tuning.goals import Goal
-from tracking.tuning.held_out_evaluation import HeldOutEvaluator, stored_in_study
+from tracking.tuning.held_out_evaluation import HeldOutEvaluator
 from tracking.tuning.search_plan import SearchPlan
-from tracking.tuning.study import open_study
 
 
 def episodes(values, key: str = "HOTA") -> list[Episode]:
@@ -94,46 +93,6 @@ def test_a_winner_that_fails_on_test_scenes_is_told(made):
     found, notes = HeldOutEvaluator(made, game).compared(ToyConfig(skip=3))
     assert found == []
     assert [note.partition(":")[0] for note in notes] == ["one.toml", "two.toml"]
-
-
-class CountingGame:
-    """`played`: episodes so far."""
-
-    def __init__(self) -> None:
-        self.played = 0
-
-    def __call__(self, sources, values, every):
-        for s in sources:
-            self.played += 1
-            if values.get("skip") == 4:
-                yield WorkError(got="it", expected="another", remedy="none")
-                return
-            scores = {"HOTA": 0.1 + 0.2, "MOTA": 0.5, "objective": 0.5}
-            yield Episode(s.name, s.seed, math.nan, scores, 7, 1 / 3, 0.1)
-
-
-def test_each_set_is_played_once(tmp_path):
-    made, game = toy_plan(tmp_path), CountingGame()
-    for _ in range(2):
-        with open_study(made, tmp_path / "j", "x") as study:
-            play = stored_in_study(study, game)
-            first = list(play(made.validation, {"skip": 1}, False))
-            assert str(list(play(made.validation, {"skip": 1}, False))) == str(first)
-            assert [(e.seed, e.frames, e.seconds_tracking) for e in first] == [
-                (s.seed, 7, 1 / 3) for s in made.validation
-            ]
-            assert first[0].scores == {"HOTA": 0.1 + 0.2, "objective": 0.5}, "what is not compared is not kept"
-        assert game.played == len(made.validation)
-    with open_study(made, tmp_path / "j", "x") as study:
-        play = stored_in_study(study, game)
-        for sources, values, every in (
-            (made.validation, {"skip": 2}, False),
-            (made.validation, {"skip": 1}, True),
-            (made.training, {"skip": 1}, False),
-        ):
-            before = game.played
-            list(play(sources, values, every))
-            assert game.played == before + len(sources)
 
 
 def test_the_same_command_again_plays_nothing(tmp_path, monkeypatch):

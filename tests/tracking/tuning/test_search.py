@@ -174,19 +174,6 @@ def test_two_processes_share_a_journal(tmp_path):
     assert (tmp_path / "toy.toml").is_file()
 
 
-@pytest.mark.slow
-def test_a_trial_of_another_process_is_not_taken_away(tmp_path):
-    """Nor by a third one, which asks while it is played."""
-    made = toy_plan(tmp_path, trials=2, only=["reach"])
-    with open_study(made, tmp_path / "study.journal", "toy") as study:
-        assert study.ask() is not None
-        script = KILLED_AT.replace("tune_arguments(folder)", "tune_arguments(folder, trials=2, only=['reach'])")
-        line = [sys.executable, "-c", script, str(tmp_path), "3", "toy.toml"]
-        assert subprocess.run(line, cwd=ROOT, check=False).returncode == -signal.SIGKILL
-        states = [t.state.name for t in study.trials()]
-    assert states == ["RUNNING", "RUNNING"]
-
-
 @pytest.mark.parametrize(
     ("change", "word"),
     [

@@ -71,37 +71,6 @@ def test_pieces_of_a_person_lie_in_the_gate_and_start_no_track(config, broken):
     assert known[-1] == 1
 
 
-def two_tracks_at_one_blob(first_var, second_var):
-    """A tracker with two confirmed steady tracks, and a blob between them, nearer to the first in px. Variances are
-    those of the filters' places, m^2."""
-    last = []
-    track([[p] for p in walk(60, 180, 4, 20)], watch=lambda tracker, _: last.append(tracker))
-    people = last[-1].people
-    x, y, h, w = people.bank[kalman.PLACE, 0]
-    people.start_tracks(np.array([[x + 30, y, h, w, people.angle[0, 0]]]), np.ones(1), 2.0)
-    people.confirmed[:], people.rho[:], people.scale[:] = True, 1.0, 40.0
-    people.angle[1] = people.angle[1, 0]
-    people.bank[kalman.VAR, 0, :2], people.bank[kalman.VAR, 1, :2] = first_var, second_var
-    people.bank[kalman.VAR, 1, 2:] = people.bank[kalman.VAR, 0, 2:]
-    return last[-1], np.array([[x + 10, y, h, w, people.angle[0, 0]]])
-
-
-@pytest.mark.parametrize("directed", [True, False])
-def test_the_cost_of_a_pair_is_its_log_likelihood(directed):
-    """Differences of d^2 + ln |S| between tracks are those of -2 ln N(z; prediction, S) in px and rad."""
-    tracker, z = two_tracks_at_one_blob(0.01, 0.03)
-    people, angle_var = tracker.people, np.array([0.01 if directed else np.inf])
-    people.angle[1], people.scale[:] = [0.05, 0.2], [38.0, 44.0]
-    expected = []
-    for k in range(2):
-        y = (z[0] - np.append(people.bank[kalman.PLACE, k], people.angle[0, k]))[: 5 if directed else 4]
-        s = (people.bank[kalman.VAR, k] + people.noise) * people.scale[k] ** 2
-        s = np.append(s, people.angle[1, k] + 0.01)[: len(y)]
-        expected.append(np.sum(y * y / s + np.log(2 * np.pi * s)))
-    cost = sum(people.innovations(z, angle_var))[:, 0]
-    assert cost[1] - cost[0] == pytest.approx(expected[1] - expected[0])
-
-
 def test_a_post_does_not_cut_a_person_in_two():
     way = walk(100, 180, 3, 40)
     made = track([[p] for p in way], post=160.0)
@@ -149,21 +118,6 @@ def test_shadows_move_the_centroid_only_where_they_are_foreground(dark, moved):
     bank = seen[-1][:, 0]
     off = abs(bank[kalman.PLACE, 0] - way[-1][0]) / (TALL / 1.7)
     assert (off > 3 * np.sqrt(bank[kalman.VAR, 0])) == moved
-
-
-def test_a_track_that_lies_stands_up_where_templates_measure_it():
-    """Two in one blob, one of whom was taken for somebody lying."""
-    pair = [[(80 + 4 * k, 180, TALL), (98 + 4 * k, 181, TALL)] for k in range(30)]
-
-    def fell(tracker, tracks):
-        if tracks.index == 12:
-            tracker.people.angle[0, 0] = 0.0
-
-    made = track(pair, watch=fell)
-    assert made[12].box[0, 2] > made[12].box[0, 3]
-    for t, (a, b) in zip(made[18:], pair[18:], strict=True):
-        assert mine(t, a) == mine(made[11], pair[11][0])
-        assert mine(t, b) == mine(made[11], pair[11][1])
 
 
 def test_a_lost_frame_only_predicts():

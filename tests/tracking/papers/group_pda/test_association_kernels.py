@@ -12,14 +12,12 @@ from filterpy.kalman import KalmanFilter
 
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
-from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
-from tracking.papers.group_pda.merging import GroupMerging, merged
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.merging import merged
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
-from tracking.papers.group_pda.splitting import split
 
 STATES = ["nothing", "null", "measured"]
 PLAIN = reference.Rules(
@@ -128,22 +126,6 @@ def test_four_hundred_random_cases() -> None:
     options = [n for key, n in seen.items() if isinstance(key, tuple)]
     assert len(options) == 4 * (3 * 4 + 1)  # without group constraint there is neither miss nor freezing
     assert min(seen[k] for k in ("nothing", "null", "measured", "missed", "moved", "shared", "carried")) > 5, seen
-
-
-def test_groups_are_updated_each_by_itself() -> None:
-    """There is no mutual exclusion (4.1): the order of groups and of points does not matter."""
-    for seed in range(60):
-        rules, case, region = random_case(seed)
-        points, weights, d2, own, hits, age, *groups = case
-        r = np.random.default_rng(seed)
-        to, by = r.permutation(len(groups[0])), r.permutation(len(points))
-        names = np.where(own >= 0, np.argsort(to)[own], -1)
-        turned = points[by], weights[by], d2[np.ix_(to, by)], names[by], hits[by], age[by], *(a[to] for a in groups)
-        before, after = kernel(case, rules, region), kernel(turned, rules, region[to])
-        assert [before[0][k] for k in to] == after[0]
-        assert np.array_equal(before[1][np.ix_(to, by)], after[1])
-        for a, b in zip(before[2:], after[2:], strict=True):
-            np.testing.assert_allclose(b, a[to], rtol=1e-9, atol=1e-11)
 
 
 def kalman(x, P, F, Q):
@@ -360,24 +342,3 @@ def test_merging_pools_moments(seed: int) -> None:
     place, seen, _ = one.members[0]
     np.testing.assert_allclose(place + one.x[0, :2], union, atol=1e-12)
     assert np.array_equal(seen, np.repeat(np.arange(4.0), [len(y) for y in points]))
-
-
-@pytest.mark.parametrize("pixels", [False, True])
-def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
-    """E5: groups made of measurements cannot be merged back (3.3), even if merging needs no time at all."""
-    splits = 0
-    for seed in range(100):
-        r = np.random.default_rng(seed)
-        person = np.diag([0.05, 0.2]) if pixels else None
-        rules = scale_parameters(GroupPdaConfig(merge_time=0.0), 10.0, 1.0, person)
-        points = r.uniform(0, 9, (int(r.integers(2, 9)), 2))
-        if pixels:
-            points = np.concatenate([p + r.normal(0, [0.1, 0.3], (40, 2)) for p in points])
-        weights = np.full(len(points), 1 / 40 if pixels else 1.0)
-        one = newborn(points, weights, np.zeros(len(points), np.int64), rules, 1.0)
-        one.id[:], ids = 0, GroupIds()
-        found = split(one, 0, points, weights, rules, 1.0, ids)
-        splits += found is not None
-        assert found is None or len(one) == len(found.after) > 1
-        assert not list(GroupMerging().step(one, rules, 1.0)), seed
-    assert splits > 50

@@ -253,28 +253,6 @@ def test_reset_is_a_fresh_start_and_the_input_stays_as_it_is() -> None:
     assert all(p.tobytes() == q.tobytes() for p, q in zip(frames, kept, strict=True))
 
 
-def test_no_id_is_used_twice_and_events_speak_of_known_ones() -> None:
-    """A group comes again and again where none was; between them groups join and part."""
-    r, frames = np.random.default_rng(0), busy(0, frames=240)
-    frames = [
-        np.vstack([p, *([noisy([block(2, 1, (80, 0))], r)] if k % 60 < 20 else [])]) for k, p in enumerate(frames)
-    ]
-    known: set[int] = set()
-    gone: set[int] = set()
-    for t in track(frames):
-        for e in t.events:
-            assert e.before == tuple(sorted(set(e.before)))
-            assert e.after == tuple(sorted(set(e.after)))
-            assert set(e.before) <= known - gone
-            assert not set(e.after) & gone
-            assert 1 <= e.start <= e.end == e.emitted == t.index
-            assert e.members == ()
-            known |= set(e.after)
-            gone |= set(e.before) - set(e.after)
-        assert set(t.id.tolist()) <= known - gone
-    assert len(gone) >= 4
-
-
 def clouds(seed: int, speed: float, count: int = 40) -> list[Array]:
     """Two clouds of points that fly through each other; speed: the difference of their velocities, m/s."""
     r = np.random.default_rng(seed)

@@ -13,9 +13,7 @@ from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
 from tests.reference_relational import drawn, relate, relations
 from tracking.filters.person_streams import birth_keys
-from tracking.grouping.belief import UNSEEN, default_belief
-from tracking.grouping.pair_evidence import frames_per_step
-from tracking.grouping.pair_probabilities import pair_probabilities
+from tracking.grouping.belief import UNSEEN
 from tracking.papers.relational import sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
@@ -256,21 +254,6 @@ def test_a_pairs_relation_approaches_its_equilibrium_at_its_rate():
         assert relations(particles)[:, 0, 1].mean() == pytest.approx(g * (1 - np.exp(-0.05 * step)), abs=0.012)
 
 
-def test_pairs_that_are_far_in_all_particles_and_not_related_are_left_out():
-    rules, particles = np.array([0.1, 5.0, 3.0, 3.0]), placed(10, [[0, 0], [1, 0], [50, 0]])
-    particles.pos[0, 2] = [49.0, 0.0]
-
-    def pairs():
-        particles.hold(transition_kernels.near_pairs(particles.pos, rules))
-        return particles.pairs.tolist()
-
-    assert pairs() == [[0, 1]]
-    relate(particles, 0, 2, np.arange(particles.count) == 3)
-    assert pairs() == [[0, 1], [0, 2]]
-    particles.pos[5, 2] = [3.0, 0.0]
-    assert pairs() == [[0, 1], [0, 2], [1, 2]]
-
-
 # E8
 
 
@@ -393,24 +376,6 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
     assert np.array_equal(relations(tracker.particles)[:, 1], before)  # who is not seen stays with the partners
 
 
-def test_the_probabilities_are_those_of_the_belief_over_the_reported_tracks():
-    scene = simulate(load("cross", ["camera.fps=5", "duration=8"]), 40_004, 0, ())
-    ready = prepare("relational", scene, detections="file", params={"particles": 200})
-    ready.reset(3)
-    tracks, said = [], {}
-    for frame in ready.frames():
-        tracks.append(ready.step(frame))
-        ids, together = ready.tracker.walking_together()
-        for i, a in enumerate(ids):
-            said |= {(frame.index, int(a), int(b)): together[i, j] for j, b in enumerate(ids) if a < b}
-    found = pair_probabilities(tracks, scene.fps, scene.px_per_m, default_belief())
-    rows = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), found.probability.tolist(), strict=True)
-    expected = {(f, a, b): p for f, a, b, p in rows}
-    known = [key for key in expected if (key[0] - 1) % frames_per_step(scene.fps) == 0]
-    assert len(known) > 100
-    np.testing.assert_allclose([said[key] for key in known], [expected[key] for key in known], atol=1e-9)
-
-
 def walked(evidence, apart, frames):
     """The probability that two people walk together, in each frame, 10 frames/s: both walk at 1.2 m/s, the second one
     apart(t) beside the first, m."""
@@ -436,28 +401,3 @@ def test_the_belief_tells_who_passes_from_who_walks_along():
         stays, comes = np.log(both) - np.log1p(-np.array(both))
         assert stays > 2
         assert (stays - comes > 2) == (evidence == "belief"), (evidence, stays, comes)
-
-
-def test_newcomers_of_a_frame_join_as_if_one_came_after_the_other():
-    rules, count, draws = np.array([0.05, 5.9, 3.3, 5.9]), 500, np.random.default_rng(3)
-    old, new = draws.uniform(0, 6, (5, 2)), draws.uniform(0, 6, (7, 2))
-    uniforms = draws.random((len(new), count))
-
-    def joined(portions):
-        particles, begin = placed(count, old), 0
-        relate(particles, 0, 1)
-        for points in np.split(new, portions):
-            label = np.empty((count, particles.people + len(points)), np.int64)
-            label[:, : particles.people] = particles.labels()
-            places = np.tile(points, (count, 1, 1))
-            particles.add(places, np.zeros_like(places), 0.7)
-            u = uniforms[begin : begin + len(points)]
-            joined_by(particles, label, points, u, rules)
-            assert np.array_equal(label, particles.labels())
-            begin += len(points)
-        return relations(particles)
-
-    together = joined([])
-    assert np.array_equal(together, joined([1, 2, 3, 4, 5, 6]))
-    assert np.array_equal(together, together.transpose(0, 2, 1))
-    assert together[:, -2:, :-2].any()

@@ -19,8 +19,6 @@ from tracking.papers.stereo.measurement import (
     state_jacobian,
 )
 from tracking.papers.stereo.space_group import (
-    mean_covariance,
-    mean_position,
     measure,
     motion_model,
     newborn,
@@ -123,22 +121,6 @@ def test_depth_has_no_bias_where_members_stand_at_many_depths() -> None:
         predict(group, motion)
         measure(group, points, measurement, motion, k * DT)
     assert abs((group.pos - camera.position) @ camera.rotation[2] - 8.0) < 0.02
-
-
-def test_the_covariance_of_a_mean_is_that_of_its_weights() -> None:
-    """One lone member has nearly half of the weight."""
-    camera, r = rig(0.0, focal=246.0), np.random.default_rng(0)
-    config = StereoConfig(centroid_noise=0.005, density_width=0.6)
-    z = np.repeat([7.0, 11.0], [6, 1])
-    true = camera.position + z[:, None] * camera.rotation[2]
-    means = []
-    for _ in range(1000):
-        points = at_places(true + 0.05 * r.standard_normal(true.shape), np.repeat(0.0025 * np.eye(3)[None], len(z), 0))
-        mean, weights = mean_position(points, PairMeasurement(camera), config)
-        means.append(mean)
-    assert weights[-1] > 0.3
-    stated = np.sqrt(np.diag(mean_covariance(points, weights, config)))
-    assert np.std(means, axis=0) == pytest.approx(stated, rel=0.12)
 
 
 def test_the_spread_is_that_of_the_members_without_their_errors() -> None:
