@@ -13,37 +13,17 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("scenarios", "sim", "tracking")
 LINES = 500
 SCORING = (
-    "scenarios.limits",
-    "tracking.scoring",
-    "tracking.grouping.grouped_tracks",
-    "tracking.grouping.foot_points",
-    "scenarios.errors",
-    "sim.arrays",
-    "sim.types",
-    "sim.truth.group_hulls",
-    "sim.truth.crossing_events",
-    "sim.truth.queue_detection",
-    "sim.geometry.polygons",
-    "sim.scene.camera",
-    "sim.scene.terrain",
-)
+    "scenarios.limits", "tracking.scoring", "tracking.grouping.grouped_tracks", "tracking.grouping.foot_points",
+    "scenarios.errors", "sim.arrays", "sim.types", "sim.truth.group_hulls", "sim.truth.crossing_events",
+    "sim.truth.queue_detection", "sim.geometry.polygons", "sim.scene.camera", "sim.scene.terrain",
+)  # fmt: skip
 """What scoring may import of ours: people use it alone, on their own arrays."""
 
 
 TRUTH = ("Truth", "FrameTruth", "truth", "load_truth")
 LEGACY = (
-    "seed",
-    "rand",
-    "randn",
-    "random",
-    "normal",
-    "uniform",
-    "choice",
-    "shuffle",
-    "permutation",
-    "poisson",
-    "randint",
-)
+    "seed", "rand", "randn", "random", "normal", "uniform", "choice", "shuffle", "permutation", "poisson", "randint",
+)  # fmt: skip
 
 
 @cache
@@ -99,17 +79,10 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
     names = of("tracking.papers", "tracking.detect")
     assert names
     hidden = (
-        "tracking.scoring",
-        "tracking.running.truth_detections",
-        "tracking.app",
-        "sim.truth.label",
-        "sim.truth.merge_split_events",
-        "sim.truth.group_hulls",
-        "sim.truth.crossing_events",
-        "sim.truth.queue_detection",
-        "sim.io",
-        "sim.sequence",
-    )
+        "tracking.scoring", "tracking.running.truth_detections", "tracking.app", "sim.truth.label",
+        "sim.truth.merge_split_events", "sim.truth.group_hulls", "sim.truth.crossing_events",
+        "sim.truth.queue_detection", "sim.io", "sim.sequence",
+    )  # fmt: skip
     assert offences(names, *hidden) == []
     assert offences(names, *(f"sim.types.{word}" for word in TRUTH)) == []
     for name in names:
@@ -231,15 +204,8 @@ def test_classes_share_no_mutable_state(name):
 
 
 DECIDING = (
-    "sim.crowd",
-    "sim.truth",
-    "sim.scene",
-    "sim.detector",
-    "sim.geometry",
-    "sim.rng",
-    "sim.clock",
-    "sim.elementary",
-)
+    "sim.crowd", "sim.truth", "sim.scene", "sim.detector", "sim.geometry", "sim.rng", "sim.clock", "sim.elementary",
+)  # fmt: skip
 """What decides motion, truth and detections: the same bits on every processor."""
 
 BY_PROCESSOR = {
@@ -257,17 +223,9 @@ BY_PROCESSOR = {
 """Functions of numpy, BLAS and the C library whose code is chosen by processor; `sim.elementary` has their equals."""
 
 DRAWS = {
-    "normal",
-    "standard_normal",
-    "exponential",
-    "poisson",
-    "gamma",
-    "beta",
-    "lognormal",
-    "uniform",
-    "choice",
+    "normal", "standard_normal", "exponential", "poisson", "gamma", "beta", "lognormal", "uniform", "choice",
     "binomial",
-}
+}  # fmt: skip
 """Methods of numpy's generators that call the C library or may be contracted; `sim.rng` has their equals."""
 
 WITHOUT_ARITHMETIC = {"scipy.optimize.linear_sum_assignment", "scipy.sparse.csgraph.connected_components"}

@@ -10,20 +10,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = {
-    "numpy",
-    "scipy",
-    "numba",
-    "cv2",
-    "pymunk",
-    "pyarrow",
-    "pydantic",
-    "filterpy",
-    "gymnasium",
-    "av",
-    "rich",
-    "matplotlib",
-    "optuna",
-}
+    "numpy", "scipy", "numba", "cv2", "pymunk", "pyarrow", "pydantic", "filterpy", "gymnasium", "av", "rich",
+    "matplotlib", "optuna",
+}  # fmt: skip
 LIST = "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
 
 

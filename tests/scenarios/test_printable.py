@@ -18,16 +18,12 @@ TEXT = st.text(alphabet=st.characters(exclude_categories=()), max_size=60)
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        ("", ""),
-        ("Zürich 北京 é 😀 [/red] x[door]y \\n", "Zürich 北京 é 😀 [/red] x[door]y \\n"),
-        ("\x1b[31mred\x07", "\\x1b[31mred\\x07"),
-        ("a\u202eb\u2066c\u200d", "a\\u202eb\\u2066c\\u200d"),
-        ("\x9b31m\x7f", "\\x9b31m\\x7f"),
-        ("\udcff", "\\udcff"),
-        ("\U000e0041", "\\U000e0041"),
+        ("", ""), ("Zürich 北京 é 😀 [/red] x[door]y \\n", "Zürich 北京 é 😀 [/red] x[door]y \\n"),
+        ("\x1b[31mred\x07", "\\x1b[31mred\\x07"), ("a\u202eb\u2066c\u200d", "a\\u202eb\\u2066c\\u200d"),
+        ("\x9b31m\x7f", "\\x9b31m\\x7f"), ("\udcff", "\\udcff"), ("\U000e0041", "\\U000e0041"),
         ("a\u2028b\nc", "a\\u2028b\\nc"),
     ],
-)
+)  # fmt: skip
 def test_control_characters_are_escaped(text, shown):
     assert printable(text) == shown
     assert printable(shown) == shown

@@ -30,12 +30,6 @@ def test_friends_meet_has_18_simple_and_10_hard_entries() -> None:
         assert (camera.kind, camera.image, camera.px_per_m, camera.fps) == ("top", (640, 480), 40, 10)
 
 
-def test_harder_entries_stand_beside_the_others() -> None:
-    assert len(HARD) == 21
-    assert not {e.name for e in HARD} & {e.name for e in FRIENDS}
-    assert all(e.scenario.camera == FRIENDS[0].scenario.camera for e in HARD)
-
-
 def test_strangers_of_the_hard_suite_are_near_and_alike_for_seconds() -> None:
     for name in ("abreast", "beside", "converge", "brush", "door", "lag"):
         entries = [e for e in HARD if e.name.startswith(f"friends-{name}-")]

@@ -56,14 +56,6 @@ def test_shares_are_those_of_the_draws(given):
         assert made.share_within(low, high) == pytest.approx(np.mean((drawn >= low) & (drawn <= high)), abs=0.04)
 
 
-def test_ids_that_are_no_text_are_no_steps_of_a_setting(tmp_path):
-    path = tmp_path / "s.toml"
-    path.write_text('schema = 1\ngroup = [{ id = 1, size = 2, start = [4, 4], goal = [9, 4] }, 5]\nlist = [1, "a"]\n')
-    for setting in ("group.1.size=3", "group.²=3", "group.x.size=1", "list.id=3", "group.99999999999999999999=1"):
-        with pytest.raises(InputError):
-            load(path, set=[setting])
-
-
 @pytest.mark.parametrize("events", ["", "event = [5]", "event = [{ type = 3 }]", 'event = "x"'])
 def test_unknown_keys_of_distributions(tmp_path, events):
     path = tmp_path / "s.toml"
@@ -74,10 +66,3 @@ def test_unknown_keys_of_distributions(tmp_path, events):
     path.write_text(f"schema = 1\n{events}\ngroup = [{{ id = 5, when = {{ tme = 3 }} }}]\n")
     with pytest.raises(InputError):
         load(path)
-
-
-@pytest.mark.parametrize("text", ['{}{"a":' * 3 + "x" * 20_000, "group.a." + "y" * 20_000 + "=3", "a=" + "[" * 20_000])
-def test_long_settings_make_short_errors(text):
-    with pytest.raises(InputError) as error:
-        load("merge", set=[text])
-    assert len(error.value.place) < 200

@@ -22,17 +22,6 @@ def scenario(**keys: Any) -> Scenario:
     return Scenario.model_validate({"schema": 1, "group": group, **keys})
 
 
-def test_a_sequence_says_all_a_command_needs() -> None:
-    motion = crowd(0, frames=25)
-    sequence = observe(scenario(), motion)
-    assert (sequence.name, sequence.fps, sequence.length, sequence.image_size) == ("made-up", 10.0, 25, (640, 480))
-    assert sequence.camera is not None
-    assert sequence.scene is motion.scene
-    assert sequence.has_detections
-    assert not sequence.has_images
-    assert sequence.px_per_m > 0
-
-
 def test_detections_need_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     def poisoned(*_: object) -> None:
         raise AssertionError("truth was asked for")
@@ -42,15 +31,6 @@ def test_detections_need_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sum(len(f.detections.pos) for f in sequence if f.detections) > 0
     with pytest.raises(AssertionError):
         _ = sequence.truth
-
-
-def test_the_scenarios_sensor_and_camera_are_used() -> None:
-    blind = observe(scenario(sensor={"detect_prob": 0.0, "clutter_rate": 0.0}), crowd(0))
-    assert sum(len(f.detections.pos) for f in blind if f.detections) == 0
-    above = observe(scenario(camera={"kind": "top", "image": [320, 240]}), crowd(0))
-    assert above.camera is not None
-    assert above.camera.kind == "top"
-    assert above.image_size == (320, 240)
 
 
 def test_people_out_of_view_are_refused_at_once() -> None:

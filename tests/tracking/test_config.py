@@ -37,15 +37,11 @@ def test_set_parses_each_kind():
 @pytest.mark.parametrize(
     ("assignment", "words"),
     [
-        ("raet=2", "did you mean rate?"),
-        ("rate=11", "a number from 0.1 to 10"),
-        ("rate=nan", "a number from 0.1 to 10"),
-        ("rate=x", "a number from 0.1 to 10"),
-        ("count=2.5", "an integer"),
-        ("kind=c", "one of a, b"),
-        ("rate", "name=value"),
+        ("raet=2", "did you mean rate?"), ("rate=11", "a number from 0.1 to 10"),
+        ("rate=nan", "a number from 0.1 to 10"), ("rate=x", "a number from 0.1 to 10"), ("count=2.5", "an integer"),
+        ("kind=c", "one of a, b"), ("rate", "name=value"),
     ],
-)
+)  # fmt: skip
 def test_wrong_assignments_name_what_was_expected(assignment, words):
     with pytest.raises(InputError, match=words.replace("?", r"\?")):
         Small().with_set(assignment)
@@ -66,13 +62,10 @@ def test_toml_round_trip(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('tracker = "blob"', "expected small"),
-        ("[params]\nrat = 1", "did you mean rate"),
-        ("rate = 1", "under"),
-        ("params = 3", "under"),
-        ("x = = 1", "TOML"),
+        ('tracker = "blob"', "expected small"), ("[params]\nrat = 1", "did you mean rate"), ("rate = 1", "under"),
+        ("params = 3", "under"), ("x = = 1", "TOML"),
     ],
-)
+)  # fmt: skip
 def test_wrong_files_are_one_line(tmp_path, text, words):
     path = tmp_path / "p.toml"
     path.write_text(text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.stats import block_intervals, block_length, block_weights, mean_interval, paired, wilson
+from tracking.stats import block_intervals, block_length, mean_interval, paired, wilson
 
 
 def test_interval_of_two_numbers_is_students() -> None:
@@ -60,18 +60,6 @@ def test_wilson_as_in_tables(hits: int, count: int, low: float, high: float) -> 
 )  # fmt: skip
 def test_a_block_is_as_long_as_errors_last(frames: int, fps: float, likeness: float, expected: int) -> None:
     assert block_length(frames, fps, likeness) == expected
-
-
-def test_weights_are_blocks_of_neighbours() -> None:
-    weights = block_weights(23, 5, 3000, np.random.default_rng(0))
-    assert weights.shape == (3000, 23)
-    assert (weights.sum(axis=1) == 23).all()
-    assert weights.mean(axis=0) == pytest.approx(np.ones(23), abs=0.1), "the first and the last frame, too"
-    one = block_weights(23, 23, 5, np.random.default_rng(0))
-    assert (one == 1).all()
-    alone = block_weights(40, 8, 1, np.random.default_rng(3))[0]
-    assert set(np.flatnonzero(np.diff(alone, append=alone[0])) + 1) <= set(range(1, 41))
-    assert np.count_nonzero(np.diff(alone, append=alone[0])) <= 10, "five blocks have ten ends"
 
 
 def mean_of(x: np.ndarray):

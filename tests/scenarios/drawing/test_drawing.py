@@ -9,7 +9,7 @@ import pytest
 
 from scenarios.drawing.plan_svg import svg
 from scenarios.drawing.routes import middle, spread
-from scenarios.drawing.words import number, order, text, trigger
+from scenarios.drawing.words import number, text
 from scenarios.loading.resolve import load, names
 from scenarios.schema.values import Distribution
 
@@ -49,12 +49,6 @@ def test_svg_is_well_formed_and_names_groups_and_orders(path: Path) -> None:
     assert svg(load(path)) == svg(load(path))
 
 
-def test_a_scenario_without_orders(path: Path) -> None:
-    scenario = load(path, ["event=[]"])
-    assert "Orders\n  none" in text(scenario)
-    assert "a (3)" in words_of(svg(scenario))
-
-
 def test_every_catalogue_scenario_is_drawn() -> None:
     for name in names():
         scenario = load(name)
@@ -66,13 +60,10 @@ def test_stairs_service_and_turn(path: Path) -> None:
     scenario = load(
         path,
         [
-            "world.stairs=[{foot=[6, 1], head=[9, 1]}]",
-            "world.service=[[15, 8]]",
-            "turn_deg={uniform=[0, 360]}",
-            "mirror=true",
-            "lead=2",
+            "world.stairs=[{foot=[6, 1], head=[9, 1]}]", "world.service=[[15, 8]]", "turn_deg={uniform=[0, 360]}",
+            "mirror=true", "lead=2",
         ],
-    )
+    )  # fmt: skip
     assert "turned by 0 to 360°, mirrored by a coin, 2 s further on" in text(scenario)
     assert {"stairs, +1.5 m", "service"} <= set(words_of(svg(scenario)))
 
@@ -92,13 +83,3 @@ def test_stairs_service_and_turn(path: Path) -> None:
 )
 def test_values_in_words_and_their_extent(value, words, mid, half) -> None:  # type: ignore[no-untyped-def]
     assert (number(value, "s"), middle(value), spread(value)) == (words, mid, half)
-
-
-def test_every_trigger_in_words(path: Path) -> None:
-    def of(when: str) -> str:
-        return trigger(load(path, [f"event.m1.when={when}"]).event[0].when)
-
-    assert of("{ time = { uniform = [1, 2] } }") == "at 1 to 2 s"
-    assert of("{ reach = { group = 'a' }, delay = 2 }") == "when a comes within 1 m of its goal, 2 s later"
-    assert of("{ reach = { group = 'a', at = [8, 5], radius = 2 } }") == "when a comes within 2 m of (8, 5)"
-    assert "to meet and stand" in order(load(path, ["event.m1.goal=meet"]).event[0])

@@ -37,19 +37,15 @@ def test_settings_after_it_win_and_hiding_stays(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "'sensor'"),
-        ("[sensor]\ndetect_prop = 0.5", "detect_prob"),
-        ("[sensor]\ndetect_prob = 1.5", "sensor.detect_prob"),
-        ("[camera]\nfps = 5\n[sensor]\n", "'camera'"),
-        ("[sensor]\nnoise_px = 3", "set box_noise.scale"),
-        ("[sensor]\nbox_noise = { acros = [0, 1] }", "'across'"),
+        ("", "'sensor'"), ("[sensor]\ndetect_prop = 0.5", "detect_prob"),
+        ("[sensor]\ndetect_prob = 1.5", "sensor.detect_prob"), ("[camera]\nfps = 5\n[sensor]\n", "'camera'"),
+        ("[sensor]\nnoise_px = 3", "set box_noise.scale"), ("[sensor]\nbox_noise = { acros = [0, 1] }", "'across'"),
         ("[sensor]\nmiss_memory = [{ share = 0.5, time = 1.0 }]\npersistence = 0.5", "miss_memory or persistence"),
         ("[sensor]\nmiss_memory = [{ share = 0.6, time = 1.0 }, { share = 0.6, time = 2.0 }]", "at most 1"),
-        ("[sensor]\ntrue_scores = [0.5, 0.4]", "do not decrease"),
-        ("schema = 2\n[sensor]\n", "schema"),
+        ("[sensor]\ntrue_scores = [0.5, 0.4]", "do not decrease"), ("schema = 2\n[sensor]\n", "schema"),
         ("[sensor", "TOML"),
     ],
-)
+)  # fmt: skip
 def test_what_is_wrong_is_one_line(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "bad.toml"
     path.write_text(text)
@@ -57,8 +53,3 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, text: str, words: str) -> Non
         sensor_settings(path)
     assert words in str(error.value)
     assert "bad.toml" in str(error.value)
-
-
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
-        sensor_settings(tmp_path / "none.toml")

@@ -36,12 +36,3 @@ def test_it_is_the_recursive_filter_of_each_persons_own_noise() -> None:
             filtered = lfilter([SD[k]], [1.0, -keep[k]], noise[:, k])
             np.testing.assert_allclose(u[:, p, k], filtered, atol=1e-14)
     np.testing.assert_array_equal(fluctuations(CROWD, people(keys[1:]), 50, FPS, 7, 2), u[:, 1:])
-
-
-def test_zero_switches_each_off() -> None:
-    u = fluctuations(CrowdSpec(velocity_noise=(0, 0.2), place_noise=(0.3, 0)), people([(0, 0, 0)]), 9, FPS, 0, 0)
-    assert (u.any(axis=(0, 1)) == [False, True, True, False]).all()
-
-
-def test_nobody() -> None:
-    assert fluctuations(CROWD, [], 5, FPS, 0, 0).shape == (5, 0, 4)

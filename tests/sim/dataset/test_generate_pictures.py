@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
 from sim.dataset.generate import generate
 from sim.io.files import atomic
@@ -91,17 +90,6 @@ def test_streams_are_asked_for_and_stored(tmp_path, simulate):
     simulate.asked.clear()
     generate([Entry("x", scenario())], range(2), tmp_path, streams=["right", "left"], images="png")
     assert simulate.asked == []
-
-
-def test_other_streams_or_images_are_not_overwritten(tmp_path, simulate):
-    generate([Entry("x", scenario())], range(1), tmp_path, streams=("left",), images="jpg")
-    before = content(tmp_path)
-    others = ((("left", "ids"), "jpg", "streams"), ((), "jpg", "streams"), (("left",), "png", "images"))
-    for streams, images, word in others:
-        with pytest.raises(InputError, match=word) as error:
-            generate([Entry("x", scenario())], range(2), tmp_path, streams=streams, images=images)
-        assert "\n" not in str(error.value)
-    assert content(tmp_path) == before
 
 
 def alter(path: Path) -> None:

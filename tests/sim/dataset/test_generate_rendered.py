@@ -44,8 +44,3 @@ def test_one_content_in_every_kind(tmp_path):
             assert found["jpg"][k][key] == found["png"][k][key] == found["mp4"][k][key]
         assert bare[k]["truth_hash"] == found["jpg"][k]["truth_hash"]
     assert found["jpg"][0]["pixels"]["left"] != found["jpg"][1]["pixels"]["left"]
-
-
-@pytest.mark.parametrize("images", ["jpg", "mp4"])
-def test_any_number_of_workers(tmp_path, images):
-    assert made(tmp_path / "1", images=images)[1] == made(tmp_path / "2", images=images, workers=2)[1]

@@ -66,15 +66,6 @@ def test_same_bytes_again_and_what_is_there_is_kept(walk: Sequence, tmp_path: Pa
     assert content(first) == content(second)
 
 
-def test_another_replay_in_its_place_is_refused(walk: Sequence, tmp_path: Path) -> None:
-    store_replays([walk], ReplayOptions(SMALL, streams=()), range(20_000, 20_001), tmp_path)
-    other = ReplayOptions(
-        load_observation(set=["camera.image=[160, 120]", "camera.fps=5", "sensor.detect_prob=0.5"]), streams=()
-    )
-    with pytest.raises(InputError, match="another sequence"):
-        store_replays([walk], other, range(20_000, 20_001), tmp_path)
-
-
 def test_real_motion_stays_out_of_what_is_tuned_on(walk: Sequence, tmp_path: Path) -> None:
     for first in (0, 10_000):
         with pytest.raises(InputError, match="20000"):

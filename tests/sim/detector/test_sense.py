@@ -187,13 +187,6 @@ def hidden_from_below(truth: Truth, share: float) -> Truth:
     return truth.replace(visible_box=part if share else truth.box, visibility=np.full(len(truth.id), 1 - share))
 
 
-@pytest.mark.parametrize("camera", [pinhole(at=(8.0, -8.0, 9.0)), above()])
-def test_points_of_people_in_full_view_are_their_own(camera: Any) -> None:
-    truth = hidden_from_below(seen(people=4, frames=5), 0.0)
-    own, default = (sense(truth, perfect(noise_m=0.1, box="visible", **k), 1, camera) for k in ({"points": "own"}, {}))
-    assert np.array_equal(everything(own, "pos"), everything(default, "pos"))
-
-
 @pytest.mark.parametrize("z", [0.0, 0.8])
 def test_points_follow_the_foot_of_the_visible_part(z: float) -> None:
     camera = pinhole(at=(8.0, -8.0, 9.0))

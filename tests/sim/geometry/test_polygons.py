@@ -43,16 +43,10 @@ def test_overlap_is_that_of_a_dense_raster():
 @pytest.mark.parametrize(
     ("moved", "common"),
     [
-        ((0.5, 0), 0.5),
-        ((0.5, 0.5), 0.25),
-        ((0, 0), 1),
-        ((1, 0), 0),
-        ((0, -1), 0),
-        ((1, 1), 0),
-        ((3, 0), 0),
+        ((0.5, 0), 0.5), ((0.5, 0.5), 0.25), ((0, 0), 1), ((1, 0), 0), ((0, -1), 0), ((1, 1), 0), ((3, 0), 0),
         ((1e-12, 0), 1),
     ],
-)
+)  # fmt: skip
 def test_squares(moved, common):
     zero = np.zeros(1, np.int64)
     a, b = pack([SQUARE]), pack([SQUARE + np.array(moved)])
@@ -130,12 +124,3 @@ def test_gap_of_one_inside_another_and_against_samples():
         sampled = np.hypot(*np.moveaxis(rims[0][:, None] - rims[1], -1, 0)).min()
         overlap = iou_matrix([a], [b])[0, 0] > 0
         assert polygon_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
-
-
-def test_points_in_a_dilated_hull():
-    points = np.array([[0.5, 0.5], [1, 0.5], [1.2, 0.5], [1.25, 1.25], [-0.31, 0.5]])
-    assert contains(SQUARE, points).tolist() == [True, True, False, False, False]
-    assert contains(SQUARE, points, 0.3).tolist() == [True, True, True, False, False]
-    assert contains(SQUARE, points, 0.36).tolist() == [True] * 5
-    assert contains(np.zeros((0, 2)), points, 1).tolist() == [False] * 5
-    assert contains(SQUARE[:2], points, 0.5).tolist() == [True, True, False, False, False]

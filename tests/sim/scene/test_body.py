@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim.scene.body import BODY, HEAD, contour, ellipsoids, outlines, person_boxes
+from sim.scene.body import BODY, HEAD, ellipsoids, person_boxes
 from sim.scene.camera import project
 from sim.scene.terrain import height_at
 from sim.types import Camera, Scene, Stairs
@@ -38,22 +38,9 @@ def test_a_person_is_as_tall_and_wide_as_the_contract_says() -> None:
     assert np.sqrt(shapes.shape[0, 0, 1, 1]) == pytest.approx(0.135 * 1.7)  # across the heading
 
 
-def test_contours_touch_the_boxes() -> None:
-    pos3 = np.array([[6.0, 4.0, 0.0], [9.0, 7.0, 0.0]])
-    heading, height = np.array([0.3, 2.0]), np.array([1.6, 1.9])
-    edge = contour(outlines(pinhole(), ellipsoids(pos3, heading, height)), points=720)
-    box = person_boxes(pinhole(), pos3, heading, height)
-    assert edge.min(axis=1) == pytest.approx(box[:, :2], abs=0.01)
-    assert edge.max(axis=1) == pytest.approx(box[:, :2] + box[:, 2:], abs=0.01)
-
-
 def test_who_is_behind_the_camera_has_no_box() -> None:
     box = person_boxes(pinhole(0), np.array([[8.0, -9.0, 6.0], [8.0, -6.0, 6.0]]), np.zeros(2), np.full(2, 1.7))
     assert np.isnan(box).all()
-
-
-def test_nobody_has_no_boxes() -> None:
-    assert person_boxes(pinhole(), np.zeros((0, 3)), np.zeros(0), np.zeros(0)).shape == (0, 4)
 
 
 def stairs(steps: int = 10) -> Scene:

@@ -24,8 +24,7 @@ MIRRORED = (np.diag([-1.0, 1.0, 1.0]) @ np.array(DOWN)).tolist()
 LARGER = (2 * np.array(DOWN)).tolist()
 
 BAD = {
-    "mirrored": (GOOD | {"rotation": MIRRORED}, "mirrored"),
-    "scaled": (GOOD | {"rotation": LARGER}, "right angles"),
+    "mirrored": (GOOD | {"rotation": MIRRORED}, "mirrored"), "scaled": (GOOD | {"rotation": LARGER}, "right angles"),
     "no rotation": (GOOD | {"rotation": [[0, 0, 0]] * 3}, "right angles"),
     "underground": (GOOD | {"position": [1, 2, -5]}, "above the ground"),
     "on the ground": (GOOD | {"position": [1, 2, 0]}, "above the ground"),
@@ -35,18 +34,16 @@ BAD = {
     "mm for px": (GOOD | {"focal_px": [3.5, 3.5]}, "focal"),
     "two unlike focal lengths": (GOOD | {"focal_px": [500, 5000]}, "focal"),
     "the centre elsewhere": (GOOD | {"centre_px": [5000, 240]}, "centre"),
-    "no image": (GOOD | {"image": [0, 0]}, "image"),
-    "half a pixel": (GOOD | {"image": [640.5, 480]}, "image"),
+    "no image": (GOOD | {"image": [0, 0]}, "image"), "half a pixel": (GOOD | {"image": [640.5, 480]}, "image"),
     "a huge image": (GOOD | {"image": [16000, 16000]}, "image"),
     "a lens that folds": (GOOD | {"radial": -2.0}, "radial"),
     "far away": (GOOD | {"position": [1e300, 2, 5]}, "position"),
     "no numbers": (GOOD | {"position": ["1", "2", "5"]}, "position"),
     "a telephoto lens just above the ground": (CLOSE, "px_per_m"),
     "no scale from above": (TOP | {"px_per_m": 0.0}, "px_per_m"),
-    "from above, but level": (TOP | {"rotation": DOWN}, "look"),
-    "another format": (GOOD | {"format": 2}, "format"),
+    "from above, but level": (TOP | {"rotation": DOWN}, "look"), "another format": (GOOD | {"format": 2}, "format"),
     "a format that is no number": (GOOD | {"format": "1"}, "format"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", BAD)

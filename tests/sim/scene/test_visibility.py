@@ -74,13 +74,6 @@ def test_walls_and_pillars_against_rays(seed: int) -> None:
     assert (see(camera, OPEN, xy, heading, height).visibility > fast + 0.2).any()  # they hide somebody
 
 
-def test_alone_in_view_is_seen_whole() -> None:
-    seen = see(pinhole(), OPEN, np.array([[8.0, 4.0]]))
-    assert seen.visibility == [1.0]
-    assert seen.truncation == [0.0]
-    assert seen.visible_box == pytest.approx(seen.box)
-
-
 def test_a_door_is_an_opening() -> None:
     halves = np.array([[[4.0, 3.0], [7.4, 3.0]], [[8.6, 3.0], [12.0, 3.0]]])
     scene = Scene(np.array([16.0, 10.0]), walls=halves, wall_height=30.0)
@@ -109,14 +102,6 @@ def test_the_image_cuts_people() -> None:
     assert seen.box[0, 0] > 0  # the walk led from outside to inside
 
 
-def test_behind_the_camera_is_unseen() -> None:
-    camera = pinhole(0, 0, (8, 5, 1.5))
-    seen = see(camera, OPEN, np.array([[8.0, 3.0], [8.0, 9.0]]))
-    assert seen.visibility.tolist() == [0.0, 1.0]
-    assert seen.truncation[0] == 1.0
-    assert np.isnan(seen.box[0]).all()
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_order_of_rows_and_further_frames_change_nothing(seed: int) -> None:
     xy, heading, height = crowded(seed)
@@ -133,9 +118,3 @@ def test_order_of_rows_and_further_frames_change_nothing(seed: int) -> None:
     )
     assert both.visibility == pytest.approx(np.concatenate([one.visibility, one.visibility]))
     assert one.box == pytest.approx(person_boxes(pinhole(), pos3, heading, height))
-
-
-def test_nobody() -> None:
-    seen = see(pinhole(), OPEN, np.zeros((0, 2)))
-    assert seen.visibility.shape == (0,)
-    assert seen.visible_box.shape == (0, 4)

@@ -1,11 +1,8 @@
 import numpy as np
 import pytest
 
-from scenarios.loading import checks
 from scenarios.loading.resolve import load
-from sim.crowd import forces_avoidance_kernels, population
 from sim.crowd.world import run
-from sim.truth import queue_detection
 from sim.truth.crossing_events import crossings
 from sim.truth.queue_detection import detect_queues, queues
 
@@ -143,11 +140,6 @@ def test_queue_of_two_or_for_less_than_three_seconds_is_none():
     assert len(queued([waiting(k, arrive=3, leave=6.3) for k in range(3)])) == 1
 
 
-@pytest.mark.parametrize(("spacing", "found"), [(0.3, 0), (0.45, 1), (1.45, 1), (1.6, 0)])
-def test_queue_spacing(spacing, found):
-    assert len(queued([waiting(k, spacing=spacing) for k in range(4)])) == found
-
-
 def served(people=5, service=2.0, spacing=0.8):
     """The head leaves every `service` seconds; the others then move up at 1 m/s, one place."""
     paths = []
@@ -204,18 +196,3 @@ def test_walking_in_file_or_shuffling_abreast_is_not_a_queue():
 def found(pos, vel, there, group):
     events = crossings(pos, vel, there, group, FPS) + queues(pos, vel, there, group, FPS)
     return [(e.kind, e.start, e.end, set(e.members)) for e in events]
-
-
-def test_nobody():
-    none = np.zeros((0, 0, 2))
-    assert crossings(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS) == []
-    assert queues(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS) == []
-    alone = np.zeros((20, 1, 2))
-    assert crossings(alone, alone, alone[..., 0] == 0, np.full((20, 1), -1), FPS) == []
-    assert queues(alone, alone, alone[..., 0] == 0, np.full(alone.shape[:2], -1), FPS) == []
-
-
-def test_facts_of_scenarios_and_truth_agree():
-    """`scenarios` cannot import `sim`: what its checks know of queues and bodies stands there once more."""
-    assert checks.QUEUE_PEOPLE == queue_detection.QUEUE_PEOPLE
-    assert checks.BODY == population.BODY_RADIUS == forces_avoidance_kernels.BODY

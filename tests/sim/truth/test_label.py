@@ -96,14 +96,6 @@ def test_rows_are_sorted_and_say_what_the_motion_says() -> None:
     assert now.id.tolist() == (np.flatnonzero(motion.present[6]) + 1).tolist()
 
 
-def test_without_a_camera_there_are_no_boxes() -> None:
-    truth = bodies(crowd(0), None)
-    assert truth.box is None
-    assert truth.visible_box is None
-    assert (truth.visibility == 1).all()
-    assert np.isnan(truth.px_per_m)
-
-
 def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> None:
     pytest.importorskip("sim.truth.merge_split_events", exc_type=ImportError)
     pytest.importorskip("sim.truth.crossing_events", exc_type=ImportError)

@@ -73,15 +73,6 @@ def test_the_wrong_kind_or_the_wrong_people_do_not_count() -> None:
     assert check(motion, truth_of(motion, 50, kind="form")) == {"m1": 0}
 
 
-def test_an_event_after_all_was_done_does_not_count() -> None:
-    motion, truth = merging(), truth_of(merging(), 25)
-    assert truth.events is not None
-    again = GroupEvent("merge", 60, 60, None, (1, -1), (1,), (1, 2, 3), (0.0, 0.0))
-    with pytest.raises(WorkError):
-        check(motion, truth.replace(events=(again,)))
-    assert check(motion, truth.replace(events=(again, *truth.events))) == {"m1": 1}
-
-
 def test_an_order_that_never_fired() -> None:
     with pytest.raises(WorkError, match="never fired"):
         check(merging(None), truth_of(merging(None), 50))

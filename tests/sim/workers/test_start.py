@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import os
-import signal
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from scenarios.errors import InputError, WorkError
+from scenarios.errors import WorkError
 from sim.workers.pool import MAX_LOSSES, THREAD_VARIABLES, process_pool
 from sim.workers.start import results_in_order, start_workers
-from tests.errands import complain, fall, fall_at_first, hide, process, refuse, root_of, told
+from tests.errands import complain, fall, fall_at_first, hide, process, root_of, told
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -21,18 +19,6 @@ def test_every_item_with_its_result(workers: int) -> None:
     with start_workers(workers) as run:
         assert sorted(run(root_of, [9.0, 4.0, 16.0])) == [(4.0, 2.0), (9.0, 3.0), (16.0, 4.0)]
         assert list(run(root_of, [])) == []
-
-
-def test_one_worker_is_this_process_and_two_are_others() -> None:
-    with start_workers(1) as run:
-        assert dict(run(process, [1])) == {1: os.getpid()}
-    with start_workers(2) as run:
-        assert os.getpid() not in dict(run(process, range(4))).values()
-
-
-def test_no_worker_is_refused() -> None:
-    with pytest.raises(InputError, match="workers"):
-        start_workers(0)
 
 
 @pytest.mark.parametrize("workers", [1, 3])
@@ -66,27 +52,12 @@ def test_the_work_of_dead_workers_is_done_again(tmp_path: Path) -> None:
         assert sorted(run(fall_at_first, markers)) == [(m, m.name) for m in markers]
 
 
-def test_a_worker_killed_while_it_waits_is_replaced() -> None:
-    with process_pool(1) as run:
-        ((_, first),) = run(process, [0])
-        os.kill(first, signal.SIGKILL)
-        ((_, second),) = run(process, [0])
-    assert second != first
-
-
 def test_an_item_that_kills_all_its_workers_is_one_clear_error() -> None:
     with (
         pytest.raises(WorkError, match=f"got an item that killed {MAX_LOSSES} workers, the last by exit code 3"),
         process_pool(2) as run,
     ):
         list(run(fall, [0, 3, 2]))
-
-
-def test_who_stops_looking_can_run_again() -> None:
-    with process_pool(2) as run:
-        for _ in run(time.sleep, [0.0, 1800.0]):
-            break
-        assert sorted(run(refuse, range(3))) == [(0, 0), (1, 1), (2, 2)]
 
 
 @pytest.mark.parametrize("workers", [1, 3])

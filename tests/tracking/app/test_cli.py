@@ -107,8 +107,7 @@ COMMANDS = {
         "fit relational no-such-scene --out {out}/mine.toml",
     ),
     "fit joint": (
-        "fit joint party --seeds 30000:30003 --out {out}/mine.toml",
-        "fit joint no-such-scene --out {out}/mine.toml",
+        "fit joint party --seeds 30000:30003 --out {out}/mine.toml", "fit joint no-such-scene --out {out}/mine.toml",
     ),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
@@ -117,13 +116,11 @@ COMMANDS = {
     "score one": ("score {one} {tracks}/scene-s40000", "score {one} {tracks}/scene-s40001"),
     "score text": ("score {one} {tracks}/scene-s40000/tracks.mot.txt", "score {one} {one}/gt/groups.csv"),
     "view": (
-        "view {one} {tracks}/scene-s40000 --out {out}/page.html",
-        "view {one} {out}/nothing --out {out}/page.html",
+        "view {one} {tracks}/scene-s40000 --out {out}/page.html", "view {one} {out}/nothing --out {out}/page.html",
     ),
     "view all": ("view {data} {tracks} --out {out}", "view {data} {tracks} --out {out}/page.html"),
     "view pictures": (
-        "view {seen} --video beside --out {out}/page.html",
-        "view {seen} --video outside --out {out}/page.html",
+        "view {seen} --video beside --out {out}/page.html", "view {seen} --video outside --out {out}/page.html",
     ),
     "overlay": (
         "overlay {seen} {tracks}-seen --out {out}/film.mp4",
@@ -136,11 +133,10 @@ COMMANDS = {
     "export coco": ("export coco {data} --out {out}/coco.json", "export coco {out}/nothing --out {out}/coco.json"),
     "export kitti": ("export kitti {seen} --out {out}", "export kitti {one} --out {out}"),
     "export webdataset": (
-        "export webdataset {data} --out {out}",
-        "export webdataset {data} --out {out} --shard-size 0",
+        "export webdataset {data} --out {out}", "export webdataset {data} --out {out} --shard-size 0",
     ),
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
-}
+}  # fmt: skip
 SMALL = ("scenarios --out", "fit sensor", "fit relational", "fit joint")  # a few kB
 FEW = ("export coco", "fit grouping", "sheet", "track", "track blob")  # less than 12 kB
 WRITING = [name for name, (good, _) in COMMANDS.items() if "--out {out}" in good]
@@ -308,17 +304,14 @@ def _leaves(group):
 @pytest.mark.parametrize(
     ("line", "got"),
     [
-        ("trak", "no such command 'trak'"),
-        ("track blob", "missing argument 'SOURCE'"),
-        ("track blob x", "missing option '--out'"),
-        ("track blob x --out y --colour red", "no such option: --colour"),
+        ("trak", "no such command 'trak'"), ("track blob", "missing argument 'SOURCE'"),
+        ("track blob x", "missing option '--out'"), ("track blob x --out y --colour red", "no such option: --colour"),
         ("track blob x --out y --seed one", "invalid value for '--seed'"),
         ("track blob x --out y --detections magic", "magic"),
         ("generate merge --seeds 0:2 --out y --workers 0", "invalid value for '--workers'"),
-        ("scenarios --out x.svg", "--out without a scenario to explain"),
-        ("export coc", "no such command 'coc'"),
+        ("scenarios --out x.svg", "--out without a scenario to explain"), ("export coc", "no such command 'coc'"),
     ],
-)
+)  # fmt: skip
 def test_usage(line, got, as_json, capsys):
     assert run(line.split() + ["--json"] * as_json) == 2
     printed = capsys.readouterr()

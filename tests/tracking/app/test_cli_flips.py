@@ -189,30 +189,24 @@ LAMP = "light.switch=[{ at = 0.2, gain = 0.5 }]"
 PICTURES = {
     "light.sun_azimuth_deg": ("light.sun_azimuth_deg=0", "light.sun_azimuth_deg=90"),
     "light.sun_elevation_deg": ("light.sun_elevation_deg=30", "light.sun_elevation_deg=60"),
-    "light.shadow": ("", "light.shadow=0.6"),
-    "light.penumbra": ("", "light.penumbra=0.4"),
+    "light.shadow": ("", "light.shadow=0.6"), "light.penumbra": ("", "light.penumbra=0.4"),
     "light.drift": ("", "light.drift=0.1"),
     "light.drift_time": ("light.drift=0.1", "light.drift=0.1;light.drift_time=2"),
-    "light.flicker": ("", "light.flicker=0.05"),
-    "light.cloud": ("", "light.cloud=0.2"),
+    "light.flicker": ("", "light.flicker=0.05"), "light.cloud": ("", "light.cloud=0.2"),
     "light.cloud_size": ("light.cloud=0.2", "light.cloud=0.2;light.cloud_size=2"),
     "light.cloud_speed": ("light.cloud=0.2", "light.cloud=0.2;light.cloud_speed=3"),
     "light.switch[].at": (LAMP, LAMP.replace("0.2", "0.4")),
     "light.switch[].gain": (LAMP, LAMP.replace("0.5", "0.7")),
     "light.switch[].ramp": (LAMP, LAMP.replace("gain", "ramp = 0.6, gain")),
-    "picture.texture": ("", "picture.texture=0.9"),
-    "picture.samples": ("", "picture.samples=3"),
-    "picture.noise": ("", "picture.noise=6"),
-    "picture.blur_px": ("", "picture.blur_px=1.5"),
-    "picture.jpeg": ("", "picture.jpeg=50"),
-    "picture.shot": ("", "picture.shot=1"),
+    "picture.texture": ("", "picture.texture=0.9"), "picture.samples": ("", "picture.samples=3"),
+    "picture.noise": ("", "picture.noise=6"), "picture.blur_px": ("", "picture.blur_px=1.5"),
+    "picture.jpeg": ("", "picture.jpeg=50"), "picture.shot": ("", "picture.shot=1"),
     "picture.foliage": ("", "picture.foliage=0.3"),
     "picture.sway_px": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_px=4"),
     "picture.sway_time": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_time=2"),
-    "picture.right_gain": ("", "picture.right_gain=1.2"),
-    "picture.right_roll_deg": ("", "picture.right_roll_deg=1"),
+    "picture.right_gain": ("", "picture.right_gain=1.2"), "picture.right_roll_deg": ("", "picture.right_roll_deg=1"),
     "picture.right_down_px": ("", "picture.right_down_px=1"),
-}
+}  # fmt: skip
 """What pictures alone are made of: looked for in frame 3, at 0.4 s, without the noise; `right_` in right pictures."""
 
 TEXT_ONLY = {"schema", "about", "group[].id", "event[](merge).into", "event[](split).parts[].id"}

@@ -205,24 +205,3 @@ def test_tracks_are_not_written_into_a_stored_sequence(made, tmp_path, capsys, b
     line = ["track", "blob", data, "--detections", "file", "--out", folder.parent]
     assert "inside the stored sequence" in refused(capsys, *line)
     assert sorted(data.rglob("*")) == before
-
-
-def test_side_files_are_no_tracks(made, tmp_path, capsys):
-    (tmp_path / "texts").mkdir()
-    name = next((made / "blob").iterdir()).name
-    shutil.copy(made / "blob" / name / "tracks.mot.txt", tmp_path / "texts" / f"{name}.txt")
-    (tmp_path / "texts" / f"._{name}.txt").write_bytes(b"\0\5\x16\7")
-    (source,) = (made / "data").rglob(name)
-    assert run(["score", str(source), str(tmp_path / "texts")]) == 0
-
-
-def test_a_renamed_folder_is_named_as_the_cause(tmp_path, capsys):
-    """seqinfo.ini still has the name of before; tracks have that of the folder."""
-    ini = recording(tmp_path / "data" / "cam1", "1,1,5,5,10,20,1,1,1\n2,1,6,5,10,20,1,1,1\n") / "seqinfo.ini"
-    ini.write_text("[Sequence]\nname=video_1\nframeRate=25\nseqLength=2\n")
-    (tmp_path / "results").mkdir()
-    for name in ("cam1", "cam2"):
-        (tmp_path / "results" / f"{name}.txt").write_text("1,1,5,5,10,20,1,-1,-1,-1\n")
-    line = refused(capsys, "score", tmp_path / "data", tmp_path / "results")
-    assert "got tracks of cam1, cam2; expected tracks of video_1" in line
-    assert f"name=video_1 in {ini} is another than its folder's, cam1: correct it" in line

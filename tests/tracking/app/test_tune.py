@@ -57,23 +57,16 @@ def test_the_same_again_as_one_object_with_more_trials(line, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (["--seeds", "0-5"], "--seeds: got '0-5'"),
-        (["--validation", "x"], "--validation: got 'x'"),
+        (["--seeds", "0-5"], "--seeds: got '0-5'"), (["--validation", "x"], "--validation: got 'x'"),
         (["--test", "0:5"], "--test: got 0:5; expected test seeds"),
-        (["--trials", "none"], "invalid value for '--trials'"),
-        (["--objective", "HOTTA"], "did you mean HOTA?"),
-        (["--only", "reach,skipp"], "did you mean skip?"),
-        (["--set", "reech=1"], "did you mean reach?"),
-        (["--set", "weather.sun=1"], "weather.sun"),
-        (["--suite", "no-such"], "--suite: got 'no-such'"),
-        (["--prune", "2"], "--prune: got 2.0"),
-        (["--workers", "0"], "invalid value for '--workers'"),
-        (["--storage", "nonsense://x"], "--storage"),
-        (["--detections", "image"], "--detections"),
-        (["--sensor", "no-such.toml"], "no-such.toml"),
-        (["--out", "toy.json"], "--out: got toy.json"),
+        (["--trials", "none"], "invalid value for '--trials'"), (["--objective", "HOTTA"], "did you mean HOTA?"),
+        (["--only", "reach,skipp"], "did you mean skip?"), (["--set", "reech=1"], "did you mean reach?"),
+        (["--set", "weather.sun=1"], "weather.sun"), (["--suite", "no-such"], "--suite: got 'no-such'"),
+        (["--prune", "2"], "--prune: got 2.0"), (["--workers", "0"], "invalid value for '--workers'"),
+        (["--storage", "nonsense://x"], "--storage"), (["--detections", "image"], "--detections"),
+        (["--sensor", "no-such.toml"], "no-such.toml"), (["--out", "toy.json"], "--out: got toy.json"),
     ],
-)
+)  # fmt: skip
 def test_wrong_options_are_one_line(line, more, words, capsys):
     assert run(changed(line, *more)) == 2
     printed = capsys.readouterr()

@@ -100,19 +100,6 @@ def test_cleaning_takes_specks_and_fills_holes_by_the_scale():
     assert len(blobs.find(blobs.clean(torn, 50), 50)) == 2
 
 
-@pytest.mark.parametrize(("scale", "left"), [(20, True), (40, True), (60, False), (80, False)])
-def test_opening_takes_narrow_parts_where_its_disc_is_wider_than_a_pixel(scale, left, monkeypatch):
-    """Up to 40 px per m the disc of 0.05 m is one pixel. Majority and closing are switched off here."""
-    monkeypatch.setattr(blobs, "MAJORITY_M", 0.0)
-    monkeypatch.setattr(blobs, "CLOSE_M", 0.0)
-    arm = np.zeros((60, 60), bool)
-    arm[20:40, 20:40] = True
-    arm[28:30, 40:55] = True
-    with_majority = blobs.clean(arm, 1.0)
-    assert with_majority[28:30, 42:50].all()
-    assert bool(blobs.clean(arm, scale)[28:30, 42:50].any()) == left
-
-
 def test_contour_and_hull_go_round_the_blob():
     found = blobs.find(ellipse((120, 160), 80, 60, 60, 30, 0.4), 50)
     outline, hull = found.contour(0), found.hull(0)

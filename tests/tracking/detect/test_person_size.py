@@ -8,7 +8,7 @@ import pytest
 from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Context
 from tracking.detect import typical_person
-from tracking.detect.person_size import ENOUGH, SMALLEST, PersonSize
+from tracking.detect.person_size import ENOUGH, PersonSize
 
 BARE = Context(10.0, float("nan"), image_size=(480, 360))
 
@@ -74,15 +74,6 @@ def test_the_line_is_found_among_groups_and_pieces(seed):
     assert size.at(foot)[:, 0] == pytest.approx(15 + 0.2 * foot[:, 1], rel=0.08)
 
 
-def test_who_stands_still_counts_once():
-    r = np.random.default_rng(0)
-    box, stands = blobs(r, 60), np.tile([[200.0, 160.0, 20.0, 32.0]], (150, 1))
-    size = PersonSize(BARE)
-    every = np.concatenate([box, stands])
-    size.learn(every, ellipses(every), np.ones(len(every), bool))
-    assert size.at(np.array([[210.0, 192.0]]))[0, 0] == pytest.approx(15 + 0.2 * 192, rel=0.08)
-
-
 def test_few_or_wild_blobs_are_not_relied_on():
     r = np.random.default_rng(0)
     few, size = blobs(r, ENOUGH - 1), PersonSize(BARE)
@@ -97,11 +88,3 @@ def test_few_or_wild_blobs_are_not_relied_on():
     cut, size = blobs(r, 80), PersonSize(BARE)
     size.learn(cut, ellipses(cut), np.zeros(80, bool))
     assert not size.reliable
-
-
-def test_people_too_small_to_see_are_nobody():
-    r, size = np.random.default_rng(0), PersonSize(BARE)
-    box = blobs(r, 80, level=-20.0, slope=0.3)
-    size.learn(box, ellipses(box), np.ones(80, bool))
-    assert np.isnan(size.at(np.array([[240.0, (SMALLEST + 17) / 0.3]]))).all()
-    assert size.px_per_m == pytest.approx(np.median(box[:, 3]) / 1.7, rel=0.1)

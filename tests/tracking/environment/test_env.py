@@ -14,7 +14,6 @@ from gymnasium.wrappers import FlattenObservation, RecordEpisodeStatistics, Resc
 import tracking
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
-from sim.dataset.generate import generate
 from sim.sequence import simulate
 from sim.types import Truth
 from tests.toy_tracker import Toy
@@ -155,16 +154,6 @@ def test_the_truth_is_for_the_score_alone(monkeypatch):
         _ = hidden.pos
 
 
-def test_stored_sequences_and_lists(tmp_path):
-    generate(["cross"], range(7, 9), tmp_path, set=SHORT, streams=())
-    env = make("group-pda", tmp_path, set=())
-    _, rewards, info = played(env, seed=1)
-    assert info["scenario"].startswith("cross-s0000")
-    assert rewards.sum() == pytest.approx(info["objective"])
-    mixed = make("blob", [tmp_path, simulate(load("pass-by", SHORT), 1, 0, ()), "split"])
-    assert {s.name for s in mixed.unwrapped.sources} == {"cross-s00007", "cross-s00008", "pass-by", "split"}
-
-
 def test_from_pixels():
     tiny = ["camera.fps=5", "duration=2", "camera.image=[160,120]"]
     env = make("group-pda", "cross", set=tiny, detections="image", decision_every=5, render_mode="rgb_array")
@@ -176,18 +165,6 @@ def test_from_pixels():
     assert "pixel_radius" in info["names"]
     assert "radius" not in info["names"]
     assert env.render().shape == (152, 160, 3)
-
-
-def test_which_parameters_an_action_sets():
-    once, often = make().unwrapped, make(decision_every=5).unwrapped
-    assert set(often.parameter_names) < set(make(detections="image").unwrapped.parameter_names) | set(
-        once.parameter_names
-    )
-    assert "dark" not in once.parameter_names
-    assert all(p.online for p in often.space)
-    params = make("group-pda").unwrapped
-    assert params.observation_names[0] == "time"
-    assert len(make("group-pda", observation="parameters").unwrapped.observation_names) == 30 + len(params.space)
 
 
 def test_whatever_the_action_an_episode_comes_of_it():
@@ -226,20 +203,17 @@ class StillToy(Toy):
 @pytest.mark.parametrize(
     ("tracker", "options", "words"),
     [
-        (FAKE, {}, "a tracker with parameters"),
-        ("blbo", {}, "did you mean blob"),
-        ("blob", {"decision_every": 0}, "1 or more"),
-        ("blob", {"decision_every": 2.5}, "1 or more"),
+        (FAKE, {}, "a tracker with parameters"), ("blbo", {}, "did you mean blob"),
+        ("blob", {"decision_every": 0}, "1 or more"), ("blob", {"decision_every": 2.5}, "1 or more"),
         ("blob", {"observation": "statistic"}, "did you mean statistics"),
         ("blob", {"params": {"gaet": 0.5}}, "did you mean gate"),
-        ("blob", {"suite": "nothing at all"}, "a scenario, a suite"),
-        ("blob", {"render_mode": "human"}, "rgb_array"),
+        ("blob", {"suite": "nothing at all"}, "a scenario, a suite"), ("blob", {"render_mode": "human"}, "rgb_array"),
         ("blob", {"detections": "boxes"}, "one of None, image, truth, file"),
         ("blob", {"seeds": 5}, r"write for example range\(5\)"),
         ("blob", {"set": "camera.fps=5"}, r"write \['camera.fps=5'\]"),
         (StillToy, {"decision_every": 5}, "may change between frames"),
     ],
-)
+)  # fmt: skip
 def test_wrong_wishes_are_named(tracker, options, words):
     with pytest.raises(InputError, match=words):
         TuningEnv(tracker, **{"suite": "cross", "set": SHORT, **options})

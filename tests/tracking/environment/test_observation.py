@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.types import Detections, Frame, GroupEvent, Tracks
+from sim.types import Detections, Frame, Tracks
 from tracking.environment import observation
 from tracking.environment.observation import NAMES, STATISTICS, Observer
 
@@ -89,25 +89,6 @@ def test_in_the_image_lengths_are_metres_and_unknown_without_a_scale():
     assert seen["innovation"] == pytest.approx(0.2)
     assert blind["speed"] == blind["crowding"] == blind["innovation"] == 0
     assert blind["tracks"] == blind["detections"] == pytest.approx(2)
-
-
-def test_groups_that_the_tracker_names():
-    grouped = tracks(1, walk(1, 4), group=[3, 3, -1, -1])
-    event = GroupEvent("merge", 1, 1, 1, (-1, -1), (3,), (0, 1), (0.0, 0.0))
-    seen = looked([(frame(1), grouped.replace(events=(event,)))])
-    assert (seen["grouped"], seen["group_size"]) == (0.5, pytest.approx(2))
-    assert seen["merges"] == pytest.approx(600)
-    assert seen["splits"] == 0
-
-
-def test_pictures():
-    pairs = [
-        (Frame(k, k / FPS, np.full((32, 48, 3), 51 * k, np.uint8)), tracks(k, walk(k), plane="ground")) for k in (1, 2)
-    ]
-    seen = looked(pairs)
-    assert seen["brightness"] == pytest.approx(0.4)
-    assert seen["lights"] == pytest.approx(1)
-    assert seen["seen"] == seen["detections"] == 0
 
 
 def test_nothing_at_all():

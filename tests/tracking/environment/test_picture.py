@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
-from scenarios.loading.resolve import load
-from sim.sequence import simulate
 from tracking.drawing.canvas import FLOOR, colour
 from tracking.environment.env import TuningEnv
 
@@ -66,16 +62,6 @@ def test_the_picture_itself():
     shown = made.rollout.last.image
     same = (pictures[1][32:] == shown[..., ::-1]).all(axis=2)
     assert same.mean() > 0.5
-
-
-def test_in_the_image_plane_and_without_a_scene():
-    plain = simulate(load("cross", SHORT), 3, 0, ())
-    flat = dataclasses.replace(plain, camera=None, px_per_m=40.0)
-    assert flat.image_size is not None
-    for sequence in (flat, dataclasses.replace(plain, scene=None)):
-        pictures = stepped(env(sequence, set=(), tracker="blob"), 2)
-        assert all(p.shape == (512, 640, 3) for p in pictures)
-        assert not np.array_equal(pictures[1][32:], pictures[2][32:])
 
 
 def test_without_a_render_mode_there_is_no_picture():

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tests import reference_components as reference
-from tracking.filters.component_regions_kernels import FEW
 from tracking.filters.components import Constraint, linked, partition, prefixes
 
 LINK = 1.5
@@ -48,19 +47,6 @@ def test_every_prefix_of_a_thousand_random_sets() -> None:
     assert 0.2 < np.mean(verdicts) < 0.8
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_every_prefix_of_many_components(seed: int) -> None:
-    """More components than are compared pair by pair, some light, joined in several rounds or far from each other."""
-    r = np.random.default_rng(seed)
-    points = r.uniform(0, r.choice([10.0, 16.0, 40.0]), (60, 2)) + r.choice([0.0, 1e6])
-    weights, least = r.uniform(0.1, 2, 60), float(r.choice([0.0, 1.5]))
-    rule = Constraint(1.0, float(r.uniform(2, 9.21)), r.uniform(0.01, 0.1) * np.eye(2), r.uniform(0.1, 3), least)
-    assert linked(points, rule.link).max() >= FEW
-    start = int(r.integers(0, 40))
-    assert same(prefixes(points, weights, start, rule), reference.prefixes(points, weights, start, rule))
-    assert same(partition(points, weights, rule), reference.partition(points, weights, rule))
-
-
 def test_partitions_of_a_thousand_random_sets() -> None:
     joined = noise = 0
     for seed in range(1_000):
@@ -71,25 +57,6 @@ def test_partitions_of_a_thousand_random_sets() -> None:
         joined += group.max() < label.max()
         noise += group.min() < 0
     assert min(joined, noise) > 100
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_links_of_many_points(seed: int) -> None:
-    r = np.random.default_rng(seed)
-    points = r.uniform(0, 30, (600, 2)) + r.choice([0.0, 1e6], 2)
-    assert same(linked(points, LINK), reference.linked(points, LINK))
-    assert 10 < linked(points, LINK).max() < 500
-
-
-@pytest.mark.parametrize("seed", range(200))
-def test_an_element_of_a_partition_is_a_group(seed: int) -> None:
-    """So that groups made of measurements cannot be merged back, nor parted further (3.3)."""
-    points, weights, rule = random_set(np.random.default_rng(seed))
-    group = partition(points, weights, rule)
-    for g in range(group.max() + 1):
-        mine = group == g
-        assert not partition(points[mine], weights[mine], rule).any()
-        assert prefixes(points[mine], weights[mine], int(mine.sum()), rule).tolist() == [True]
 
 
 @pytest.mark.parametrize("seed", range(100))

@@ -63,13 +63,3 @@ def test_exponentials_come_back() -> None:
     at = np.array([0.1, 0.5, 2.0, 8.0])
     assert sum(m.share * np.exp(-at / m.time) for m in found) == pytest.approx(wanted(at), abs=0.01)
     assert sum(m.share for m in found) <= 1.0
-
-
-def test_shares_stay_below_one_and_noise_has_no_memory() -> None:
-    lag = np.geomspace(0.1, 10.0, 14)
-    found = fit_memory([Correlations(lag, np.full(14, 1.2), np.full(14, 1000.0))])
-    assert sum(m.share for m in found) == pytest.approx(1.0, abs=1e-6)
-    noise = np.random.default_rng(0).normal(0, 0.01, 14)
-    assert sum(m.share for m in fit_memory([Correlations(lag, noise, np.full(14, 1000.0))])) < 0.05
-    assert fit_memory([]) == ()
-    assert fit_memory([Correlations(np.zeros(0), np.zeros(0), np.zeros(0))]) == ()

@@ -169,14 +169,6 @@ def test_parameters_of_parting(changed, told):
     assert [e[0] for e in events(derive(tracks(leaving()), FPS, rule=changed))] == [told]
 
 
-def test_standing_side_by_side_links_nobody_if_told_so():
-    still = [walk((10, (0, 0)), start=(0, 0.7 * k)) for k in range(2)]
-    assert derive(tracks(still), FPS)[-1].group.tolist() == [1, 1]
-    assert derive(tracks(still), FPS, rule=LinkRule(idle=0.3))[-1].group.tolist() == [-1, -1]
-    walked = [walk((5, (1, 0)), (5, (0, 0)), start=(0, 0.7 * k)) for k in range(2)]
-    assert derive(tracks(walked), FPS, rule=LinkRule(idle=0.3))[-1].group.tolist() == [1, 1]
-
-
 def passing():
     """Two pairs that walk through each other."""
     return [walk((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
@@ -194,16 +186,6 @@ def test_named_groups_without_events_get_them():
     own[30:] = 7
     named = [t.replace(events=(), derived=False) for t in derive(naming(own), FPS)]
     assert events(with_groups(named, FPS, 1.0)) == [(31, "form", 31, (-1, -1), (7,), (1, 2))]
-
-
-def test_groups_named_by_their_members_alone():
-    pairs = np.tile([3, 3, 8, 8], (120, 1))
-    named = [
-        t.replace(events=(), group=np.full(4, -1), derived=False) for t in derive(tracks(passing(), group=pairs), FPS)
-    ]
-    made = with_groups(named, FPS, 1.0)
-    assert [e[1] for e in events(made)] == ["cross"]
-    assert made[0].group.tolist() == [3, 3, 8, 8]
 
 
 def test_a_kind_that_is_told_is_not_derived_but_the_others_are():
@@ -224,9 +206,3 @@ def test_deriving_again_changes_nothing(people):
         again = derive(made[:length], FPS)
         assert events(again) == events(made[:length])
         assert [t.group.tolist() for t in again] == [t.group.tolist() for t in made[:length]]
-
-
-def test_the_end_tells_what_is_then_known():
-    """The hulls part after frame 58: known in frame 78, or in the last one before."""
-    made = derive(tracks(passing())[:70], FPS)
-    assert [(i, kind) for i, kind, *_ in events(made)] == [(70, "cross")]

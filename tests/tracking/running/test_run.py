@@ -191,18 +191,6 @@ def test_combinations_that_cannot_work():
         track("blob", source(), sensor={"detect_prob": 0.5})
 
 
-def test_nan_is_named():
-    def bad():
-        for frame in frames():
-            box = frame.detections.box.copy()
-            if frame.index == 5:
-                box[1, 0] = np.nan
-            yield frame.replace(detections=frame.detections.replace(box=box))
-
-    with pytest.raises(InputError, match="frame 5: detection 2"):
-        track("blob", Sequence("bad", FPS, LENGTH, bad, has_detections=True))
-
-
 def test_empty_sequences():
     assert len(track("blob", Sequence("none", FPS, 0, lambda: iter(()), has_detections=True))) == 0
     bare = Sequence("bare", FPS, 3, lambda: (Frame(k, k / FPS) for k in (1, 2, 3)), has_detections=True)

@@ -85,14 +85,11 @@ def five_frames() -> Sequence:
 
 def test_whatever_happens_to_the_process_is_an_error_that_names_the_frame(mine):
     kinds = {
-        "python": "TimeoutError: no answer within 2 s",
-        "compiled": "TimeoutError: no answer within 2 s",
+        "python": "TimeoutError: no answer within 2 s", "compiled": "TimeoutError: no answer within 2 s",
         "exit": "ChildProcessError: its process ended with exit code 0",
-        "killed": "ChildProcessError: its process ended with signal 9",
-        "sys_exit": "SystemExit: 0",
-        "interrupt": "RuntimeError: KeyboardInterrupt",
-        "writes": "ValueError: assignment destination is read-only",
-    }
+        "killed": "ChildProcessError: its process ended with signal 9", "sys_exit": "SystemExit: 0",
+        "interrupt": "RuntimeError: KeyboardInterrupt", "writes": "ValueError: assignment destination is read-only",
+    }  # fmt: skip
     with TimeLimited(mine, 2.0) as limited:
         for how, words in kinds.items():
             with pytest.raises(WorkError, match=f"five, frame 3: got {words}") as caught:

@@ -56,14 +56,9 @@ def command(tmp_path, part, statement):
     tmp_path.joinpath("mine.py").write_text(TRACKER.format(part=part, statement=statement))
     tmp_path.joinpath("gt.txt").write_text("".join(f"{k},1,10,10,20,50,1,1,1\n" for k in range(1, 9)))
     return [
-        "track",
-        f"{tmp_path}/mine.py:Tracker",
-        str(tmp_path / "gt.txt"),
-        "--fps",
-        "10",
-        "--out",
+        "track", f"{tmp_path}/mine.py:Tracker", str(tmp_path / "gt.txt"), "--fps", "10", "--out",
         str(tmp_path / "out"),
-    ]
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("statement", STATEMENTS)
@@ -141,15 +136,8 @@ def test_no_exit_from_within_ends_a_command_as_if_all_were_well(tmp_path, capsys
 def search(tmp_path, statement, part, *options):
     tmp_path.joinpath("mine.py").write_text(TRACKER.format(part=part, statement=statement))
     line = [
-        "tune",
-        f"{tmp_path}/mine.py:Tracker",
-        "--suite",
-        "merge",
-        "--set",
-        "scenario.camera.fps=2",
-        "--trials",
-        "3",
-    ]
+        "tune", f"{tmp_path}/mine.py:Tracker", "--suite", "merge", "--set", "scenario.camera.fps=2", "--trials", "3",
+    ]  # fmt: skip
     line += ["--seeds", "0:2", "--validation", "10000:10001", "--test", "20000:20001", "--check", "none", *options]
     return run([*line, "--out", str(tmp_path / "best.toml"), "--json"])
 

@@ -10,7 +10,7 @@ import pytest
 
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from sim.types import Groups, Truth, Unscored
+from sim.types import Groups, Truth
 from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.app.cli import run
@@ -87,15 +87,6 @@ def test_absent_people_are_no_sparse_labels(kind: str) -> None:
     assert found.frames.sum() == found.count == LENGTH
 
 
-def test_rows_that_are_not_scored_and_group_labels_annotate_a_frame() -> None:
-    """Distractors in all frames: nobody else was there. Frames with group labels have nobody, or people."""
-    every = np.arange(1, LENGTH + 1)
-    beside = Unscored(every, np.tile([0.0, 0.0, 9.0, 9.0], (LENGTH, 1)), np.ones(LENGTH, bool))
-    sparse = labelled_in(range(1, LENGTH, 10))
-    assert annotated_frames(sparse.replace(unscored=beside)).step == 1
-    assert annotated_frames(sparse.replace(labelled=np.ones(LENGTH, bool))).step == 1
-
-
 @pytest.fixture(scope="module")
 def merge() -> tuple[Truth, tuple]:
     """A scene with a merge, and the tracks of a tracker in it."""
@@ -138,14 +129,6 @@ def test_sparse_labels_score_as_these_frames_of_both_sides(merge: tuple[Truth, t
     assert ObjectiveScorer(sparse).scores(run, float("nan")) == pytest.approx(known)
     weighted = weighted_scorers(sparse, [run])[0](np.ones((1, dense.length)))[0]
     assert dict(zip(CATALOGUE, weighted, strict=True)) == pytest.approx(dict(found), nan_ok=True)
-
-
-def test_a_prefix_of_sparse_labels_is_scored_as_far_as_it_goes(merge: tuple[Truth, tuple]) -> None:
-    dense, run = merge
-    sparse = thinned(dense, np.arange(1, dense.length + 1, 10))
-    assert evaluate(sparse, run, frames=95).frames == 10
-    known = ObjectiveScorer(sparse).scores(run[:95], float("nan"))
-    assert known["HOTA"] == evaluate(sparse, run[:95], frames=95)["HOTA"]
 
 
 def test_events_start_in_the_next_frame_that_is_scored() -> None:

@@ -8,13 +8,6 @@ import pytest
 from tracking.scoring.consistency import mean_band, normalised, normalised_square, whiteness, whiteness_band
 
 
-def test_normalised_by_hand() -> None:
-    covariances = np.array([[[4.0, 0.0], [0.0, 9.0]], [[2.0, 1.0], [1.0, 2.0]]])
-    errors = np.array([[2.0, 3.0], [1.0, 0.0]])
-    assert normalised_square(errors, covariances) == pytest.approx([2.0, 2 / 3])  # inverse of [[2, 1], [1, 2]] is …/3
-    assert normalised(errors, covariances)[0] == pytest.approx([1.0, 1.0])
-
-
 def test_bands_by_tables() -> None:
     """Chi-square with 100 degrees of freedom has its 2.5 and 97.5 % points at 74.22 and 129.56."""
     assert mean_band(50, 2) == pytest.approx((74.22 / 50, 129.56 / 50), abs=1e-3)

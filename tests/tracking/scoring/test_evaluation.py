@@ -153,16 +153,6 @@ def test_nothing_said_and_nothing_there() -> None:
     assert evaluate(truth([Scene({})] * 4), tracks([Scene({})] * 4))["FP"] == 0
 
 
-def test_the_similarity_is_the_one_asked_for() -> None:
-    box = np.array([[0, 0, 10, 20], [100, 0, 10, 20]], float)
-    true = truth([Scene(TWO)], box=box)
-    seen = [t.replace(box=box + np.array([5, 0, 0, 0])) for t in tracks([Scene(TWO)])]
-    assert evaluate(true, seen).similarity == "ground"
-    assert evaluate(true, seen, similarity="boxes")["MOTA"] == -1  # IoU 1/3
-    assert evaluate(true, seen, similarity="ground")["MOTA"] == 1
-    assert evaluate(true, seen, similarity="image")["MOTA"] == 1  # 5 px of 80
-
-
 @pytest.mark.parametrize(("similarity", "lacking"), [("boxes", "no boxes"), ("image", "in the image")])
 def test_what_is_not_there_cannot_be_compared(similarity: str, lacking: str) -> None:
     with pytest.raises(IncomparableError, match=lacking):

@@ -49,28 +49,19 @@ def test_equal_to_trackeval_in_a_crowd(seed: int) -> None:
 @pytest.mark.parametrize(
     "case",
     [
-        ([[]], [[]], [np.zeros((0, 0))]),
-        ([[1, 2], [2]], [[], []], [np.zeros((2, 0)), np.zeros((1, 0))]),
+        ([[]], [[]], [np.zeros((0, 0))]), ([[1, 2], [2]], [[], []], [np.zeros((2, 0)), np.zeros((1, 0))]),
         ([[], []], [[4], [4, 5]], [np.zeros((0, 1)), np.zeros((0, 2))]),
         ([[1], [], [1]], [[4], [4], [5]], [np.ones((1, 1)), np.zeros((0, 1)), np.ones((1, 1))]),
         ([[1], [1], [1]], [[4], [], [4]], [np.ones((1, 1)), np.zeros((1, 0)), np.ones((1, 1))]),
         ([[1], [1], [1]], [[4], [5], [4]], [np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1))]),
-        ([[1, 2]], [[4, 5]], [np.zeros((2, 2))]),
-        ([[1, 2]], [[4, 5]], [np.full((2, 2), 0.5)]),
+        ([[1, 2]], [[4, 5]], [np.zeros((2, 2))]), ([[1, 2]], [[4, 5]], [np.full((2, 2), 0.5)]),
         ([[1]], [[4]], [np.full((1, 1), 0.5 - 1e-16)]),
     ],
     ids=[
-        "nothing",
-        "no tracks",
-        "no truth",
-        "nobody true",
-        "nobody said",
-        "a miss",
-        "far",
-        "all equal",
+        "nothing", "no tracks", "no truth", "nobody true", "nobody said", "a miss", "far", "all equal",
         "rounded half",
     ],
-)
+)  # fmt: skip
 def test_equal_to_trackeval_at_the_edges(case) -> None:
     assert_equal_to_trackeval(*case)
 
@@ -87,12 +78,3 @@ def test_numbers_of_ids_and_order_of_rows_change_nothing(seed: int) -> None:
     assert people_scores(matrix_pairs(*zip(*moved, strict=True))) == pytest.approx(
         people_scores(matrix_pairs(true, est, similarity)), abs=1e-12
     )
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_scores_of_every_beginning(seed: int) -> None:
-    true, est, similarity = random_case(seed)
-    whole = matrix_pairs(true, est, similarity)
-    for n in range(1, len(true) + 1):
-        part = whole.in_frames(np.arange(len(true)) < n)
-        assert people_scores(part) == people_scores(matrix_pairs(true[:n], est[:n], similarity[:n]))

@@ -10,7 +10,6 @@ from sim.sequence import simulate
 from sim.types import Truth
 from tracking import track
 from tracking.scoring import evaluate, score_arrays, user_arrays
-from tracking.scoring.people_comparison import IncomparableError
 
 ROWS = {"frame": [1, 1, 2, 2], "id": [1, 2, 1, 2], "pos": [[0, 0], [1, 0], [0, 0], [1, 0]], "group": [7, 7, 7, 7]}
 
@@ -84,27 +83,22 @@ def test_empty_sides_are_no_error() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"grp": [1, 1, 1, 1]}, "'grp'"),
-        ({"pos": None}, "frame, id, and pos or box"),
-        ({"pos": [0, 1, 0, 1]}, r"pos of shape \(4,\)"),
-        ({"id": [1, 2, 1]}, "3 rows of id"),
+        ({"grp": [1, 1, 1, 1]}, "'grp'"), ({"pos": None}, "frame, id, and pos or box"),
+        ({"pos": [0, 1, 0, 1]}, r"pos of shape \(4,\)"), ({"id": [1, 2, 1]}, "3 rows of id"),
         ({"frame": [0, 0, 1, 1]}, "got 0 in frame, expected numbers from 1 on"),
         ({"frame": [1, 1, 2, 10**7]}, "got 10000000.* in frame, expected numbers from 1 on, to 1,000,000"),
         ({"frame": [1, 1, 2, 1e300]}, "1e.300 in frame"),
-        ({"id": [1, -2, 1, 2]}, "-2 in id, expected numbers from 0"),
-        ({"group": [7, -2, 7, 7]}, "-2 in group"),
+        ({"id": [1, -2, 1, 2]}, "-2 in id, expected numbers from 0"), ({"group": [7, -2, 7, 7]}, "-2 in group"),
         ({"id": ["a", "b", "a", "b"]}, "'a' in id, expected whole numbers: number them"),
-        ({"id": [None, 1, 2, 3]}, "None"),
-        ({"pos": [["x", "y"]] * 4}, "'x' in pos, expected numbers"),
+        ({"id": [None, 1, 2, 3]}, "None"), ({"pos": [["x", "y"]] * 4}, "'x' in pos, expected numbers"),
         ({"pos": [[0, 0], [1e200, 0], [0, 0], [1, 0]]}, "1e.200 in pos, expected numbers from -1e.06 to 1,000,000"),
         ({"pos": None, "box": [[0, 0, 1, 0]] * 4}, "box without area"),
         ({"frame": np.ones(5001), "id": np.arange(5001), "pos": np.zeros((5001, 2)), "group": None}, "5001 rows"),
-        ({"id": [1, 2.5, 1, 2]}, "not whole"),
-        ({"pos": [[0, 0], [np.nan, 0], [0, 0], [1, 0]]}, "not finite"),
+        ({"id": [1, 2.5, 1, 2]}, "not whole"), ({"pos": [[0, 0], [np.nan, 0], [0, 0], [1, 0]]}, "not finite"),
         ({"frame": [1, 1, 1, 1]}, "id 1 is twice in frame 1"),
         ({"pos": None, "box": [[0, 0, 1, 1]] * 4}, "one of them on both"),
     ],
-)
+)  # fmt: skip
 def test_wrong_columns(change: dict, said: str) -> None:
     wrong = {name: values for name, values in (ROWS | change).items() if values is not None}
     with pytest.raises(ValueError, match=said):
@@ -128,13 +122,3 @@ def test_frames_that_are_left_out_change_nothing(seed: int, monkeypatch) -> None
     sparse = dict(score_arrays(true, est, fps=5))
     monkeypatch.setattr(user_arrays, "_live_frames", lambda frame, length, fps: np.arange(1, length + 1))
     assert dict(score_arrays(true, est, fps=5)) == pytest.approx(sparse, nan_ok=True)
-
-
-@pytest.mark.parametrize("scale", [0.0, -20.0, float("nan"), float("inf")])
-def test_positions_in_the_image_are_not_compared_without_a_scale(scale: float) -> None:
-    table = {"frame": [1, 2], "id": [1, 1], "box": [[0, 0, 10, 20], [1, 0, 10, 20]]}
-    with pytest.raises(IncomparableError, match="no image scale"):
-        score_arrays(table, table, fps=10.0, similarity="image", px_per_m=scale)
-    nobody = {"frame": [], "id": [], "box": []}
-    assert score_arrays(table, nobody, fps=10.0, similarity="image", px_per_m=scale)["MOTA"] == 0.0
-    assert score_arrays(table, table, fps=10.0, px_per_m=scale)["HOTA"] == 1.0

@@ -30,13 +30,10 @@ def test_unknown_scores_are_left_out_of_the_mean():
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        (["HOTTA"], "did you mean HOTA"),
-        (["hota"], "did you mean HOTA"),
-        (["HOTA", "HOTA"], "HOTA twice"),
-        ([], "got none"),
-        (["fps"], "docs/reference/metrics.md"),
+        (["HOTTA"], "did you mean HOTA"), (["hota"], "did you mean HOTA"), (["HOTA", "HOTA"], "HOTA twice"),
+        ([], "got none"), (["fps"], "docs/reference/metrics.md"),
     ],
-)
+)  # fmt: skip
 def test_wrong_keys_are_one_line(keys, words):
     with pytest.raises(InputError, match=words) as caught:
         goals_of(keys)

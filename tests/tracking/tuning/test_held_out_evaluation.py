@@ -74,12 +74,6 @@ def test_what_brings_nothing_is_taken_back(made):
     assert len(game.seen) == 3, "what is at its default is not tried"
 
 
-def test_a_default_that_is_refused_beside_the_rest_stays_away(made):
-    game = Game({}, refused={"skip": 0})
-    kept, value = HeldOutEvaluator(made, game).simplified(ToyConfig(skip=3), 0.2, ["skip"])
-    assert (kept, value) == (ToyConfig(skip=3), 0.2)
-
-
 def test_who_cannot_be_played_on_validation_scenes_is_out(made):
     game = Game({}, refused={"skip": 3})
     candidates = [Candidate(0, ToyConfig(), (0.1,)), Candidate(4, ToyConfig(skip=3), (0.9,))]

@@ -10,8 +10,6 @@ import pytest
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import toy_plan
 from tracking.tuning.comparison import Candidate, TrialRecord
-from tracking.tuning.goals import Goal
-from tracking.tuning.plots import BLUE, ORANGE
 from tracking.tuning.result import TuningResult
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -55,21 +53,3 @@ def test_trials_given_up_are_hollow(found):
     near = tuple(replace(t, values=(0.45,)) if t.pruned else t for t in found.trials)
     shown = dots(replace(found, trials=near).plots()[".history.svg"])
     assert [fill for _, _, fill in shown].count("#fff") == 1
-
-
-def test_importance_has_a_bar_for_each_parameter(found):
-    bars = [r.attrib for r in ElementTree.fromstring(found.plots()[".importance.svg"]).iter(f"{SVG}rect")][1:]
-    assert [b["fill"] for b in bars] == [ORANGE, BLUE, BLUE, BLUE]
-    assert float(bars[0]["width"]) / float(bars[1]["width"]) == pytest.approx(7 / 3, rel=1e-3)
-    assert "0.1 → 1 m" in found.plots()[".importance.svg"]
-
-
-def test_front_is_drawn_for_two_goals(found):
-    made = replace(found.plan, goals=(Goal("HOTA"), Goal("GOSPA", False)))
-    configs = [found.default, ToyConfig(skip=1), ToyConfig(skip=2)]
-    points = [(0.5, 2.0), (0.7, 3.0), (0.4, 4.0)]
-    three = [Candidate(k, config, (), p) for k, (config, p) in enumerate(zip(configs, points, strict=True))]
-    two = replace(found, plan=made, candidates=tuple(three), front=tuple(three[:2]))
-    text = two.plots()[".front.svg"]
-    assert [fill for _, _, fill in dots(text)] == [ORANGE, ORANGE, BLUE]
-    assert "defaults" in text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 import shutil
@@ -185,28 +184,11 @@ def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_two_of_one_name_are_refused(data: Path, tmp_path: Path) -> None:
-    both = tmp_path / "both"
-    for part in ("one", "two"):
-        (both / part).mkdir(parents=True)
-        (both / part / "flockscope-train").symlink_to(data / "flockscope-train")
-    with pytest.raises(InputError, match=r"two sequences flockscope-train/a\.2-s00000"):
-        webdataset(both, tmp_path / "out")
-
-
 @pytest.mark.parametrize(
     ("text", "size"), [("1", 1), ("500MB", 500_000_000), ("1.5 GB", 1_500_000_000), ("20 kB", 20_000), ("7B", 7)]
 )
 def test_sizes(text: str, size: int) -> None:
     assert size_of(text) == size
-
-
-def test_a_stream_of_a_shard_needs_no_seeking(data: Path, tmp_path: Path) -> None:
-    """As object stores give it."""
-    webdataset(data, tmp_path / "out")
-    body = (tmp_path / "out" / "shard-000000.tar").read_bytes()
-    with tarfile.open(fileobj=io.BytesIO(body), mode="r|") as tar:
-        assert sum(1 for _ in tar) == len(members(tmp_path / "out" / "shard-000000.tar"))
 
 
 def copied(data: Path, tmp_path: Path, change: Callable[[dict[str, Any], Path], None]) -> Path:

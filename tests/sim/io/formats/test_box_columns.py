@@ -43,11 +43,6 @@ def test_rows_without_ids_are_no_guess(tmp_path, score):
     assert "as the first line" in error.value.remedy
 
 
-@pytest.mark.parametrize("ids", [True, False])
-def test_rows_with_ids_are_read(tmp_path, ids):
-    assert open_source(written(tmp_path, people(ids)), fps=10)[0].length == FRAMES
-
-
 def test_shares_of_the_picture_are_refused_and_scaled(tmp_path):
     rows = people(ids=False)
     scaled = written(tmp_path, np.c_[rows[:, :2], rows[:, 2:] / (1920, 1080, 1920, 1080)])
@@ -115,14 +110,6 @@ def test_corners(tmp_path, ids):
         written(tmp_path / "gt", rows, "gt.txt")
         with pytest.warns(UserWarning, match="look like x1,y1,x2,y2"):
             _ = open_source(tmp_path, fps=10)[0].truth
-
-
-def test_people_at_the_left_edge_are_no_corners(tmp_path):
-    """Widths above the left edge that do not vary with it."""
-    rows = people(ids=False)
-    rows[:, 2] = np.resize((3, 20, 9, 15, 6), len(rows))
-    rows[:, 3] = 5
-    open_source(written(tmp_path, rows), fps=10)
 
 
 @pytest.mark.parametrize(

@@ -141,12 +141,6 @@ def test_categories_of_people_and_cars(tmp_path):
     assert set(open_source(path, fps=25, person_class=4)[0].truth.id) == {3, 4, 5}
 
 
-@pytest.mark.filterwarnings("always")
-def test_categories_have_no_distractors(tmp_path):
-    """Class 2 of VisDrone is a person who sits, no distractor of MOTChallenge."""
-    assert open_source(visdrone(tmp_path, lambda k: 1 + k % 2), fps=25)[0].truth.unscored is None
-
-
 @pytest.mark.parametrize("unit", [1, 100, 1000])
 @pytest.mark.parametrize("header", ["", "frame,id,x,y\n"])
 def test_positions_alone_are_in_metres_or_refused(tmp_path, unit, header):

@@ -109,23 +109,16 @@ GOOD = "1,1,0,0,5,5,1,1,1\n"
 @pytest.mark.parametrize(
     ("gt", "line", "word"),
     [
-        (GOOD + "2,1,0,0,nan,5,1,1,1\n", 2, "finite"),
-        (GOOD + "\n2,1,0,0,5,0,1,1,1\n", 3, "above 0"),
-        (GOOD + "1,1,0,0,5,5,1,1,1\n", 2, "once"),
-        (GOOD + "4,1,0,0,5,5,1,1,1\n", 2, "1 to 3"),
-        (GOOD + "0,1,0,0,5,5,1,1,1\n", 2, "1 to 3"),
-        (GOOD + "1.5,1,0,0,5,5,1,1,1\n", 2, "whole"),
-        (GOOD + "2,1,0,0,5,x,1,1,1\n", 2, "'x'"),
-        (GOOD + "2,1,0,0,5\n", 2, "9 columns"),
-        (GOOD + "2,1,0,0,5,5,1,1,1.5\n", 2, "visibility"),
-        ("1,2,3\n", 1, "columns"),
-        (GOOD + "1,2,1e200,0,5,5,1,1,1\n", 2, "within 1e"),
-        (GOOD + "1,1.5,0,0,5,5,1,1,1\n", 2, "whole number"),
+        (GOOD + "2,1,0,0,nan,5,1,1,1\n", 2, "finite"), (GOOD + "\n2,1,0,0,5,0,1,1,1\n", 3, "above 0"),
+        (GOOD + "1,1,0,0,5,5,1,1,1\n", 2, "once"), (GOOD + "4,1,0,0,5,5,1,1,1\n", 2, "1 to 3"),
+        (GOOD + "0,1,0,0,5,5,1,1,1\n", 2, "1 to 3"), (GOOD + "1.5,1,0,0,5,5,1,1,1\n", 2, "whole"),
+        (GOOD + "2,1,0,0,5,x,1,1,1\n", 2, "'x'"), (GOOD + "2,1,0,0,5\n", 2, "9 columns"),
+        (GOOD + "2,1,0,0,5,5,1,1,1.5\n", 2, "visibility"), ("1,2,3\n", 1, "columns"),
+        (GOOD + "1,2,1e200,0,5,5,1,1,1\n", 2, "within 1e"), (GOOD + "1,1.5,0,0,5,5,1,1,1\n", 2, "whole number"),
         (GOOD + "1,9007199254740993,0,0,5,5,1,1,1\n", 2, "whole number"),
-        (GOOD + "1,1_0,0,0,5,5,1,1,1\n", 2, "'1_0'"),
-        (GOOD + "1,²,0,0,5,5,1,1,1\n", 2, "'²'"),
+        (GOOD + "1,1_0,0,0,5,5,1,1,1\n", 2, "'1_0'"), (GOOD + "1,²,0,0,5,5,1,1,1\n", 2, "'²'"),
     ],
-)
+)  # fmt: skip
 def test_bad_rows_are_one_line(tmp_path, gt, line, word):
     with pytest.raises(InputError, match=word) as error:
         open_source(folder(tmp_path, gt))[0].truth  # noqa: B018

@@ -51,12 +51,6 @@ def test_biwi_groups_survive_their_traps(tmp_path):
         assert biwi.read_groups(folder / "groups.txt") == {1: 1, 2: 1, 3: 1}
 
 
-def test_biwi_slots_take_the_most_frequent_step():
-    assert biwi.frame_numbers(np.array([1, 11, 21, 81, 81])).tolist() == [1, 2, 3, 9, 9]
-    assert biwi.frame_numbers(np.array([780, 786, 792, 799])).tolist() == [1, 2, 3, 4]
-    assert biwi.frame_numbers(np.array([5, 5])).tolist() == [1, 1]
-
-
 def test_biwi_without_groups_is_not_labelled(tmp_path):
     folder = biwi_folder(tmp_path)
     (folder / "groups.txt").unlink()
@@ -194,18 +188,6 @@ def test_bad_caviar_is_one_line(tmp_path, frames, tag, word):
 
 
 STEP = 6
-
-
-def shifted(*grids):
-    """Rows (frame, id, x, y) of one person per grid, which is annotated every 6 frames, from its first to its last."""
-    return [(f, k, f / 10, k) for k, (first, last) in enumerate(grids, 1) for f in range(first, last, STEP)]
-
-
-def test_biwi_on_a_grid_that_is_shifted_by_half_a_step(tmp_path):
-    """Rounding half to even would put 795 and 801 into the same slot, and leave the slot between them empty."""
-    rows = shifted((780, 792), (795, 830))
-    (s,) = open_source(biwi_folder(tmp_path, "", rows))
-    assert s.truth.frame.tolist() == [1, 2, 4, 5, 6, 7, 8, 9]
 
 
 def test_biwi_that_changes_back_to_the_first_grid(tmp_path):

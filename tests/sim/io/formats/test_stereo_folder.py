@@ -52,15 +52,6 @@ def test_a_calibration_that_is_no_pair_is_refused(tmp_path, changed, place) -> N
     assert error.value.place == place
 
 
-@pytest.mark.parametrize(
-    "text", ["", "no yaml", "%YAML:1.0\n---\nP1: [", "\x00\x01", "%YAML:1.0\n---\nimage_width: [1.., 2]\n"]
-)
-def test_damaged_yaml_is_an_input_error(tmp_path, text) -> None:
-    (tmp_path / "pair.yml").write_text(text)
-    with pytest.raises(InputError):
-        read_calibration(tmp_path / "pair.yml")
-
-
 def test_a_folder_with_right_pictures_is_a_stereo_recording(tmp_path) -> None:
     r = np.random.default_rng(0)
     camera = rig(40.0).replace(image=(SIZE[1], SIZE[0]), centre_px=(SIZE[1] / 2, SIZE[0] / 2), focal_px=(50.0, 50.0))

@@ -5,27 +5,18 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.pictures import video_decoding
 from sim.io.source import open_source
 from sim.types import Camera
 from tests.small_videos import SIZE, cut, damage, disc, picture, write_jpegs, write_video
 
 KINDS = {
-    "x264.mp4": {},
-    "long-groups.mp4": {"options": {"g": "250", "bf": "3"}},
-    "h264-in.avi": {},
-    "mpeg4.avi": {"codec": "mpeg4"},
-    "jpegs.avi": {"codec": "mjpeg", "pix_fmt": "yuvj420p"},
-    "mpeg2.mpg": {"codec": "mpeg2video", "rate": 25},
-    "transport.ts": {"rate": 25},
-    "bare.h264": {"rate": 25},
-    "bare.y4m": {"codec": "wrapped_avframe"},
-    "media.wmv": {"codec": "wmv2"},
-    "vp9.webm": {"codec": "libvpx-vp9"},
-    "quick.mov": {"audio": True},
-    "grey.mkv": {"codec": "ffv1", "pix_fmt": "gray"},
+    "x264.mp4": {}, "long-groups.mp4": {"options": {"g": "250", "bf": "3"}}, "h264-in.avi": {},
+    "mpeg4.avi": {"codec": "mpeg4"}, "jpegs.avi": {"codec": "mjpeg", "pix_fmt": "yuvj420p"},
+    "mpeg2.mpg": {"codec": "mpeg2video", "rate": 25}, "transport.ts": {"rate": 25}, "bare.h264": {"rate": 25},
+    "bare.y4m": {"codec": "wrapped_avframe"}, "media.wmv": {"codec": "wmv2"}, "vp9.webm": {"codec": "libvpx-vp9"},
+    "quick.mov": {"audio": True}, "grey.mkv": {"codec": "ffv1", "pix_fmt": "gray"},
     "10-bit.mkv": {"codec": "ffv1", "pix_fmt": "yuv420p10le"},
-}
+}  # fmt: skip
 
 
 def one(path, **options):
@@ -259,18 +250,6 @@ def test_the_background_sample(tmp_path, name, asked, wanted, words):
     frames = [f.image for f in sequence]
     assert sequence.source["background"] == words
     assert np.array_equal(sequence.background(), np.stack([frames[k - 1] for k in wanted]))
-
-
-@pytest.mark.parametrize("wanted", [[5, 30, 45], [1, 60], [10, 11], [4, 5, 6], [60], [1]])
-def test_any_frames_of_any_groups(tmp_path, wanted):
-    """Also those that the decoder still holds when the next group is left out."""
-    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(60)], options={"g": "5", "bf": "3"})
-    index = video_decoding.index_packets(path)
-    assert sum(index.keys) >= 12
-    every = dict(video_decoding.decode_frames(path, index))
-    found = dict(video_decoding.decode_frames(path, index, wanted))
-    assert list(found) == wanted
-    assert all(np.array_equal(found[k], every[k]) for k in wanted)
 
 
 def test_a_sample_longer_than_the_video(tmp_path):

@@ -163,12 +163,6 @@ def test_pictures_that_may_be_shifted_against_labels_are_refused(tmp_path, files
         open_source(folder(tmp_path / "a", files, gt=rows(*frames), ini=ini))
 
 
-def test_more_pictures_than_frames_are_told(tmp_path):
-    path = folder(tmp_path / "a", names(range(1, 6)), ini="seqLength=3\n")
-    with pytest.warns(UserWarning, match=r"2 pictures beyond frame 3 \(seqLength\) are not read"):
-        open_source(path)
-
-
 def test_side_files_are_ignored(tmp_path):
     """Files of macOS, Windows and network disks: beside pictures, sequences, videos and their folders."""
     path = folder(tmp_path / "data/a", names(range(1, 4)), gt=rows(1, 2, 3))

@@ -79,15 +79,6 @@ def test_a_deleted_or_cut_file_is_named(tmp_path, make_tracks, name):
     assert error.value.file == str(folder / name)
 
 
-def test_tables_without_a_seal_were_never_finished(tmp_path, make_tracks):
-    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
-    (folder / "run.json").unlink()
-    with pytest.raises(InputError, match="incomplete: track again"):
-        read_tracks(folder)
-    (problem,) = validate(folder)
-    assert "incomplete: track again" in problem.line()
-
-
 def test_a_run_of_an_older_version_is_one_line(tmp_path, make_tracks):
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
     (folder / "run.json").write_bytes(tables.json_document({"format": 1, **INFO, "boxes": "measured"}))
@@ -128,15 +119,10 @@ def _parquet() -> bytes:
 
 
 FOREIGN = {
-    "tracks.parquet": _parquet(),
-    "a broken tracks.parquet": b"PAR1",
-    "run.json": b'{"boxes": [1, 2], "format": 1}',
-    "a broken run.json": b'{"boxes": "measured"',
-    "a list in run.json": b'["boxes"]',
-    "another run.json": b'{"mine": 1}',
-    "tracks.txt": b"mine",
-    "groups.csv": b"mine",
-}
+    "tracks.parquet": _parquet(), "a broken tracks.parquet": b"PAR1", "run.json": b'{"boxes": [1, 2], "format": 1}',
+    "a broken run.json": b'{"boxes": "measured"', "a list in run.json": b'["boxes"]',
+    "another run.json": b'{"mine": 1}', "tracks.txt": b"mine", "groups.csv": b"mine",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", FOREIGN)

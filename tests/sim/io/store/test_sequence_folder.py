@@ -127,17 +127,13 @@ def swap(path, old, new):
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
-        ("gt/gt.txt", ",1,1,", ",1,9,"),
-        ("gt/groups.csv", "1 2", "1 3"),
-        ("gt/events.json", '"members": [1', '"members": [99'),
-        ("gt/events.json", '"end": 12', '"end": 99'),
-        ("gt/script.json", '"event": null', '"event": 9'),
-        ("det/det.txt", ",-1,", ",-1,7"),
+        ("gt/gt.txt", ",1,1,", ",1,9,"), ("gt/groups.csv", "1 2", "1 3"),
+        ("gt/events.json", '"members": [1', '"members": [99'), ("gt/events.json", '"end": 12', '"end": 99'),
+        ("gt/script.json", '"event": null', '"event": 9'), ("det/det.txt", ",-1,", ",-1,7"),
         ("gt/near.csv", "start,end,a,b\n", "start,end,a,b\n1,2,1,2\n"),
-        ("seqinfo.ini", "seqLength=12", "seqLength=13"),
-        ("scenario.toml", "fake", "fakes"),
+        ("seqinfo.ini", "seqLength=12", "seqLength=13"), ("scenario.toml", "fake", "fakes"),
     ],
-)
+)  # fmt: skip
 def test_validate_sees_what_disagrees(tmp_path, make_sequence, name, old, new):
     folder = tmp_path / "a"
     sequence_folder.write_sequence(folder, make_sequence(5), scenario=SCENARIO, seed=5)

@@ -45,18 +45,13 @@ def test_replay_track_score_and_look(walk: Path, tmp_path: Path, capsys: pytest.
 @pytest.mark.parametrize(
     ("words", "place", "got"),
     [
-        (["--seeds", "0"], "--seeds", "train"),
-        (["--start", "500"], "--start", "500 s"),
-        (["--duration", "0"], "--duration", "0"),
-        (["--set", "camera.height=0.4"], "camera.height", "out of view"),
-        (["--set", "camra.fps=5"], "camra", "camra"),
-        (["--camera", "none.toml"], "", "no such file"),
-        (["--camera", "bad.toml"], "world", "world"),
-        (["--streams", "none", "--images", "png"], "--images", "png"),
-        (["--streams", "left,up"], "streams", "up"),
-        (["--sensor", "none.toml"], "", "no such file"),
+        (["--seeds", "0"], "--seeds", "train"), (["--start", "500"], "--start", "500 s"),
+        (["--duration", "0"], "--duration", "0"), (["--set", "camera.height=0.4"], "camera.height", "out of view"),
+        (["--set", "camra.fps=5"], "camra", "camra"), (["--camera", "none.toml"], "", "no such file"),
+        (["--camera", "bad.toml"], "world", "world"), (["--streams", "none", "--images", "png"], "--images", "png"),
+        (["--streams", "left,up"], "streams", "up"), (["--sensor", "none.toml"], "", "no such file"),
     ],
-)
+)  # fmt: skip
 def test_wrong_input_is_one_line(
     walk: Path, words: list[str], place: str, got: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],

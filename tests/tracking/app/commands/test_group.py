@@ -29,13 +29,10 @@ FPS = 10.0
 Place = Callable[[float], tuple[float, float]]
 
 WALK: dict[int, Place] = {
-    1: lambda t: (1 + 1.2 * t, 2.0),
-    2: lambda t: (1 + 1.2 * t, 2.8),
-    3: lambda t: (1 + 1.2 * t, 3.6 + 0.8 * max(0.0, 4 - t)),
-    4: lambda t: (26 - 1.1 * t, 2.4),
-    5: lambda t: (1 + 1.2 * t, 9.0),
-    6: lambda t: (26 - 1.1 * t, 3.2),
-}
+    1: lambda t: (1 + 1.2 * t, 2.0), 2: lambda t: (1 + 1.2 * t, 2.8),
+    3: lambda t: (1 + 1.2 * t, 3.6 + 0.8 * max(0.0, 4 - t)), 4: lambda t: (26 - 1.1 * t, 2.4),
+    5: lambda t: (1 + 1.2 * t, 9.0), 6: lambda t: (26 - 1.1 * t, 3.2),
+}  # fmt: skip
 """Two people walk together, a third joins them, two others walk through them, one stays away."""
 
 

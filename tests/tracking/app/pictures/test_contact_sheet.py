@@ -43,11 +43,6 @@ def test_the_part_of_the_world_where_people_are_is_shown(sequence: Sequence, tru
     assert (high <= sequence.scene.size + 1).all()
 
 
-def test_merges_and_splits_outrank_the_rest() -> None:
-    events = dict.fromkeys(range(10, 100, 10), "form") | {5: "merge", 150: "split"}
-    assert {5, 150} <= set(choose_frames(bare(200, events), 3))
-
-
 @settings(deadline=None)
 @given(
     length=st.integers(1, 300),

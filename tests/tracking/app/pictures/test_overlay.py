@@ -108,12 +108,6 @@ def test_what_a_frame_lacks_is_told() -> None:
     assert [number(p, STRIP, 2) for p in made] == [1, 1, 3]
 
 
-def test_ellipses_hold_95_percent() -> None:
-    ring = layer_of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None).at(1).ellipse[0]
-    offset = ring - [45, 40]
-    np.testing.assert_allclose((offset**2 / [4.0, 1.0]).sum(axis=1), 5.991, rtol=1e-6)
-
-
 def test_people_on_the_ground_stand_upright_in_the_picture(sequence: Sequence, tracks: list[Tracks]) -> None:
     """Without boxes of their own; ellipses lie on the ground round their feet."""
     plain = [t.replace(box=None) for t in tracks]
@@ -123,15 +117,6 @@ def test_people_on_the_ground_stand_upright_in_the_picture(sequence: Sequence, t
     assert (wide > seen.box[:, 2]).all()
     assert (np.abs(seen.ellipse.mean(axis=1) - seen.at) < 60).all()
     assert np.isnan(layer_of_tracks(plain, None, None).at(1).box).all()
-
-
-def test_events_stand_for_a_while_from_when_they_are_known() -> None:
-    merge = GroupEvent("merge", 2, 4, 6, (1, 2), (1,), (1, 2), (0.0, 0.0))
-    enter = GroupEvent("enter", 6, 6, 6, (), (1,), (1,), (0.0, 0.0))
-    tracks = [answer(k, {}, events=(merge, enter) if k == 6 else ()) for k in range(1, 20)]
-    side = layer_of_tracks(tracks, None, None)
-    assert [k for k in range(1, 20) if side.recent_events(k, 5.0)] == [6, 7, 8, 9, 10]
-    assert [e.kind for e in side.recent_events(6, 5.0)] == ["merge"]
 
 
 def coloured(picture: np.ndarray, group: int) -> np.ndarray:

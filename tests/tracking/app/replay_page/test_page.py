@@ -33,14 +33,10 @@ def decode(side: dict) -> dict[str, np.ndarray]:
     frame = np.concatenate([np.arange(a, a + n) for _, a, n in stints]) if len(stints) else np.zeros(0)
     pairs = np.array(side["group"]).reshape(-1, 2)
     return {
-        "id": np.repeat(stints[:, 0], stints[:, 2]),
-        "frame": frame,
-        "group": np.repeat(pairs[:, 0], pairs[:, 1]),
-        "x": column(side["x"]) / side["scale"],
-        "y": column(side["y"]) / side["scale"],
-        "angle": column(side["a"]),
+        "id": np.repeat(stints[:, 0], stints[:, 2]), "frame": frame, "group": np.repeat(pairs[:, 0], pairs[:, 1]),
+        "x": column(side["x"]) / side["scale"], "y": column(side["y"]) / side["scale"], "angle": column(side["a"]),
         "box": np.stack([column(c) / 2 for c in side["box"]], axis=1) if side["box"] else None,
-    }
+    }  # fmt: skip
 
 
 def test_truth_comes_back(sequence: Sequence, truth: Truth) -> None:

@@ -148,14 +148,6 @@ def test_a_confirmed_person_who_stands_is_not_learned_as_background(monkeypatch)
     assert mine(made[-1], stands[0][0])
 
 
-def test_same_pictures_same_bytes():
-    frames = [[(60 + 4 * k, 180, TALL), (200 - 3 * k, 175, TALL)] for k in range(25)]
-    first, again = track(frames), track(frames)
-    for a, b in zip(first, again, strict=True):
-        for name in ("id", "pos", "vel", "cov", "box", "score"):
-            assert getattr(a, name).tobytes() == getattr(b, name).tobytes()
-
-
 def test_a_moved_scene_moves_the_answer():
     """All pictures shifted to the right by 24 px: the same tracks, 24 px to the right."""
     people = [[(60 + 4 * k, 180, TALL), (200 - 3 * k, 175, TALL)] for k in range(25)]

@@ -174,18 +174,9 @@ def test_masses_sum_to_one(seed: int) -> None:
     weights = np.where(np.arange(12) < 5, 1.0, 0.0)
     hold = np.zeros(1, bool)
     alone = (
-        y[:5],
-        weights[:5],
-        np.zeros((1, 5)),
-        np.full(5, -1),
-        np.ones(5, np.int64),
-        np.zeros(5),
-        x,
-        P,
-        extent,
-        size,
+        y[:5], weights[:5], np.zeros((1, 5)), np.full(5, -1), np.ones(5, np.int64), np.zeros(5), x, P, extent, size,
         hold,
-    )
+    )  # fmt: skip
     hits = np.where(np.arange(12) < 5, 1, 2)
     among = y, weights, np.arange(12.0)[None], np.full(12, -1), hits, np.zeros(12), x, P, extent, size, hold
     for a, b in zip(kernel(alone, PLAIN)[3:], kernel(among, PLAIN)[3:], strict=True):
@@ -242,13 +233,10 @@ def settled(gate, correct, frames=200, start=1.0, count=4_000):
 @pytest.mark.parametrize(
     ("gate", "correct", "extent", "inside"),
     [
-        (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2)),
-        (9.21, False, 0.943, 1 - np.exp(-0.943 * 9.21 / 2)),
-        (13.8, False, 0.993, 1.0),
-        (9.21, True, 1.0, 0.99),
-        (13.8, True, 1.0, 1.0),
+        (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2)), (9.21, False, 0.943, 1 - np.exp(-0.943 * 9.21 / 2)),
+        (13.8, False, 0.993, 1.0), (9.21, True, 1.0, 0.99), (13.8, True, 1.0, 1.0),
     ],
-)
+)  # fmt: skip
 def test_what_the_gate_cuts_off(gate: float, correct: bool, extent: float, inside: float, start: float) -> None:
     """E3: the fixed point of s = c(gate s), or of s = c(gate s) / c(gate), which is 1."""
     found = settled(gate, correct, start=start)

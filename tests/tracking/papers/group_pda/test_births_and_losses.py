@@ -236,10 +236,3 @@ def test_pixels_of_pairs_that_pass_each_other_keep_their_ids() -> None:
     assert not changes(made)
     assert sizes(made[-1]) == pytest.approx(sizes(made[10]), rel=0.2)
     assert np.sign(made[-1].vel[:, 0]).tolist() == np.sign(made[10].vel[:, 0]).tolist()
-
-
-def test_who_stands_for_long_does_not_become_background(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Unprotected he would be within two time constants."""
-    monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)
-    made = watched([[(80.0, 60.0)]] * 60, GroupPdaConfig(background_time=1.0))
-    assert all(t.id.tolist() == [1] for t in made[5:])

@@ -63,14 +63,11 @@ def test_where_the_encounter_begins_and_ends() -> None:
 @pytest.mark.parametrize(
     ("names", "fate"),
     [
-        (right, Outcome(kept=True, merged=False)),
-        (swapped, Outcome(kept=False, merged=False)),
-        (one_while_near, Outcome(kept=True, merged=True)),
-        (one_to_the_end, Outcome(kept=False, merged=True)),
-        (lost_for(4), Outcome(kept=True, merged=False)),
-        (lost_for(5), Outcome(kept=False, merged=False)),
+        (right, Outcome(kept=True, merged=False)), (swapped, Outcome(kept=False, merged=False)),
+        (one_while_near, Outcome(kept=True, merged=True)), (one_to_the_end, Outcome(kept=False, merged=True)),
+        (lost_for(4), Outcome(kept=True, merged=False)), (lost_for(5), Outcome(kept=False, merged=False)),
     ],
-)
+)  # fmt: skip
 def test_passing(names: Callable[[int], dict[int, tuple[int, ...]]], fate: Outcome, unit: str) -> None:
     assert outcomes(true(), said(names, unit=unit)) == [fate]
 

@@ -114,17 +114,6 @@ def same(a: list[Tracks], b: list[Tracks], matrix: Array | None = None, shift: A
             np.testing.assert_allclose(f.pos, A @ np.array(e.pos) + d, atol=1e-6)
 
 
-def bytes_of(made: list[Tracks]) -> list[tuple[bytes, ...]]:
-    """All that a user is told, as bytes."""
-    said = []
-    for t in made:
-        g = t.groups
-        assert g is not None
-        arrays = [t.id, t.pos, t.vel, t.cov, t.score, g.id, g.pos, g.vel, g.extent, g.size, *g.hull]
-        said.append((*(np.ascontiguousarray(a).tobytes() for a in arrays), repr(t.events).encode()))
-    return said
-
-
 @pytest.mark.parametrize("ranks", [(2, 2), (3, 2)])
 @pytest.mark.parametrize("turn", [np.pi, np.pi / 2])
 def test_groups_that_walk_through_each_other_keep_ids_and_sizes(ranks: tuple[int, int], turn: float) -> None:
@@ -238,19 +227,6 @@ def test_the_image_needs_a_scale(first: list[Points]) -> None:
     with pytest.raises(InputError) as told:
         track([*first, block(2, 2)], plane="image")
     assert told.value.place == "context.px_per_m"
-
-
-def test_reset_is_a_fresh_start_and_the_input_stays_as_it_is() -> None:
-    frames = busy(0)
-    kept = [p.copy() for p in frames]
-    for p in frames:
-        p.flags.writeable = False
-    tracker = GroupPda()
-    first = bytes_of(track(frames, tracker=tracker))
-    track(busy(5)[:45], tracker=tracker)
-    assert bytes_of(track(frames, tracker=tracker)) == first
-    assert bytes_of(track(kept)) == first
-    assert all(p.tobytes() == q.tobytes() for p, q in zip(frames, kept, strict=True))
 
 
 def clouds(seed: int, speed: float, count: int = 40) -> list[Array]:
