@@ -53,8 +53,6 @@ def test_subtraction_stereo(entry: str, frames: int) -> None:
     found = {e.name: e for e in resolve("suite:subtraction-stereo")}[f"stereo-{entry}"]
     sequence = simulate(found.scenario, 90_001)
     assert (sequence.length, sequence.fps) == (frames, 30)
-    assert sequence.truth is not None
-    assert sequence.camera is not None
     if entry != "stairs":
         assert sequence.camera.position[2] == pytest.approx(5.1)
     else:
@@ -67,7 +65,6 @@ def test_everybody_climbs_the_stairs(seed: int) -> None:
     """Members who walk at the outside of their group, too: nobody passes beside the flight or the landing."""
     (found,) = [e for e in resolve("suite:subtraction-stereo") if e.name == "stereo-stairs"]
     truth = simulate(found.scenario, seed, streams=()).truth
-    assert truth is not None
     z = truth.z[truth.pos[:, 1] < 5.9]
     assert len(z) > 100
     assert z.min() == pytest.approx(1.6, abs=0.01)

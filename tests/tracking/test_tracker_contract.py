@@ -133,7 +133,6 @@ def reordered(sequence: Sequence, seed: int) -> Sequence:
     def frames() -> Iterator[Frame]:
         for frame in sequence:
             d, order = frame.detections, np.random.default_rng([seed, frame.index]).permutation
-            assert d is not None
             k = order(len(d.pos))
             box = None if d.box is None else d.box[k]
             yield frame.replace(detections=d.replace(pos=d.pos[k], box=box, score=d.score[k]))
@@ -182,8 +181,6 @@ def without_calibration(sequence: Sequence) -> Sequence:
     def frames() -> Iterator[Frame]:
         for frame in sequence:
             d = frame.detections
-            assert d is not None
-            assert d.box is not None
             yield frame.replace(detections=d.replace(plane="image", pos=d.box[:, :2] + d.box[:, 2:] / 2))
 
     return replace(sequence, frames=frames, bare=None, camera=None, scene=None, px_per_m=float("nan"))
@@ -216,7 +213,6 @@ def test_no_look_ahead_in_a_recording(shared_data: Path, tracker: str, mode: Det
     (pets,) = open_source(shared_data / "mot" / "PETS09-S2L1-first200", images=False)
     whole = track(tracker, pets, detections=mode)
     truth = pets.truth
-    assert truth is not None
     rows = truth.frame <= 30
     cut_truth = truth.replace(
         length=30, labelled=None, frame=truth.frame[rows], id=truth.id[rows], group=truth.group[rows],

@@ -59,7 +59,6 @@ def test_a_member_stays_behind_and_catches_up_and_is_one_of_the_group(path: Path
     assert len(apart) > 10
     assert gap[apart[-1] :][~np.isnan(gap[apart[-1] :])][20:].max() < 1.6
     truth = simulate(load(path, [STOP.replace("}]", ", members = 1 }]")]), 1, streams=()).truth
-    assert truth is not None
     assert set(truth.group.tolist()) == {int(truth.group[0])} != {-1}
 
 

@@ -46,8 +46,6 @@ def test_a_dataset_like_any_other(walk: Sequence, tmp_path: Path) -> None:
     assert str(tmp_path) not in (made[0] / "manifest.json").read_text() + (made[0] / "scenario.toml").read_text()
     stored = open_source(tmp_path / "a")[0]
     assert is_real(stored)
-    assert stored.truth is not None
-    assert stored.truth.labelled is not None
     assert stored.truth.labelled.all()
     assert next(iter(stored)).image is not None
     assert stored.load_people is None

@@ -46,7 +46,6 @@ def test_as_many_as_asked_for_whatever_their_life(model: dict[str, float]) -> No
 
 def test_those_beside_people_keep_their_place_and_size() -> None:
     truth = people()
-    assert truth.box is not None
     model = {"life": 3.0, "near": 1.0, "across": (0.5, 0.0), "foot": (-0.2, 0.0), "near_height": (-0.7, 0.0)}
     box = everything(alarms(truth, **model, aspect=(-1.0, 0.0)), "box")
     first = truth.box[truth.rows(1)]

@@ -45,9 +45,6 @@ def test_a_perfect_sensor_gives_the_truth(camera: Any) -> None:
     truth = bodies(crowd(1), camera)
     for d in sense(truth, perfect(), 3, camera, SIZE):
         now = truth.at(d.index)
-        assert now.pos is not None
-        assert now.box is not None
-        assert d.box is not None
         assert d.plane == "ground"
         assert d.t == now.t
         order = np.lexsort(d.pos.T), np.lexsort(now.pos.T)
@@ -61,7 +58,6 @@ def test_boxes_alone_are_found_in_the_image_and_points_alone_on_the_ground() -> 
     boxes_only = truth.replace(pos=None, vel=None, visible_box=None)
     for d in sense(boxes_only, perfect(clutter_rate=3.0), 3, None, SIZE):
         assert d.plane == "image"
-        assert d.box is not None
         assert d.pos == pytest.approx(d.box[:, :2] + d.box[:, 2:] / 2)
     points_only = truth.replace(box=None, visible_box=None)
     for d in sense(points_only, perfect(clutter_rate=3.0, noise_m=0.1), 3):
@@ -159,7 +155,6 @@ def test_who_is_hidden_is_missed() -> None:
 
 def test_small_people_are_missed() -> None:
     truth = seen(people=1, frames=1)
-    assert truth.box is not None
     tall = float(truth.box[0, 3])
     for small, p in ((tall, 0.5), (2 * tall, 0.25), (tall / 2, 1.0), (tall / 3, 1.0)):
         assert detection_probability(truth, perfect(small_px=small)) == pytest.approx([p])
@@ -169,7 +164,6 @@ def test_small_people_are_missed() -> None:
 
 def test_visible_boxes_follow_the_visible_part() -> None:
     truth = seen(people=2, frames=3)
-    assert truth.box is not None
     part = truth.box * np.array([1, 1, 1, 0.5])
     cut = truth.replace(visible_box=part)
     found = sense(cut, perfect(box="visible"), 1)
@@ -182,7 +176,6 @@ def test_visible_boxes_follow_the_visible_part() -> None:
 
 def hidden_from_below(truth: Truth, share: float) -> Truth:
     """The same people, of each of whom the lower `share` of the box is hidden."""
-    assert truth.box is not None
     part = truth.box * np.array([1, 1, 1, 1 - share])
     return truth.replace(visible_box=part if share else truth.box, visibility=np.full(len(truth.id), 1 - share))
 
@@ -192,7 +185,6 @@ def test_points_follow_the_foot_of_the_visible_part(z: float) -> None:
     camera = pinhole(at=(8.0, -8.0, 9.0))
     truth = seen(people=6, frames=3)
     truth = hidden_from_below(truth.replace(z=np.full(len(truth.id), z)), 0.4)
-    assert truth.box is not None
     rays_end = foot_points(truth.visible_box, truth.z, camera), foot_points(truth.box, truth.z, camera)  # type: ignore[arg-type]
     wanted = truth.pos + rays_end[0] - rays_end[1]
     found = everything(sense(truth, perfect(box="visible"), 1, camera), "pos")

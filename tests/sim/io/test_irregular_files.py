@@ -37,9 +37,8 @@ def test_no_reader_opens_it(kind, what, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # a socket's path is short
     folder = write_texts(tmp_path)[kind]
     put(folder / next(iter(TEXTS[kind])), what)
-    with pytest.raises(InputError) as error:
+    with pytest.raises(InputError):
         READERS[kind](folder)
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("what", ["FIFO", "device", "folder", "circle"])

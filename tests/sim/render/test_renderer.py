@@ -71,7 +71,6 @@ def test_ids_masks_and_counts_are_those_of_a_slow_renderer(view: str, scene: str
 def test_disparities_are_those_of_a_slow_renderer(view: str, scene: str) -> None:
     motion, camera = motion_in(SCENES[scene]), VIEWS[view]
     wanted, found = slow.disparity(camera, motion, 5), make_renderer(motion, camera).pixels(5, disparity=True).disparity
-    assert found is not None
     assert np.isnan(wanted).sum() > 100
     both = np.isfinite(wanted) & np.isfinite(found)
     assert (np.isfinite(wanted) != np.isfinite(found)).sum() <= 12  # of 19,200: grazing rays, and 1 mm of depth
@@ -181,7 +180,6 @@ def test_both_cameras_see_the_same_surfaces() -> None:
     motion, camera = motion_in(BUILT), VIEWS["high"]
     made = make_renderer(motion, camera, Light(), SHARP)
     left, right, d = made.frame(3), made.right(3), made.pixels(3, disparity=True).disparity
-    assert d is not None
     v, u = np.nonzero(np.isfinite(d))
     x = np.clip(u - d[v, u], 0, 158.0)
     low = np.floor(x).astype(int)
@@ -215,7 +213,6 @@ def test_geometric_visibility_is_that_of_the_pixels(scene: str) -> None:
     motion, camera = crowd(5, people=14, frames=3, scene=SCENES[scene]), pinhole(25.0, at=(8.0, -6.0, 4.5))
     truth, pixels = bodies(motion, camera), make_renderer(motion, camera).pixels(2)
     here = truth.rows(2)
-    assert truth.box is not None
     assert np.abs(truth.visibility[here] - pixels.visibility).max() < 0.06
     whole = pixels.visibility == 1
     assert np.abs(truth.box[here] - pixels.box)[whole].max() <= 1.0
@@ -263,6 +260,5 @@ def test_nobody_behind_the_camera_and_no_people_at_all() -> None:
 def test_sky_is_above_the_horizon_and_has_no_disparity() -> None:
     made = make_renderer(motion_in(BARE, 2), small(pinhole(5.0, at=(8.0, -6.0, 2.0))))
     pixels = made.pixels(1, disparity=True)
-    assert pixels.disparity is not None
     assert np.isnan(pixels.disparity[0]).all()
     assert made.frame(1)[0].mean() > made.frame(1)[-1].mean()

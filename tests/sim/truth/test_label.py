@@ -52,7 +52,6 @@ def test_groups_keep_ids_and_members_and_get_places_in_the_image() -> None:
     assert [g.id.tolist() for g in found] == [[3, 8], [], [3, 8], []]
     assert found[2].members[1].tolist() == [4, 5, 6]
     box = truth.at(3).box
-    assert box is not None
     middle = box[:, :2] + box[:, 2:] / 2
     assert found[2].pos == pytest.approx(np.stack([middle[:2].mean(axis=0), middle[3:].mean(axis=0)]))
     assert found[2].extent[1] == pytest.approx(np.cov(middle[3:].T, bias=True))
@@ -85,8 +84,6 @@ def test_rows_are_sorted_and_say_what_the_motion_says() -> None:
     truth = bodies(motion, pinhole())
     assert (np.lexsort((truth.id, truth.frame)) == np.arange(len(truth.id))).all()
     assert len(truth.id) == motion.present.sum()
-    assert truth.pos is not None
-    assert truth.height is not None
     assert truth.box is not None
     assert (truth.pos == motion.pos[truth.frame - 1, truth.id - 1]).all()
     assert (truth.height == motion.height[truth.id - 1]).all()
@@ -104,7 +101,6 @@ def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> No
     assert truth.events is not None
     assert truth.groups is not None
     assert truth.groups_px is not None
-    assert truth.labelled is not None
     assert truth.labelled.all()
     merged = [e for e in truth.events if e.kind in ("merge", "form")]
     assert len(merged) == 1
@@ -113,10 +109,7 @@ def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> No
     first, last = truth.at(1), truth.at(truth.length)
     assert first.group.tolist() == [first.group[0], first.group[0], -1, -1]
     assert last.group.tolist() == [last.group[0]] * 3 + [-1]
-    assert last.groups is not None
-    assert last.groups_px is not None
     assert last.groups.members[0].tolist() == last.groups_px.members[0].tolist() == [1, 2, 3]
-    assert last.box is not None
     middles = last.box[:3, :2] + last.box[:3, 2:] / 2
     assert last.groups_px.pos[0] == pytest.approx(middles.mean(axis=0))
 
@@ -139,6 +132,4 @@ def test_a_sequence_without_groups_has_truth() -> None:
 
     alone = [f"group.{name}.size=1" for name in ("passers", "stop", "north", "south", "west", "east")]
     truth = simulate(load("crowd", [*alone, "duration=3"]), 1).truth
-    assert truth is not None
-    assert truth.groups_px is not None
     assert all(len(g.id) == 0 for g in truth.groups_px)

@@ -92,7 +92,6 @@ def merge() -> tuple[Truth, tuple]:
     """A scene with a merge, and the tracks of a tracker in it."""
     sequence = simulate(load("merge"), 5)
     run = track("blob", sequence, detections="file")
-    assert sequence.truth is not None
     return sequence.truth, run.tracks
 
 

@@ -62,7 +62,6 @@ def theirs(folder: Path, name: str, benchmark: str, preprocessing: bool) -> dict
 def ours(source: Path, tracks: Path) -> tuple[Truth, Scores]:
     (sequence,) = open_source(source)
     truth = sequence.truth
-    assert truth is not None
     return truth, evaluate(truth, read_tracks(tracks, fps=10, length=FRAMES))
 
 

@@ -41,7 +41,6 @@ def with_groups_of_one(true: Truth) -> Truth:
 
 
 def told(case: Recording, plane: str) -> list[Tracks]:
-    assert case.truth is not None
     return wholes(SimpleNamespace(truth=with_groups_of_one(case.truth)), plane)
 
 

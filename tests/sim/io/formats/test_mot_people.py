@@ -36,9 +36,8 @@ def test_classes_left_out_are_counted_and_can_be_named(tmp_path, tails):
 @pytest.mark.parametrize("wrong", [0, 2])
 def test_a_class_that_leaves_nobody_is_an_error_that_counts(tmp_path, wrong):
     folder = labels(tmp_path, [f"1,{wrong},1"] * 2)
-    with pytest.raises(InputError, match=rf"got 6 rows of class {wrong}.*--class") as error:
+    with pytest.raises(InputError, match=rf"got 6 rows of class {wrong}.*--class"):
         _ = open_source(folder, fps=25)[0].truth
-    assert "\n" not in str(error.value)
     assert len(open_source(folder, fps=25, person_class=wrong)[0].truth.id) == 6
 
 

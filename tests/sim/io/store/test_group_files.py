@@ -28,9 +28,8 @@ def test_events(change, tmp_path):
     path.write_text(json.dumps({"format": 1, "events": [EVENT]}))
     assert len(read_events(path)) == 1
     path.write_text(json.dumps({"format": 1, "events": [EVENT | change]}))
-    with pytest.raises(InputError) as error:
+    with pytest.raises(InputError):
         read_events(path)
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,6 @@ def test_each_missing_or_altered_file_is_named(tmp_path, make_sequence):
                 open_source(folder)
             assert error.value.file.endswith(name)
             assert kind in error.value.got
-            assert "\n" not in str(error.value)
             assert [p.file for p in validate(folder)] == [error.value.file]
             (folder / name).write_bytes(whole)
     (folder / "manifest.json").unlink()
@@ -92,7 +91,6 @@ def test_each_altered_or_missing_field_of_the_manifest_is_told(tmp_path, make_se
             with pytest.raises(InputError) as error:
                 open_source(folder)
             assert error.value.file == str(path)
-            assert "\n" not in str(error.value)
             assert [str(p) for p in validate(folder)] == [str(error.value)]
             path.write_text(json.dumps(whole))
     assert validate(folder) == []

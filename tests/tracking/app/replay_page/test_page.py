@@ -17,7 +17,6 @@ NIL = page_rows.NIL
 
 def data_of(page: str) -> dict:
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
-    assert found is not None
     return json.loads(found.group(1))
 
 

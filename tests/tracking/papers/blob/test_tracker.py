@@ -150,23 +150,6 @@ def test_weak_detections_continue_but_do_not_start(config):
     assert all(len(t.id) == 1 for t in fading[15:])
 
 
-def associate(d2, rho):
-    """Who is paired with whom at these squared distances (N, M), in order."""
-    tracker = Blob(both("optimal"))
-    tracker.reset(CONTEXT, 0)
-    tracker.people.start_tracks(np.tile([100.0, 200, 68, 28], (len(d2), 1)), np.ones(len(d2)), 0.0)
-    tracker.people.rho[:] = rho
-    return sorted(
-        zip(
-            *(
-                k.tolist()
-                for k in tracker.people.associate(np.array(d2), tracker.people.rho_log_det(), tracker.updater.gate)
-            ),
-            strict=True,
-        )
-    )
-
-
 @pytest.mark.parametrize(
     "config",
     [BlobConfig(), BlobConfig(association="nearest", gate=0.99), BlobConfig(confirm_ratio=1.05, tentative_time=0.1)],

@@ -78,7 +78,6 @@ def ids(made: list[Tracks]) -> set[int]:
 
 
 def sizes(tracks: Tracks) -> Array:
-    assert tracks.groups is not None
     return tracks.groups.size
 
 
@@ -189,8 +188,6 @@ def test_a_false_alarm_beside_a_group_is_no_member(angle: float, ranks: int, gap
     assert not changes(made)
     for k in range(at + 2, len(frames)):
         own, other = made[k].groups, plain[k].groups
-        assert own is not None
-        assert other is not None
         assert not holds(own.hull[0], middle[k] + away)  # nor does he walk along
         assert own.hull[0] - own.pos[0] == pytest.approx(other.hull[0] - other.pos[0], abs=0.1)
         assert abs(own.size[0] - other.size[0]) <= 1 / ranks**2
@@ -227,11 +224,3 @@ def test_the_image_needs_a_scale(first: list[Points]) -> None:
     with pytest.raises(InputError) as told:
         track([*first, block(2, 2)], plane="image")
     assert told.value.place == "context.px_per_m"
-
-
-def clouds(seed: int, speed: float, count: int = 40) -> list[Array]:
-    """Two clouds of points that fly through each other; speed: the difference of their velocities, m/s."""
-    r = np.random.default_rng(seed)
-    a, b = r.normal(0, 0.36, (2, count, 2))
-    way = np.array([1.0, 0.0])
-    return [noisy([a + s * way, b - s * way], r) for s in np.arange(-3, 3, speed / FPS) / 2]

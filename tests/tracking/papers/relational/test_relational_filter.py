@@ -355,7 +355,6 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
     seat(tracker, placed(20_000, place, np.array([[0, 0], [1, 0], [0, 0], [0, 0]])))
     relate(tracker.particles, 0, 3)
     tracker._follow(np.concatenate([place, np.zeros((4, 2))], axis=1))
-    assert tracker.belief is not None
     assert (tracker.belief.log_odds[3, :3] == UNSEEN).all()
     tracker.belief.log_odds[:3, :3] = odds = np.array([[0, 1.0, -2.0], [1.0, 0, 0.5], [-2.0, 0.5, 0]])
     for _ in range(60):

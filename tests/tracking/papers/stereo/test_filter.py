@@ -98,7 +98,6 @@ def test_errors_have_the_stated_covariance(depth: float) -> None:
             else:
                 predict(group, motion)
                 measure(group, points, measurement, motion, k * DT)
-        assert group is not None
         e = group.ekf.x[:, 0] - x
         nees.append(e @ np.linalg.solve(group.ekf.P, e))
     sd = np.sqrt(2 * 6 / runs)

@@ -20,7 +20,6 @@ def test_a_hull_in_the_image_covers_bodies_from_their_feet_to_their_heads() -> N
         Tracks(1, 0.0, "space", "group", one, one, pos, 0 * pos, np.eye(6)[None], None, np.ones(1), groups, ()), camera
     )
     assert made.plane == "image"
-    assert made.groups is not None
     (hull,) = made.groups.hull
     for height, inside in (
         (1.4 - BELOW, True),
