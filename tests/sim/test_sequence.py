@@ -47,7 +47,6 @@ def test_truth_of_a_script_that_did_not_come_true_is_refused(monkeypatch: pytest
 
 
 def test_simulation_is_repeatable_and_hides_by_name() -> None:
-    pytest.importorskip("sim.crowd.world", exc_type=ImportError)
     hide = {"hide": [{"start": 0.5, "end": 1.5, "group": "b"}]}
     a, b = (sim.sequence.simulate(scenario(duration=2.0, sensor=hide), 3) for _ in range(2))
     for x, y in zip(a, b, strict=True):

@@ -10,7 +10,6 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.dataset.generate import generate
-from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Truth
 from tracking.app.cli import run
@@ -84,20 +83,6 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def test_a_stride_of_one_changes_no_byte(made: dict[int | None, Path]) -> None:
     assert files(made[None]) == files(made[1])
-
-
-def test_pictures_of_common_frames_have_the_same_bytes(made: dict[int | None, Path]) -> None:
-    every, kept = files(made[None]), files(made[4])
-    for folder in ("img1", "img1_right", "disparity", "ids"):
-        assert sum(name.startswith(f"{folder}/") for name in kept) == 20
-        for k in range(20):
-            assert kept[f"{folder}/{k + 1:06d}.png"] == every[f"{folder}/{4 * k + 1:06d}.png"]
-    assert kept["background/000050.png"] == every["background/000050.png"]
-    same_rows(open_source(made[None])[0].truth, open_source(made[4])[0].truth, 4)
-    visible = [
-        open_source(made[stride])[0].frame_truth(index).pixels.visible_px for stride, index in ((None, 9), (4, 3))
-    ]
-    assert visible[0].tolist() == visible[1].tolist()
 
 
 def test_a_stored_sequence_of_another_stride_is_refused(made: dict[int | None, Path], capsys) -> None:

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from sim.types import Camera, Context, Detections, Frame
-from tracking.papers.joint.config import JointConfig
-from tracking.papers.joint.tracker import Joint
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.relations import Relational
 from tracking.papers.relational.tracker import Particle
@@ -65,18 +63,3 @@ def test_a_person_far_away_changes_no_track(name, camera):
     assert sum(len(frame[0]) > 0 for frame in alone) > 30
     for first, last in ((0, FRAMES), (17, FRAMES), (0, 20)):
         assert near_tracks(TRACKERS[name](), context, first, last) == alone
-
-
-def test_joint_draws_for_a_person_the_same_numbers_whoever_else_is_there():
-    """A new person is drawn into the particles alike, whether or not another one has been tracked for a while."""
-    drawn = []
-    for far in (False, True):
-        tracker = Joint(JointConfig(particles=20, partitions=5))
-        tracker.reset(Context(FPS, float("nan")), 5)
-        for k in range(14):
-            points = np.array([[80.0, 60.0 + 0.1 * k], [0.1 * k, 0.0]])[0 if far else 1 : 1 + (k >= 10)]
-            found = Detections(k + 1, k / FPS, "ground", points, score=np.ones(len(points)))
-            tracker.step(Frame(k + 1, k / FPS), found)
-        assert tracker.nested.x.shape[1] == 1 + far
-        drawn.append(tracker.nested.x[:, -1].tobytes())
-    assert drawn[0] == drawn[1]

@@ -56,18 +56,6 @@ def test_every_catalogue_scenario_is_drawn() -> None:
         assert name in words_of(svg(scenario))
 
 
-def test_stairs_service_and_turn(path: Path) -> None:
-    scenario = load(
-        path,
-        [
-            "world.stairs=[{foot=[6, 1], head=[9, 1]}]", "world.service=[[15, 8]]", "turn_deg={uniform=[0, 360]}",
-            "mirror=true", "lead=2",
-        ],
-    )  # fmt: skip
-    assert "turned by 0 to 360°, mirrored by a coin, 2 s further on" in text(scenario)
-    assert {"stairs, +1.5 m", "service"} <= set(words_of(svg(scenario)))
-
-
 @pytest.mark.parametrize(
     ("value", "words", "mid", "half"),
     [

@@ -175,7 +175,6 @@ def test_one_failure_is_named_and_the_others_kept(tmp_path, simulate, error):
 
 
 def test_one_run_at_a_time(tmp_path, simulate):
-    pytest.importorskip("fcntl")
     found = []
 
     def second(*_):

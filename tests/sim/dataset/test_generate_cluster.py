@@ -16,7 +16,6 @@ from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset import generate as generating
 from sim.dataset.generate import generate
-from sim.io.files import atomic
 from sim.io.store.validate import validate
 from sim.workers.start import WorkerOptions
 from tests.loopback import Loopback, loopback
@@ -126,16 +125,3 @@ def test_nothing_is_left_of_a_folder_that_no_worker_sees(tmp_path: Path, cluster
     with pytest.raises(InputError, match=f"{tmp_path}/there: on .*: got another folder, or none"):
         generate(ENTRIES, range(2), tmp_path / "there", streams=(), workers=WorkerOptions(cluster=cluster.address))
     assert os.listdir(tmp_path) == []
-
-
-def test_a_folder_that_cannot_be_locked_is_written_all_the_same(tmp_path: Path, here, monkeypatch) -> None:
-    """NFS locks files that are open for writing, which no folder is."""
-    fcntl = pytest.importorskip("fcntl")
-
-    def refuse(descriptor: int, how: int) -> None:
-        raise OSError(9, "Bad file descriptor")
-
-    monkeypatch.setattr(fcntl, "flock", refuse)
-    generate(ENTRIES, range(6), tmp_path / "there", streams=())
-    assert content(tmp_path / "there") == here
-    assert list((tmp_path / "there").rglob(f"{atomic.PARTIAL}*")) == []

@@ -66,23 +66,6 @@ def test_points_are_where_people_with_these_boxes_stand(near: float) -> None:
         assert pos == pytest.approx(foot_points(box, np.zeros(len(box)), camera))
 
 
-def test_drift_has_the_sd_asked_for_along_both_axes() -> None:
-    truth, ways = people(11), []
-    for seed in range(150):
-        found = alarms(truth, 0.7, seed, life=1e6, drift=0.4)
-        first, last = found[0].box, found[-1].box
-        if first is not None and last is not None and len(first) == len(last) == 1:
-            way = (
-                last[0]
-                + last[0, [2, 3, 2, 3]] * [0.5, 1.0, 0, 0]
-                - first[0]
-                - first[0, [2, 3, 2, 3]] * [0.5, 1.0, 0, 0]
-            )
-            ways.append(way[:2] / first[0, 3])  # in 1 s
-    assert len(ways) > 30
-    assert np.std(ways, axis=0) == pytest.approx([0.4, 0.4], rel=0.3)
-
-
 @pytest.mark.parametrize("camera", [pinhole(), pinhole(10, 0, (8, -6, 2)), above(), None])
 def test_everything_is_finite_whatever_is_known(camera: Any) -> None:
     truth = bodies(crowd(0, frames=100), camera or pinhole())

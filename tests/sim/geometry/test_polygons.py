@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from sim.geometry.footprints import FOOTPRINT, footprint_hull, footprint_hulls
 from sim.geometry.polygons import (
@@ -62,12 +63,11 @@ def test_no_area_no_overlap():
 
 
 def test_hull_of_points():
-    scipy_hull = pytest.importorskip("scipy.spatial").ConvexHull
     for seed in range(50):
         points = np.random.default_rng(seed).normal(size=(12, 2))
         hull = convex_hull(points)
-        assert area(hull) == pytest.approx(scipy_hull(points).volume)
-        assert len(hull) == len(scipy_hull(points).vertices)
+        assert area(hull) == pytest.approx(ConvexHull(points).volume)
+        assert len(hull) == len(ConvexHull(points).vertices)
     assert convex_hull(np.array([[0, 0], [1, 1], [2, 2], [1, 1.0]])).tolist() == [[0, 0], [2, 2]]
     assert convex_hull(np.zeros((3, 2))).tolist() == [[0, 0]]
     assert convex_hull(np.zeros((0, 2))).shape == (0, 2)

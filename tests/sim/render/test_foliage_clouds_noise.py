@@ -123,21 +123,6 @@ def test_noise_grows_with_brightness_by_the_share_of_shot_noise(shot: float) -> 
         assert empty.var(axis=0, ddof=1).mean() == pytest.approx(wanted, rel=0.04)
 
 
-def test_lossy_artefacts_come_last_and_change_from_frame_to_frame() -> None:
-    import cv2
-
-    motion, camera, light = motion_in(), VIEWS["high"], Light(drift=0.1, cloud=0.05)
-    raw, lossy = (make_renderer(motion, camera, light, Picture(jpeg=q, foliage=0.1)) for q in (0, 60))
-    for index in (2, 3):
-        code = cv2.imencode(".jpg", raw.frame(index), [cv2.IMWRITE_JPEG_QUALITY, 60])[1]
-        assert np.array_equal(cv2.imdecode(code, cv2.IMREAD_COLOR), lossy.frame(index))
-    off = lossy.background(1).astype(float) - lossy.background(0)
-    assert (off != 0).mean() > 0.3
-    across = np.abs(np.diff(off, axis=1)).mean(axis=(0, 2))  # steps at the edges of blocks
-    edge = np.arange(len(across)) % 8 == 7
-    assert across[edge].mean() > 1.15 * across[~edge].mean()
-
-
 @pytest.mark.parametrize("view", VIEWS)
 @pytest.mark.parametrize("samples", [2, 3])
 def test_a_pixel_is_the_mean_of_its_samples(view: str, samples: int) -> None:

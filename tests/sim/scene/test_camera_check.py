@@ -75,19 +75,6 @@ def test_ground_too_far_away_gives_no_scale(tmp_path):
     assert is_number(scales[1], *SCALES)
 
 
-def test_tsai(tmp_path):
-    text = """<Camera><Geometry width="768" height="576" dpx="5.0e-03" dpy="4.0e-03"/>
-    <Intrinsic focal="{}" kappa1="5.1e-03" cx="324.0" cy="282.0" sx="1.1"/>
-    <Extrinsic tx="800" ty="-3000" tz="{}" rx="{}" ry="-0.89" rz="-0.43"/></Camera>"""
-    path = tmp_path / "c.xml"
-    path.write_text(text.format(5.5, 35000, 2.04))
-    assert read_calibration(path).position[2] > 0
-    for wrong, word in (((5500, 35000, 2.04), "focal"), ((5.5, -35000, 2.04), "above"), ((5.5, 1e30, 2), "tz")):
-        path.write_text(text.format(*wrong))
-        with pytest.raises(InputError, match=word):
-            read_calibration(path)
-
-
 def test_cameras_of_scenarios():
     settings = ["camera.height=5", "camera.position=[8, -4]", "camera.crop=true"]
     assert simulate(load("merge", set=settings), 40000).camera is not None

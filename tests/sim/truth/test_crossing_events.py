@@ -2,9 +2,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.geometry.footprints import footprint_hull
-from sim.geometry.polygons import polygon_gap
-from sim.truth.crossing_events import encounters, members_by_frame, net_crossings
+from sim.truth.crossing_events import net_crossings
 
 
 def cut(a, b):
@@ -43,26 +41,3 @@ def test_net_crossings_are_those_of_the_segments():
     spiral, ray = np.stack([np.cos(round_twice), np.sin(round_twice)], axis=1), np.linspace([0, 0], [3, 0.01], 40)
     assert net_crossings(ray, spiral, np.zeros(40, np.int64), 1)[0] == cut(ray, spiral) == -2
     assert net_crossings(ray, 1.1 * spiral[::-1], np.zeros(40, np.int64), 1)[0] == cut(ray, 1.1 * spiral[::-1]) == 2
-
-
-def test_encounters_are_the_frames_in_which_hulls_are_near():
-    """Against the gap of each two hulls, frame by frame; two groups and one who is alone wander about."""
-    r = np.random.default_rng(1)
-    way = np.cumsum(r.normal(0, 0.4, (200, 4, 2)), axis=0) + r.uniform(0, 8, (4, 2))
-    pos = np.abs(way % 8 - 4)[:, [0, 0, 1, 1, 2, 3, 3]] + r.uniform(-0.6, 0.6, (7, 2))
-    group = np.tile([4, 4, 2, 2, -1, 9, 9], (200, 1))
-    group[80:90, 3] = -1  # group 2 is one alone, hence none
-    met = encounters(pos, members_by_frame(group), fps=10.0)
-    for names in ((2, 4), (2, 9), (4, 9)):
-        near = []
-        for t in range(200):
-            sides = [pos[t, group[t] == g] for g in names]
-            hulls = [footprint_hull(side) for side in sides]
-            near.append(min(len(side) for side in sides) > 1 and polygon_gap(*hulls) <= 1.0)
-        frames = np.flatnonzero(near)
-        cuts = np.flatnonzero(np.diff(frames) > 5) + 1  # half a second is bridged
-        expected = [(int(some[0]), int(some[-1])) for some in np.split(frames, cuts) if len(some)]
-        mine = (met.a == names[0]) & (met.b == names[1])
-        assert list(zip(met.first[mine].tolist(), met.last[mine].tolist(), strict=True)) == expected
-    assert len(met) > 3
-    assert (np.diff(met.first) >= 0).all()

@@ -94,8 +94,6 @@ def test_rows_are_sorted_and_say_what_the_motion_says() -> None:
 
 
 def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> None:
-    pytest.importorskip("sim.truth.merge_split_events", exc_type=ImportError)
-    pytest.importorskip("sim.truth.crossing_events", exc_type=ImportError)
     motion, camera = meeting(), pinhole()
     truth = label(motion, camera)
     assert truth.events is not None
@@ -112,18 +110,6 @@ def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> No
     assert last.groups.members[0].tolist() == last.groups_px.members[0].tolist() == [1, 2, 3]
     middles = last.box[:3, :2] + last.box[:3, 2:] / 2
     assert last.groups_px.pos[0] == pytest.approx(middles.mean(axis=0))
-
-
-def test_the_orders_times_change_nothing() -> None:
-    pytest.importorskip("sim.truth.merge_split_events", exc_type=ImportError)
-    pytest.importorskip("sim.truth.crossing_events", exc_type=ImportError)
-    from sim.types import Order
-
-    ordered = meeting().replace(orders=(Order("m", "merge", 21, ((1, 2), (3,)), ((1, 2, 3),)),))
-    a, b = label(ordered, None), label(meeting(), None)
-    assert [(e.kind, e.start, e.members) for e in a.events or ()] == [
-        (e.kind, e.start, e.members) for e in b.events or ()
-    ]
 
 
 def test_a_sequence_without_groups_has_truth() -> None:

@@ -156,14 +156,3 @@ def test_near_lists_strangers_only_and_whole_stretches():
                 expected += [(s + 1, e, a + 1, b + 1) for s, e in edges.reshape(-1, 2) if e - s >= 8]
         got = zip(m.near.start, m.near.end, m.near.a, m.near.b, strict=True)
         assert sorted(tuple(map(int, row)) for row in got) == sorted(expected), seed
-
-
-def test_nobody_and_nothing():
-    none = np.zeros((0, 0, 2))
-    assert groups_and_events(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS).events == ()
-    empty = np.zeros((5, 0, 2))
-    m = groups_and_events(empty, empty, np.zeros((5, 0), bool), np.zeros((5, 0), np.int64), FPS)
-    assert m.group.shape == (5, 0)
-    gone = np.full((5, 2, 2), np.nan)
-    m = groups_and_events(gone, gone, np.zeros((5, 2), bool), np.full((5, 2), -1), FPS)
-    assert (m.group == -1).all()

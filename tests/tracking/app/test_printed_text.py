@@ -50,19 +50,6 @@ def test_text_errors_warnings_and_progress_show_names_letter_by_letter(name, sho
     ]  # fmt: skip
 
 
-def test_the_bar_on_a_terminal_shows_names_letter_by_letter(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "200")
-    with ProgressMeter("[/red]", 2) as meter:
-        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-        meter._show()
-        for name in NAMES:
-            meter.update(1, 2, name)
-            meter._bar.refresh()
-    shown = capsys.readouterr().err
-    assert "\x1b[31mred" not in shown
-    assert all(name in shown for name in ("[/red]", *SHOWN)), shown
-
-
 @pytest.mark.parametrize("name", [*NAMES, "\udcff", "\x9b", "\U000e0041", "\u2028"])
 def test_json_holds_names_whole_and_as_escapes(name, capsys):
     print_result(CommandResult({"name": name}), as_json=True)

@@ -179,7 +179,6 @@ def test_validate_says_whether_a_run_is_whole(made, tracks, capsys):
 
 def test_one_run_at_a_time_writes_to_a_folder(made, tmp_path, capsys):
     """The second command fails at once; a writer in Python fails, too, and inside the command it does not."""
-    pytest.importorskip("fcntl")
     (source,) = (made / "data").rglob("*-s40000")
     with lock_folder(tmp_path / "out"):
         line = ["track", "blob", str(source), "--detections", "file", "--out", str(tmp_path / "out")]

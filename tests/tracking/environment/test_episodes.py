@@ -52,9 +52,3 @@ def test_no_labels_no_episode():
     bare = sources(type(sequence)(**{**sequence.__dict__, "load_truth": None, "has_detections": True}))[0]
     with pytest.raises(InputError, match="nothing to score by"):
         play("blob", bare)
-
-
-def test_which_pictures_are_drawn():
-    assert streams_for("blob", None) == ()
-    assert streams_for("group-pda", "truth") == ()
-    assert streams_for("blob", "image") == ("left", "background")

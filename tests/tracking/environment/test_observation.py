@@ -91,15 +91,6 @@ def test_in_the_image_lengths_are_metres_and_unknown_without_a_scale():
     assert blind["tracks"] == blind["detections"] == pytest.approx(2)
 
 
-def test_nothing_at_all():
-    observer = Observer(FPS)
-    assert not observer.statistics(float("nan")).any()
-    empty = [(frame(k), tracks(k, [])) for k in (1, 2, 3)]
-    seen = looked(empty)
-    assert {k for k, v in seen.items() if v} == {"time", "seen"}
-    assert not any(v for k, v in looked([], observer=observer).items())
-
-
 def test_bounds_and_kind():
     rng, observer = np.random.default_rng(3), Observer(FPS)
     for k in range(1, 40):

@@ -55,15 +55,6 @@ def test_places_are_where_they_belong():
         assert of_colour(around, colour(id)) > 5
 
 
-def test_the_picture_itself():
-    made = env(set=[*SHORT, "camera.image=[160,120]"], detections="image")
-    pictures = stepped(made, 1)
-    assert [p.shape for p in pictures] == [(152, 160, 3)] * 2
-    shown = made.rollout.last.image
-    same = (pictures[1][32:] == shown[..., ::-1]).all(axis=2)
-    assert same.mean() > 0.5
-
-
 def test_without_a_render_mode_there_is_no_picture():
     made = env(render_mode=None)
     made.reset(seed=1)

@@ -33,17 +33,3 @@ KNOWN = "assert gymnasium.registry['flockscope/Tuning-v0'].entry_point == 'track
 )
 def test_it_is_known(lines):
     run(*lines)
-
-
-def test_without_gymnasium_the_rest_goes_on():
-    run(
-        "class Gone:",
-        "    def find_spec(self, name, path=None, target=None):",
-        "        if name == 'gymnasium': raise ModuleNotFoundError(name)",
-        "sys.meta_path.insert(0, Gone())",
-        "import tracking",
-        "try: import gymnasium",
-        "except ModuleNotFoundError: pass",
-        "else: raise SystemExit('found')",
-        "from tracking import evaluate",
-    )

@@ -34,15 +34,6 @@ def test_numbers_differ_by_seed_role_frame_person_and_index():
     assert np.array_equal(copy.deepcopy(later).normals(0, keys, 5, 1), later.normals(0, keys, 5, 1))
 
 
-def test_people_at_one_place_have_different_keys():
-    twice = birth_keys(np.repeat(PLACES[:3], 2, axis=0), 3)
-    assert len(np.unique(twice)) == 6
-    assert np.array_equal(
-        np.sort(twice)[np.isin(np.sort(twice), birth_keys(PLACES[:3], 3))], np.sort(birth_keys(PLACES[:3], 3))
-    )
-    assert len(birth_keys(np.zeros((0, 2)), 3)) == 0
-
-
 @pytest.mark.parametrize("of", ["people", "rows", "frames", "roles"])
 def test_the_distributions_and_no_correlation(of):
     """Along each way in which numbers are counted."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -49,14 +47,6 @@ def test_rho_does_not_see_the_measured_values(seed):
     pattern = np.random.default_rng(seed).random(80) < 0.5
     first, second = (follow(MADE, pattern, np.random.default_rng(k)) for k in (1, 2))
     assert np.array_equal(first, second)
-
-
-def test_larger_q_confirms_sooner_and_larger_r_later():
-    def hits(dynamics):
-        return track_uncertainty.hits_to_confirm(dynamics, 1.25)
-
-    assert hits(replace(MADE, sigma=MADE.sigma * np.sqrt(10))) < hits(MADE)
-    assert hits(replace(MADE, noise=MADE.noise * 10)) > hits(MADE)
 
 
 def test_a_newborn_that_would_be_confirmed_at_once_is_refused():

@@ -1,17 +1,10 @@
 """Recordings without frames, without scores, and polygons without vertices are no error."""
 
-from contextlib import contextmanager
-
 import numpy as np
-import pytest
 
-from scenarios.errors import InputError
-from sim.dataset import generate
 from sim.geometry.polygons import iou_matrix, pack
-from sim.types import Detections, Sequence, Truth
-from sim.workers.start import WorkerOptions
-from tracking.app.pictures.contact_sheet import choose_frames, sheet_picture
-from tracking.app.pictures.overlay import write_overlay
+from sim.types import Detections, Truth
+from tracking.app.pictures.contact_sheet import choose_frames
 from tracking.fitting.detection_matching import match_detections
 from tracking.fitting.error_statistics import error_statistics
 from tracking.fitting.false_alarms import fit_false_alarms
@@ -35,25 +28,7 @@ def test_boxes_without_scores():
     assert matched.score.tolist() == [1.0]
 
 
-def test_pictures_of_a_sequence_without_frames(tmp_path):
-    nothing = Sequence("none", 10.0, 0, lambda: iter(()), load_truth=lambda: EMPTY, has_images=True, image_size=(8, 8))
-    with pytest.raises(InputError, match="no frame"):
-        write_overlay(nothing, None, tmp_path / "o.mp4")
-    with pytest.raises(InputError, match="no frame"):
-        sheet_picture(nothing, EMPTY)
-    assert not list(tmp_path.iterdir())
-
-
 def test_polygons_without_vertices():
     empty = np.zeros((0, 2))
     assert iou_matrix([empty, empty], [empty]).tolist() == [[0.0], [0.0]]
     assert len(pack([empty], 0).vertex) == 1
-
-
-def test_a_cluster_without_jobs_needs_no_marker(monkeypatch):
-    @contextmanager
-    def workers(*_):
-        yield lambda *_, **__: iter(())
-
-    monkeypatch.setattr(generate, "start_workers", workers)
-    assert generate._run_jobs([], WorkerOptions(cluster="tcp://localhost:1"), lambda _: None) == {}

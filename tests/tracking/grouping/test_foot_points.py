@@ -71,19 +71,6 @@ def test_a_class_and_its_text_score_the_same(scene, run, tmp_path, similarity) -
     assert mine["group_F1"] > 0
 
 
-def test_groups_lie_in_the_image(run) -> None:
-    """Hulls go round boxes, and events lie among the members' boxes."""
-    for t in run:
-        for members, hull in zip(t.groups.members, t.groups.hull, strict=True):
-            box = t.box[np.isin(t.id, members)]
-            assert hull.min(axis=0) == pytest.approx(box[:, :2].min(axis=0))
-            assert hull.max(axis=0) == pytest.approx((box[:, :2] + box[:, 2:]).max(axis=0))
-        for event in t.events:
-            there = np.isin(t.id, event.members)
-            if there.any():
-                assert event.pos == pytest.approx(t.pos[there].mean(axis=0))
-
-
 @pytest.mark.parametrize("similarity", [None, "image"])
 def test_the_objective_of_boxes_is_that_of_all_scores(scene, run, similarity) -> None:
     bare = without_groups(run)

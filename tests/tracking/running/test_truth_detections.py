@@ -10,7 +10,7 @@ from sim.sequence import simulate
 from sim.types import Sequence, Tracks
 from tracking.running.prepare import prepare
 from tracking.running.run import track
-from tracking.running.truth_detections import from_truth, perfect
+from tracking.running.truth_detections import from_truth
 from tracking.scoring import evaluate
 
 
@@ -91,17 +91,3 @@ def test_what_a_tracker_writes_reaches_neither_truth_nor_the_next_run(merge, mod
     assert np.array_equal(merge.truth.pos, before[0])
     assert np.array_equal(merge.truth.box, before[1])
     assert all(np.array_equal(a.pos, b.pos) for a, b in zip(clean, again, strict=True))
-
-
-def test_people_without_a_box_are_not_detected(merge):
-    """Somebody behind the camera has a position but no box; the other people's rows stay whole."""
-    here = merge.truth.at(3)
-    box = here.box.copy()
-    box[1] = np.nan
-    found = perfect(here.replace(box=box))
-    rest = np.arange(len(here.id)) != 1
-    assert np.array_equal(found.pos, here.pos[rest])
-    assert np.array_equal(found.box, here.box[rest])
-    assert len(found.score) == rest.sum()
-    found = perfect(here.replace(box=box, pos=None, vel=None))
-    assert np.array_equal(found.box, here.box[rest])

@@ -11,7 +11,6 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Groups, Truth
-from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.app.cli import run
 from tracking.objective import ObjectiveScorer
@@ -128,20 +127,6 @@ def test_sparse_labels_score_as_these_frames_of_both_sides(merge: tuple[Truth, t
     assert ObjectiveScorer(sparse).scores(run, float("nan")) == pytest.approx(known)
     weighted = weighted_scorers(sparse, [run])[0](np.ones((1, dense.length)))[0]
     assert dict(zip(CATALOGUE, weighted, strict=True)) == pytest.approx(dict(found), nan_ok=True)
-
-
-def test_events_start_in_the_next_frame_that_is_scored() -> None:
-    """A merge between two labelled frames, told between two others: matched, with its parents and children."""
-    pair, length = {1: (0.0, 0.0), 2: (0.8, 0.0)}, 101
-    apart, together = Scene(pair), Scene(pair, {7: ((1, 2), None)})
-    scenes = [apart if f < 44 else together for f in range(1, length + 1)]
-    happened, told = event("merge", 44, (1, 2)), event("merge", 46, (1, 2), emitted=63)
-    sparse = thinned(truth(scenes, [happened]).replace(groups_px=truth(scenes).groups), np.arange(1, length + 1, 10))
-    run = [t.replace(own_events=("merge",), derived=True) for t in tracks(scenes, [told])]
-    found = evaluate(sparse, run)
-    assert (found["merge_TP"], found["merge_FP"], found["merge_FN"]) == (1, 0, 0)
-    assert found["lineage_accuracy"] == 1
-    assert found["merge_latency"] == pytest.approx((71 - 51) / 10)
 
 
 def columns(t: Truth, group: bool = True, step: int = 1, frames: int = 1) -> dict:

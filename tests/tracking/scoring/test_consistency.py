@@ -15,16 +15,6 @@ def test_bands_by_tables() -> None:
     assert whiteness_band(401, 2, level=0.99) == pytest.approx(2.5758 / np.sqrt(800), abs=1e-4)
 
 
-def test_autocorrelation_by_hand() -> None:
-    v = np.array([[1.0], [-1.0], [1.0], [-1.0]])
-    assert whiteness(v, lags=2) == pytest.approx([-1.0, 1.0])
-    v = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
-    assert whiteness(v, lags=4)[:2] == pytest.approx([0.0, 1.0])
-    assert np.isnan(whiteness(v, lags=4)[2:]).all()
-    assert np.isnan(whiteness(np.zeros((0, 2)))).all()
-    assert np.isnan(whiteness(np.zeros((5, 2)))).all()
-
-
 def run(r: np.random.Generator, frames: int, runs: int, believed: float, lasting: float = 0.0):
     """Scalar random walks (q = 0.1, r = 1) seen through noise that lasts from frame to frame, filtered with the
     believed r: errors, variances, innovations, their variances, (runs, frames) each."""

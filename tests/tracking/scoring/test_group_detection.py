@@ -93,14 +93,3 @@ def test_hulls_without_members() -> None:
     assert found(true, hulls, "exact_groups", unit="group") == near(1 / 2, 1, 2 / 3)
     assert np.isnan(found(true, hulls, "GMITRE", unit="group")).all()
     assert np.isnan(found(true, [Scene({})], "GMITRE", unit="group")).all()
-
-
-def test_people_with_hulls_without_members_have_no_gmitre() -> None:
-    """A tracker of people whose groups name nobody does not say who is alone."""
-    made = tracks([scene((1, 2))])
-    bare = made[0].groups
-    none = (np.zeros(0, np.int64),)
-    unnamed = [made[0].replace(groups=type(bare)(bare.id, none, bare.pos, bare.vel, bare.extent, bare.size, bare.hull))]
-    got = evaluate(truth([scene((1, 2))]), unnamed)
-    assert np.isnan(got["GMITRE_F1"])
-    assert got["exact_groups_F1"] == 1

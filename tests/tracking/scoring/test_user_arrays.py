@@ -9,7 +9,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Truth
 from tracking import track
-from tracking.scoring import evaluate, score_arrays, user_arrays
+from tracking.scoring import evaluate, score_arrays
 
 ROWS = {"frame": [1, 1, 2, 2], "id": [1, 2, 1, 2], "pos": [[0, 0], [1, 0], [0, 0], [1, 0]], "group": [7, 7, 7, 7]}
 
@@ -109,16 +109,3 @@ def test_wrong_columns(change: dict, said: str) -> None:
 def test_wrong_frame_rate(fps: float) -> None:
     with pytest.raises(ValueError, match=f"fps: got {fps!r}, expected a number from 0.01 to 1000"):
         score_arrays(ROWS, ROWS, fps=fps)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_frames_that_are_left_out_change_nothing(seed: int, monkeypatch) -> None:
-    r = np.random.default_rng(seed)
-    frame = np.repeat(np.flatnonzero(np.repeat(r.random(12) < 0.5, 80)) + 1, 6)
-    rows = {"frame": frame, "id": np.tile(np.arange(6), len(frame) // 6)}
-    place = np.array([[0, 0], [0.8, 0], [1.6, 0], [4, 4], [4.8, 4], [9, 9]])[rows["id"]]
-    pos, group = place + r.normal(0, 0.02, place.shape), np.array([1, 1, 1, 2, 2, -1])[rows["id"]]
-    true, est = rows | {"pos": pos, "group": np.where(frame > 500, group, -1)}, rows | {"pos": pos}
-    sparse = dict(score_arrays(true, est, fps=5))
-    monkeypatch.setattr(user_arrays, "_live_frames", lambda frame, length, fps: np.arange(1, length + 1))
-    assert dict(score_arrays(true, est, fps=5)) == pytest.approx(sparse, nan_ok=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -16,12 +17,10 @@ MARKS = {"a": TEXT, "b": TABLE}
 
 
 def png() -> bytes:
-    cv2 = pytest.importorskip("cv2")
     return bytes(cv2.imencode(".png", np.arange(48, dtype=np.uint8).reshape(4, 4, 3))[1])
 
 
 def test_a_marked_picture_shows_the_same():
-    cv2 = pytest.importorskip("cv2")
     shown = (cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_COLOR) for body in (png(), marked_png(png())))
     assert np.array_equal(*shown)
 

@@ -17,7 +17,6 @@ def biwi_folder(tmp_path, groups="", rows=None):
 
 
 def test_seq_hotel_truth(shared_data):
-    pytest.importorskip("sim.truth.merge_split_events")
     (s,) = open_source(shared_data / "biwi" / "seq_hotel")
     t = s.truth
     assert (len(t.frame), len(np.unique(t.id))) == (6544, 390)
@@ -94,7 +93,6 @@ def xml(tmp_path, *frames, tag="dataset"):
 
 
 def test_meet_walk_together_truth(shared_data):
-    pytest.importorskip("sim.truth.merge_split_events")
     t = open_source(shared_data / "caviar" / "mwt1gt.xml", fps=25)[0].truth
     assert (t.pos, t.groups, len(t.groups_px)) == (None, None, 707)
     assert t.box[0].tolist() == [18, 205, 14, 8]

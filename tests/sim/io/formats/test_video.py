@@ -1,6 +1,7 @@
 import warnings
 from fractions import Fraction
 
+import cv2
 import numpy as np
 import pytest
 
@@ -45,7 +46,6 @@ def test_every_frame_in_its_place(tmp_path, name):
 
 
 def test_rotation_is_undone(tmp_path):
-    cv2 = pytest.importorskip("cv2")
     for degrees in (90, 180):
         path = write_video(tmp_path / f"{degrees}.mp4", [picture(k) for k in range(3)], rotation=degrees)
         sequence = one(path)

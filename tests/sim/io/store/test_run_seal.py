@@ -7,7 +7,6 @@ import pickle
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +15,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from scenarios.errors import InputError
-from sim.hashing import labels_hash
 from sim.io.files import tables
 from sim.io.store import seal
-from sim.io.store.run_seal import NAMES, check_run, read_run, tracked_hash
+from sim.io.store.run_seal import NAMES, check_run, read_run
 from sim.io.store.track_files import read_tracks, tracks_files, write_tracks
 from sim.io.store.validate import validate
 from tests.sealing import seal_again
@@ -134,18 +132,6 @@ def test_a_file_with_our_name_and_words_is_not_replaced(tmp_path, make_tracks, k
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == {name: FOREIGN[kind]}
 
 
-@pytest.mark.parametrize("body", [b'{"boxes": "measured"', b"", b"[]"])
-def test_texts_beside_a_damaged_run_json_are_no_other_program_s(tmp_path, make_tracks, body):
-    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
-    (folder / "run.json").write_bytes(body)
-    for _ in range(2):
-        with pytest.raises(InputError, match=r"run\.json.*delete run\.json, then track again"):
-            read_tracks(folder)
-        (folder / "tracks.parquet").unlink(missing_ok=True)
-    (folder / "run.json").write_text('{"mine": 1}')
-    assert len(read_tracks(folder)) > 0
-
-
 FAULTS = {
     "id": (lambda t: t.replace(id=np.where(t.id == t.id.max(), -1, t.id)), "negative id"),
     "id twice": (lambda t: t.replace(id=np.full_like(t.id, 3)), "second time"),
@@ -192,18 +178,6 @@ def test_groups_of_other_frames_or_ids(tmp_path, make_tracks):
     seal_again(folder)
     with pytest.raises(InputError, match=r"groups\.parquet: frame \d+: got group -\d"):
         read_tracks(folder)
-
-
-def test_what_was_tracked(make_sequence):
-    """Labels and frame rate count; name, scale and what follows from the rest do not."""
-    sequence = make_sequence(1)
-    truth, own = sequence.truth, tracked_hash(sequence)
-    assert own == labels_hash(truth)
-    assert labels_hash(truth.replace(name="other", px_per_m=9.0, vel=None, events=None)) == own
-    for change in ({"fps": 5.0}, {"length": 13}, {"pos": truth.pos + 1e-9}, {"group": truth.group + 1}):
-        assert labels_hash(truth.replace(**change)) != own
-    assert tracked_hash(replace(sequence, source={"truth_hash": "abc"})) == "abc"
-    assert tracked_hash(replace(sequence, load_truth=None)) is None
 
 
 # A program of its own that writes the new run over a folder, killed before the k-th call that changes the disk.

@@ -30,7 +30,6 @@ def test_upright_people_on_stairs_are_seen_higher_up(make_tracks):
 
 def test_boxes_of_upright_people():
     """At 10 m the horizon cuts the head, feet are 500 * 1.7 / 10 px below, and the width is seen at about 10 m."""
-    pytest.importorskip("sim.scene.camera")
     boxes = upright_boxes(LEVEL, np.array([[0.0, 10.0], [2.0, 20.0], [0.0, -10.0]]))
     left, top, width, height = boxes[0]
     assert top == pytest.approx(240, abs=1e-9)
@@ -44,7 +43,6 @@ def test_boxes_of_upright_people():
 
 
 def test_a_tracker_without_boxes_gets_them_in_text_only(tmp_path, make_tracks):
-    pytest.importorskip("sim.scene.camera")
     live = [t.replace(pos=t.pos + np.array([0, 10])) for t in make_tracks(2, boxed=False)]
     write_tracks(tmp_path, live, fps=10.0, camera=LEVEL)
     assert json.loads((tmp_path / "run.json").read_text())["boxes"] == "projected"

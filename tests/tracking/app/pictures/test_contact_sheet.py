@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 import cv2
@@ -31,18 +30,6 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
     assert chosen == sorted(chosen)
 
 
-def test_the_part_of_the_world_where_people_are_is_shown(sequence: Sequence, truth: Truth) -> None:
-    """With pillars, doors, stairs and service points, and not beyond the walls round it."""
-    from tracking.app.pictures.contact_sheet import sheet_area
-
-    wide = dataclasses.replace(sequence, scene=dataclasses.replace(sequence.scene, size=np.array([60.0, 40.0])))
-    low, high = sheet_area(wide, truth)
-    np.testing.assert_allclose(high, truth.pos.max(axis=0) + 2)
-    low, high = sheet_area(sequence, truth.replace(pos=np.clip(truth.pos, 0, sequence.scene.size)))
-    assert (low >= -1).all()
-    assert (high <= sequence.scene.size + 1).all()
-
-
 @settings(deadline=None)
 @given(
     length=st.integers(1, 300),
@@ -69,11 +56,6 @@ def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_p
     u, v = 10 + (x - low[0]) * scale, (HEAD + TITLE) / 2 + (high[1] - y) * scale
     np.testing.assert_allclose(picture[round(v), round(u)], colour(7), atol=12)
     np.testing.assert_allclose(picture[round(v) + 30, round(u) + 30], FLOOR, atol=12)
-
-
-def test_the_same_sequence_gives_the_same_bytes(sequence: Sequence, tmp_path: Path) -> None:
-    a, b = write_sheet(sequence, tmp_path / "a.png"), write_sheet(sequence, tmp_path / "b.png")
-    assert a.read_bytes() == b.read_bytes()
 
 
 def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) -> None:

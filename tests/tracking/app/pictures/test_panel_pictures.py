@@ -7,9 +7,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pytest
 
-from sim.types import PixelTruth, Sequence, Truth
+from sim.types import PixelTruth
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.pictures.contact_sheet import (
     HEAD,
@@ -17,7 +16,6 @@ from tracking.app.pictures.contact_sheet import (
     WIDTH,
     choose_frames,
     empty_truth,
-    sheet_picture,
     write_sheet,
 )
 from tracking.app.pictures.panel_pictures import OBJECTS, PanelPictures, coloured_disparity, coloured_ids
@@ -50,18 +48,6 @@ def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
     top = (HEAD + TITLE) // 2
     first = cv2.resize(read[top : top + round(SIZE[1] * shrunk), 10 : 10 + WIDTH // 2], SIZE)
     assert number(first) == chosen[0]
-
-
-def test_pictures_stand_above_the_plan(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
-    def frames():
-        for frame in sequence.frames():
-            yield frame.replace(image=np.full((480, 640, 3), 77, np.uint8))
-
-    low = sheet_picture(sequence, truth, 4)
-    seen = dataclasses.replace(sequence, frames=frames, bare=sequence.frames, has_images=True)
-    high = sheet_picture(seen, truth, 4)
-    assert high.shape[0] - low.shape[0] == pytest.approx(WIDTH * 480 / 640 / 2, abs=1)
-    assert ((high == 77).all(axis=2)).mean() > 0.2
 
 
 def test_small_pictures(tmp_path: Path) -> None:

@@ -37,15 +37,6 @@ def test_a_direction_far_off_is_a_distance_and_one_that_is_none_is_not():
     assert again.angle[0, 0] == UP
 
 
-def test_what_is_expected_of_a_size_is_no_new_evidence_in_each_frame():
-    one, var = people([100, 100, 90, 40, UP]), 0.15**2
-    for _ in range(200):
-        one.relax_axes(np.array([0]), np.array([[68.0, 24.0]]), var)
-    assert one.bank[kalman.PLACE, 0, 2:] == pytest.approx([68, 24])
-    assert one.bank[kalman.VAR, 0, 2:] == pytest.approx(var)
-    assert one.bank[kalman.PLACE, 0, :2] == pytest.approx([100, 100])
-
-
 @pytest.mark.parametrize(("x", "wide", "hidden"), [(123, 34, True), (100, 16, False)])
 def test_who_lies_behind_somebody_is_excused_by_the_boxes_round_the_ellipses(x, wide, hidden):
     """Of 68 px of his length 28 are behind a wide person beside him, 16 behind a slim one in front."""

@@ -84,9 +84,3 @@ def test_who_turns_on_the_spot_stays_the_same():
     made = track(40.0, [[(60, 60, 0.0 if k < 12 else 1.57)] for k in range(24)])
     assert len(ids(made)) == 1
     assert all(len(t.id) == 1 for t in made[2:])
-
-
-def test_a_person_half_in_the_colour_of_shadow_is_seen():
-    made = track(40.0, [[(30 + 3 * k, 60, 0.0)] for k in range(25)], shade=0)
-    assert len(ids(made)) == 1
-    assert all(len(t.id) == 1 for t in made[3:])

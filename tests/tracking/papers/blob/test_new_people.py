@@ -60,15 +60,6 @@ def test_who_enters_is_the_slow_way(seed):
     assert np.array_equal(scene.cover, slow.painted(mask.shape, got))
 
 
-def test_no_more_are_tried_than_there_are_sizes_for():
-    """Beyond the count whose guesses know a person's size none is tried."""
-    mask = mask_of([40.0, 80.0, 60.0, 24.0], [60.0, 80.0, 60.0, 24.0])
-    guesses = np.concatenate(slow.guesses(mask, 3, Fixed(60.0, 24.0)))
-    guesses[2, 2] = np.nan
-    found = new_people._in_region(ExplainedForeground(mask), guesses, float(np.pi / 4 * 60 * 24), 0.3)
-    assert len(found) == 1
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
 def test_as_many_come_in_as_there_are(count):
     """Side by side, a head's width of each hidden behind the next."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import fields, replace
-from itertools import combinations
 
 import numpy as np
 import pytest
@@ -267,27 +266,6 @@ def test_places_of_missed_members(seed: int) -> None:
         ]
     long = error.reshape(-1, 100, 2).sum(1)  # errors of sums tell what correlated errors amount to
     assert np.var(long) / 100 == pytest.approx(R / frames, rel=0.15)
-
-
-def noise_of(seen, extent, size, rules, cov=None):
-    own = np.full(3, np.nan) if cov is None else np.array([cov[0, 0], cov[0, 1], cov[1, 1]])
-    xx, xy, yy = centroid_noise(float(seen), float(seen), own, extent, float(size), rules.numbers)
-    return np.array([[xx, xy], [xy, yy]])
-
-
-@pytest.mark.parametrize("seen", [1, 2, 3, 5, 6])
-def test_centroid_of_some_members(seen: int) -> None:
-    """Six people who keep their places, of whom so many are seen: all ways to choose them, and draws with noise."""
-    r = np.random.default_rng(seen)
-    offset = r.normal(0, [1.0, 0.5], (6, 2))
-    extent = np.cov(offset.T, bias=True)
-    exact = noise_of(seen, extent, 6, replace(PLAIN, noise=0.0))
-    means = np.array([offset[list(c)].mean(axis=0) for c in combinations(range(6), seen)]) - offset.mean(axis=0)
-    np.testing.assert_allclose(exact, means.T @ means / len(means), rtol=1e-10, atol=1e-13)
-    draws = np.array([r.permutation(6)[:seen] for _ in range(20_000)])
-    noisy = (offset[draws] + r.normal(0, 0.3, (20_000, seen, 2))).mean(axis=1) - offset.mean(axis=0)
-    found = noise_of(seen, extent + 0.09 * np.eye(2), 6, replace(PLAIN, noise=0.3))
-    np.testing.assert_allclose(noisy.T @ noisy / len(noisy), found, atol=0.03 * np.trace(found))
 
 
 def bank(**given):

@@ -92,38 +92,6 @@ def test_equally_fast_groups_within_reach_merge_once(ranks: tuple[int, int], sta
         assert sizes(made[-1]) == pytest.approx([10], abs=0.5)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_group_that_has_just_merged_merges_with_a_third(seed: int) -> None:
-    """A second group comes to the first one's right until frame 21, and they are one before the third on its left,
-    there from frame 27 on, is known to stay. The union's centroid jumps, which makes the onset 0.3 s later."""
-    starts = []
-    for others in ((2.6,), (2.0, 2.6)):
-        r, frames = np.random.default_rng(seed), []
-        for k in range(90):
-            s = k / FPS
-            sides = [y * (1.6 + max(until - s, 0)) for y, until in zip((-1, 1), others[::-1], strict=False)]
-            frames.append(noisy([block(2, 2, (s, y)) for y in (0.0, *sides)], r))
-        found = changes(track(frames))
-        assert [kind for kind, *_ in found] == ["merge"] * len(others)
-        starts.append(found[-1][1])
-    assert 0 <= starts[1] - starts[0] <= 3
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("length", [2, 5, 8])
-def test_files_that_join_end_to_end_do_so_when_they_are_near(length: int, seed: int) -> None:
-    """The last of one and the first of the other are 1.2 m apart from frame 41 on, within 2 r, however far their
-    middles are."""
-    r, frames = np.random.default_rng(seed), []
-    for k in range(100):
-        s, file = k / FPS, np.column_stack([0.7 * np.arange(length), np.zeros(length)])
-        behind = file - [0.7 * (length - 1) + 1.2 + 0.9 * max(4.0 - s, 0), 0]
-        frames.append(noisy([file + np.array([s, 0]), behind + np.array([s, 0])], r))
-    ((kind, start, before, _),) = changes(track(frames, GroupPdaConfig(radius=0.75)))
-    assert (kind, before) == ("merge", (1, 2))
-    assert start == pytest.approx(41, abs=4)
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_who_was_missed_before_he_left_has_split_off(seed: int) -> None:
     """At 2.5 frames/s, with the next sight of him 0.8 s later, 1.3 m on."""

@@ -85,17 +85,3 @@ def test_eq_5_of_people_alone_is_eq_3_to_the_last_bit():
     for k in range(5):
         total += own[:, k]
     assert np.array_equal(out, np.repeat(total[:, None], 2, axis=1))
-
-
-def test_a_group_of_all_moves_with_its_mean_velocity():
-    """The most probable new state has places moved by the mean velocity, and old velocities (E4)."""
-    rng = np.random.default_rng(4)
-    old = rng.normal(0, 1, (1, 4, 4))
-    label = np.ones((1, 1, 4), np.int64)
-    best = old.copy()
-    best[..., :2] += DT * old[..., 2:].mean(axis=1, keepdims=True)
-    top = dynamics(best, old, label)[0]
-    for _ in range(50):
-        assert dynamics(best + rng.normal(0, 0.05, best.shape), old, label)[0] < top
-    apart, _ = dynamics(best, old, np.zeros((1, 1, 4), np.int64))
-    assert apart < top

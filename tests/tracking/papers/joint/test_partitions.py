@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, binder_gain, label_of, validity
-from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint import partition_kernels
-from tracking.papers.joint.config import JointConfig
-from tracking.papers.joint.distributions import FrameModel, stam_cumulated
+from tracking.papers.joint.distributions import stam_cumulated
 from tracking.papers.joint.estimate import binder_partition, histogram_partition
 
 SCALES = np.array([0.5, 2.0])
@@ -69,19 +67,6 @@ def test_the_true_partition_is_the_best_of_all(points):
     ranked = np.argsort(found)
     assert label_of(parts[ranked[0]]).tolist() == label_of(true).tolist()
     assert found[ranked[1]] > 1.3 * found[ranked[0]]
-
-
-def test_the_data_of_the_validity_are_the_states():
-    """Eq. 4: d_cl(Z, X) with X in m and m/s, so that people who pass each other are no cluster."""
-    config = JointConfig(belief_rate=0.0, validity_rate=3.0)
-    model = FrameModel(
-        config, 0.1, 0.1, np.full((4, 2), np.nan), np.zeros((4, 4)), PersonStreams(0), np.zeros(4, np.uint64)
-    )
-    state = np.array([[0, 0, 1, 0], [0, 0.7, 1, 0], [5, 0, 1, 0], [5, 0.7, -1, 0]])
-    parts = list(all_partitions(4))
-    found = model.energy(state[None], np.array([[label_of(p) for p in parts]]))[0]
-    np.testing.assert_allclose(found, [-0.3 * validity(state, p, *SCALES) for p in parts])
-    assert sorted(map(sorted, parts[int(found.argmax())])) == [[0, 1], [2], [3]]
 
 
 def uniform(people, count):

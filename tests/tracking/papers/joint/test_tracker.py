@@ -159,17 +159,6 @@ def test_a_member_who_is_missed_stays_in_the_group():
     assert [len(t.id) for t in tracks[24:36]] == [3] * 12
 
 
-def test_with_a_memory_people_join_and_part_later():
-    """Two people come near each other, stand, and walk apart slowly."""
-    gap = np.concatenate([np.linspace(4, 0.7, 40), np.full(60, 0.7), np.linspace(0.7, 6, 60)])
-    together = []
-    for memory in (0.0, 0.4):
-        tracks = stepped(Joint(JointConfig(belief_memory=memory)), [np.array([[0, 0], [0, g]]) for g in gap])
-        together.append([t.index for t in tracks if (t.group >= 0).any()])
-    assert together[0][0] < together[1][0] <= 100
-    assert together[0][-1] < together[1][-1] < 160
-
-
 def test_a_lost_image_removes_nobody():
     tracks = stepped(Joint(), [*walk([[0, 0]], [1.0, 0.0], 20), *[None] * 25])
     assert tracks[-1].id.tolist() == tracks[19].id.tolist() == [1]

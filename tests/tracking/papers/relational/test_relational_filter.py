@@ -334,19 +334,6 @@ def test_partners_count_by_how_alike_they_are():
     np.testing.assert_allclose(np.cov(particles.vel[..., 0].T), [[1, common], [common, 1]], atol=0.02)
 
 
-@pytest.mark.parametrize("name", ["paper", "caviar-25fps"])
-def test_presets_couple_velocities_as_the_paper(name):
-    tracker = Relational(RelationalConfig.preset(name))
-    tracker.reset(Context(25.0, float("nan")), 0)
-    seat(tracker, placed(50, np.random.default_rng(0).normal(0, 3, (4, 2))))
-    relate(tracker.particles, 0, 1, np.arange(tracker.particles.count) < 25)
-    _, coupling, alike, spread = tracker._coupling()
-    assert coupling.tolist() == AT_ONCE.tolist()
-    assert transition_kernels.belonging(50.0, 9.0, alike) == 1
-    assert tracker.particles.pairs.tolist() == [[0, 1]]
-    assert not spread.any()
-
-
 def test_the_equilibrium_of_a_pair_is_the_belief():
     """Whatever the particles say; pairs without a belief, 4 m and more apart, do not walk together."""
     tracker = Relational(RelationalConfig(particles=20_000, relation_rate=2.0))

@@ -19,7 +19,6 @@ from tracking.papers.stereo.measurement import VEL, PairMeasurement, PlaceMeasur
 from tracking.papers.stereo.merging import merge, overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera
 from tracking.papers.stereo.space_group import SpaceGroup, motion_model, newborn
-from tracking.papers.stereo.splitting import split
 from tracking.papers.stereo.tracker import Stereo
 
 FPS = 30.0
@@ -252,19 +251,6 @@ def test_parts_that_would_merge_at_once_do_not_split(gap: float, parts: int, mon
     assert tracker.groups[0].first_seen == 0.0
     if parts == 1:
         assert tracker.groups[0].apart_since == pytest.approx(1.0, abs=0.1), "the clock runs on"
-
-
-def test_a_child_has_the_velocity_of_its_parent_and_its_covariance() -> None:
-    (step,) = together(walkers(0, 12, [0, 5, 1], [1, 0, 0], 1), walkers(1, 8, [4, 5, 1], [0, 1, 0], 1, first=100))
-    config = StereoConfig()
-    motion = motion_model(config, 1 / FPS)
-    group = newborn(step, PLACE, motion, 0.0)
-    group.apart_since = 0.0
-    before = group.ekf
-    (child,) = split(group, step, sphere_groups(step.pos, config.radius, 1), PLACE, motion, config.split_time)
-    assert child.count == 8
-    assert np.array_equal(child.ekf.x[VEL], before.x[VEL])
-    assert np.array_equal(child.ekf.P[np.ix_(VEL, VEL)], before.P[np.ix_(VEL, VEL)])
 
 
 def test_a_group_that_is_gone_is_deleted() -> None:
