@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
 from benchmarks import results
+from scenarios.loading.resolve import resolve
+from scenarios.loading.suites import read_entries
 
 TABLES = results.tables()
 SHOWN = {(page, name): text for page in results.pages() for name, text in results.shown(page).items()}
@@ -82,3 +85,21 @@ def test_a_block_without_a_table_stays_empty(tmp_path, monkeypatch):
     assert "| blob | 1 | 2 |" in shown
     assert "`python -m benchmarks one`, 2026-01-01" in shown
     assert results.with_tables(shown, {"t": table}) == shown
+
+
+SUITES = Path(__file__).resolve().parents[1] / "benchmarks" / "tuning_suites"
+
+
+@pytest.mark.parametrize("path", sorted(SUITES.glob("*.toml")), ids=lambda path: path.stem)
+def test_each_can_be_read(path: Path) -> None:
+    assert [entry.name for entry in resolve(str(path))] == [line.name for line in read_entries(path)]
+
+
+def test_labelled_scenes_are_those_of_groups_seen_by_labellers() -> None:
+    """Everybody is seen at 2.5 frames/s, and nothing else is changed."""
+    groups, labelled = read_entries(SUITES / "groups.toml"), read_entries(SUITES / "labelled.toml")
+    for plain, seen, entry in zip(groups, labelled, resolve(str(SUITES / "labelled.toml")), strict=True):
+        sensor = [setting for setting in seen.settings if setting.startswith("sensor.")]
+        assert (seen.name, seen.scenario, seen.settings) == (plain.name, plain.scenario, (*plain.settings, *sensor))
+        slow = "camera.fps=2.5" in plain.settings
+        assert (entry.scenario.sensor.detect_prob == 1, entry.scenario.sensor.clutter_rate == 0) == (slow, slow)

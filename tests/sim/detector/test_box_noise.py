@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from scenarios.schema.sensor import BoxNoise
+from scenarios.schema.sensor import BoxNoise, Memory
 from sim.detector.box_noise import box_errors, perturb_boxes
+from sim.detector.correlated_noise import correlated_normals
 from sim.scene.camera import foot_points, project
 from tests.reference_sense import above, pinhole
 
@@ -54,3 +55,18 @@ def test_feet_are_where_they_project_from(camera, z: float) -> None:
     share = 0.5 if camera.kind == "top" else 1.0
     box = np.column_stack([uv - np.array([10.0, 40.0 * share]), np.full(30, 20.0), np.full(30, 40.0)])
     assert foot_points(box, xyz[:, 2], camera) == pytest.approx(xyz[:, :2])
+
+
+def drawn(memory: list[Memory], frames: int = 4000, first: int = 1, id: int = 1) -> np.ndarray:
+    fresh = np.random.default_rng(id).standard_normal((frames, 3))
+    return correlated_normals(fresh, memory, first, 10.0, 7, id, 0)
+
+
+def test_correlation_is_the_sum_of_the_parts() -> None:
+    memory = [Memory(share=0.3, time=0.3), Memory(share=0.5, time=2.0)]
+    z = np.stack([drawn(memory, id=k) for k in range(40)])
+    assert z.mean() == pytest.approx(0.0, abs=0.03)
+    assert z.std() == pytest.approx(1.0, abs=0.02)
+    for lag in (1, 3, 10, 30):
+        wanted = sum(m.share * np.exp(-lag / (10 * m.time)) for m in memory)
+        assert (z[:, lag:] * z[:, :-lag]).mean() == pytest.approx(wanted, abs=0.025)

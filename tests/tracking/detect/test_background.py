@@ -1,10 +1,13 @@
 """Background subtraction: closed forms, people and light in the sample, lamps, removed objects, symmetries, twins."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 
 from scenarios.errors import InputError
 from tests import reference_background as reference
+from tracking.detect import brightness_gain
 from tracking.detect.background import (
     BACKGROUND,
     DARK,
@@ -285,3 +288,9 @@ def test_black_never_becomes_so_black_that_noise_is_foreground():
     noisy = black.copy()
     noisy[:, 25:] = 1
     assert (made.classify(noisy) == BACKGROUND).all()
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 8, 50, 51, 5000])
+def test_median_is_numpys(n):
+    values = np.random.default_rng(n).normal(1, 0.2, n).astype(np.float32)
+    assert brightness_gain._median(values) == float(np.median(values))

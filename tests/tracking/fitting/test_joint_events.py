@@ -21,7 +21,9 @@ from tracking.fitting.joint_events import (
     log_probabilities,
     partition_rows,
 )
+from tracking.fitting.relational import fit_relational, logistic
 from tracking.papers.joint.config import FITTED, JointConfig
+from tracking.papers.relational.config import RelationalConfig
 
 
 def state(pos):
@@ -78,3 +80,27 @@ def test_the_classifier_beats_the_frequencies_on_unseen_scenes():
     assert true["merges"] > 10
     assert true["log_loss"] < 0.8 * true["prior_log_loss"]
     assert both["log_loss"] < both["prior_log_loss"]
+
+
+ENDS = RelationalConfig().speed_ends
+
+
+def test_logistic_regression_finds_its_weights():
+    rng = np.random.default_rng(0)
+    design = np.stack([np.ones(40_000), -rng.exponential(2, 40_000), -rng.exponential(0.5, 40_000)], axis=1)
+    true = np.array([3.0, 1.5, 4.0])
+    same = rng.random(40_000) < 1 / (1 + np.exp(-design @ true))
+    np.testing.assert_allclose(logistic(design, same), true, rtol=0.05)
+
+
+def test_pairs_that_a_line_separates_have_finite_weights():
+    distance = np.linspace(0, 4, 400)
+    weights = logistic(np.stack([np.ones(400), -distance, np.zeros(400)], axis=1), distance < 1.5)
+    assert weights[0] / weights[1] == pytest.approx(1.5, abs=0.05)
+    assert weights[2] == 0
+    assert 3 < weights[1] < 30
+
+
+def test_without_scenes_nothing_is_fitted():
+    with pytest.raises(InputError, match="0 changes of velocity"):
+        fit_relational([], ENDS)

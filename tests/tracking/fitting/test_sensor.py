@@ -13,8 +13,10 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from scenarios.schema.sensor import BoxNoise, FalseAlarms, Memory, Sensor
 from sim.detector.sense import sense
+from sim.geometry.polygons import iou_matrix, pack
 from sim.sequence import simulate
-from sim.types import Frame, Sequence, Truth
+from sim.types import Detections, Frame, Sequence, Truth
+from tracking.app.pictures.contact_sheet import choose_frames
 from tracking.fitting.detection_matching import MatchedRecording, match_detections, match_sequence
 from tracking.fitting.error_statistics import error_statistics, simulated_detections
 from tracking.fitting.false_alarms import fit_false_alarms
@@ -161,3 +163,28 @@ def test_what_cannot_be_fitted_is_refused() -> None:
     short = truth.replace(length=1, **{f: getattr(truth, f)[few] for f in fields})
     with pytest.raises(InputError, match="labelled people"):
         fit_sensor([as_sequence(short, camera, KNOWN)])
+
+
+NONE = np.zeros(0, np.int64)
+EMPTY = Truth("none", 10.0, 0, 40.0, NONE, NONE, NONE, None, None, np.zeros((0, 4)), np.zeros(0))
+
+
+def test_a_recording_without_frames():
+    matched = match_detections(EMPTY, [], (64, 48))
+    assert fit_false_alarms([matched]) == (0.0, None)
+    assert all(np.isnan(v) for v in error_statistics([matched]).values())
+    assert choose_frames(EMPTY, 8) == []
+
+
+def test_boxes_without_scores():
+    box = np.array([[10.0, 10, 8, 20]])
+    one = np.ones(1, np.int64)
+    truth = Truth("one", 10.0, 1, 40.0, one, one, -one, None, None, box, np.ones(1))
+    matched = match_detections(truth, [Detections(1, 0.0, "image", box[:, :2], None, box)], (64, 48))
+    assert matched.score.tolist() == [1.0]
+
+
+def test_polygons_without_vertices():
+    empty = np.zeros((0, 2))
+    assert iou_matrix([empty, empty], [empty]).tolist() == [[0.0], [0.0]]
+    assert len(pack([empty], 0).vertex) == 1

@@ -17,6 +17,7 @@ from tracking import track
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.frame_weights import weighted_scorers
+from tracking.scoring.weighted_sums import FrameSums
 
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
 PAIR = {1: ((1, 2), None)}
@@ -72,3 +73,16 @@ def test_no_weight_where_a_score_is_defined_makes_it_unknown() -> None:
     nothing = scored(true, tracks([FOUND] * 20), np.zeros(20))
     assert np.isnan([nothing["group_F1"], nothing["GOSPA"], nothing["RMSE_pos"]]).all()
     assert nothing["HOTA"] == 0
+
+
+def test_a_stated_total_stands_at_weights_of_one_and_changes_with_them() -> None:
+    sums = FrameSums(3)
+    frame, values = np.array([1, 2, 2]), np.array([0.1, 0.2, 0.3])
+    sums.add("plain", frame, values)
+    sums.add("number", frame)
+    sums.add("exact", frame, values, 0.6)
+    found = sums.of(np.array([[1.0, 1.0, 1.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.5]]))
+    assert found["exact"][0] == 0.6 != 0.1 + 0.2 + 0.3
+    for name in ("plain", "exact"):
+        assert found[name] == pytest.approx([0.6, 0.2, 0.25])
+    assert found["number"].tolist() == [3, 2, 1]

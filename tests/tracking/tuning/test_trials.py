@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from tests.tuning_toys import toy_plan
-from tracking.environment.episodes import Episode
+from tests.tuning_toys import TOY, toy_plan, write_scenes
+from tracking.environment.episodes import Episode, sources
+from tracking.tuning.goals import Goal, finite_mean, goals_of
+from tracking.tuning.parallel_episodes import EpisodeTask, play_task
 from tracking.tuning.study import open_study
 from tracking.tuning.trials import run_trials
+from tracking.tuning.tuned_tracker import tuned_tracker
 
 
 class Game:
@@ -91,3 +97,56 @@ def test_a_trial_that_others_took_as_left_is_theirs(tmp_path):
         run_trials(study, interrupted, lambda *now: None)
         assert len(study.records()) >= 2
         assert not any(t.error for t in study.records())
+
+
+def test_a_worker_whose_tracker_is_another_one_ends_it_all(tmp_path: Path) -> None:
+    """An answer would be taken for one about the parameters."""
+    (source,) = sources(write_scenes(tmp_path)[0], (1,))
+    same, other = (EpisodeTask(TOY, source, {}, "file", False, code) for code in (tuned_tracker(TOY).code, "another"))
+    assert play_task(same).frames == 20
+    with pytest.raises(WorkError, match=r"another .*toy_tracker.py:Toy in a worker; .* start the workers anew"):
+        play_task(other)
+
+
+def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
+    """Else all episodes would be tuned to one and the same luck."""
+    text = Path(TOY.rpartition(":")[0]).read_text()
+    lucky = text.replace("self.fps = context.fps", "self.fps, self.config = context.fps, ToyConfig(skip=seed % 5)")
+    assert lucky != text
+    (tmp_path / "lucky.py").write_text(lucky)
+    name = f"{tmp_path / 'lucky.py'}:Toy"
+    for source in sources(write_scenes(tmp_path)[0], (5, 9)):
+        own, fixed = (
+            play_task(EpisodeTask(name, source, {}, "file", True, tuned_tracker(name).code)),
+            play_task(EpisodeTask(TOY, source, {"skip": source.seed % 5}, "file", True, tuned_tracker(TOY).code)),
+        )
+        assert own.scores == fixed.scores
+
+
+def episode(seconds: float = 1.0, frames: int = 10, **scores: float) -> Episode:
+    return Episode("x", 0, scores.get("objective", math.nan), scores, frames, seconds, 0.0)
+
+
+def test_gain_is_positive_where_the_second_is_better():
+    assert Goal("HOTA").gain(0.2, 0.5) == pytest.approx(0.3)
+    assert Goal("GOSPA", False).gain(0.2, 0.5) == pytest.approx(-0.3)
+
+
+def test_unknown_scores_are_left_out_of_the_mean():
+    goal = Goal("event_F1")
+    assert goal.mean([episode(event_F1=0.5), episode(), episode(event_F1=1.0)]) == 0.75
+    assert math.isnan(goal.mean([episode()]))
+    assert math.isnan(finite_mean([]))
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        (["HOTTA"], "did you mean HOTA"), (["hota"], "did you mean HOTA"), (["HOTA", "HOTA"], "HOTA twice"),
+        ([], "got none"), (["fps"], "docs/reference/metrics.md"),
+    ],
+)  # fmt: skip
+def test_wrong_keys_are_one_line(keys, words):
+    with pytest.raises(InputError, match=words) as caught:
+        goals_of(keys)
+    assert "--objective" in str(caught.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import cv2
@@ -11,9 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.errors import InputError
-from sim.types import GroupEvent, Sequence, Truth
-from tracking.app.pictures.contact_sheet import choose_frames, write_sheet
-from tracking.drawing.canvas import FLOOR, colour
+from sim.types import GroupEvent, PixelTruth, Sequence, Truth
+from tests.coded_pictures import SIZE, number, sequence
+from tracking.app.pictures.contact_sheet import (
+    HEAD,
+    TITLE,
+    WIDTH,
+    choose_frames,
+    empty_truth,
+    write_sheet,
+)
+from tracking.app.pictures.panel_pictures import OBJECTS, PanelPictures, coloured_disparity, coloured_ids
+from tracking.drawing.canvas import FLOOR, GRID, colour
 
 
 def bare(length: int, starts: dict[int, str]) -> Truth:
@@ -63,3 +73,52 @@ def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) ->
         with pytest.raises(InputError, match="no labelled people"):
             write_sheet(Sequence("none", 10.0, 10, sequence.frames, load), tmp_path / "none.png")
     assert not (tmp_path / "none.png").exists()
+
+
+def pixels(index: int) -> PixelTruth:
+    ids = np.zeros(SIZE[::-1], np.int64)
+    ids[30:50, 5:15], ids[:10] = index, -2
+    disparity = np.full(SIZE[::-1], 2.0)
+    disparity[:, :5] = np.nan
+    disparity[30:50, 5:15] = 9.0
+    one = np.ones(1)
+    return PixelTruth(ids, disparity, one, one, np.ones((1, 4)), np.ones(1, np.int64))
+
+
+def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
+    """Without labels too: frames spread over the recording."""
+    bare = sequence(60)
+    truth = empty_truth(bare)
+    chosen = choose_frames(truth, 4)
+    pictures = PanelPictures(bare, truth, chosen)
+    assert pictures.kinds() == ()
+    for index in chosen:
+        area = np.zeros((SIZE[1] * 4, SIZE[0] * 4, 3), np.uint8)
+        pictures.draw_large(area, index)
+        assert number(area, 0, 4) == index
+    read = cv2.imread(str(write_sheet(bare, tmp_path / "s.png", 4)))
+    shrunk = WIDTH / 2 / SIZE[0]
+    top = (HEAD + TITLE) // 2
+    first = cv2.resize(read[top : top + round(SIZE[1] * shrunk), 10 : 10 + WIDTH // 2], SIZE)
+    assert number(first) == chosen[0]
+
+
+def test_small_pictures(tmp_path: Path) -> None:
+    """One kind alone has the left picture beside it; ids keep their colours."""
+    plain = dataclasses.replace(sequence(3), load_pixels=lambda i: pixels(i).replace(disparity=None))
+    assert PanelPictures(plain, empty_truth(plain), [1, 2]).kinds() == ("left", "ids")
+    both = dataclasses.replace(plain, load_pixels=pixels)
+    pictures = PanelPictures(both, empty_truth(both), [2])
+    assert pictures.kinds() == ("ids", "disparity")
+    area = np.zeros((SIZE[1], 2 * SIZE[0], 3), np.uint8)
+    pictures.draw_small(area, 2)
+    np.testing.assert_array_equal(area[45, 10], colour(2))
+
+
+def test_colours() -> None:
+    here = pixels(3)
+    ids = coloured_ids(here.ids)
+    assert (tuple(ids[40, 10]), tuple(ids[2, 2]), tuple(ids[25, 40])) == (colour(3), OBJECTS, FLOOR)
+    shown = coloured_disparity(here.disparity, 2.0, 9.0).astype(int)
+    assert tuple(shown[40, 2]) == GRID
+    assert shown[40, 10].sum() > shown[25, 40].sum() + 100
