@@ -1,4 +1,4 @@
-"""TOML and JSON of strangers: every text is a value or one line."""
+"""TOML and JSON of strangers are a value or one line; what is printed has no control characters."""
 
 from __future__ import annotations
 

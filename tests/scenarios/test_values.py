@@ -1,4 +1,4 @@
-"""Values that no simulation can hold are refused when the scenario is loaded, by the probability of a draw."""
+"""Values that no simulation can hold are refused when the scenario is loaded."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What holds for every array of the shared types."""
+"""The shared types: arrays, ids that stand twice in a frame, and hashes of content."""
 
 from __future__ import annotations
 

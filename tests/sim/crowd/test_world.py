@@ -1,4 +1,4 @@
-"""Whole motions: repeatable, finite, nobody through walls, orders fired, the batch interface as the plain loop."""
+"""Whole motions: repeatable at any frame rate, nobody through walls, through doors, orders fired."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hulls of many sets at once, beside the plain one of a set."""
+"""Polygons: overlap, hulls, gaps; beside dense rasters, samples and scipy."""
 
 from __future__ import annotations
 

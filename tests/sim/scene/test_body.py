@@ -1,4 +1,4 @@
-"""What boxes alone tell: the scale of the image, and who is visible."""
+"""Bodies and stairs, and what boxes alone tell: the scale of the image, and who is visible."""
 
 from __future__ import annotations
 

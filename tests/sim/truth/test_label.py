@@ -1,4 +1,4 @@
-"""Hulls, means and extents of labelled groups."""
+"""Labels of a motion: rows, groups with hulls, means and extents, on the ground and in the image."""
 
 import numpy as np
 import pytest

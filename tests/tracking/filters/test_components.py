@@ -1,4 +1,4 @@
-"""Points that are one group: beside all distances and pairs looked at afresh, closed forms, invariance, growth."""
+"""Points that are one group, and cell lists: beside looks at all points and pairs, closed forms, invariance."""
 
 from __future__ import annotations
 

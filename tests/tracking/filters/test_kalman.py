@@ -1,4 +1,4 @@
-"""The bank against filterpy, the asymptote against the Riccati solver, gates against chi2, angles in a circle."""
+"""Kalman filters beside filterpy, the Riccati solver and chi2; pairing beside all pairings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random numbers of people: what they depend on, and what their distributions are."""
+"""Random numbers of people: what they depend on and their distributions; resampling beside filterpy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who is whose detection: small scenes by hand."""
+"""Who is whose detection, in small scenes by hand; correlations of errors over time come back."""
 
 from __future__ import annotations
 

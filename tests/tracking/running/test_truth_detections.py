@@ -1,4 +1,4 @@
-"""Detections made from labels: their order tells nothing, and their arrays lead to no other frame."""
+"""Which detections a tracker gets; those made from labels tell nothing by their order or their arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the small files of a truth refuse: one line that names the place."""
+"""The small files of a truth, cameras and scenes: exact round trips; what is refused names its place."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""A manifest with an intact seal whose values are of another kind: one line, not a TypeError later."""
+"""Stored sequences: exact round trips; whatever happens to a file or the manifest is told in one line."""
 
 import errno
 import json
