@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -30,37 +29,6 @@ def test_a_headline_is_not_older_than_the_code(name):
     assert not results.is_stale(TABLES[name]), f"python -m benchmarks results {name}"
 
 
-def test_sources_are_what_the_benchmark_imports_without_docstrings(tmp_path, monkeypatch):
-    (tmp_path / "benchmarks").mkdir()
-    (tmp_path / "sim").mkdir()
-    for name in results.PACKAGES:
-        (tmp_path / name).mkdir(exist_ok=True)
-    (tmp_path / "tracking" / "papers").mkdir()
-    (tmp_path / "benchmarks" / "one.py").write_text('"""Doc."""\nfrom sim.a import f\nTRACKER = "tracking.t:T"\n')
-    (tmp_path / "sim" / "a.py").write_text("def f():\n    return 1\n")
-    (tmp_path / "sim" / "b.py").write_text("")
-    (tmp_path / "tracking" / "t.py").write_text("class T: pass\n")
-    monkeypatch.setattr(results, "ROOT", tmp_path)
-
-    def now() -> str:
-        results._module_files.cache_clear()
-        results._module_facts.cache_clear()
-        return results.sources_hash(table)
-
-    table = results.Table("t", "one")
-    first = now()
-    assert results.sources_of(table) == ["benchmarks.one", "sim.a", "tracking.t"]
-    (tmp_path / "benchmarks" / "one.py").write_text(
-        '"""Other."""\n# why\nfrom sim.a import f\nTRACKER = "tracking.t:T"\n'
-    )
-    (tmp_path / "sim" / "b.py").write_text("x = 1\n")
-    assert now() == first
-    (tmp_path / "sim" / "a.py").write_text("def f():\n    return 2\n")
-    assert now() != first
-    results._module_files.cache_clear()
-    results._module_facts.cache_clear()
-
-
 def one(*cells: str) -> list[dict[str, object]]:
     return [{"title": "", "columns": ["", "score", "count"], "rows": [["blob", *cells]]}]
 
@@ -72,19 +40,6 @@ def test_few_seeds_leave_their_bands():
         "blob, score: 0.75 is now 0.86",
         "blob, count: 10 is now 11",
     ]
-
-
-def test_a_block_without_a_table_stays_empty(tmp_path, monkeypatch):
-    monkeypatch.setattr(results, "FOLDER", tmp_path)
-    table = results.Table("t", "one")
-    text = "a\n<!-- results: t -->\nold\n<!-- end -->\nb\n"
-    assert results.with_tables(text, {"t": table}) == "a\n<!-- results: t -->\n<!-- end -->\nb\n"
-    content = {"tables": one("1", "2"), "command": "python -m benchmarks one", "date": "2026-01-01"}
-    table.file.write_text(json.dumps(content))
-    shown = results.with_tables(text, {"t": table})
-    assert "| blob | 1 | 2 |" in shown
-    assert "`python -m benchmarks one`, 2026-01-01" in shown
-    assert results.with_tables(shown, {"t": table}) == shown
 
 
 SUITES = Path(__file__).resolve().parents[1] / "benchmarks" / "tuning_suites"

@@ -9,6 +9,8 @@ from sim.crowd.navigation import scene_of
 from sim.crowd.population import draw_population
 from sim.sequence import simulate
 
+pytestmark = pytest.mark.slow
+
 FRIENDS = resolve("suite:friends-meet")
 HARD = resolve("suite:friends-meet-hard")
 

@@ -10,6 +10,8 @@ import pytest
 
 from benchmarks import realism
 
+pytestmark = pytest.mark.slow
+
 SEEDS = range(1000, 1010)
 
 

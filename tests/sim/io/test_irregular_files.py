@@ -53,17 +53,6 @@ def test_among_pictures(what, tmp_path):
         open_source(tmp_path, fps=5)
 
 
-def test_a_link_to_a_missing_picture_is_a_lost_frame(tmp_path):
-    import cv2
-
-    (tmp_path / "img1").mkdir()
-    for k in (1, 3):
-        cv2.imwrite(str(tmp_path / "img1" / f"{k}.png"), np.zeros((8, 8, 3), np.uint8))
-    (tmp_path / "img1" / "2.png").symlink_to(tmp_path / "nowhere")
-    with pytest.warns(UserWarning, match="frame 2"):
-        assert [f.image is None for f in open_source(tmp_path, fps=5)[0].frames()] == [False, True, False]
-
-
 def test_videos(tmp_path):
     for suffix in ("mp4", "xml", "txt"):
         os.mkfifo(tmp_path / f"a.{suffix}")

@@ -109,14 +109,3 @@ def test_boxes_tell_nearly_what_bodies_tell() -> None:
     assert found.truncation == pytest.approx(truth.truncation, abs=0.1)
     seen = np.isfinite(found.visible_box).all(axis=1) & np.isfinite(truth.visible_box).all(axis=1)
     assert np.median(np.abs(found.visible_box - truth.visible_box)[seen]) < 1.0
-
-
-def test_what_is_labelled_is_kept() -> None:
-    truth = bodies(crowd(3, frames=2), pinhole())
-    assert with_visibility(truth, (640, 480)) is truth
-    given = np.linspace(0.1, 0.9, len(truth.id))
-    found = with_visibility(truth.replace(visible_box=None, visibility=given), (640, 480))
-    assert np.array_equal(found.visibility, given)
-    assert found.visible_box is not None
-    points = truth.replace(box=None, visible_box=None)
-    assert with_visibility(points, None) is points

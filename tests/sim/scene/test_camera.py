@@ -51,16 +51,6 @@ def test_the_ground_comes_back_through_a_bent_lens(k, tilt):
     assert np.abs((origin + depth[:, None] * direction)[:, :2] - xy).max() < 1e-8
 
 
-@pytest.mark.parametrize("k", [0.0, *BENDS])
-def test_the_jacobian_is_the_slope(k):
-    camera = pinhole(35, -15).replace(radial=k, focal_px=(480.0, 530.0))
-    uv = np.random.default_rng(2).uniform([20, 260], [620, 470], (100, 2))
-    step = 1e-4
-    slope = [(to_ground(camera, uv + d) - to_ground(camera, uv - d)) / (2 * step) for d in step * np.eye(2)]
-    right = np.stack(slope, axis=2)
-    assert ground_jacobian(camera, uv) == pytest.approx(right, rel=1e-5, abs=1e-8)
-
-
 def test_axes_are_right_down_forward() -> None:
     camera = pinhole(tilt=0, at=(0, 0, 1))
     uv, depth = project(camera, np.array([[0, 10, 1], [1, 10, 1], [0, 10, 2], [0, -1, 1.0]]))

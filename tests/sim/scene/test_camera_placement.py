@@ -74,15 +74,6 @@ def test_the_camera_looks_from_where_people_look_largest(seed: int) -> None:
     assert np.array_equal(place_camera(CameraSpec(), motion.replace(fps=20.0)).rotation, chosen.rotation)
 
 
-def test_a_view_that_the_scenario_fixes_keeps_yaw_0() -> None:
-    motion = crowd(2)
-    ahead = camera_rotation(np.deg2rad(40), 0.0)
-    for keys in ({"height": 20.0}, {"position": (8.0, -10.0), "crop": True}):
-        assert np.array_equal(place_camera(CameraSpec.model_validate(keys), motion).rotation, ahead)
-    above = place_camera(CameraSpec(kind="top"), motion)
-    assert np.array_equal(above.rotation, camera_rotation(np.pi / 2, 0.0))
-
-
 def test_from_above() -> None:
     motion = crowd(4)
     camera = place_camera(CameraSpec(kind="top"), motion)

@@ -21,7 +21,7 @@ from sim.types import Truth
 from tests.toy_tracker import Toy
 from tracking.config import Config, param
 from tracking.environment.env import OBSERVATIONS, TuningEnv
-from tracking.parameter_space import decode, encode
+from tracking.parameter_space import encode
 from tracking.running.tracker_registry import names
 
 ID = "flockscope/Tuning-v0"
@@ -72,18 +72,6 @@ def test_rewards_sum_to_what_evaluate_says(tracker):
     for frame, total in zip((7, 14, 21, 28), np.cumsum(rewards), strict=False):
         prefix = tracking.evaluate(sequence.truth, run, frames=frame)["objective"]
         assert total == pytest.approx(prefix, abs=1e-9, nan_ok=True)
-
-
-@pytest.mark.parametrize("tracker", names())
-def test_once_per_episode_is_a_run_with_these_parameters(tracker):
-    env = make(tracker)
-    action = np.random.default_rng(2).uniform(-0.3, 0.3, env.action_space.shape).astype(np.float32)
-    _, (reward,), info = played(env, action, seed=4)
-    config = decode(env.unwrapped.space, action, env.unwrapped.defaults)
-    assert info["params"] == config.as_dict()
-    sequence = next(s for s in env.unwrapped.sources if (s.name, s.seed) == (info["scenario"], info["seed"])).open()
-    run = tracking.track(tracker, sequence, params=config)
-    assert reward == tracking.evaluate(sequence.truth, run)["objective"] == info["scores"]["objective"]
 
 
 @pytest.mark.parametrize("every", [None, 9])
@@ -167,16 +155,6 @@ def test_from_pixels():
     assert "pixel_radius" in info["names"]
     assert "radius" not in info["names"]
     assert env.render().shape == (152, 160, 3)
-
-
-def test_whatever_the_action_an_episode_comes_of_it():
-    for tracker in names():
-        for every in (None, 10):
-            env = make(tracker, "cross", seeds=range(1), decision_every=every)
-            for corner in (-1.0, 1.0):
-                _, rewards, info = played(env, np.full(env.action_space.shape, corner), seed=2)
-                assert np.isfinite(rewards).all()
-                assert rewards.sum() == pytest.approx(info["objective"], abs=1e-9)
 
 
 class Deaf(Toy):

@@ -71,15 +71,6 @@ def test_the_order_of_points_changes_nothing(seed: int) -> None:
     assert verdict[0] == verdict[1]
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1e6])
-@pytest.mark.parametrize("seed", range(30))
-def test_units_change_nothing(seed: int, scale: float) -> None:
-    points, weights, rule = random_set(np.random.default_rng(seed))
-    other = Constraint(scale * rule.link, rule.gate, scale**2 * rule.prior, rule.strength, rule.least)
-    assert same(partition(scale * points, weights, other), partition(points, weights, rule))
-    assert same(prefixes(scale * points, weights, 0, other), prefixes(points, weights, 0, rule))
-
-
 def disc(x, y, count=80, sd=0.5):
     """Points on a circle whose 1/N covariance is sd^2 I."""
     t = np.arange(count) * 2 * np.pi / count

@@ -87,6 +87,7 @@ def correlation(memory: tuple[Memory, ...], lag: float) -> float:
     return sum(part.share * float(np.exp(-lag / part.time)) for part in memory)
 
 
+@pytest.mark.slow
 def test_noise_comes_back() -> None:
     found, known = fitted().box_noise, KNOWN.box_noise
     for name, absolute in (("across", 0.004), ("foot", 0.006), ("top", 0.006), ("width", 0.02)):
@@ -98,6 +99,7 @@ def test_noise_comes_back() -> None:
     assert fitted().box == "amodal"
 
 
+@pytest.mark.slow
 def test_false_alarms_come_back() -> None:
     busy = KNOWN.model_copy(update={"clutter_rate": 4.0})
     rate, found = fit_false_alarms(seen(busy, seed=50))
@@ -114,12 +116,14 @@ def test_false_alarms_come_back() -> None:
     near(found.jitter, 0.02, 0.006)
 
 
+@pytest.mark.slow
 def test_scores_come_back() -> None:
     found = fitted()
     near(np.array(found.true_scores)[[1, 5, 9]], (0.4, 0.8, 0.96), 0.03)
     near(np.array(found.false_scores)[[1, 5, 9]], (0.22, 0.3, 0.54), 0.06)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("points", "box"), [("own", "visible"), ("seen", "visible"), ("foot", "amodal")])
 def test_points_are_told(points: Any, box: Any) -> None:
     small = BoxNoise(scale=0.3)  # with large errors of boxes people are matched with their neighbours' detections
@@ -128,6 +132,7 @@ def test_points_are_told(points: Any, box: Any) -> None:
     near(found.noise_m, Sensor().noise_m if points == "foot" else 0.1, 0.01)
 
 
+@pytest.mark.slow
 def test_synthetic_errors_look_like_those_they_were_fitted_to() -> None:
     """Statistics of new draws of the fitted sensor lie among those of new draws of the true one."""
     first = seen(KNOWN)[:2]

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
 from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import load
-from sim.io.store.track_files import write_tracks
-from sim.scene.boxes import scale_of_all_boxes
 from sim.scene.camera import px_per_m_at_centre
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
-from tracking.running import image_scale
-from tracking.running.image_scale import ImageScale, learned_by
 from tracking.running.prepare import prepare
 from tracking.running.run import TrackingRun, grouped, track
-from tracking.scoring import user_arrays
 
 FPS, LENGTH = 10.0, 30
 
@@ -201,41 +194,6 @@ def test_empty_sequences():
     assert [len(t.id) for t in track("blob", bare)] == [0, 0, 0]
 
 
-class Placed(Stranger):
-    """Knows places on the ground, or in the image, and no boxes."""
-
-    plane = "image"
-
-    def step(self, frame, detections):
-        return super().step(frame, detections).replace(plane=self.plane, box=None)
-
-
-class Grounded(Placed):
-    plane = "ground"
-
-
-class OfGroups(Grounded):
-    """Its rows are groups, which are no upright people."""
-
-    def step(self, frame, detections):
-        made = super().step(frame, detections)
-        return made.replace(unit="group", group=made.id.copy(), groups=None, events=())
-
-
-@pytest.mark.parametrize(
-    ("tracker", "seen", "expected"),
-    [
-        (Placed, True, "none"), (Grounded, True, "projected"), (Grounded, False, "none"), (OfGroups, True, "none"),
-        ("blob", True, "measured"),
-    ],
-)  # fmt: skip
-def test_the_run_and_its_files_agree_on_where_boxes_come_from(tmp_path, tracker, seen, expected):
-    camera = simulate(load("merge"), seed=3).camera if seen else None
-    run = track(tracker, source(camera=camera))
-    write_tracks(tmp_path, run, fps=FPS, camera=camera, info=run.info)
-    assert run.info["boxes"] == json.loads((tmp_path / "run.json").read_text())["boxes"] == expected
-
-
 def test_one_plane_in_a_run_and_again_in_the_next():
     class Turncoat(Stranger):
         def step(self, frame, detections):
@@ -338,29 +296,6 @@ def test_detections_that_start_no_track() -> None:
     assert any(len(t.id) for t in track("blob", scored(0.2), params={"score_start": 0.2}))
 
 
-@pytest.mark.parametrize("tracker", ["blob", "group-pda"])
-def test_detections_that_start_tracks(tracker) -> None:
-    """Also of a tracker that does not use scores."""
-    track(tracker, scored(0.2 if tracker == "group-pda" else 0.5))
-
-
-class Learned:
-    def __init__(self, value: object) -> None:
-        self.px_per_m = value
-
-
-@pytest.mark.parametrize("value", [40, 40.0, np.float32(40), np.float64(40), np.int32(40)])
-def test_a_trackers_own_scale_is_a_number_of_any_kind(value):
-    assert learned_by(Learned(value)) == 40.0
-    assert image_scale.from_tracks(ImageScale(float("nan")), learned_by(Learned(value)), ()) == ImageScale(40.0)
-
-
-@pytest.mark.parametrize("value", [None, True, "40", np.ones(1), float("nan"), np.float32("inf")])
-def test_anything_else_is_no_scale(value):
-    assert np.isnan(learned_by(Learned(value)))
-    assert np.isnan(learned_by(object()))
-
-
 def side_by_side(index: int) -> Tracks:
     """Two people at rest, 60 px apart in the image."""
     pos = np.array([[200.0, 200.0], [260.0, 200.0]])
@@ -391,11 +326,3 @@ def test_stored_tracks_are_grouped_by_the_scale_of_the_tracker(monkeypatch):
         grouped([side_by_side(1)], made)
     seen = px_per_m_at_centre(camera)
     assert used == [seen, seen, 55.0, 20.0, 20.0, seen]
-
-
-def test_scoring_and_readers_take_the_scale_of_the_truth_alike():
-    """`tracking.scoring` stands alone, so that it has the rule of its own."""
-    height = np.random.default_rng(0).uniform(20, 90, 33)
-    box = np.column_stack([np.zeros((33, 3)), height])
-    assert user_arrays._scale(box) == scale_of_all_boxes(height) == np.median(height) / 1.7
-    assert np.isnan(scale_of_all_boxes(height[:0]))

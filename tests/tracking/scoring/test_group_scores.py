@@ -34,14 +34,6 @@ def test_one_giant_group_is_not_two():
         assert found[f"group_{key}"] == near(value), key
 
 
-def test_hulls_that_only_touch_do_not_match():
-    # One true and one estimated group, an edge in common: 1 missed, 1 false of 1: 1 - (1 + 1 + 0)/1 = -1.
-    found = scores([Scene(APART, {1: ((1, 2), (0, 0, 2, 1))})], [Scene(APART, {1: ((3, 4), (2, 0, 4, 1))})])
-    assert found["group_1-FP"] == found["group_1-FN"] == near(0)
-    assert found["group_MOTA"] == near(-1)
-    assert np.isnan(found["group_MOTP"])
-
-
 def test_a_switch_is_remembered_while_nobody_is_found():
     # The group is matched with 7, with nobody, with 8 (a switch from 7, not a fresh start), 8, 7 (another):
     # 1 - (1 missed + 2 switches)/5.

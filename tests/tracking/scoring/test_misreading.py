@@ -5,7 +5,6 @@ import pytest
 
 from sim.types import Tracks, Truth
 from tracking.app.cli import run
-from tracking.scoring import score_arrays
 from tracking.scoring.misreading import likely_misreading
 
 SIZE = (1920, 1080)
@@ -100,12 +99,6 @@ def test_shares_of_the_picture():
     assert "--box-scale 1920,1080 (shares of the picture)" in text
 
 
-def test_runs_of_ours_are_tracked_again():
-    rows = walk()
-    text = likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:] / 2), given="run")
-    assert "--box-scale 2 to `flockscope track`" in text
-
-
 @pytest.mark.parametrize(("shift", "words"), [(1, "-1"), (-1, "+1"), (-20, "+20")])
 def test_shifted_frames(shift, words):
     rows = walk()
@@ -121,15 +114,6 @@ def test_frames_at_another_rate():
     some = rows[rows[:, 0] % 5 == 1]
     text = likely_misreading(truth_of(rows), tracks_of((some[:, 0] - 1) // 5 + 1, some[:, 1], some[:, 2:]))
     assert "with frames numbered 1, 6, 11, …" in text
-
-
-def test_frames_in_the_column_of_ids():
-    rows = walk()
-    order = np.argsort(rows[:, 1], kind="stable")
-    swapped = rows[order][:, [1, 0, 2, 3, 4, 5]]
-    text = likely_misreading(truth_of(rows), tracks_of(swapped[:, 0], swapped[:, 1], swapped[:, 2:]))
-    assert "with ids in column 1 and frames in column 2, 100% would" in text
-    assert "id,frame,left,top,width,height," in text
 
 
 @pytest.mark.parametrize("share", [1, 0.3])
@@ -189,11 +173,3 @@ def test_the_warning_of_score_and_its_remedy(tmp_path, capsys):
     text.write_text("frame,id,x1,y1,x2,y2,score\n" + text.read_text())
     high, told = score(capsys, folder, text, "--box-scale", "2")
     assert (high, told) == (pytest.approx(1, abs=1e-3), "")
-
-
-def test_arrays():
-    rows = walk()
-    truth, found = ({"frame": rows[:, 0].astype(int), "id": rows[:, 1].astype(int), "box": b} for b in (
-        rows[:, 2:], corners(rows[:, 2:])))  # fmt: skip
-    with pytest.warns(UserWarning, match="read as x1,y1,x2,y2, 100% would. Give left, top, width, height in px"):
-        assert score_arrays(truth, found, fps=25)["HOTA"] < 0.05

@@ -12,7 +12,7 @@ from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import toy_plan, tune_arguments
 from tracking.environment.episodes import Episode
 from tracking.tuning import tune
-from tracking.tuning.comparison import Candidate, Comparison, compare_episodes, pareto_front
+from tracking.tuning.comparison import Candidate, compare_episodes, pareto_front
 from tracking.tuning.goals import Goal
 from tracking.tuning.held_out_evaluation import HeldOutEvaluator
 from tracking.tuning.search_plan import SearchPlan
@@ -100,13 +100,3 @@ def test_the_same_command_again_plays_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr("tracking.tuning.parallel_episodes._attempt", never)
     assert str(tune(**given, out=tmp_path / "toy.toml")) == str(first)
     assert (tmp_path / "toy.json").read_bytes() == content
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "said"),
-    [(0.05, 0.15, "+0.1000 [+0.0500, +0.1500]"), (float("nan"), float("nan"), "+0.1000 (no interval)")],
-)
-def test_an_unknown_interval_is_not_printed(low: float, high: float, said: str) -> None:
-    line = Comparison("merge", "HOTA", True, 0.5, 0.6, 0.1, low, high, 1 + (low == low)).line()
-    assert said in line
-    assert "nan" not in line

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import FlockscopeError, InputError
-from tests.loopback import loopback
 from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, toy_plan, tune_arguments
 from tracking.tuning import tune
@@ -93,19 +92,6 @@ def test_the_same_again_and_with_two_workers(found, tmp_path):
         assert contents(out) == contents(found[1])
     tune(**tune_arguments(tmp_path)).write(tmp_path / "toy.toml")
     assert contents(tmp_path) == contents(found[1])
-
-
-@pytest.mark.slow
-def test_the_same_on_a_cluster(tmp_path):
-    """Two workers elsewhere: the same bytes as here."""
-    small = {"trials": 4, "check": None, "only": ["reach"]}
-    tune(**tune_arguments(tmp_path, **small), out=tmp_path / "toy.toml")
-    here = contents(tmp_path)
-    for path in tmp_path.glob("toy.*"):
-        path.unlink()
-    with loopback(tmp_path) as cluster:
-        tune(**tune_arguments(tmp_path, cluster=cluster.address, **small), out=tmp_path / "toy.toml")
-    assert contents(tmp_path) == here
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from tests.tuning_toys import TOY, toy_plan, write_scenes
 from tracking.environment.episodes import Episode, sources
-from tracking.tuning.goals import Goal, finite_mean, goals_of
+from tracking.tuning.goals import goals_of
 from tracking.tuning.parallel_episodes import EpisodeTask, play_task
 from tracking.tuning.study import open_study
 from tracking.tuning.trials import run_trials
@@ -79,26 +78,6 @@ def test_a_score_that_no_scene_has_is_an_error(tmp_path):
         played(tmp_path, objective="queue_F1")
 
 
-@pytest.mark.slow
-def test_a_trial_that_others_took_as_left_is_theirs(tmp_path):
-    """Without a journal nobody knows who is at work: of two processes one may play what the other is at, too."""
-    made, url = toy_plan(tmp_path, seeds=range(12), trials=2, only=["skip"]), f"sqlite:///{tmp_path}/s.db"
-
-    def interrupted(sources, values, every):
-        for k, answer in enumerate(Game()(sources, values, every)):
-            if k == 5 and not others:
-                with open_study(made, url, "x") as other:
-                    others.append(other.ask(retry_unfinished=True))
-                    run_trials(other, Game(), lambda *now: None)
-            yield answer
-
-    others = []
-    with open_study(made, url, "x") as study:
-        run_trials(study, interrupted, lambda *now: None)
-        assert len(study.records()) >= 2
-        assert not any(t.error for t in study.records())
-
-
 def test_a_worker_whose_tracker_is_another_one_ends_it_all(tmp_path: Path) -> None:
     """An answer would be taken for one about the parameters."""
     (source,) = sources(write_scenes(tmp_path)[0], (1,))
@@ -121,22 +100,6 @@ def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
             play_task(EpisodeTask(TOY, source, {"skip": source.seed % 5}, "file", True, tuned_tracker(TOY).code)),
         )
         assert own.scores == fixed.scores
-
-
-def episode(seconds: float = 1.0, frames: int = 10, **scores: float) -> Episode:
-    return Episode("x", 0, scores.get("objective", math.nan), scores, frames, seconds, 0.0)
-
-
-def test_gain_is_positive_where_the_second_is_better():
-    assert Goal("HOTA").gain(0.2, 0.5) == pytest.approx(0.3)
-    assert Goal("GOSPA", False).gain(0.2, 0.5) == pytest.approx(-0.3)
-
-
-def test_unknown_scores_are_left_out_of_the_mean():
-    goal = Goal("event_F1")
-    assert goal.mean([episode(event_F1=0.5), episode(), episode(event_F1=1.0)]) == 0.75
-    assert math.isnan(goal.mean([episode()]))
-    assert math.isnan(finite_mean([]))
 
 
 @pytest.mark.parametrize(

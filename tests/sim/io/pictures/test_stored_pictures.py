@@ -144,19 +144,6 @@ def test_pictures_are_checked_when_they_are_read(tmp_path, make_pictured, images
     assert validate(tmp_path / "a") == []
 
 
-@pytest.mark.parametrize("wanted", [("right",), ("disparity",), ("ids",), ("left", "ids"), ("background",), ()])
-def test_any_streams(tmp_path, make_pictured, same, wanted):
-    live = make_pictured(3, tuple(wanted))
-    read = stored(tmp_path / "a", live, wanted)
-    assert (read.has_images, read.has_right) == ("left" in wanted, "right" in wanted)
-    assert all((f.image is not None) == ("left" in wanted) for f in read)
-    assert (read.load_pixels is not None) == ("ids" in wanted)
-    assert (read.background() is not None) == (not {"left", "right", "background"}.isdisjoint(wanted))
-    assert validate(tmp_path / "a") == []
-    if wanted in (("disparity",), ("ids",), ()):
-        assert manifest(tmp_path / "a")["images"] is None
-
-
 def test_streams_that_are_not_there(tmp_path, make_pictured):
     for wanted, images in ((("right",), "jpg"), (("right",), "mp4"), (("disparity",), "jpg")):
         with pytest.raises(InputError, match=wanted[0]):

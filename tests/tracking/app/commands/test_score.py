@@ -140,20 +140,6 @@ def test_boxes_are_compared_by_their_feet_where_the_camera_is_known(
         assert row["HOTA"] > scored(capsys, data, path, "--similarity", "boxes")["sequences"][0]["HOTA"] + 0.05
 
 
-def test_a_short_recording_is_an_indication_only(made: Path, capsys, monkeypatch) -> None:
-    """The scene lasts under a minute; with the border below its length it is long enough."""
-    one = [made / "data" / "flockscope-train" / "merge-s00005", made / "file"]
-    (note,) = scored(capsys, *one, "--blocks", "2")["notes"]
-    assert "indicative under 60 s" in note
-    assert run(["score", *map(str, one), "--blocks", "2"]) == 0
-    assert "indicative under 60 s" in " ".join(capsys.readouterr().out.split())
-    assert scored(capsys, *one)["notes"] == []
-    monkeypatch.setattr("tracking.app.commands.score_ranking.SURE", 5.0)
-    assert scored(capsys, *one, "--blocks", "2")["notes"] == []
-    assert run(["score", *map(str, one), "--blocks", "2"]) == 0
-    assert "indicative" not in capsys.readouterr().out
-
-
 def test_two_runs_of_one_recording(made: Path, capsys) -> None:
     """Resampled frames were joined, and each join was a switch: IDSW 24 had the interval [46, 76]."""
     one = made / "data" / "flockscope-train" / "merge-s00005"

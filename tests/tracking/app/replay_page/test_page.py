@@ -121,21 +121,8 @@ def test_without_boxes_there_is_no_image(sequence: Sequence, truth: Truth) -> No
 def test_nobody_anywhere(sequence: Sequence) -> None:
     none = np.zeros(0, np.int64)
     empty = Truth("none", 10.0, 5, 60.0, none, none, none, np.zeros((0, 2)), None, None, np.zeros(0), events=())
-    quiet = [
-        Tracks(
-            k,
-            0.0,
-            "ground",
-            "person",
-            none,
-            none,
-            np.zeros((0, 2)),
-            np.zeros((0, 2)),
-            np.zeros((0, 4, 4)),
-            groups=Groups.none(),
-        )
-        for k in range(1, 6)
-    ]
+    two, cov = np.zeros((0, 2)), np.zeros((0, 4, 4))
+    quiet = [Tracks(k, 0.0, "ground", "person", none, none, two, two, cov, groups=Groups.none()) for k in range(1, 6)]
     data = page_data(Sequence("none", 10.0, 5, lambda: iter(()), lambda: empty), quiet)
     assert data["truth"]["x"] == data["tracks"]["x"] == []
     assert data["truth"]["bars"] == []

@@ -165,21 +165,6 @@ def test_whoever_is_always_seen_is_confirmed(config, fps):
     assert tracker.people.confirmed.all()
 
 
-@pytest.mark.parametrize("start", [0.0, 0.1, 1.2, 4.1, 8.2, 1000.3])
-def test_a_tentative_track_has_its_time_whenever_it_starts(start, monkeypatch):
-    monkeypatch.setattr("tracking.papers.blob.update_from_boxes.CONFIRM_GATE", 0.1)
-    tracker = Blob(BlobConfig(tentative_time=1.0))
-    tracker.reset(CONTEXT, 0)
-    first = []
-    for k in range(14):
-        box = np.array(at((100 + 14 * (k % 2), 200)))  # never near enough to be confirmed
-        found = Detections(k + 1, start + k / FPS, "image", box[:, :2], None, box, np.ones(1))
-        tracker.step(Frame(k + 1, start + k / FPS), found)
-        first.append(1 in tracker.people.id)
-    assert not tracker.people.confirmed.any()
-    assert first == [True] * 11 + [False] * 3
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_moving_the_scene_moves_the_answer(config, seed):
     boxes, shift = crowd(seed), np.array([333.0, -77.0, 0, 0])
@@ -203,6 +188,7 @@ def test_covariances_are_sound_and_ids_unique(config, seed):
             assert (np.linalg.eigvalsh(cov) > 0).all()
 
 
+@pytest.mark.slow
 def test_innovations_are_white_and_of_unit_size_on_the_model_itself():
     r = np.random.default_rng(3)
     config = BlobConfig(gate=0.999999)

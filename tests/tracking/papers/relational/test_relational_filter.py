@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 
 import numpy as np
 import pytest
@@ -300,20 +299,6 @@ def test_velocities_of_partners_approach_each_other_with_the_time_constant():
         np.testing.assert_allclose(a - b, np.array([2, -1]) / np.e, rtol=1e-12)
         np.testing.assert_allclose((a + b) / 2, [1, 0.5], rtol=1e-12)
         assert alone.tolist() == [1, 1]
-
-
-def test_partners_have_a_share_of_the_noise_in_common():
-    """The variance of each person's noise is that of a person alone; the correlation of partners is common_noise."""
-    count, rng = 40_000, np.random.default_rng(4)
-    particles = placed(count, [[0, 0], [0, 1], [1, 0], [9, 9]])
-    for i, j in itertools.combinations(range(3), 2):
-        relate(particles, i, j)
-    noise, shared = rng.standard_normal((2, count, 4, 2))
-    move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), np.array([0.5, 0.7]), 1.0, shared)
-    expected = np.eye(4)
-    expected[:3, :3] += 0.7 * (1 - np.eye(3))
-    np.testing.assert_allclose(np.cov(particles.vel[..., 0].T), expected, atol=0.03)
-    assert np.array_equal(particles.vel[:, 3], noise[:, 3])
 
 
 def test_partners_count_by_how_alike_they_are():

@@ -69,6 +69,7 @@ def test_a_linear_measurement_makes_it_a_kalman_filter() -> None:
         assert np.abs(group.ekf.P - kf.P).max() < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [5.0, 10.0, 20.0])
 def test_errors_have_the_stated_covariance(depth: float) -> None:
     """NEES of the state over 60 runs of 2 s: 6 in the mean, within 99 % of chi-square."""
@@ -104,6 +105,7 @@ def test_errors_have_the_stated_covariance(depth: float) -> None:
     assert abs(np.mean(nees) - 6) < 2.6 * sd + 0.3
 
 
+@pytest.mark.slow
 def test_depth_has_no_bias_where_members_stand_at_many_depths() -> None:
     """The mean of their disparities would tell a depth 0.13 m too small."""
     camera, r = rig(0.0, focal=246.0), np.random.default_rng(5)
