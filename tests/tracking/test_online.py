@@ -127,25 +127,6 @@ def test_a_change_half_way_is_seen_from_there_on_and_not_before(name, points):
     assert differ(plain[11:], late[11:])
 
 
-@pytest.mark.parametrize(("sequence", "mode"), [("points", "file"), ("pixels", "image")])
-@pytest.mark.parametrize("name", names())
-def test_any_change_between_any_frames(name, sequence, mode, request):
-    """Random parameters in every other frame: those that cannot be are refused before anything is changed."""
-    kind, rng = find(name).config_class, np.random.default_rng(5)
-    space = kind.space(online=True)
-    source = pictures_for(name, request) if mode == "image" else request.getfixturevalue(sequence)
-    ready = prepare(name, source, detections=mode)
-    ready.reset(0)
-    for frame in ready.frames():
-        before = ready.tracker.config
-        ready.tracker.config = decode(space, rng.uniform(-1, 1, len(space)), kind())
-        try:
-            ready.step(frame)
-        except InputError:
-            ready.tracker.config = before
-            ready.step(frame)
-
-
 def test_a_refused_change_leaves_blob_as_it_was(points):
     """Newborn tracks that would be confirmed at once."""
     wrong = dataclasses.replace(find("blob").config_class(), confirm_ratio=2.0, speed_prior=0.1, accel_noise=10.0)

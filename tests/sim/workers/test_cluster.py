@@ -47,21 +47,6 @@ def test_every_item_with_its_result(two: Loopback) -> None:
     assert set(who.values()) <= {worker.pid for worker in two.workers}
 
 
-def test_items_are_taken_when_there_is_somebody_to_do_them(two: Loopback) -> None:
-    taken, seen = [], []
-
-    def items() -> Iterator[int]:
-        for k in range(12):
-            assert len(taken) - len(seen) < 2 + 1
-            taken.append(k)
-            yield k
-
-    with start_workers(1, two.address) as run:
-        for k, _ in run(process, items(), ahead=1):
-            seen.append(k)
-    assert sorted(seen) == list(range(12))
-
-
 def test_an_error_there_is_raised_here(two: Loopback) -> None:
     with pytest.raises(ValueError, match="-1 is negative") as caught, start_workers(1, two.address) as run:
         list(run(refuse, [1, -1]))

@@ -12,6 +12,7 @@ import pytest
 
 from tests.sealing import seal_again
 from tests.small_disks import small_disk
+from tests.tuning_toys import TOY
 from tracking.app.cli import run
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -57,6 +58,8 @@ TRACK = "track blob {made}/data --out {tmp}/out"
 CLASS = "track {tmp}/bad:Mine {made}/data --out {tmp}/out"
 DET = "track blob {tmp}/bad --fps 10 --out {tmp}/out"
 LABELS = "track blob {tmp}/bad --fps 10 --detections truth --out {tmp}/out"
+REPLAY = "replay {walk} --out {tmp}/out"
+TUNE = f"tune {TOY} --suite {{made}}/scene.toml --out {{tmp}}/toy.toml"
 GOOD = "generate {made}/scene.toml --seeds 0 --out {tmp}/out"
 
 # what is wrong: the suffix and content of the file `bad`, the command, and what the line must say ("bad": its name).
@@ -126,6 +129,22 @@ OPTIONS = {
     "overlay {one} --out {tmp}/film.avi": "ends in .mp4; write {tmp}/",
     "view {one} --out {tmp}/page": "ends in .html; write {tmp}/",
     "fit sensor {one} --out {tmp}/mine.txt": "ends in .toml; write {tmp}/",
+    "fit sensor {tmp}/none --out {tmp}/x.toml": "nothing there",
+    "fit grouping merge --seeds x --out {tmp}/x.toml": "--seeds",
+    f"{GOOD} --sensor {{tmp}}/none.toml": "no such file",
+    **{f"{REPLAY} {option}": word for option, word in {
+        "--seeds 0": "train", "--start 500": "500 s", "--duration 0": "--duration", "--camera {tmp}/no.toml": "no such",
+        "--set camera.height=0.4": "out of view", "--set camra.fps=5": "camra", "--streams left,up": "up",
+        "--streams none --images png": "--images", "--camera {made}/scene.toml": "scene.toml",
+    }.items()},
+    **{f"{TUNE} {option}": word for option, word in {
+        "--seeds 0-5": "--seeds: got '0-5'", "--test 0:5": "--test: got 0:5; expected test seeds",
+        "--objective HOTTA": "did you mean HOTA?", "--only reach,skipp": "did you mean skip?",
+        "--set reech=1": "did you mean reach?", "--set weather.sun=1": "weather.sun", "--prune 2": "--prune: got 2.0",
+        "--storage nonsense://x": "--storage", "--detections image": "--detections",
+        "--sensor {tmp}/none.toml": "none.toml", "--check no-such": "no-such",
+    }.items()},
+    TUNE.replace(".toml", ".json"): "--out",
 }  # fmt: skip
 
 
@@ -133,8 +152,11 @@ OPTIONS = {
 def places(made, tmp_path) -> dict[str, Path]:
     """Folders and good files that the commands above name."""
     found = {"made": made, "one": made / "data" / "flockscope-demo" / "scene-s40000", "tmp": tmp_path / "here"}
+    walk = "".join(f"{10 * k} {person} {0.5 * k} 0 {person}.0 0 0 0\n" for k in range(20) for person in (1, 2))
     files = {"det": ("det.txt", DETECTION), "biwi": ("obsmat.txt", ""), "caviar": ("people.xml", "<dataset/>")}
+    files["walk"] = ("walk/obsmat.txt", walk)
     found["tmp"].mkdir()
+    (tmp_path / "walk").mkdir()
     for key, (name, text) in files.items():
         found[key] = tmp_path / name
         found[key].write_text(text)

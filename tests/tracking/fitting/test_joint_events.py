@@ -8,21 +8,17 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading.resolve import resolve
-from sim.sequence import simulate
 from tracking.fitting.joint_events import (
     MERGE,
     NONE,
     SPLIT,
     EventRows,
-    event_rows,
     event_scores,
     fit_events,
     log_probabilities,
     partition_rows,
 )
 from tracking.fitting.relational import fit_relational, logistic
-from tracking.papers.joint.config import FITTED, JointConfig
 from tracking.papers.relational.config import RelationalConfig
 
 
@@ -66,20 +62,6 @@ def test_the_fit_finds_its_weights():
 def test_without_events_nothing_is_fitted():
     with pytest.raises(InputError, match="0 merges, 0 splits"):
         fit_events(EventRows.joined([]))
-
-
-@pytest.mark.slow
-def test_the_classifier_beats_the_frequencies_on_unseen_scenes():
-    """E8: log loss on seeds that nothing was fitted to, on true partitions and with wrong copies."""
-    entries = [e for e in resolve("suite:friends-meet") if e.repeat == 2 and "queue" not in e.name]
-    truths = [(simulate(e.scenario, 30_200, e.repeat, ()).truth, 30_200) for e in entries]
-    true, both = (
-        event_scores(EventRows.joined(event_rows(t, JointConfig().lag, s, wrong=wrong) for t, s in truths), FITTED)
-        for wrong in (False, True)
-    )
-    assert true["merges"] > 10
-    assert true["log_loss"] < 0.8 * true["prior_log_loss"]
-    assert both["log_loss"] < both["prior_log_loss"]
 
 
 ENDS = RelationalConfig().speed_ends
