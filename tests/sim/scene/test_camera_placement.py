@@ -27,7 +27,7 @@ def extremes(camera: Camera, motion: Motion) -> np.ndarray:
     return np.array([*box[:, :2].min(0), *(box[:, :2] + box[:, 2:]).max(0)])
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("tilt", [0, 10, 40, 65, 90])
 def test_solved_views_show_everybody_and_are_tight(seed: int, tilt: float) -> None:
     motion = crowd(seed)

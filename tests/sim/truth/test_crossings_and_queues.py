@@ -68,7 +68,7 @@ def test_across_and_back_is_no_cross():
     assert len(crossed(stepping(2.4, 5.4, 6.9))) == 1
 
 
-@pytest.mark.parametrize("angle", range(0, 360, 15))
+@pytest.mark.parametrize("angle", range(0, 360, 45))
 def test_paths_that_meet_in_a_point_of_both_cross_at_any_angle(angle):
     """Both walk through the very place (5, 5), in different frames: turned about, rounding puts it on either side."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
@@ -178,8 +178,8 @@ def test_simulated_queues_are_first_in_first_out(name):
         assert found[0].left
 
 
-@pytest.mark.parametrize("people", range(3, 9))
-@pytest.mark.parametrize("radius", [0.45, 0.5, 0.55, 0.6, 0.8, 1.0, 1.2])
+@pytest.mark.parametrize("people", [3, 5, 8])
+@pytest.mark.parametrize("radius", [0.45, 0.55, 0.8, 1.2])
 def test_a_circle_of_people_talking_is_not_a_queue(people, radius):
     rng = np.random.default_rng(people)
     angle = 2 * np.pi * np.arange(people) / people + 0.3

@@ -59,7 +59,7 @@ CLASS = "track {tmp}/bad:Mine {made}/data --out {tmp}/out"
 DET = "track blob {tmp}/bad --fps 10 --out {tmp}/out"
 LABELS = "track blob {tmp}/bad --fps 10 --detections truth --out {tmp}/out"
 REPLAY = "replay {walk} --out {tmp}/out"
-TUNE = f"tune {TOY} --suite {{made}}/scene.toml --out {{tmp}}/toy.toml"
+TUNE = f"tune {TOY} --trials 2 --suite {{made}}/scene.toml --out {{tmp}}/toy.toml"
 GOOD = "generate {made}/scene.toml --seeds 0 --out {tmp}/out"
 
 # what is wrong: the suffix and content of the file `bad`, the command, and what the line must say ("bad": its name).
@@ -144,7 +144,7 @@ OPTIONS = {
         "--storage nonsense://x": "--storage", "--detections image": "--detections",
         "--sensor {tmp}/none.toml": "none.toml", "--check no-such": "no-such",
     }.items()},
-    TUNE.replace(".toml", ".json"): "--out",
+    TUNE.replace("toy.toml", "toy.json"): "--out",
 }  # fmt: skip
 
 

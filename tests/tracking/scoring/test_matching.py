@@ -63,8 +63,8 @@ def test_of_equally_good_matchings_the_one_of_scipy(given: list[np.ndarray]) -> 
     assert set(zip(pairs.i[chosen].tolist(), pairs.j[chosen].tolist(), strict=True)) == expected
 
 
-@pytest.mark.parametrize("seed", range(30))
-@pytest.mark.parametrize("reach", [0.3, 0.7, 1.5])
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("reach", [0.3, 1.5])
 def test_gated_crowds_with_rounded_similarities(seed: int, reach: float) -> None:
     """People on a coarse grid, similarity 0 beyond a reach: gates and ties as sequences have them."""
     r = np.random.default_rng(seed)
@@ -84,7 +84,7 @@ def test_one_metre_is_near_enough_and_more_is_not() -> None:
     assert mapped_people(point_pairs(rows, rows, np.zeros((2, 2)), there, 2.0), least=0.6).tolist() == [-1, -1]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_mapping_equals_the_assignment_of_each_frame(seed: int) -> None:
     r = np.random.default_rng(seed)
     sizes = r.integers(0, 9, (12, 2))

@@ -16,7 +16,7 @@ def summed(kernel, W, miss, spare):
     return kernel(W, miss, spare, found), found
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(15))
 def test_equals_brute_force(seed):
     """Also with zeros in the matrix, impossible misses and columns that must be used."""
     rng = np.random.default_rng(seed)
