@@ -169,14 +169,11 @@ def test_unknown_names_are_answered_with_near_ones() -> None:
 
 
 MINE = Sensor(
-    detect_prob=0.9,
-    by_visibility=(0.0, 0.5, 1.0),
+    detect_prob=0.9, by_visibility=(0.0, 0.5, 1.0),
     miss_memory=(Memory(share=0.4, time=0.5), Memory(share=0.2, time=5.0)),
-    box_noise=BoxNoise(across=(-0.01, 0.05), memory=(Memory(share=0.3, time=1.0),)),
-    points="foot",
-    false_alarms=FalseAlarms(life=1.5, at=((0.2, 0.3), (0.5, 0.9))),
-    true_scores=(0.1, 0.9),
-)
+    box_noise=BoxNoise(across=(-0.01, 0.05), memory=(Memory(share=0.3, time=1.0),)), points="foot",
+    false_alarms=FalseAlarms(life=1.5, at=((0.2, 0.3), (0.5, 0.9))), true_scores=(0.1, 0.9),
+)  # fmt: skip
 
 
 def test_what_is_written_is_what_a_scenario_gets(tmp_path: Path) -> None:

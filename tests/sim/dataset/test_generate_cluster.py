@@ -91,13 +91,9 @@ def test_the_same_bytes(tmp_path: Path, cluster: Loopback, here: dict[str, bytes
     monkeypatch.chdir(tmp_path)
     seen = []
     made = generate(
-        ENTRIES,
-        range(6),
-        "there",
-        streams=(),
-        workers=WorkerOptions(cluster=cluster.address),
+        ENTRIES, range(6), "there", streams=(), workers=WorkerOptions(cluster=cluster.address),
         progress=lambda *a: seen.append(a[:2]),
-    )
+    )  # fmt: skip
     assert made[0] == tmp_path / "there/flockscope-train/x-s00000"
     assert seen == [(k, 12) for k in range(1, 13)]
     assert content(tmp_path / "there") == here

@@ -43,16 +43,6 @@ def test_jitter_is_smoothed_until_people_could_walk_so() -> None:
     assert np.median(away) < 0.06
 
 
-def test_smoothing_is_a_time_whatever_the_rate() -> None:
-    made = []
-    for rate in (10.0, 50.0):
-        way = curve(int(20 * rate) + 1, rate)
-        way[:, 0] += 0.12 * np.sin(6.0 * np.arange(len(way)) / rate)  # 4.3 m/s²
-        made.append(resample(*rows({1: way}), rate, 10.0, 0.0, 20.0))
-    assert made[0].smoothing == made[1].smoothing > 0.05
-    assert made[0].pos[20:-20] == pytest.approx(made[1].pos[20:-20], abs=0.01)
-
-
 def test_people_come_and_go_and_long_gaps_are_absence() -> None:
     away = int(GAP * RATE) + 2
     frame, id, pos = rows({1: curve(20), 2: curve(8), 3: curve(1)}, {2: 6, 3: 2})

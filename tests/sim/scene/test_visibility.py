@@ -54,12 +54,9 @@ def test_people_against_rays(seed: int, camera: Camera) -> None:
 def test_walls_and_pillars_against_rays(seed: int) -> None:
     r = np.random.default_rng(seed)
     scene = Scene(
-        np.array([16.0, 10.0]),
-        walls=np.array([[[5.0, 4.0], [8.0, 4.6]], [[9.0, 3.0], [9.5, 6.0]]]),
-        pillars=np.array([[8.2, 2.0, 0.4], [6.0, 6.0, 0.3]]),
-        wall_height=1.2,
-        pillar_height=2.5,
-    )
+        np.array([16.0, 10.0]), walls=np.array([[[5.0, 4.0], [8.0, 4.6]], [[9.0, 3.0], [9.5, 6.0]]]),
+        pillars=np.array([[8.2, 2.0, 0.4], [6.0, 6.0, 0.3]]), wall_height=1.2, pillar_height=2.5,
+    )  # fmt: skip
     xy = r.uniform([5, 1], [11, 9], (10, 2))
     for wall in scene.walls:  # nobody stands in a wall
         along = (wall[1] - wall[0]) / np.linalg.norm(wall[1] - wall[0])

@@ -11,13 +11,12 @@ import subprocess
 import sys
 import time
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from scenarios.errors import WorkError
-from tests.small_disks import small_disk
 from tracking.app.cli import run
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -137,8 +136,6 @@ COMMANDS = {
     ),
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
 }  # fmt: skip
-SMALL = ("scenarios --out", "fit sensor", "fit relational", "fit joint")  # a few kB
-FEW = ("export coco", "fit grouping", "sheet", "track", "track blob")  # less than 12 kB
 WRITING = [name for name, (good, _) in COMMANDS.items() if "--out {out}" in good]
 
 
@@ -407,26 +404,6 @@ def test_ctrl_c_in_a_real_process(place, workers):
     sequences = [p for p in (place.out / "flockscope-train").iterdir() if p.is_dir()]
     assert 0 < len(sequences) < 400
     assert all(run(["validate", str(p)]) == 0 for p in sequences)
-
-
-@pytest.fixture
-def tiny_disk(tmp_path):
-    """A file system of 12 kB, less than any command writes; for commands with a folder, their first file fits."""
-    with small_disk(tmp_path / "tiny", "size=12k") as disk:
-        yield disk
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in WRITING if name not in SMALL])
-def test_every_command_on_a_full_disk(name, place, tiny_disk, capsys):
-    """Exit code 1 and one line; no file is half there, and what is there is complete by its own rules."""
-    (tiny_disk / "filler").write_bytes(b"x" * 8192 if name in FEW else b"")
-    tiny = replace(place, out=tiny_disk / "out")
-    assert run(words(COMMANDS[name][0], tiny)) == 1
-    check_output(capsys, 1, as_json=False)
-    left = [p.name for p in tiny_disk.rglob("*") if p.is_file()]
-    assert not [n for n in left if n.startswith(".partial-")]
-    assert not set(left) & {"page.html", "film.mp4", "plan.svg", "toy.toml", "index.json", "manifest.json", "run.json"}
 
 
 def test_a_dataset_altered_is_told_by_every_reader(place, tmp_path, capsys):

@@ -18,16 +18,6 @@ def make(r, n=5, d=4):
     return dt, sigma, noise, var, rate_var, place
 
 
-@pytest.mark.parametrize("dt", [0.04, 1 / 7, 0.4])
-def test_constant_velocity_by_hand(dt):
-    """To the last bit: filterpy's factors 0.25 and 0.5 are powers of two."""
-    A, Q = kalman.constant_velocity(dt, 2)
-    expected, block = np.eye(4), np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
-    expected[0, 2] = expected[1, 3] = dt
-    assert np.array_equal(A, expected)
-    assert np.array_equal(Q, np.kron(block, np.eye(2)))
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_bank_equals_filterpy_over_random_misses(seed):
     r = np.random.default_rng(seed)

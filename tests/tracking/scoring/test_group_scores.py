@@ -68,19 +68,6 @@ def test_an_estimated_group_is_clean_with_60_percent_right_ones(wrong, clean):
     assert found["group_GDSR2"] == clean
 
 
-def test_hota_of_groups():
-    # One group for 4 frames, told as 7, 7, 8, 8 with the very hull: DetA 1; each match's pair of identities shares 2
-    # frames of 4 + 2 - 2: AssA 1/2; HOTA √(1/2). Identities found 2 of 4 (AssRe), all of theirs (AssPr).
-    def told(name):
-        return Scene(APART, {name: ((1, 2), None)})
-
-    found = scores([told(1)] * 4, [told(7), told(7), told(8), told(8)])
-    assert found["group_DetA"] == found["group_DetRe"] == found["group_DetPr"] == found["group_LocA"] == near(1)
-    assert found["group_AssA"] == found["group_AssRe"] == near(0.5)
-    assert found["group_AssPr"] == near(1)
-    assert found["group_HOTA"] == near(0.5**0.5)
-
-
 def test_matching_by_members():
     # Who is with whom is right, but each hull is drawn round the other group: by hulls both are matched wrongly.
     true = {1: ((1, 2), (0, 0, 2, 1)), 2: ((3, 4), (3, 0, 5, 1))}

@@ -36,19 +36,10 @@ def tracks_of(frame, id, box=None, pos=None):
         n, here = int(r.sum()), box[r, :2] + box[r, 2:] / 2 if pos is None else pos[r]
         found.append(
             Tracks(
-                k,
-                k / 25,
-                "image" if pos is None else "ground",
-                "person",
-                id[r].astype(int),
-                np.full(n, -1),
-                here,
-                np.full((n, 2), np.nan),
-                np.full((n, 4, 4), np.nan),
-                None if box is None else box[r],
-                np.ones(n),
+                k, k / 25, "image" if pos is None else "ground", "person", id[r].astype(int), np.full(n, -1), here,
+                np.full((n, 2), np.nan), np.full((n, 4, 4), np.nan), None if box is None else box[r], np.ones(n),
             )
-        )
+        )  # fmt: skip
     return found
 
 

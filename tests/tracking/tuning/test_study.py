@@ -18,7 +18,7 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.tuning.journal import LockedJournal, TrialLocks
-from tracking.tuning.sampler import distribution, place_in_search
+from tracking.tuning.sampler import distribution
 from tracking.tuning.study import FINISHED, open_study
 
 
@@ -69,25 +69,6 @@ def test_a_trial_moves_few_parameters_of_the_best(tmp_path):
     assert min(near) >= 1
     assert 2 <= sum(near) / len(near) <= 7
     assert min(far) > len(first) / 2
-
-
-def test_a_trial_done_again_keeps_its_place(tmp_path):
-    made = toy_plan(tmp_path, trials=3)
-    with open_study(made, tmp_path / "j", "x") as study:
-        study.tell(study.ask(), [0.1])
-        left = study.ask()
-    with open_study(made, tmp_path / "j", "x") as study:
-        again = study.ask()
-        assert again.params == left.params
-        assert study.place(again) == 1
-        study.tell(again, [0.2])
-        fresh = study.ask()
-        assert (fresh.number, study.place(fresh)) == (3, 2)
-        study.tell(fresh, [0.3])
-        assert study.ask() is None
-        assert [t.number for t in study.records()] == [0, 1, 2]
-        assert [t.state.name for t in study.trials()] == ["COMPLETE", "FAIL", "COMPLETE", "COMPLETE"]
-        assert [place_in_search(study.trials(), t) for t in study.trials()] == [0, 1, 1, 2]
 
 
 def test_killed_between_two_lines(tmp_path):

@@ -75,24 +75,6 @@ def test_what_is_shown_and_stored(made: Path, tmp_path: Path, capsys) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_a_sure_difference_says_which_is_better(made: Path, capsys) -> None:
-    """Nearest has many more switches; of a score where lower is better, the difference has the other sign."""
-    words = ["score", str(made / "data"), str(made / "texts"), FAKE, "--by", "HOTA"]
-    found = ranked(capsys, made, *words[2:])
-    (pair,) = found["differences"]
-    assert run(words) == 0
-    rows = {line.split("  ")[0]: line.split() for line in capsys.readouterr().out.splitlines()}
-    sure = {key: d for key, d in pair["scores"].items() if d["sure"]}
-    assert sure
-    for key, d in sure.items():
-        up = CATALOGUE[key].better == "higher"
-        assert (d["mean"] > 0) == (d["sure"] == ("better" if up else "worse")), key
-    shown = {key: row for key, row in rows.items() if key.removesuffix(" ↓") in sure}
-    assert shown
-    assert all(row[-2:] == ["surely", sure[key.removesuffix(" ↓")]["sure"]] for key, row in shown.items())
-
-
-@pytest.mark.filterwarnings("ignore::UserWarning")
 def test_any_number_of_workers_gives_the_same(made: Path, tmp_path: Path, capsys) -> None:
     runs = [str(made / "good"), str(made / "bad"), FAKE]
     alone, both = (ranked(capsys, made, *runs, "--workers", n, "--csv", str(tmp_path / n)) for n in "12")

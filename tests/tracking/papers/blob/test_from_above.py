@@ -17,14 +17,9 @@ COLOURS = (30, 20, 190), (190, 30, 20), (20, 170, 40)
 
 def camera(scale):
     return Camera(
-        "top",
-        (WIDE, HIGH),
-        (scale, scale),
-        (WIDE / 2, HIGH / 2),
-        np.array([0.0, 0, 10]),
-        camera_rotation(np.pi / 2, 0.0),
-        px_per_m=scale,
-    )
+        "top", (WIDE, HIGH), (scale, scale), (WIDE / 2, HIGH / 2), np.array([0.0, 0, 10]),
+        camera_rotation(np.pi / 2, 0.0), px_per_m=scale,
+    )  # fmt: skip
 
 
 def box(scale, x, y, heading):
