@@ -78,11 +78,3 @@ def log_component(state: np.ndarray, nu: float, s: float, s_v: float) -> float:
         total += multivariate_t(mean[:2], shape, df=after).logpdf(state[n, :2])
         total += multivariate_normal(mean[2:], s_v**2 * (1 + 1 / n) * np.eye(2)).logpdf(state[n, 2:])
     return float(total)
-
-
-def log_evidence(state: np.ndarray, parts: list[list[int]], c: float, nu: float, s: float, s_v: float) -> float:
-    """Returns log p(Z, X) of a partition, but for a constant: Chinese restaurant process, components."""
-    return sum(
-        np.log(c) + float(np.log(np.arange(1, len(part))).sum()) + log_component(state[part], nu, s, s_v)
-        for part in parts
-    )
