@@ -87,13 +87,6 @@ def test_files_are_memory(tmp_path: Path, detections: str) -> None:
             assert now[key] == pytest.approx(value, abs=1e-12, nan_ok=True), key
 
 
-def test_every_key_of_the_catalogue_and_no_other_is_returned() -> None:
-    scene = [Scene(TWO, {1: ((1, 2), None)})] * 30
-    for groups, unit in ((None, "person"), (truth(scene).groups, "person"), (truth(scene).groups, "group")):
-        found = evaluate(truth(scene, groups=groups), tracks(scene, unit=unit))
-        assert list(found) == list(CATALOGUE)
-
-
 def test_every_score_lies_in_its_range() -> None:
     r = np.random.default_rng(1)
 

@@ -9,7 +9,6 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from tests.tuning_toys import TOY, toy_plan, write_scenes
 from tracking.environment.episodes import Episode, sources
-from tracking.tuning.goals import goals_of
 from tracking.tuning.parallel_episodes import EpisodeTask, play_task
 from tracking.tuning.study import open_study
 from tracking.tuning.trials import run_trials
@@ -100,16 +99,3 @@ def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
             play_task(EpisodeTask(TOY, source, {"skip": source.seed % 5}, "file", True, tuned_tracker(TOY).code)),
         )
         assert own.scores == fixed.scores
-
-
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        (["HOTTA"], "did you mean HOTA"), (["hota"], "did you mean HOTA"), (["HOTA", "HOTA"], "HOTA twice"),
-        ([], "got none"), (["fps"], "docs/reference/metrics.md"),
-    ],
-)  # fmt: skip
-def test_wrong_keys_are_one_line(keys, words):
-    with pytest.raises(InputError, match=words) as caught:
-        goals_of(keys)
-    assert "--objective" in str(caught.value)

@@ -66,19 +66,6 @@ def test_pets_is_read_with_its_ground_positions(shared_data):
     assert 0.8 < np.median(speed) < 1.6, "people walk"
 
 
-def test_tud_without_seqinfo_is_taken_at_25_fps_with_one_warning(shared_data):
-    with pytest.warns(UserWarning, match="25 fps") as seen:
-        (s,) = open_source(shared_data / "mot" / "TUD-Campus")
-    frames = list(s)
-    assert len(seen) == 1
-    assert (s.fps, s.length, s.image_size) == (25.0, 71, None)
-    assert s.truth.pos is None
-    assert len(s.truth.frame) == 359
-    assert frames[0].detections.plane == "image"
-    (again,) = open_source(shared_data / "mot" / "TUD-Campus", fps=30)
-    assert again.fps == 30
-
-
 def test_nine_columns_are_flag_class_visibility(tmp_path):
     rows = "1,1,0,0,5,5,1,1,0.25\n1,2,0,0,5,5,0,1,1\n1,3,0,0,5,5,0,7,1\n2,1,1,0,5,5,1,1,-1\n"
     (s,) = open_source(folder(tmp_path, rows))

@@ -24,12 +24,6 @@ def test_bars_are_unbroken_lives_in_free_lanes() -> None:
     assert made == [Bar(2, 1, 4, 0, 2), Bar(1, 1, 9, 1, 3), Bar(3, 6, 9, 0, 2)]
 
 
-def test_one_person_is_no_group_unless_a_row_is_one() -> None:
-    assert bars(*rows((5, 1, 3, 1))) == []
-    assert bars(*rows((5, 1, 3, 1)), least=1) == [Bar(5, 1, 3, 0, 1)]
-    assert bars(*rows()) == []
-
-
 @given(st.lists(st.tuples(st.integers(1, 40), st.integers(0, 10)), max_size=12))
 def test_bars_of_a_lane_never_overlap(spans: list[tuple[int, int]]) -> None:
     made = bars(*rows(*((k, a, a + n, 2) for k, (a, n) in enumerate(spans))))
@@ -52,9 +46,3 @@ def test_links_join_and_fork() -> None:
         ]
     )
     assert made == [Link(10, 2, 1), Link(14, 1, 3)]
-
-
-def test_a_row_may_stand_for_many() -> None:
-    frame, group = rows((7, 1, 3, 1))
-    assert bars(frame, group, least=0, people=np.array([3.2, 4.6, 0.3])) == [Bar(7, 1, 3, 0, 5)]
-    assert bars(frame, group, least=0, people=np.zeros(3)) == [Bar(7, 1, 3, 0, 0)]
