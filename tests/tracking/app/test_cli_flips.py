@@ -500,15 +500,15 @@ OPTIONS = {
     for option, how in options.items()
 }
 ELSEWHERE = {
-    ("generate", "workers"),  # the same bytes for any number: tests/sim/test_generate.py
-    ("track", "workers"),  # as well: test_sequence_workers.py
+    ("generate", "workers"),  # the same bytes for any number: tests/sim/dataset/test_generate.py
+    ("track", "workers"),  # as well: test_stored_tracks.py
     ("score", "workers"),
-    ("generate", "cluster"),  # and on a cluster: tests/sim/test_generate_cluster.py
+    ("generate", "cluster"),  # and on a cluster: tests/sim/dataset/test_generate_cluster.py
     ("kitti", "folder"),  # tests/sim/io/export/test_kitti.py
     ("demo", "quick"),  # the long one is for `make demo`
-    ("generate", "sensor"),  # tests/tracking/app/test_fit.py
+    ("generate", "sensor"),  # commands/test_fit.py
     ("track", "sensor"),
-    ("track", "grouping"),  # tests/tracking/tuning/test_rule.py
+    ("track", "grouping"),  # commands/test_fit.py
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("generate", "stride"),  # tests/sim/test_stride.py
     ("coco", "min_visibility"),  # tests/sim/io/export/test_coco.py
@@ -516,8 +516,7 @@ ELSEWHERE = {
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
 }
 OWN = ("group", "grouping", "joint", "relational", "replay", "sensor", "tune")
-"""Commands whose options are tested one by one in files of their own: commands/test_group.py, test_replay.py,
-test_fit.py, test_tune.py, and in tests/tracking/fitting."""
+"""Commands whose options are tested one by one in files of their own: commands/, test_tune.py, test_cli_bad_input.py."""
 
 
 def commands(group) -> list[tuple[str, list[str]]]:
