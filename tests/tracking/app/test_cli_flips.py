@@ -516,7 +516,7 @@ ELSEWHERE = {
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
 }
 OWN = ("group", "grouping", "joint", "relational", "replay", "sensor", "tune")
-"""Commands whose options are tested one by one in files of their own: commands/, test_tune.py, test_cli_bad_input.py."""
+"""Commands whose options are tested one by one in commands/, test_tune.py and test_cli_bad_input.py."""
 
 
 def commands(group) -> list[tuple[str, list[str]]]:
