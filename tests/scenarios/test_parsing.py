@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.errors import InputError
-from scenarios.loading.overrides import parse_value
+from scenarios.loading.overrides import parse_setting, parse_value
 from scenarios.loading.toml_files import parse
-from scenarios.printable import printable
+from scenarios.printable import printable, shortened
 from sim.io.files.tables import read_json
 from tracking.papers.blob.config import BlobConfig
 
@@ -105,3 +105,14 @@ def test_an_error_is_a_short_line_whatever_was_found():
     assert error.line().isprintable()
     assert len(error.line()) <= 400
     assert str(pickle.loads(pickle.dumps(error))) == str(error) == error.line()
+
+
+def test_keys_of_settings_have_as_many_steps_as_tables_may_be_deep():
+    assert len(parse_setting(".".join("a" * 32) + "=1")[0]) == 32
+    with pytest.raises(InputError, match=r"got 2000 steps; expected at most 32 tables and lists inside each other"):
+        parse_setting(".".join("a" * 2000) + "=1")
+
+
+def test_long_text_is_cut_in_the_middle():
+    assert shortened("abcdef", 6) == "abcdef"
+    assert shortened("a" * 50 + "b" * 50, 10) == "aaaaaa…bbb"

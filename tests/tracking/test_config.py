@@ -106,3 +106,18 @@ def test_a_preset_is_found_by_name_beside_files(tmp_path, monkeypatch):
         Small.preset("paper")
     with pytest.raises(InputError, match="No such file"):
         Small.load("paper2")
+
+
+def test_a_vector_has_as_many_numbers_as_its_default():
+    @dataclasses.dataclass(frozen=True)
+    class Rows(Config):
+        rows: tuple[float, ...] = param((0.1, 0.5), (0.0, 1.0), "", "by row", "vector")
+
+    assert Rows.from_dict({"rows": [1, 0.25]}).rows == (1.0, 0.25)
+    assert Rows().with_set("rows=[0.2, 0.3]") == Rows().with_set("rows=0.2,0.3") == Rows((0.2, 0.3))
+    assert not Rows.space()
+    for wrong in ([0.1], [0.1, 0.2, 0.3], [0.1, 1.5], [0.1, "a"], 0.1, "ab"):
+        with pytest.raises(InputError, match=r"2 numbers from 0 to 1"):
+            Rows.from_dict({"rows": wrong})
+    with pytest.raises(InputError, match=r"2 numbers from 0 to 1"):
+        Rows().with_set("rows=0.2")

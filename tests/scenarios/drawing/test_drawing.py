@@ -71,3 +71,10 @@ def test_every_catalogue_scenario_is_drawn() -> None:
 )
 def test_values_in_words_and_their_extent(value, words, mid, half) -> None:  # type: ignore[no-untyped-def]
     assert (number(value, "s"), middle(value), spread(value)) == (words, mid, half)
+
+
+def test_stops_and_scatter_in_words(path: Path) -> None:
+    stops = "[{ at = [9, 4], until = [4, 8], stay = 1 }, { at = [8, 4], stay = { uniform = [2, 3] }, members = 1 }]"
+    said = text(load(path, [f"group.a.stops={stops}", "group.a.scatter=0.5", "group.a.enter=-1"]))
+    assert "stopping at (9, 4) [until 4, 8 s, for 1 s], (8, 4) [for 2 to 3 s, only 1 member]" in said
+    assert "scattered by 0.5 m, entering at -1 s" in said

@@ -7,6 +7,7 @@ import pytest
 from scenarios.errors import OrderError, WorkError
 from sim.dataset import sequence_job
 from sim.dataset.generate import generate
+from tracking.tuning.search import PlayedScenes, _unfulfilled
 
 store = sequence_job.simulate_and_store
 
@@ -36,3 +37,26 @@ def test_more_than_five_per_cent_are_a_failure(tmp_path, monkeypatch):
         generate(["cross"], range(20), tmp_path, set=["duration=1"], streams=())
     with pytest.raises(WorkError, match="never fired"):
         generate(["cross"], range(1), tmp_path / "one", set=["duration=1"], streams=())
+
+
+def test_a_search_counts_its_scenes():
+    class Scene:
+        def __init__(self, seed):
+            self.name, self.seed, self.key = "cross", seed, seed
+
+        def open(self):
+            if self.seed == 7:
+                raise OrderError(place="event m1", got="no merge", expected="one", remedy="mend it")
+            return self
+
+        truth = None
+
+    scenes = PlayedScenes(lambda *_: iter(()))
+    for seed in range(20):
+        scenes.record(one := Scene(seed), _unfulfilled(one))
+    scenes.require_most()
+    assert [line.split(":")[0] for line in scenes.left_out.values()] == ["cross seed 7"]
+    few = PlayedScenes(lambda *_: iter(()))
+    few.record(Scene(7), _unfulfilled(Scene(7)))
+    with pytest.raises(WorkError, match="1 of 1 scenes"):
+        few.require_most()

@@ -124,3 +124,9 @@ def test_queues_are_first_in_first_out(leaving: tuple[int, ...]) -> None:
     else:
         with pytest.raises(WorkError, match=r"left by people 2, 1.* first in, first out"):
             check(motion, truth)
+
+
+def test_the_recording_may_end_first() -> None:
+    motion = merging(140)
+    with pytest.raises(WorkError, match="until the recording ends"):
+        check(motion, truth_of(motion, 30))

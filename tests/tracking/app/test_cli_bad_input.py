@@ -85,6 +85,7 @@ FILES = {
     "labels in a sheet": (".txt", ROWS + "4,1\n", "sheet {tmp}/bad --out {tmp}/out/s.png", "bad line 4 columns"),
     "labels scored": (".txt", ROWS + "0,1,1,1,2,5,1,1,1\n", "score {tmp}/bad {tmp}/bad --fps 10", "bad line 4 frame"),
     "nothing labelled": (".txt", DETECTION, "sheet {tmp}/bad --out {tmp}/out/x.png", "label"),
+    "nothing to export": (".txt", DETECTION, "export coco {tmp}/bad --out {tmp}/out/c.json", "no labelled boxes"),
     "no Python": (".py", TRACKER.format("boxes") + "        return (", CLASS, "bad SyntaxError line 5"),
     "needs what is not there": (".py", TRACKER.format("stereo") + "        return None", CLASS, "needs stereo"),
 }  # fmt: skip
@@ -117,6 +118,7 @@ OPTIONS = {
     **{f"{TRACK} --set {text}": "" for text in ("gate", "gaet=0.9", "gate=7", "gate=x", "scenario.duration=3")},
     f"{TRACK} --detections truth --set sensor.noise=3": "sensor.noise",
     f"{TRACK} --detections truth --set sensor.box=round": "sensor.box",
+    GOOD.replace("{tmp}/out", "{det}/out"): "det.txt",  # a path through a file
     f"{GOOD} --streams none --images png": "--images",
     f"{GOOD} --streams ids --images png": "--images",
     f"{TRACK} --fps 5": "--fps",  # options for recordings, of a generated sequence
@@ -139,7 +141,8 @@ OPTIONS = {
     }.items()},
     **{f"{TUNE} {option}": word for option, word in {
         "--seeds 0-5": "--seeds: got '0-5'", "--test 0:5": "--test: got 0:5; expected test seeds",
-        "--objective HOTTA": "did you mean HOTA?", "--only reach,skipp": "did you mean skip?",
+        "--objective HOTTA": "did you mean HOTA?", "--objective HOTA --objective HOTA": "HOTA twice",
+        "--objective fps": "metrics.md", "--only reach,skipp": "did you mean skip?",
         "--set reech=1": "did you mean reach?", "--set weather.sun=1": "weather.sun", "--prune 2": "--prune: got 2.0",
         "--storage nonsense://x": "--storage", "--detections image": "--detections",
         "--sensor {tmp}/none.toml": "none.toml", "--check no-such": "no-such",

@@ -294,3 +294,12 @@ def test_black_never_becomes_so_black_that_noise_is_foreground():
 def test_median_is_numpys(n):
     values = np.random.default_rng(n).normal(1, 0.2, n).astype(np.float32)
     assert brightness_gain._median(values) == float(np.median(values))
+
+
+def test_a_frame_of_another_kind_is_refused():
+    made = Background(shots(scene()), FPS)
+    for wrong in (np.zeros((20, 20, 3), np.uint8), np.zeros((40, 50), np.uint8), np.zeros((40, 50, 3))):
+        with pytest.raises(InputError, match="as the background sample"):
+            made.classify(wrong)
+        with pytest.raises(InputError, match="as the background sample"):
+            made.adapt(wrong, np.zeros((40, 50), np.uint8))

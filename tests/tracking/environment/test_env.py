@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -189,7 +190,8 @@ class StillToy(Toy):
         ("blob", {"params": {"gaet": 0.5}}, "did you mean gate"),
         ("blob", {"suite": "nothing at all"}, "a scenario, a suite"), ("blob", {"render_mode": "human"}, "rgb_array"),
         ("blob", {"detections": "boxes"}, "one of None, image, truth, file"),
-        ("blob", {"seeds": 5}, r"write for example range\(5\)"),
+        ("blob", {"seeds": 5}, r"write for example range\(5\)"), ("blob", {"seeds": [0, 20_000]}, "seeds of one split"),
+        ("blob", {"cache": -1}, "bytes"),
         ("blob", {"set": "camera.fps=5"}, r"write \['camera.fps=5'\]"),
         (StillToy, {"decision_every": 5}, "may change between frames"),
     ],
@@ -266,3 +268,30 @@ KNOWN = "assert gymnasium.registry['flockscope/Tuning-v0'].entry_point == 'track
 )
 def test_it_is_known(lines):
     run(*lines)
+
+
+def test_a_step_needs_an_episode():
+    for every in (None, 5):
+        env = make(decision_every=every).unwrapped
+        with pytest.raises(InputError, match=r"call reset\(\) first"):
+            env.step(np.zeros(env.action_space.shape, np.float32))
+
+
+def test_all_episodes_have_detections_of_one_kind():
+    """That which the recorded ones have; where they have none in common, it is said at once."""
+    whole = simulate(load("pass-by", SHORT), 1, 0, ())
+    bare, boxed = replace(whole, name="bare", has_detections=False), replace(whole, name="boxed", load_truth=None)
+    for mixed in (["cross", bare], [bare, "cross"]):
+        env = make("group-pda", mixed).unwrapped
+        assert env.mode == "truth"
+        for seed in range(6):
+            played(env, seed=seed)
+    with pytest.raises(InputError, match="bare with truth"):
+        make("group-pda", ["cross", boxed, bare])
+
+
+def test_actions_of_another_shape_are_named():
+    env = make().unwrapped
+    env.reset(seed=0)
+    with pytest.raises(InputError, match="action"):
+        env.step(np.zeros(3, np.float32))

@@ -47,3 +47,9 @@ def test_sequences_in_memory_and_lists():
 def test_wrong_sources(what, options, words):
     with pytest.raises(InputError, match=words):
         sources(what, **options)
+
+
+def test_settings_without_a_scenario_are_refused():
+    sequence = simulate(load("cross", ["duration=4"]), 3, 0, ())
+    with pytest.raises(InputError, match="leave the settings out"):
+        sources(sequence, set=["camera.fps=5"])

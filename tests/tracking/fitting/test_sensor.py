@@ -16,7 +16,8 @@ from sim.detector.sense import sense
 from sim.geometry.polygons import iou_matrix, pack
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence, Truth
-from tracking.app.pictures.contact_sheet import choose_frames
+from tracking.app.pictures.contact_sheet import choose_frames, sheet_picture
+from tracking.app.pictures.overlay import write_overlay
 from tracking.fitting.detection_matching import MatchedRecording, match_detections, match_sequence
 from tracking.fitting.error_statistics import error_statistics, simulated_detections
 from tracking.fitting.false_alarms import fit_false_alarms
@@ -193,3 +194,12 @@ def test_polygons_without_vertices():
     empty = np.zeros((0, 2))
     assert iou_matrix([empty, empty], [empty]).tolist() == [[0.0], [0.0]]
     assert len(pack([empty], 0).vertex) == 1
+
+
+def test_pictures_of_a_sequence_without_frames(tmp_path):
+    nothing = Sequence("none", 10.0, 0, lambda: iter(()), load_truth=lambda: EMPTY, has_images=True, image_size=(8, 8))
+    with pytest.raises(InputError, match="no frame"):
+        write_overlay(nothing, None, tmp_path / "o.mp4")
+    with pytest.raises(InputError, match="no frame"):
+        sheet_picture(nothing, EMPTY)
+    assert not list(tmp_path.iterdir())

@@ -148,3 +148,8 @@ def test_in_a_search_a_trial_that_hangs_is_impossible(tmp_path, capsys, mine, wo
     line += ["--workers", workers]
     assert run([*line, "--step-timeout", "3", "--out", str(tmp_path / "best.toml"), "--json"]) == 0
     assert '"impossible": 2' in capsys.readouterr().out
+
+
+def test_a_class_cannot_be_looked_up():
+    with pytest.raises(InputError, match="name that another process can look up"):
+        TimeLimited(int, 1.0)  # type: ignore[arg-type]

@@ -158,3 +158,9 @@ class Mine:
     def reset(self, context, seed): ...
     def step(self, frame, detections): ...
 """
+
+
+def test_a_missing_neighbour_is_named(tmp_path):
+    (tmp_path / "mine.py").write_text("import wE_missing")
+    with pytest.raises(InputError, match=r"No module named 'wE_missing'; .*put its file beside the tracker's"):
+        tracker_registry.find(f"{tmp_path}/mine.py:Mine")

@@ -121,3 +121,16 @@ def test_nan_names_frame_and_row():
         check_detections(Detections(7, 0.6, "image", np.ones((3, 2)), None, box, np.ones(3)), ("boxes",))
     with pytest.raises(InputError, match="got points; expected boxes"):
         check_detections(Detections(7, 0.6, "ground", np.ones((3, 2))), ("boxes",))
+
+
+def test_settings_with_dots_are_keys_of_a_table(merge):
+    """One key of box_noise brings its defaults; without any, boxes are exact."""
+    exact, whole, dotted = (
+        [d.box for d in from_truth(merge, sensor, 0)]
+        for sensor in ({"noise_m": 0.1}, {"box_noise": {"scale": 2.0}}, {"box_noise.scale": 2.0})
+    )
+    assert all(map(np.array_equal, whole, dotted))
+    assert not any(map(np.array_equal, whole, exact))
+    for sensor, words in (({"noise_px": 3}, "set box_noise.scale"), ({"noise_m.x": 3}, "sensor.noise_m")):
+        with pytest.raises(InputError, match=words):
+            from_truth(merge, sensor, 0)

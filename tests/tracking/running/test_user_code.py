@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
-from scenarios.errors import WorkError
+from scenarios.errors import InputError, WorkError
 from sim.types import Detections, Frame, Sequence
 from tracking.app.cli import run
+from tracking.config import Config, param
 from tracking.running.interrupts import recorded_interrupts
 from tracking.running.run import track
 
@@ -151,3 +155,45 @@ def test_in_a_search_the_trial_fails_and_the_search_goes_on(tmp_path, capsys, wo
 def test_a_search_whose_configs_exit_ends_with_an_error(tmp_path, capsys):
     assert search(tmp_path, "sys.exit(0)", "check of others") == 1
     assert '"got": "SystemExit: 0"' in capsys.readouterr().out
+
+
+@dataclass(frozen=True)
+class Exiting(Config):
+    tracker: ClassVar[str] = "exiting"
+    reach: float = param(1.0, (0.5, 2.0), "m", "no effect")
+
+    def check(self):
+        raise SystemExit(0)
+
+
+def test_the_check_of_a_config():
+    with pytest.raises(WorkError, match="exiting: its parameters: got SystemExit: 0"):
+        Exiting()
+
+
+class Unreadable(Exception):
+    def __str__(self):
+        raise ValueError("no text")
+
+
+class UnreadableExit(Unreadable, SystemExit):
+    pass
+
+
+@pytest.mark.parametrize("error", [Unreadable(), UnreadableExit()], ids=["Exception", "SystemExit"])
+def test_an_exception_whose_text_cannot_be_read(error):
+    tracker = Abrupt()
+    tracker.error = error
+    with pytest.raises(WorkError, match=f"got {type(error).__name__}: a message that cannot be read") as caught:
+        track(tracker, nobody())
+    assert caught.value.__cause__ is error
+
+
+@pytest.mark.parametrize("seed", [2**63, 10**30, -1, 1.5, True])
+def test_a_wrong_seed_is_found_before_the_tracker_is_made(seed):
+    class Never(Abrupt):
+        def __init__(self):
+            raise AssertionError("made")
+
+    with pytest.raises(InputError, match=r"--seed: got .* expected a whole number from 0 to 9223372036854775807"):
+        track(Never, nobody(), seed=seed)

@@ -10,6 +10,7 @@ from sim.sequence import simulate
 from sim.types import Truth
 from tracking import track
 from tracking.scoring import evaluate, score_arrays
+from tracking.scoring.people_comparison import IncomparableError
 
 ROWS = {"frame": [1, 1, 2, 2], "id": [1, 2, 1, 2], "pos": [[0, 0], [1, 0], [0, 0], [1, 0]], "group": [7, 7, 7, 7]}
 
@@ -109,3 +110,13 @@ def test_wrong_columns(change: dict, said: str) -> None:
 def test_wrong_frame_rate(fps: float) -> None:
     with pytest.raises(ValueError, match=f"fps: got {fps!r}, expected a number from 0.01 to 1000"):
         score_arrays(ROWS, ROWS, fps=fps)
+
+
+@pytest.mark.parametrize("scale", [0.0, -20.0, float("nan"), float("inf")])
+def test_positions_in_the_image_are_not_compared_without_a_scale(scale: float) -> None:
+    table = {"frame": [1, 2], "id": [1, 1], "box": [[0, 0, 10, 20], [1, 0, 10, 20]]}
+    with pytest.raises(IncomparableError, match="no image scale"):
+        score_arrays(table, table, fps=10.0, similarity="image", px_per_m=scale)
+    nobody = {"frame": [], "id": [], "box": []}
+    assert score_arrays(table, nobody, fps=10.0, similarity="image", px_per_m=scale)["MOTA"] == 0.0
+    assert score_arrays(table, table, fps=10.0, px_per_m=scale)["HOTA"] == 1.0

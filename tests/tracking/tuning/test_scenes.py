@@ -106,3 +106,8 @@ def test_settings_reach_the_scenes(tmp_path):
 def test_wrong_options_are_one_line(tmp_path, change, words):
     with pytest.raises(InputError, match=words):
         toy_plan(tmp_path, **change)
+
+
+def test_one_number_is_no_range(tmp_path):
+    with pytest.raises(InputError, match=r"--seeds: got 5; expected a range of seeds; .* range\(0, 4\)"):
+        toy_plan(tmp_path, seeds=5)

@@ -193,3 +193,13 @@ def test_without_optuna_one_line_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(InputError, match=r'pip install "flockscope\[tune\]"'):
         tune(**tune_arguments(tmp_path))
+
+
+def test_another_version_of_a_tracker_is_another_search(tmp_path):
+    code = Path(TOY.rpartition(":")[0]).read_text()
+    (tmp_path / "mine.py").write_text(code)
+    given = tune_arguments(tmp_path, tracker=f"{tmp_path / 'mine.py'}:Toy", trials=1, check=None)
+    tune(**given, out=tmp_path / "toy.toml")
+    (tmp_path / "mine.py").write_text(code + "# another\n")
+    with pytest.raises(InputError, match="code differ"):
+        tune(**given, out=tmp_path / "toy.toml")

@@ -99,3 +99,19 @@ def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
             play_task(EpisodeTask(TOY, source, {"skip": source.seed % 5}, "file", True, tuned_tracker(TOY).code)),
         )
         assert own.scores == fixed.scores
+
+
+def test_errors_of_who_plays_say_nothing_of_the_parameters(tmp_path):
+    """The search ends; going on plays the trial that was interrupted again, and finds what it would have found."""
+    made = toy_plan(tmp_path, seeds=range(12), trials=6, only=["skip"])
+    with open_study(made, tmp_path / "j", "x") as study, pytest.raises(WorkError, match="a worker that died"):
+        run_trials(study, Game(dies=20), lambda *now: None)
+    with open_study(made, tmp_path / "j", "x") as study:
+        begun = study.trials()
+        assert [t.state.name for t in begun][-1] == "RUNNING"
+        assert 0 < len(study.records()) < len(begun)
+        run_trials(study, Game(), lambda *now: None)
+        found = study.records()
+    undisturbed, _ = played(tmp_path, trials=6)
+    assert found == undisturbed
+    assert not any(t.error for t in found)

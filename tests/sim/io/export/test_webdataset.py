@@ -219,3 +219,24 @@ def test_links_that_lead_out_of_a_sequence_are_not_exported(data: Path, tmp_path
     folder = copied(data, tmp_path, link)
     with pytest.raises(InputError, match=r"scenario.toml: got a link that leads out of the sequence"):
         webdataset(folder, tmp_path / "out", samples=samples)
+
+
+@pytest.mark.parametrize(("part", "more"), [("", {"shard_size": 1}), ("", {"samples": "frame"}), ("b-s00000", {})])
+def test_another_export_is_not_overwritten(data: Path, tmp_path: Path, part: str, more: dict[str, Any]) -> None:
+    source = data / "flockscope-train" / part
+    for first, second in (((data, {}), (source, more)), ((source, more), (data, {}))):
+        out = tmp_path / f"out{len(list(tmp_path.iterdir()))}"
+        webdataset(first[0], out, **first[1])
+        before = content(out)
+        with pytest.raises(InputError, match=r"shard-00000\d.tar: got a shard of another export"):
+            webdataset(second[0], out, **second[1])
+        assert content(out) == before
+
+
+def test_two_of_one_name_are_refused(data: Path, tmp_path: Path) -> None:
+    both = tmp_path / "both"
+    for part in ("one", "two"):
+        (both / part).mkdir(parents=True)
+        (both / part / "flockscope-train").symlink_to(data / "flockscope-train")
+    with pytest.raises(InputError, match=r"two sequences flockscope-train/a\.2-s00000"):
+        webdataset(both, tmp_path / "out")

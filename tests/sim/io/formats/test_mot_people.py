@@ -152,3 +152,10 @@ def test_positions_alone_are_in_metres_or_refused(tmp_path, unit, header):
     for read in (lambda: open_source(path, fps=25)[0].truth, lambda: read_tracks(path, fps=25)):
         with pytest.raises(InputError, match=r"half of the steps faster than 1.*m/s; expected positions"):
             read()
+
+
+def test_labels_without_ids_are_an_error(tmp_path):
+    (tmp_path / "gt").mkdir()
+    (tmp_path / "gt" / "gt.txt").write_text(f"1,-1,{BOX},1,1,1\n")
+    with pytest.raises(InputError, match="negative ids in all 1 rows"):
+        _ = open_source(tmp_path, fps=25)[0].truth

@@ -250,3 +250,10 @@ def test_the_rate_of_a_video_beside_it_is_named(tmp_path, folder):
     text.write_text("1,1,5,5,10,20\n2,1,6,5,10,20\n")
     with pytest.warns(UserWarning, match=r"taken at 25 fps, but cam\.mp4 beside it has 7: give --fps 7"):
         assert open_source(path)[0].fps == 25
+
+
+def test_seqinfo_of_too_large_pictures(tmp_path):
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\nseqLength=4\nimWidth=16384\nimHeight=16384\n")
+    with pytest.raises(InputError, match="16384×16384 px") as error:
+        open_source(tmp_path)
+    assert error.value.place == "imWidth, imHeight"

@@ -212,3 +212,11 @@ def test_biwi_bounds(tmp_path):
     (tmp_path / "obsmat.txt").write_text("")
     with pytest.raises(InputError, match="no line"):
         open_source(tmp_path)
+
+
+def test_cvml_of_caviar_says_what_is_assumed(tmp_path):
+    path = xml(tmp_path, ([OBJECT.format(1, 10)], []))
+    with pytest.warns(UserWarning, match="taken at 25 fps, with pictures of 384×288 px"):
+        (s,) = open_source(path)
+    assert (s.fps, s.image_size) == (25, (384, 288))
+    assert open_source(path, fps=30)[0].fps == 30

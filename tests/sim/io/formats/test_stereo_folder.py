@@ -108,3 +108,21 @@ def test_a_whole_calibration_in_mm_is_refused(tmp_path) -> None:
     write_yaml(tmp_path / "pair.yml", camera.replace(baseline=120.0), position=1000 * camera.position)
     with pytest.raises(InputError, match=r"position: got height .*all lengths in metres"):
         read_calibration(tmp_path / "pair.yml")
+
+
+def test_right_pictures_without_numbers_are_as_many_as_the_left_ones(tmp_path) -> None:
+    for name, files in (("img1", "abc"), ("img1_right", "bc")):
+        (tmp_path / name).mkdir()
+        for file in files:
+            cv2.imwrite(str(tmp_path / name / f"{file}.png"), np.zeros((*SIZE, 3), np.uint8))
+    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\n")
+    with pytest.raises(InputError, match="2 pictures without numbers; expected 3, as in img1"):
+        open_source(tmp_path)
+
+
+def test_all_missing_keys_are_named_at_once(tmp_path) -> None:
+    write_yaml(tmp_path / "pair.yml", rig(40.0), image_width=None, position=None, rotation=None)
+    with pytest.raises(
+        InputError, match="image_width, rotation, position: got nothing; expected the keys image_width, "
+    ):
+        read_calibration(tmp_path / "pair.yml")

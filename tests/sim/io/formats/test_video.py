@@ -272,3 +272,12 @@ def test_a_folder_of_videos(tmp_path):
         write_video(tmp_path / name, [picture(k) for k in range(3)])
     (tmp_path / "notes.md").write_text("…")
     assert [s.name for s in open_source(tmp_path)] == ["a", "b"]
+
+
+def test_a_matroska_that_breaks_off_is_told(tmp_path):
+    """Its header says how many seconds, not how many frames."""
+    whole = write_video(tmp_path / "a.mkv", [picture(k) for k in range(40)], options={"g": "10", "bf": "0"})
+    one(whole)  # warnings are errors
+    with pytest.warns(UserWarning, match=r"a.mkv: ends after 2\.\d of the 4\.0 s it promises"):
+        sequence = one(cut(whole, 0.7))
+    assert 20 <= sequence.length < 30

@@ -269,3 +269,9 @@ def test_the_sample_of_a_folder(tmp_path):
         assert len(sequence.background()) == 11
     with pytest.raises(InputError, match="recording of 12 frames"):
         open_source(path, images=True, background="spread:13")
+
+
+def test_more_pictures_than_frames_are_told(tmp_path):
+    path = folder(tmp_path / "a", names(range(1, 6)), ini="seqLength=3\n")
+    with pytest.warns(UserWarning, match=r"2 pictures beyond frame 3 \(seqLength\) are not read"):
+        open_source(path)

@@ -9,7 +9,8 @@ import av
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, WorkError
+from sim.io.pictures import video_encoding
 from sim.io.pictures.video_encoding import BT601, NARROW, write_video
 from tests.small_videos import SIZE, picture
 
@@ -89,4 +90,13 @@ def test_a_full_disk_at_any_byte_is_an_error(tmp_path, monkeypatch):
 def test_ctrl_c_while_libav_writes_is_not_lost(tmp_path, monkeypatch):
     Disk(monkeypatch, 1000, error=KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
+        made(tmp_path / "b.mp4")
+
+
+def test_a_video_that_lacks_pictures_is_an_error(tmp_path, monkeypatch):
+    """Whatever has swallowed them: the written file is counted."""
+    counted = video_encoding._pictures_in(made(tmp_path / "a.mp4"))
+    assert counted == 25
+    monkeypatch.setattr(video_encoding, "_pictures_in", lambda path: 24)
+    with pytest.raises(WorkError, match="got 24 of 25 pictures"):
         made(tmp_path / "b.mp4")

@@ -318,3 +318,24 @@ def test_what_cannot_be_read_is_not_written(make_tracks, key, value):
 def test_right_values_and_further_keys(tmp_path, make_tracks):
     for info in ({}, dict.fromkeys(WRONG.keys() - {"tracker", "sequence", "boxes"}), {"mine": [1, {"a": None}]}):
         assert info.items() <= read_run(write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=info)).items()
+
+
+def test_half_an_id_in_a_table(tmp_path, make_tracks, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr("sim.io.store.track_tables.RunRows.reject_faults", lambda *_: None)
+        wrong = [t.replace(id=t.id.astype(float) + 0.5) for t in make_tracks(1)]
+        write_tracks(tmp_path / "t", wrong, fps=10.0)
+    with pytest.raises(InputError, match="id: got a column of float64"):
+        read_tracks(tmp_path / "t")
+
+
+@pytest.mark.parametrize("body", [b'{"boxes": "measured"', b"", b"[]"])
+def test_texts_beside_a_damaged_run_json_are_no_other_program_s(tmp_path, make_tracks, body):
+    folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
+    (folder / "run.json").write_bytes(body)
+    for _ in range(2):
+        with pytest.raises(InputError, match=r"run\.json.*delete run\.json, then track again"):
+            read_tracks(folder)
+        (folder / "tracks.parquet").unlink(missing_ok=True)
+    (folder / "run.json").write_text('{"mine": 1}')
+    assert len(read_tracks(folder)) > 0
