@@ -5,13 +5,9 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-import pytest
-
 from scenarios.drawing.plan_svg import svg
-from scenarios.drawing.routes import middle, spread
-from scenarios.drawing.words import number, text
+from scenarios.drawing.words import text
 from scenarios.loading.resolve import load, names
-from scenarios.schema.values import Distribution
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -54,23 +50,6 @@ def test_every_catalogue_scenario_is_drawn() -> None:
         scenario = load(name)
         assert scenario.about in text(scenario)
         assert name in words_of(svg(scenario))
-
-
-@pytest.mark.parametrize(
-    ("value", "words", "mid", "half"),
-    [
-        (3.0, "3 s", 3, 0),
-        (Distribution(normal=(2, 0.5)), "2 ± 0.5 s", 2, 1),
-        (Distribution(normal=(2, 0.5), clip=(1.5, 2.5)), "2 ± 0.5 s (1.5 to 2.5)", 2, 0.5),
-        (Distribution(uniform=(1, 5)), "1 to 5 s", 3, 2),
-        (Distribution(choice=(-1, 1)), "-1 or 1 s", 0, 1),
-        (Distribution(choice=(1, 1, 1, 2)), "1 (75 %) or 2 (25 %) s", 1.25, 0.5),
-        (Distribution(exponential=3), "about 3 s", 3, 6),
-        (Distribution(poisson=1.1, clip=(2, 6)), "about 1.1 s (2 to 6)", 2, 2),
-    ],
-)
-def test_values_in_words_and_their_extent(value, words, mid, half) -> None:  # type: ignore[no-untyped-def]
-    assert (number(value, "s"), middle(value), spread(value)) == (words, mid, half)
 
 
 def test_stops_and_scatter_in_words(path: Path) -> None:

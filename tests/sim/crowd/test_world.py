@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pymunk.batch
 import pytest
 
 from scenarios.loading.resolve import load, names
 from sim.clock import SCRIPT_RATE
-from sim.crowd.forces import Steering
 from sim.crowd.navigation import BEHIND, Navigator
-from sim.crowd.world import WRITE, World, run
+from sim.crowd.world import run
 from sim.truth.label import label
 from sim.truth.order_fulfilment import check_orders
 from sim.types import Scene
@@ -41,23 +39,6 @@ def test_people_go_through_the_door_and_not_through_the_wall() -> None:
     crossing = (x[:-1] < 10) != (x[1:] < 10)
     assert crossing.any()
     assert (np.abs(y[:-1][crossing] - 6) < 0.7).all()
-
-
-def test_batches_read_what_the_loop_reads() -> None:
-    world = World(load("crowd"), 2, 0, Steering())
-    world._come_and_go(0.0, True)
-    by_loop = np.array([(*b.position, *b.velocity) for b in (world.bodies[c] for c in world.columns)])
-    np.testing.assert_array_equal(world._read()[: len(by_loop)], by_loop)
-    gone = sorted(world.bodies)[:3]
-    for column in gone:
-        body = world.bodies.pop(column)
-        world.space.remove(body, *body.shapes)
-    world._map_rows()
-    by_loop = np.array([(*b.position, *b.velocity) for b in (world.bodies[c] for c in world.columns)])
-    np.testing.assert_array_equal(world.state, by_loop)
-    world.force[: len(by_loop)] = np.arange(2 * len(by_loop)).reshape(-1, 2)
-    pymunk.batch.set_space_bodies(world.space, WRITE, world._write_buffer)
-    assert [tuple(world.bodies[c].force) for c in world.columns] == [tuple(f) for f in world.force[: len(by_loop)]]
 
 
 # a wall across the room with a door of 1.4 m in it

@@ -110,19 +110,6 @@ def test_shadows_fall_where_somebody_stands_before_the_sun(view: str) -> None:
     assert (np.abs(ratio[ground] - 1.0) > 0.03).mean() < 0.001
 
 
-def test_walls_and_pillars_cast_shadows_and_stairs_show_steps() -> None:
-    motion, camera = motion_in(BUILT, 1), VIEWS["high"]
-    made = make_renderer(motion, camera, Light(shadow=0.5, sun_azimuth_deg=20.0, sun_elevation_deg=40.0), SHARP)
-    o = made.left_view.geometry.place.reshape(-1, 3).astype(float)
-    sun = made.illumination.sun
-    blocked = np.isfinite(slow.still(o + 0.01 * sun, np.tile(sun, (len(o), 1)), BUILT)[0]).reshape(120, 160)
-    ground = made.left_view.geometry.kind == 1
-    direct = made.left_view.empty_scene.direct
-    assert (blocked & ground).sum() > 300
-    assert direct[blocked & ground].mean() < 0.15
-    assert direct[~blocked & ground].mean() > 0.45
-
-
 def test_frames_are_pure_functions_of_their_index() -> None:
     motion, camera = motion_in(BUILT), VIEWS["high"]
     light = Light(drift=0.1, flicker=0.02, cloud=0.1, switch=(LightSwitch(at=0.5, gain=0.7),))

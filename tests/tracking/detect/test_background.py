@@ -278,18 +278,6 @@ def test_a_sample_that_is_none_is_refused_in_one_line(sample, words):
 # --- grey and extreme pictures ---------------------------------------------------------------------------------------
 
 
-def test_black_never_becomes_so_black_that_noise_is_foreground():
-    black = np.zeros((40, 50, 3), np.uint8)
-    black[:, :25] = 90
-    made = Background(np.stack([black] * 20), 10.0)
-    for _ in range(30_000 // 4):
-        made.adapt(black, np.zeros((40, 50), np.uint8))
-    assert made.mean.min() >= 1.0
-    noisy = black.copy()
-    noisy[:, 25:] = 1
-    assert (made.classify(noisy) == BACKGROUND).all()
-
-
 @pytest.mark.parametrize("n", [1, 2, 3, 8, 50, 51, 5000])
 def test_median_is_numpys(n):
     values = np.random.default_rng(n).normal(1, 0.2, n).astype(np.float32)

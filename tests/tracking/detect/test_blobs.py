@@ -98,15 +98,3 @@ def test_cleaning_takes_specks_and_fills_holes_by_the_scale():
     torn = person.copy()
     torn[90:110] = False
     assert len(blobs.find(blobs.clean(torn, 50), 50)) == 2
-
-
-def test_contour_and_hull_go_round_the_blob():
-    found = blobs.find(ellipse((120, 160), 80, 60, 60, 30, 0.4), 50)
-    outline, hull = found.contour(0), found.hull(0)
-    assert cv2.contourArea(outline.astype(np.float32)) == pytest.approx(found.area[0], rel=0.1)
-    v, u = np.nonzero(found.label)
-    pixels = np.stack([u, v], axis=1) + 0.5
-    near = [cv2.pointPolygonTest(hull.astype(np.float32), pixel, True) for pixel in pixels.tolist()]
-    assert min(near) > -0.8
-    x, y = hull.T
-    assert np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0

@@ -59,18 +59,6 @@ def test_a_picture_with_more_foreground_than_people_can_cover_is_implausible(mon
     assert made(background="trained").segment(picture(PERSON)).plausible
 
 
-def test_protected_places_are_not_learned(monkeypatch):
-    monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)
-    quick = {"background_time": 1.0}
-    kept, learned = made(**quick), made(**quick)
-    everywhere, nowhere = np.ones(kept.shape, bool), np.zeros(kept.shape, bool)
-    for k in range(60):
-        for pipeline, protected in ((kept, everywhere), (learned, nowhere)):
-            pipeline.adapt(pipeline.segment(picture(PERSON, seed=k)), protected)
-    assert len(kept.person_blobs(kept.segment(picture(PERSON)).mask)) == 1
-    assert not learned.segment(picture(PERSON)).mask.any()
-
-
 @pytest.mark.parametrize("unknown", [np.nan, 0.0])
 def test_an_unknown_scale_is_guessed_from_the_images_height(unknown):
     assert made(unknown).scale == painted.HIGH / ASSUMED_HEIGHT

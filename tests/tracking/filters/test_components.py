@@ -71,27 +71,6 @@ def test_the_order_of_points_changes_nothing(seed: int) -> None:
     assert verdict[0] == verdict[1]
 
 
-def disc(x, y, count=80, sd=0.5):
-    """Points on a circle whose 1/N covariance is sd^2 I."""
-    t = np.arange(count) * 2 * np.pi / count
-    return np.stack([x + np.sqrt(2) * sd * np.cos(t), y + np.sqrt(2) * sd * np.sin(t)], axis=1)
-
-
-def test_closure() -> None:
-    """Of three discs only the first two overlap, and what they are together overlaps the third."""
-    rule = Constraint(0.2, 9.21, np.eye(2), 1e-6)
-    first, second, third = disc(0, 0), disc(3, 0), disc(1.5, 2.9)
-    points = np.concatenate([first, second, third])
-    assert linked(points, rule.link).max() == 2
-    assert not partition(points, np.ones(240), rule).any()
-    assert partition(np.concatenate([first, third]), np.ones(160), rule).max() == 1
-    assert partition(np.concatenate([second, third]), np.ones(160), rule).max() == 1
-    verdicts = prefixes(points, np.ones(240), 160, rule)
-    assert verdicts[0]
-    assert verdicts[-1]
-    assert same(verdicts, [reference.is_group(points[:n], np.ones(n), rule) for n in range(160, 241)])
-
-
 def test_nobody_one_and_all_at_the_same_place() -> None:
     none = np.zeros((0, 2))
     assert linked(none, LINK).shape == partition(none, np.zeros(0), RULE).shape == (0,)

@@ -82,20 +82,6 @@ def test_split_after_two_seconds_apart():
     assert events(made) == [(116, "split", 97, (1,), (-1, 1), (1, 2, 3))]
 
 
-def test_in_the_image_lengths_are_multiplied():
-    for scale in (25.0, 400.0):
-        made = derive(tracks(joining(), scale=scale), FPS, px_per_m=scale, rule=RULE)
-        assert events(made) == events(derive(tracks(joining()), FPS, rule=RULE))
-        assert made[150].groups.pos[0] == pytest.approx(
-            derive(tracks(joining()), FPS, rule=RULE)[150].groups.pos[0] * scale
-        )
-        assert made[128].events[0].pos[0] == pytest.approx(
-            derive(tracks(joining()), FPS, rule=RULE)[128].events[0].pos[0] * scale
-        )
-    boxed = derive(tracks(side_by_side(), scale=100.0, boxes=True), FPS, px_per_m=100.0, rule=RULE)
-    assert boxed[20].groups.hull[0].tolist() == pytest.approx(np.array([[195, -10], [205, -10], [205, 80], [195, 80]]))
-
-
 def naming(own):
     """A pair whose tracker names its groups, own (T, 2), from the first frame on, where there is none yet."""
     return [t.replace(groups=Groups.none() if (t.group < 0).all() else None) for t in tracks(side_by_side(), group=own)]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,7 +9,6 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Groups, Truth
 from tracking import track
-from tracking.app.cli import run
 from tracking.objective import ObjectiveScorer
 from tracking.scoring import evaluate, score_arrays
 from tracking.scoring.annotated_frames import annotated_frames
@@ -147,27 +143,3 @@ def test_sparse_arrays_score_as_these_frames_numbered_anew(merge: tuple[Truth, t
     assert (anew.step, found.step, found.frames) == (1, 5, anew.frames)
     assert dict(found) == pytest.approx(dict(anew), nan_ok=True)
     assert found["event_F1"] == found["event_F1"]
-
-
-def written(folder: Path, frames, length: int = LENGTH) -> tuple[Path, Path]:
-    """A MOTChallenge folder labelled in these frames, and tracks of the same people in all frames."""
-    labels, every = labelled_in(frames, length=length), labelled_in(range(1, length + 1), length=length)
-    text = folder / "S" / "gt" / "gt.txt"
-    text.parent.mkdir(parents=True)
-    (folder / "S" / "seqinfo.ini").write_text(f"[Sequence]\nname=S\nframeRate=25\nseqLength={length}\n")
-    for path, rows in ((text, labels), (folder / "S.txt", every)):
-        lines = np.column_stack([rows.frame, rows.id, rows.box, np.ones((len(rows.id), 3))]).tolist()
-        path.write_text("".join(",".join(f"{v:g}" for v in line[: 9 if path == text else 7]) + "\n" for line in lines))
-    return folder / "S", folder / "S.txt"
-
-
-def test_the_command_says_how_many_frames_are_scored(tmp_path: Path, capsys) -> None:
-    folder, results = written(tmp_path, range(1, LENGTH, 10))
-    assert run(["score", str(folder), str(results)]) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert "labels are sparse (1 frame in 10): only annotated frames are scored, 60 of 600" in out
-    assert run(["score", str(folder), str(results), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    (row,) = found["sequences"]
-    assert (row["frames_scored"], row["label_step"], row["MOTA"], row["FP"]) == (60, 10, 1, 0)
-    assert len(found["notes"]) == 1

@@ -63,21 +63,6 @@ def test_places_and_boxes_of_every_frame(seed: int, broken: bool, monkeypatch: p
     assert as_dict(box_pairs(true, est, a, b)) == pytest.approx(expected(true, est, overlap), abs=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_part_of_the_frames(seed: int) -> None:
-    r = np.random.default_rng(seed)
-    true, est = random_rows(r), random_rows(r)
-    a, b = places(r, true, False), places(r, est, False)
-    whole = point_pairs(true, est, a, b, 4.0)
-    mask = r.random(13) < 0.5
-    for kept in (mask, np.arange(13) <= 6):
-        part, i, j = whole.in_frames(kept), kept[true.frame], kept[est.frame]
-        alone = point_pairs(true.keep(i), est.keep(j), a[i], b[j], 4.0)
-        assert as_dict(part) == as_dict(alone)
-        assert part.true.id.tolist() == alone.true.id.tolist()
-        assert part.est.frame.tolist() == alone.est.frame.tolist()
-
-
 def best(rows, only, id, away, reach):
     """The row of this id with the least `away` (R,), which is at most reach and not below 0; -1 if there is none."""
     found = np.flatnonzero(only & (rows.id == id) & (away >= 0) & (away <= reach))

@@ -66,25 +66,6 @@ def test_a_group_is_right_with_two_thirds(n: int, inside: int, others: int, righ
     assert found(true, est, "exact_groups") == (exact, exact, exact)
 
 
-@pytest.mark.parametrize(
-    ("true", "est", "precision", "recall"),
-    [
-        pytest.param(((1, 2), (3, 4)), ((1, 2, 3, 4),), 0, 0, id="merged"),
-        pytest.param(((1, 2, 3, 4),), ((1, 2), (3, 4)), 0, 0, id="split in halves"),
-        pytest.param(((1, 2, 3, 4),), ((1, 2, 3), (4, 5)), 1 / 2, 1, id="split, 3 of 4 left"),
-        pytest.param(((1, 2), (3, 4, 5)), ((1, 2, 6),), 1, 1 / 2, id="a person alone attached"),
-        pytest.param(((1, 2), (3, 4)), ((1, 2), (3, 4), (5, 6)), 2 / 3, 1, id="a false group"),
-        pytest.param(((1, 2),), (), 1, 0, id="nothing reported"),
-        pytest.param((), ((1, 2),), 0, 1, id="nothing to find"),
-        pytest.param((), (), 1, 1, id="nothing on either side"),
-    ],
-)
-def test_groups_right_of_one_frame(true: Sets, est: Sets, precision: float, recall: float) -> None:
-    p, r, f1 = found([scene(*true)], [scene(*est)], "right_groups")
-    assert (p, r) == near(precision, recall)
-    assert f1 == pytest.approx(2 * p * r / (p + r) if p + r else 0)
-
-
 def test_hulls_without_members() -> None:
     """The people inside are the members; of two hulls round one group only one is right. Who is alone is not said."""
     true = [scene((1, 2))]

@@ -68,20 +68,6 @@ def test_an_estimated_group_is_clean_with_60_percent_right_ones(wrong, clean):
     assert found["group_GDSR2"] == clean
 
 
-def test_matching_by_members():
-    # Who is with whom is right, but each hull is drawn round the other group: by hulls both are matched wrongly.
-    true = {1: ((1, 2), (0, 0, 2, 1)), 2: ((3, 4), (3, 0, 5, 1))}
-    told = {1: ((1, 2), (3, 0, 5, 1)), 2: ((3, 4), (0, 0, 2, 1))}
-    by_hull, by_members = (
-        scores([Scene(APART, true)], [Scene(APART, told)], group_match=by) for by in ("hull", "members")
-    )
-    assert (by_hull["group_TP"], by_hull["group_GDSR"]) == (2, 0)
-    assert (by_members["group_TP"], by_members["group_GDSR"]) == (2, 1)
-    assert by_members["group_MOTP"] == near(3)
-    assert by_hull["group_F1_hull"] == by_members["group_F1_hull"] == near(1)
-    assert by_hull["group_F1"] == by_members["group_F1"] == near(1)  # by members, whatever is asked
-
-
 def test_one_group_of_everybody_finds_neither_of_two_pairs():
     two, one = {1: ((1, 2), None), 2: ((3, 4), None)}, {9: ((1, 2, 3, 4), None)}
     assert scores([Scene(APART, two)], [Scene(APART, one)])["group_F1"] == 0

@@ -257,3 +257,19 @@ def test_seqinfo_of_too_large_pictures(tmp_path):
     with pytest.raises(InputError, match="16384×16384 px") as error:
         open_source(tmp_path)
     assert error.value.place == "imWidth, imHeight"
+
+
+def test_equal_scores_say_nothing():
+    assert unit_scores(np.array([-1.0, -1.0]))[0].tolist() == [1.0, 1.0]
+
+
+def test_an_outlier_among_shares_is_clipped():
+    score = np.random.default_rng(4).uniform(0.5, 1, 400)
+    mapped, told = unit_scores(np.append(score, 400.0))
+    assert mapped.tolist() == [*score.tolist(), 1.0]
+    assert told == "1 of 401 scores outside 0 to 1 are clipped"
+
+
+def test_a_seqinfo_that_is_no_ini_file(tmp_path):
+    with pytest.raises(InputError, match="expected key=value lines"):
+        open_source(folder(tmp_path, GOOD, ini="nothing\n"))

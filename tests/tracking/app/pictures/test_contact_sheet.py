@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 import cv2
@@ -101,18 +100,6 @@ def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
     top = (HEAD + TITLE) // 2
     first = cv2.resize(read[top : top + round(SIZE[1] * shrunk), 10 : 10 + WIDTH // 2], SIZE)
     assert number(first) == chosen[0]
-
-
-def test_small_pictures(tmp_path: Path) -> None:
-    """One kind alone has the left picture beside it; ids keep their colours."""
-    plain = dataclasses.replace(sequence(3), load_pixels=lambda i: pixels(i).replace(disparity=None))
-    assert PanelPictures(plain, empty_truth(plain), [1, 2]).kinds() == ("left", "ids")
-    both = dataclasses.replace(plain, load_pixels=pixels)
-    pictures = PanelPictures(both, empty_truth(both), [2])
-    assert pictures.kinds() == ("ids", "disparity")
-    area = np.zeros((SIZE[1], 2 * SIZE[0], 3), np.uint8)
-    pictures.draw_small(area, 2)
-    np.testing.assert_array_equal(area[45, 10], colour(2))
 
 
 def test_colours() -> None:

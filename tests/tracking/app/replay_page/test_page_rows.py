@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from sim.geometry.footprints import footprint_hull
 from sim.geometry.polygons import area, convex_hull
-from sim.types import Groups, Sequence, Tracks
+from sim.types import Sequence
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page import page_rows
 from tracking.app.replay_page.page import page_data
@@ -71,26 +71,6 @@ def test_bars_and_links_of_groups(sequence: Sequence) -> None:
     }  # fmt: skip
     assert data["tracks"]["links"] == [[54, 2, 1], [114, 1, 3]]
     assert data["truth"]["links"] == [[50, 2, 1], [110, 1, 3]]
-
-
-def test_what_a_tracker_of_groups_leaves_out(sequence: Sequence) -> None:
-    """No groups, no hulls, or nan: the rows are there, what is unknown is NIL; one without a row is of groups too."""
-    answers = wholes(sequence, "ground")
-    bare = [
-        answers[0].replace(groups=None),
-        answers[1].replace(groups=answers[1].groups.replace(hull=())),
-        answers[2].replace(
-            groups=answers[2].groups.replace(size=np.full(2, np.nan), extent=np.full((2, 2, 2), np.nan))
-        ),
-    ]
-    rows = rows_of(page_data(sequence, bare)["tracks"])
-    np.testing.assert_array_equal(np.isnan(rows["size"]), rows["frame"] != 2)
-    np.testing.assert_array_equal(np.isnan(rows["axes"][:, 0]), rows["frame"] != 2)
-    assert [len(h) > 0 for h in rows["hull"]] == (rows["frame"] == 3).tolist()
-    two, none = np.zeros((0, 2)), np.zeros(0, np.int64)
-    empty = [Tracks(1, 0.0, "image", "group", none, none, two, two, np.zeros((0, 4, 4)), groups=Groups.none())]
-    side = page_data(sequence, empty)["tracks"]
-    assert (side["plane"], side["wholes"]["size"], side["bars"]) == ("image", [], [])
 
 
 @given(st.lists(st.tuples(st.floats(0, 8), st.floats(0, 8)), min_size=1, max_size=9))

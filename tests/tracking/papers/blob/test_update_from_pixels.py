@@ -51,26 +51,6 @@ def test_a_person_in_two_pieces_for_ten_frames_stays_one_track():
     assert all(overlap(t.box[0], box(p)) > 0.5 for t, p in zip(made[5:], way[5:], strict=True))
 
 
-PAPER = BlobConfig.preset("paper")
-
-
-@pytest.mark.parametrize(
-    "config", [BlobConfig(split=False), PAPER, BlobConfig()], ids=["no split", "paper", "defaults"]
-)
-@pytest.mark.parametrize("broken", [range(20, 21), range(20, 26)], ids=["one frame", "six frames"])
-def test_pieces_of_a_person_lie_in_the_gate_and_start_no_track(config, broken):
-    """Frame 367 in the paper's own cascade and with the default noises: the waist hides."""
-    way, frames, r, known = walk(60, 180, 4, 34), [], np.random.default_rng(5), []
-    for k, p in enumerate(way):
-        image = painted.picture([p], r)
-        if k in broken:
-            waist = slice(int(p[1] - 0.5 * TALL) - 4, int(p[1] - 0.5 * TALL) + 4)
-            image[waist] = painted.picture([], r)[waist]
-        frames.append(image)
-    track(frames, config, watch=lambda tracker, _: known.append(tracker.people.next_id - 1))
-    assert known[-1] == 1
-
-
 def test_a_post_does_not_cut_a_person_in_two():
     way = walk(100, 180, 3, 40)
     made = track([[p] for p in way], post=160.0)

@@ -10,7 +10,7 @@ from tests.reference_relational import drawn, relate
 from tracking.papers.relational import sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
-from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
+from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.relations import Relational
 from tracking.papers.relational.tracker import Particle
 
@@ -215,27 +215,6 @@ def test_a_detection_that_is_certainly_nobodys_starts_a_person_at_the_largest_do
         found = Detections(k + 1, k / 10, "ground", np.zeros((1, 2)), None, None, np.ones(1))
         tracks = tracker.step(Frame(k + 1, k / 10), found)
     assert len(tracks.id) == 1
-
-
-def two(count):
-    """Two people far from each other."""
-    made = ParticleSet.empty(count)
-    for x in (0.0, 50.0):
-        made.add(np.full((count, 1, 2), x), np.zeros((count, 1, 2)), 1.0)
-    return made
-
-
-def test_shares_of_effective_particles_and_of_ancestors():
-    """Person 1 has a tenth of the particles left, person 2 all of them."""
-    particles, found = two(100), ParticleDiversity(2.0)
-    particles.weights[:, 0] = np.repeat([0.1, 0.0], [10, 90])
-    found.weigh(particles)
-    particles.resample(0.5, 0.0, drawn(particles, np.random.default_rng(0)))
-    found.resample(particles)
-    assert found.summary() == {"effective_particles_of_a_person": pytest.approx(0.1), "distinct_ancestors": None}
-    found.resample(particles)
-    assert found.summary()["distinct_ancestors"] == pytest.approx((0.1 + 1.0) / 2)
-    assert np.array_equal(particles.ancestor, np.arange(100)[:, None] * [1, 1])
 
 
 def test_probabilities_of_pairs_are_those_of_the_reported_people():
