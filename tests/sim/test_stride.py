@@ -26,11 +26,10 @@ def same_rows(every: Truth, kept: Truth, stride: int) -> None:
         np.testing.assert_array_equal(getattr(every, name)[there], getattr(kept, name), name)
 
 
-@pytest.mark.parametrize("stride", [2, 7, 500])
-@pytest.mark.parametrize("name", ["street", "merge"])
-def test_common_frames_are_equal(name: str, stride: int) -> None:
+@pytest.mark.parametrize("stride", [7, 500])
+def test_common_frames_are_equal(stride: int) -> None:
     """People, boxes and detections; the camera, too, which another camera.fps would place elsewhere."""
-    scenario = load(name)
+    scenario = load("merge")
     every, kept = simulate(scenario, 5, streams=()), simulate(scenario, 5, streams=(), stride=stride)
     assert (kept.fps, kept.length) == (every.fps / stride, -(-every.length // stride))
     assert (kept.camera.position == every.camera.position).all()
@@ -41,10 +40,9 @@ def test_common_frames_are_equal(name: str, stride: int) -> None:
         np.testing.assert_array_equal(d.detections.box, k.detections.box)
 
 
-@pytest.mark.parametrize(("stride", "fps"), [(2, 5), (4, 2.5), (8, 1.25)])
-def test_labels_are_those_of_a_camera_with_this_frame_rate(stride: int, fps: float) -> None:
-    kept = simulate(load("merge"), 5, streams=(), stride=stride).truth
-    slow = simulate(load("merge", [f"camera.fps={fps}"]), 5, streams=()).truth
+def test_labels_are_those_of_a_camera_with_this_frame_rate() -> None:
+    kept = simulate(load("merge"), 5, streams=(), stride=4).truth
+    slow = simulate(load("merge", ["camera.fps=2.5"]), 5, streams=()).truth
     assert [(e.kind, e.start, e.end, e.members) for e in kept.events] == [
         (e.kind, e.start, e.end, e.members) for e in slow.events
     ]

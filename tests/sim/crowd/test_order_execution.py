@@ -100,11 +100,10 @@ def measured(scenario, motion):
     return truth_files(observe(scenario, motion, check=False).truth.replace(orders=()))
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("name", ["merge", "split", "queue", "party", "mixed"])
-def test_times_deleted_from_the_script_change_no_onset(name, seed):
+@pytest.mark.parametrize("name", ["split", "queue", "party"])
+def test_times_deleted_from_the_script_change_no_onset(name):
     scenario = load(name, ["camera.fps=5"])
-    motion = run(scenario, seed)
+    motion = run(scenario, 0)
     files = measured(scenario, motion)
     events = json.loads(files["gt/events.json"])["events"]
     assert {o.kind for o in motion.orders}

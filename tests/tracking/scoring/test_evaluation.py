@@ -50,7 +50,7 @@ def truth_as_tracks(true: Truth, plane: str = "ground", late: int = 0) -> list[T
 
 @pytest.mark.parametrize("name", NAMES)
 def test_truth_as_tracks_is_perfect(name: str) -> None:
-    true = simulate(load(name), 5).truth
+    true = simulate(load(name, ["camera.fps=5"]), 5, streams=()).truth
     for plane, by in (("ground", "hull"), ("ground", "members"), ("image", "hull")):
         found = evaluate(true, truth_as_tracks(true, plane), group_match=by)
         # What a tracker does not tell is measured where it follows people: who passes by may cross in the picture.

@@ -19,7 +19,7 @@ from tests.hand_made import Scene, tracks, truth
 from tracking.scoring.evaluation import evaluate
 
 ALONE = 1_000
-CASES = [(name, seed) for name in ("merge", "split") for seed in range(4)]
+CASES = [(name, seed) for name in ("merge", "split") for seed in range(2)]
 
 
 @cache
