@@ -16,7 +16,6 @@ PX = 40.0
 def wholes(sequence: Sequence, plane: str) -> list[Tracks]:
     """Late by four frames: hulls of footprints on the ground, of boxes in the image; sizes a little off."""
     truth, answers = sequence.truth, []
-    assert truth is not None
     for k in range(1, truth.length + 1):
         now, late = truth.at(k), truth.at(max(k - LATE, 1))
         groups = _groups(now, late, plane)
@@ -36,7 +35,6 @@ def wholes(sequence: Sequence, plane: str) -> list[Tracks]:
 def _places(now: FrameTruth, plane: str) -> Array:
     """(N, 2) in the plane's unit."""
     assert now.pos is not None
-    assert now.box is not None
     return now.pos if plane == "ground" else now.box[:, :2] + now.box[:, 2:] / 2
 
 
@@ -47,9 +45,6 @@ def _middle(now: FrameTruth, people: tuple[int, ...], plane: str) -> tuple[float
 
 def _groups(now: FrameTruth, late: FrameTruth, plane: str) -> Groups:
     """People of this frame in the groups that they had earlier."""
-    assert now.pos is not None
-    assert now.vel is not None
-    assert now.box is not None
     then = dict(zip(late.id.tolist(), late.group.tolist(), strict=True))
     label = np.array([then.get(i, -1) for i in now.id.tolist()], np.int64)
     names = np.unique(label[label >= 0])

@@ -75,11 +75,8 @@ def number(low, high):
 def merges(draw):
     """Two pairs walk abreast; the second closes in on the first."""
     gap, left, closing, speed = (
-        draw(number(2.5, 3.5)),
-        draw(number(0.5, 1.1)),
-        draw(number(0.25, 0.42)),
-        draw(number(0.5, 1.4)),
-    )
+        draw(number(2.5, 3.5)), draw(number(0.5, 1.1)), draw(number(0.25, 0.42)), draw(number(0.5, 1.4)),
+    )  # fmt: skip
     stay = [way((0, y), (1, (speed, 0))) for y in (0, WIDTH)]
     come = [way((0, WIDTH + gap + y), ((gap - left) / closing, (speed, -closing)), (1, (speed, 0))) for y in (0, WIDTH)]
     intent = (0, (1, 1, 2, 2)), (draw(number(0.3, 1.5)), (3, 3, 3, 3))

@@ -56,13 +56,9 @@ def classify(image, mean, sigma, s, b, valid, gain, limits):
     alpha, cd = distortions(image.astype(float), expected, sigma)
     brightness = (alpha - 1) * np.sqrt(np.sum(np.square(expected / sigma), axis=-1)) / s
     rules = [
-        (~valid, 0),
-        (cd > most * b, 1),
-        ((brightness < lower) & (alpha < dark), 2),
-        ((brightness > upper) & (alpha > bright), 1),
-        (brightness > upper, 4),
-        (brightness < lower, 3),
-    ]
+        (~valid, 0), (cd > most * b, 1), ((brightness < lower) & (alpha < dark), 2),
+        ((brightness > upper) & (alpha > bright), 1), (brightness > upper, 4), (brightness < lower, 3),
+    ]  # fmt: skip
     return np.select([rule for rule, _ in rules], [kind for _, kind in rules], 0).astype(np.uint8)
 
 

@@ -63,26 +63,3 @@ def log_group_dynamics(
 def binder_gain(gain: np.ndarray, parts: list[list[int]]) -> float:
     """Returns the sum of gain (K, K) over the pairs of each part."""
     return sum(gain[a, b] for part in parts for a in part for b in part if a < b)
-
-
-def log_component(state: np.ndarray, nu: float, s: float, s_v: float) -> float:
-    """Returns log p(states (n, 4) of a component), relative to the density of the first one: a product of predictives,
-    Student's t of the places with scipy, normal ones of the velocities."""
-    from scipy.stats import multivariate_normal, multivariate_t
-
-    total = 0.0
-    for n in range(1, len(state)):
-        mean, after = state[:n].mean(axis=0), nu + 2 * (n - 1)
-        scatter = ((state[:n, :2] - mean[:2]) ** 2).sum()
-        shape = (nu * s**2 + scatter) / after * (1 + 1 / n) * np.eye(2)
-        total += multivariate_t(mean[:2], shape, df=after).logpdf(state[n, :2])
-        total += multivariate_normal(mean[2:], s_v**2 * (1 + 1 / n) * np.eye(2)).logpdf(state[n, 2:])
-    return float(total)
-
-
-def log_evidence(state: np.ndarray, parts: list[list[int]], c: float, nu: float, s: float, s_v: float) -> float:
-    """Returns log p(Z, X) of a partition, but for a constant: Chinese restaurant process, components."""
-    return sum(
-        np.log(c) + float(np.log(np.arange(1, len(part))).sum()) + log_component(state[part], nu, s, s_v)
-        for part in parts
-    )

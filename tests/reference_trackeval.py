@@ -19,11 +19,7 @@ def trackeval_scores(true: Sequence, est: Sequence, similarity: Sequence) -> dic
     data = _numbered(true, est, similarity)
     quiet = {"THRESHOLD": 0.5, "PRINT_CONFIG": False}
     found: dict[str, float] = {}
-    for metric, keys in (
-        (metrics.HOTA(), HOTA),
-        (metrics.CLEAR(quiet), CLEAR),
-        (metrics.Identity(quiet), IDENTITY),
-    ):
+    for metric, keys in ((metrics.HOTA(), HOTA), (metrics.CLEAR(quiet), CLEAR), (metrics.Identity(quiet), IDENTITY)):
         answer = metric.eval_sequence(data)
         found |= {key: float(np.mean(answer[KEYS.get(key, key)])) for key in keys}
     return found

@@ -10,20 +10,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = {
-    "numpy",
-    "scipy",
-    "numba",
-    "cv2",
-    "pymunk",
-    "pyarrow",
-    "pydantic",
-    "filterpy",
-    "gymnasium",
-    "av",
-    "rich",
-    "matplotlib",
-    "optuna",
-}
+    "numpy", "scipy", "numba", "cv2", "pymunk", "pyarrow", "pydantic", "filterpy", "gymnasium", "av", "rich",
+    "matplotlib", "optuna",
+}  # fmt: skip
 LIST = "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
 
 
@@ -62,10 +51,6 @@ def test_scoring_alone_is_numpy_and_scipy():
     assert found.isdisjoint(HEAVY - {"numpy", "scipy"})
 
 
-def test_data_types_need_numpy_only():
-    assert loaded("import sim.types").isdisjoint(HEAVY - {"numpy"})
-
-
 @pytest.mark.parametrize(
     ("package", "names"),
     [
@@ -81,17 +66,3 @@ def test_lazy_names(package, names):
         assert callable(getattr(module, name)), f"{package}.{name}"
     with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'nothing'"):
         _ = module.nothing
-
-
-def test_lazy_names_after_their_modules_were_imported():
-    """A submodule becomes an attribute of its package: none may take the place of a function."""
-    code = "\n".join(
-        [
-            "import pkgutil, importlib, scenarios, sim, tracking",
-            "for package in (scenarios, sim, tracking):",
-            "    for found in pkgutil.iter_modules(package.__path__):",
-            "        importlib.import_module(f'{package.__name__}.{found.name}')",
-            "    assert all(callable(getattr(package, name)) for name in package.__all__), package",
-        ]
-    )
-    loaded(code)

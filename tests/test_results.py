@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
+from pathlib import Path
 
 import pytest
 
 from benchmarks import results
+from scenarios.loading.resolve import resolve
+from scenarios.loading.suites import read_entries
 
 TABLES = results.tables()
 SHOWN = {(page, name): text for page in results.pages() for name, text in results.shown(page).items()}
@@ -27,50 +29,6 @@ def test_a_headline_is_not_older_than_the_code(name):
     assert not results.is_stale(TABLES[name]), f"python -m benchmarks results {name}"
 
 
-def test_printed_tables_are_read_with_their_titles():
-    text = "seeds 0:3\n\n| a | b |\n|---|---|\n| x | 1 |\nmore\n| c |\n|---|\n| – |\n"
-    first, second = results.printed_tables(text)
-    assert first == {"title": "seeds 0:3", "columns": ["a", "b"], "rows": [["x", "1"]]}
-    assert second == {"title": "more", "columns": ["c"], "rows": [["–"]]}
-
-
-def test_options_for_few_seeds_replace_those_of_the_table():
-    table = results.Table("t", "relational hidden --seeds 0:9 --chart {chart}", quick="--seeds 0:1 --counts 5")
-    assert table.words() == ["relational", "hidden", "--seeds", "0:9", "--chart", "docs/results/t.svg"]
-    assert table.words(quick=True)[2:] == ["--chart", "docs/results/t.svg", "--seeds", "0:1", "--counts", "5"]
-
-
-def test_sources_are_what_the_benchmark_imports_without_docstrings(tmp_path, monkeypatch):
-    (tmp_path / "benchmarks").mkdir()
-    (tmp_path / "sim").mkdir()
-    for name in results.PACKAGES:
-        (tmp_path / name).mkdir(exist_ok=True)
-    (tmp_path / "tracking" / "papers").mkdir()
-    (tmp_path / "benchmarks" / "one.py").write_text('"""Doc."""\nfrom sim.a import f\nTRACKER = "tracking.t:T"\n')
-    (tmp_path / "sim" / "a.py").write_text("def f():\n    return 1\n")
-    (tmp_path / "sim" / "b.py").write_text("")
-    (tmp_path / "tracking" / "t.py").write_text("class T: pass\n")
-    monkeypatch.setattr(results, "ROOT", tmp_path)
-
-    def now() -> str:
-        results._module_files.cache_clear()
-        results._module_facts.cache_clear()
-        return results.sources_hash(table)
-
-    table = results.Table("t", "one")
-    first = now()
-    assert results.sources_of(table) == ["benchmarks.one", "sim.a", "tracking.t"]
-    (tmp_path / "benchmarks" / "one.py").write_text(
-        '"""Other."""\n# why\nfrom sim.a import f\nTRACKER = "tracking.t:T"\n'
-    )
-    (tmp_path / "sim" / "b.py").write_text("x = 1\n")
-    assert now() == first
-    (tmp_path / "sim" / "a.py").write_text("def f():\n    return 2\n")
-    assert now() != first
-    results._module_files.cache_clear()
-    results._module_facts.cache_clear()
-
-
 def one(*cells: str) -> list[dict[str, object]]:
     return [{"title": "", "columns": ["", "score", "count"], "rows": [["blob", *cells]]}]
 
@@ -84,21 +42,19 @@ def test_few_seeds_leave_their_bands():
     ]
 
 
-def test_a_failing_benchmark_stores_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(results, "FOLDER", tmp_path)
-    with pytest.raises(SystemExit, match="exit code"):
-        results.make(results.Table("t", "golden --nonsense"))
-    assert not list(tmp_path.iterdir())
+SUITES = Path(__file__).resolve().parents[1] / "benchmarks" / "tuning_suites"
 
 
-def test_a_block_without_a_table_stays_empty(tmp_path, monkeypatch):
-    monkeypatch.setattr(results, "FOLDER", tmp_path)
-    table = results.Table("t", "one")
-    text = "a\n<!-- results: t -->\nold\n<!-- end -->\nb\n"
-    assert results.with_tables(text, {"t": table}) == "a\n<!-- results: t -->\n<!-- end -->\nb\n"
-    content = {"tables": one("1", "2"), "command": "python -m benchmarks one", "date": "2026-01-01"}
-    table.file.write_text(json.dumps(content))
-    shown = results.with_tables(text, {"t": table})
-    assert "| blob | 1 | 2 |" in shown
-    assert "`python -m benchmarks one`, 2026-01-01" in shown
-    assert results.with_tables(shown, {"t": table}) == shown
+@pytest.mark.parametrize("path", sorted(SUITES.glob("*.toml")), ids=lambda path: path.stem)
+def test_each_can_be_read(path: Path) -> None:
+    assert [entry.name for entry in resolve(str(path))] == [line.name for line in read_entries(path)]
+
+
+def test_labelled_scenes_are_those_of_groups_seen_by_labellers() -> None:
+    """Everybody is seen at 2.5 frames/s, and nothing else is changed."""
+    groups, labelled = read_entries(SUITES / "groups.toml"), read_entries(SUITES / "labelled.toml")
+    for plain, seen, entry in zip(groups, labelled, resolve(str(SUITES / "labelled.toml")), strict=True):
+        sensor = [setting for setting in seen.settings if setting.startswith("sensor.")]
+        assert (seen.name, seen.scenario, seen.settings) == (plain.name, plain.scenario, (*plain.settings, *sensor))
+        slow = "camera.fps=2.5" in plain.settings
+        assert (entry.scenario.sensor.detect_prob == 1, entry.scenario.sensor.clutter_rate == 0) == (slow, slow)

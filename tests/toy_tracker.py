@@ -44,7 +44,6 @@ class Toy:
         self.pos, self.id, self.next = np.zeros((0, 2)), np.zeros(0, np.int64), 0
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        assert detections is not None
         pos = detections.pos[self.config.skip :]
         n, id, vel = len(pos), np.full(len(pos), -1), np.zeros((len(pos), 2))
         apart = np.linalg.norm(pos[:, None] - self.pos[None], axis=2)

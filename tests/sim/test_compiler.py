@@ -58,6 +58,7 @@ def test_the_home_takes_the_cache_of_a_read_only_package(package, tmp_path):
     assert done.stdout.startswith(f"4 {tmp_path}/home/.cache/numba/"), done.stderr
 
 
+@pytest.mark.slow
 def test_the_temporary_folder_takes_it_without_a_home(package, tmp_path):
     (tmp_path / "tmp").mkdir()
     env = {"HOME": f"{package}/home", "TMPDIR": str(tmp_path / "tmp")}
@@ -68,6 +69,7 @@ def test_the_temporary_folder_takes_it_without_a_home(package, tmp_path):
     assert list(own.rglob("*.nbi"))
 
 
+@pytest.mark.slow
 def test_there_is_no_cache_without_any_room(package):
     env = {"HOME": f"{package}/home", "TMPDIR": str(package)}
     done = _run(package, ["-c", "import tempfile; tempfile.tempdir = '.'" + KERNEL], **env)
@@ -88,16 +90,6 @@ def test_a_command_in_a_container(package, tmp_path):
     assert (made.returncode, "warning" in made.stderr) == (0, False), made.stderr
     tracked = _run(package, [*program, "track", "blob", out, "--out", str(tmp_path / "run")], **env)
     assert (tracked.returncode, "warning" in tracked.stderr) == (0, False), tracked.stderr
-
-
-def test_a_home_that_is_no_path_is_none(tmp_path, monkeypatch):
-    """A user without a home: "~" stays, and numba would make a folder of that name in the working directory."""
-    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    monkeypatch.setattr(compiler, "_can_be_written", lambda folder: "__pycache__" not in str(folder))
-    assert not compiler._numba_finds_a_place.__wrapped__(str(tmp_path))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert compiler._numba_finds_a_place.__wrapped__(str(tmp_path))
 
 
 @pytest.mark.parametrize("harm", ["link", "open to all", "file"])
@@ -135,16 +127,6 @@ def imports_numba(text: str) -> bool:
         if isinstance(node, ast.Import | ast.ImportFrom)
         for name in ([node.module or ""] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names])
     )
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["import numba", "import os, numba as nb", "from numba import njit", "from numba.core import types",
-     "import numba.typed", "def f():\n    from numba import njit", "if True:\n    import numba"],
-)  # fmt: skip
-def test_each_form_of_import_is_seen(text):
-    assert imports_numba(text)
-    assert not imports_numba(text.replace("numba", "numbat"))
 
 
 def test_every_kernel_is_compiled_here():

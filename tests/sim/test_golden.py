@@ -23,7 +23,9 @@ def test_truth_and_detections_are_as_they_were(name: str) -> None:
 
 
 def test_nothing_depends_on_the_processor() -> None:
-    assert golden.under(golden.SETTINGS["all of these"], "scenarios", *names()) == KEPT["scenarios"]
+    assert golden.under(golden.SETTINGS["all of these"], "scenarios", *SOME) == {
+        name: KEPT["scenarios"][name] for name in SOME
+    }
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.dataset.generate import generate
-from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Truth
 from tracking.app.cli import run
@@ -28,11 +26,10 @@ def same_rows(every: Truth, kept: Truth, stride: int) -> None:
         np.testing.assert_array_equal(getattr(every, name)[there], getattr(kept, name), name)
 
 
-@pytest.mark.parametrize("stride", [2, 7, 500])
-@pytest.mark.parametrize("name", ["street", "merge"])
-def test_common_frames_are_equal(name: str, stride: int) -> None:
+@pytest.mark.parametrize("stride", [7, 500])
+def test_common_frames_are_equal(stride: int) -> None:
     """People, boxes and detections; the camera, too, which another camera.fps would place elsewhere."""
-    scenario = load(name)
+    scenario = load("merge")
     every, kept = simulate(scenario, 5, streams=()), simulate(scenario, 5, streams=(), stride=stride)
     assert (kept.fps, kept.length) == (every.fps / stride, -(-every.length // stride))
     assert (kept.camera.position == every.camera.position).all()
@@ -43,24 +40,14 @@ def test_common_frames_are_equal(name: str, stride: int) -> None:
         np.testing.assert_array_equal(d.detections.box, k.detections.box)
 
 
-@pytest.mark.parametrize(("stride", "fps"), [(2, 5), (4, 2.5), (8, 1.25)])
-def test_labels_are_those_of_a_camera_with_this_frame_rate(stride: int, fps: float) -> None:
-    kept = simulate(load("merge"), 5, streams=(), stride=stride).truth
-    slow = simulate(load("merge", [f"camera.fps={fps}"]), 5, streams=()).truth
+def test_labels_are_those_of_a_camera_with_this_frame_rate() -> None:
+    kept = simulate(load("merge"), 5, streams=(), stride=4).truth
+    slow = simulate(load("merge", ["camera.fps=2.5"]), 5, streams=()).truth
     assert [(e.kind, e.start, e.end, e.members) for e in kept.events] == [
         (e.kind, e.start, e.end, e.members) for e in slow.events
     ]
     assert kept.group.tolist() == slow.group.tolist()
     assert kept.orders == slow.orders
-
-
-def test_events_are_within_half_a_frame() -> None:
-    every = simulate(load("merge"), 5, streams=()).truth
-    for stride in (2, 5, 13):
-        kept = simulate(load("merge"), 5, streams=(), stride=stride).truth
-        assert [e.kind for e in every.events] == [e.kind for e in kept.events]
-        for e, k in zip(every.events, kept.events, strict=True):
-            assert abs((e.start - 1) / every.fps - (k.start - 1) / kept.fps) <= 0.5 / kept.fps + 1e-9
 
 
 @pytest.mark.parametrize("stride", [0, -1, 1001, 2.0])
@@ -96,29 +83,6 @@ def test_a_stride_of_one_changes_no_byte(made: dict[int | None, Path]) -> None:
     assert files(made[None]) == files(made[1])
 
 
-def test_pictures_of_common_frames_have_the_same_bytes(made: dict[int | None, Path]) -> None:
-    every, kept = files(made[None]), files(made[4])
-    for folder in ("img1", "img1_right", "disparity", "ids"):
-        assert sum(name.startswith(f"{folder}/") for name in kept) == 20
-        for k in range(20):
-            assert kept[f"{folder}/{k + 1:06d}.png"] == every[f"{folder}/{4 * k + 1:06d}.png"]
-    assert kept["background/000050.png"] == every["background/000050.png"]
-    same_rows(open_source(made[None])[0].truth, open_source(made[4])[0].truth, 4)
-    visible = [
-        open_source(made[stride])[0].frame_truth(index).pixels.visible_px for stride, index in ((None, 9), (4, 3))
-    ]
-    assert visible[0].tolist() == visible[1].tolist()
-
-
-def test_the_folder_says_its_frame_rate_and_stride(made: dict[int | None, Path]) -> None:
-    manifest = json.loads((made[4] / "manifest.json").read_text())
-    assert (manifest["stride"], manifest["sequence"]["fps"], manifest["sequence"]["length"]) == (4, 2.5, 20)
-    assert "stride" not in json.loads((made[1] / "manifest.json").read_text())
-    assert "frameRate=2.5\nseqLength=20\n" in (made[4] / "seqinfo.ini").read_text()
-    (found,) = open_source(made[4])
-    assert (found.fps, found.length, found.source["stride"]) == (2.5, 20, 4)
-
-
 def test_a_stored_sequence_of_another_stride_is_refused(made: dict[int | None, Path], capsys) -> None:
     for stored, asked in ((1, 4), (4, 1), (4, 2)):
         with pytest.raises(InputError, match=f"another sequence .*: stride {stored} → {asked}\\)"):
@@ -129,28 +93,3 @@ def test_a_stored_sequence_of_another_stride_is_refused(made: dict[int | None, P
     before = (made[4] / "manifest.json").stat().st_mtime_ns
     generate(["pass-by"], range(5, 6), made[4].parents[1], set=PAIR, streams=STREAMS, images="png", stride=4)
     assert (made[4] / "manifest.json").stat().st_mtime_ns == before
-
-
-def test_every_command_takes_a_folder_with_a_stride(made: dict[int | None, Path], tmp_path: Path, capsys) -> None:
-    data = made[4].parents[1]
-    assert run(["validate", str(data)]) == 0
-    assert run(["export", "coco", str(data), "--out", str(tmp_path / "coco.json")]) == 0
-    assert len(json.loads((tmp_path / "coco.json").read_text())["images"]) == 20
-    assert run(["export", "kitti", str(data), "--out", str(tmp_path / "kitti")]) == 0
-    assert run(["export", "webdataset", str(data), "--out", str(tmp_path / "shards")]) == 0
-    for detections in ("image", "file", "truth"):
-        run_folder = str(tmp_path / detections)
-        assert run(["track", "blob", str(data), "--detections", detections, "--out", run_folder]) == 0
-        capsys.readouterr()
-        assert run(["score", str(data), run_folder, "--json"]) == 0
-        (row,) = json.loads(capsys.readouterr().out)["sequences"]
-        assert (row["frames_scored"], row["label_step"]) == (20, 1)
-    assert row["HOTA"] > 0.5
-    assert run(["track", "stereo", str(data), "--out", str(tmp_path / "stereo")]) == 0
-
-
-def test_a_video_with_a_stride(tmp_path: Path) -> None:
-    folders = generate(["pass-by"], range(5, 6), tmp_path, set=SMALL, images="mp4", stride=10)
-    (found,) = open_source(folders[0])
-    assert (found.fps, found.length) == (1, 8)
-    assert sum(frame.image is not None for frame in found) == 8

@@ -10,7 +10,6 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tracking.environment.env import TuningEnv
@@ -69,16 +68,3 @@ def test_a_copied_environment_goes_on_as_the_original(name, detections):
         assert np.array_equal(seen, seen2)
         assert (reward, ended, info["frame"]) == (reward2, ended2, info2["frame"])
     assert on[-1][-1]["frame"] == 20
-
-
-def test_the_environment_refuses_seeds_of_two_splits():
-    with pytest.raises(InputError, match="seeds: got 0 to 20000: test, train; expected seeds of one split"):
-        TuningEnv("blob", "cross", seeds=[0, 20_000])
-
-
-@pytest.mark.parametrize("action", ["go", ["0.1"], None, [[0.1], [0.1, 0.2]], {"gate": 0.1}])
-def test_actions_that_are_no_numbers_are_refused_in_words(action):
-    env = TuningEnv("blob", "cross", seeds=[3], set=["camera.fps=2", "duration=2"])
-    env.reset(seed=0)
-    with pytest.raises(InputError, match=r"action: got .* expected .*finite numbers"):
-        env.step(action)

@@ -6,10 +6,6 @@ import numpy as np
 import pytest
 
 from sim.types import Camera, Context, Detections, Frame
-from tracking.filters.person_streams import PersonStreams, birth_keys
-from tracking.papers.joint.config import JointConfig
-from tracking.papers.joint.distributions import FrameModel
-from tracking.papers.joint.tracker import Joint
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.relations import Relational
 from tracking.papers.relational.tracker import Particle
@@ -67,51 +63,3 @@ def test_a_person_far_away_changes_no_track(name, camera):
     assert sum(len(frame[0]) > 0 for frame in alone) > 30
     for first, last in ((0, FRAMES), (17, FRAMES), (0, 20)):
         assert near_tracks(TRACKERS[name](), context, first, last) == alone
-
-
-@pytest.mark.parametrize("name", TRACKERS)
-def test_the_order_of_detections_changes_no_track(name):
-    context = Context(FPS, float("nan"))
-    assert near_tracks(TRACKERS[name](), context, 0, 30, True) == near_tracks(TRACKERS[name](), context, 0, 30)
-
-
-def test_one_person_alone_is_as_with_another_far_away():
-    """Sums over one column are made in the same order as over two."""
-    for name in ("particle", "relational"):
-        runs = []
-        for far in (False, True):
-            tracker = TRACKERS[name]()
-            tracker.reset(Context(FPS, float("nan"), CAMERA), 5)
-            for k in range(25):
-                points = np.array([[0.1 * k, 0.0], [-80.0, 60.0 + 0.1 * k]])[: 1 + far]
-                found = Detections(k + 1, k / FPS, "ground", points, score=np.ones(len(points)))
-                tracks = tracker.step(Frame(k + 1, k / FPS), found)
-            k = int(tracks.pos[:, 0].argmax())
-            runs.append([tracks.pos[k].tobytes(), tracks.vel[k].tobytes(), tracks.cov[k].tobytes()])
-        assert runs[0] == runs[1]
-
-
-def test_joint_draws_for_a_person_the_same_numbers_whoever_else_is_there():
-    """A new person is drawn into the particles alike, whether or not another one has been tracked for a while."""
-    drawn = []
-    for far in (False, True):
-        tracker = Joint(JointConfig(particles=20, partitions=5))
-        tracker.reset(Context(FPS, float("nan")), 5)
-        for k in range(14):
-            points = np.array([[80.0, 60.0 + 0.1 * k], [0.1 * k, 0.0]])[0 if far else 1 : 1 + (k >= 10)]
-            found = Detections(k + 1, k / FPS, "ground", points, score=np.ones(len(points)))
-            tracker.step(Frame(k + 1, k / FPS), found)
-        assert tracker.nested.x.shape[1] == 1 + far
-        drawn.append(tracker.nested.x[:, -1].tobytes())
-    assert drawn[0] == drawn[1]
-
-
-def test_joint_proposes_for_a_person_the_same_states_whoever_else_is_there():
-    """What follows is not independent: partitions are resampled for all people together, and with them the places."""
-    x, z = np.random.default_rng(0).normal(0, 1, (30, 3, 8)), np.array([[0.0, 0.1], [np.nan, np.nan], [0.5, 0.5]])
-    key, found = birth_keys(z[[0, 2, 2]], 1), []
-    for rows in ([0, 1, 2], [2, 0]):
-        model = FrameModel(JointConfig(), 0.1, 0.1, z[rows], np.zeros((len(rows),) * 2), PersonStreams(3), key[rows])
-        found.append([values[:, -1 if rows == [0, 1, 2] else 0] for values in model.individuals(x[:, rows])])
-    assert np.array_equal(found[0][0], found[1][0])
-    np.testing.assert_allclose(found[0][1], found[1][1], rtol=1e-12)

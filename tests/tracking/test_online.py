@@ -86,13 +86,6 @@ def changed(config, p):
 
 
 @pytest.mark.parametrize("name", names())
-def test_an_equal_config_changes_nothing(name, points):
-    config = find(name).config_class()
-    plain = answers(name, points, "file", {})
-    same(plain, answers(name, points, "file", {k: dataclasses.replace(config) for k in (1, 7, 10)}))
-
-
-@pytest.mark.parametrize("name", names())
 def test_each_parameter_changed_after_the_reset_is_as_if_reset_with(name, points):
     kind = find(name).config_class
     counted, plain = 0, answers(name, points, "file", {})
@@ -132,25 +125,6 @@ def test_a_change_half_way_is_seen_from_there_on_and_not_before(name, points):
     plain, late = answers(name, points, "file", {}), answers(name, points, "file", {12: config})
     same(plain[:11], late[:11])
     assert differ(plain[11:], late[11:])
-
-
-@pytest.mark.parametrize(("sequence", "mode"), [("points", "file"), ("pixels", "image")])
-@pytest.mark.parametrize("name", names())
-def test_any_change_between_any_frames(name, sequence, mode, request):
-    """Random parameters in every other frame: those that cannot be are refused before anything is changed."""
-    kind, rng = find(name).config_class, np.random.default_rng(5)
-    space = kind.space(online=True)
-    source = pictures_for(name, request) if mode == "image" else request.getfixturevalue(sequence)
-    ready = prepare(name, source, detections=mode)
-    ready.reset(0)
-    for frame in ready.frames():
-        before = ready.tracker.config
-        ready.tracker.config = decode(space, rng.uniform(-1, 1, len(space)), kind())
-        try:
-            ready.step(frame)
-        except InputError:
-            ready.tracker.config = before
-            ready.step(frame)
 
 
 def test_a_refused_change_leaves_blob_as_it_was(points):

@@ -45,23 +45,6 @@ def test_the_oracle_gets_what_the_tracker_got(scene) -> None:
     assert any(len(a.id) != len(b.id) for a, b in zip(oracle(scene, poor.info), again, strict=True))
 
 
-def test_of_pixels_the_oracle_has_what_is_visible(scene) -> None:
-    run = oracle(scene, {"detections": "image"})
-    found = evaluate(scene.truth, run)
-    assert found.similarity == "image"
-    assert (found["IDSW"], found["merge_F1"] != 0) == (0, True)
-    hidden = sum(scene.truth.visibility == 0)
-    assert sum(len(t.id) for t in run) == len(scene.truth.id) - hidden
-
-
-def test_from_boxes_the_oracle_has_their_feet(scene) -> None:
-    """Boxes of what is visible end above hidden feet."""
-    points, boxes = (evaluate(scene.truth, oracle(scene, {"input": kind})) for kind in ("points", "boxes"))
-    assert points.similarity == boxes.similarity == "ground"
-    assert boxes["HOTA"] < points["HOTA"]
-    assert (boxes["FP"], boxes["IDSW"]) == (0, 0)
-
-
 def test_from_stereo_pairs_the_oracle_has_the_visible_people(scene) -> None:
     run = oracle(scene, {"detections": "image", "input": "stereo"})
     found = evaluate(scene.truth, run)

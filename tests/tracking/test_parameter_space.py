@@ -45,14 +45,6 @@ def test_known_points():
     assert type(low.count) is int
 
 
-def test_whole_numbers_and_choices_have_equal_shares():
-    points = np.linspace(-1, 1, 6001)[1:-1]
-    found = [decode(SPACE, [0, 0, a, a, a], Mixed()) for a in points]
-    for name, values in (("count", range(2, 7)), ("kind", "abc"), ("on", (True, False))):
-        share = [np.mean([getattr(c, name) == v for c in found]) for v in values]
-        assert share == pytest.approx([1 / len(values)] * len(values), abs=1e-3)
-
-
 @given(st.floats(1, 5), st.floats(0.01, 40), st.integers(2, 6), st.sampled_from("abc"), st.booleans())
 def test_there_and_back(gate, rate, count, kind, on):
     config = Mixed(gate, rate, count, kind, on)
@@ -82,14 +74,6 @@ def test_what_cannot_be_is_drawn_back_along_a_line_as_little_as_may_be():
 
 def refuse_all(config):
     raise InputError(place="x", got="y", expected="z", remedy="w")
-
-
-def test_a_further_condition_counts_too():
-    def slow(config):
-        if config.rate > 2:
-            refuse_all(config)
-
-    assert 1.5 < decode(SPACE, [0, 1, 0, 0, 0], Mixed(), allowed=slow).rate <= 2
 
 
 @pytest.mark.parametrize("action", [[0.0] * 4, [[0.0] * 5], [0, 0, 0, 0, np.nan], [0, 0, 0, 0, np.inf]])

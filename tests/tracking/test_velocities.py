@@ -13,7 +13,7 @@ from scenarios.loading.resolve import load
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import Sequence, Tracks
-from tracking.grouping.grouped_tracks import with_groups, with_velocities
+from tracking.grouping.grouped_tracks import with_velocities
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.plausibility import velocity_error, velocity_warning
 from tracking.running.run import grouped, track
@@ -161,8 +161,3 @@ def test_unknown_velocities_become_the_motion_over_half_a_second() -> None:
     assert with_velocities(known, FPS) is known
     mixed = [*moving(0.3, 6), *moving(np.nan, 10)[6:]]
     assert [float(t.vel[0, 0]) for t in with_velocities(mixed, FPS)] == pytest.approx([0.3] * 6 + [1.0] * 4)
-
-
-def test_velocities_of_groups_are_filled_too() -> None:
-    groups = [t.replace(unit="group", group=t.id) for t in moving(np.nan, 5)]
-    assert with_groups(groups, FPS, 1.0)[-1].vel == pytest.approx(np.array([[1.0, 0.0]]))

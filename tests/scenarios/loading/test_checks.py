@@ -9,8 +9,6 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 
-NO_EVENT = "event=[]"
-
 
 @pytest.mark.parametrize(
     ("settings", "place", "got"),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading.resolve import Entry, load, names, resolve, suite_names
+from scenarios.loading.resolve import Entry, load, names, resolve
 
 
 def suite(path: Path, text: str) -> str:
@@ -69,14 +69,6 @@ def test_an_error_inside_an_entry_names_suite_and_entry(path: Path) -> None:
         resolve(file)
     assert file in caught.value.file
     assert "entry x" in caught.value.file
-
-
-@pytest.mark.parametrize("name", suite_names())
-def test_the_catalogues_suites_resolve(name: str) -> None:
-    if not names():
-        pytest.skip("no catalogue")
-    entries = resolve(f"suite:{name}")
-    assert len({e.name for e in entries}) == len(entries) > 0
 
 
 def test_standard_has_every_scenario_at_two_densities() -> None:

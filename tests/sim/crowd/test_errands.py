@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
-from scenarios.schema.scenario import Stop
-from scenarios.schema.values import Distribution
-from sim.crowd.population import PlannedStop, draw_stops
 from sim.crowd.world import run
 from sim.sequence import simulate
 from sim.types import Array, Motion
@@ -62,19 +59,7 @@ def test_a_member_stays_behind_and_catches_up_and_is_one_of_the_group(path: Path
     assert len(apart) > 10
     assert gap[apart[-1] :][~np.isnan(gap[apart[-1] :])][20:].max() < 1.6
     truth = simulate(load(path, [STOP.replace("}]", ", members = 1 }]")]), 1, streams=()).truth
-    assert truth is not None
     assert set(truth.group.tolist()) == {int(truth.group[0])} != {-1}
-
-
-def test_strangers_who_stop_at_one_place_stand_beside_each_other(path: Path) -> None:
-    stop = "stops = [{ at = [14, 10], stay = 30 }]"
-    more = [f"group.g{k}={{ size = 1, start = [3, {4 + 2 * k}], goal = [27, 5], {stop} }}" for k in range(6)]
-    motion = run(load(path, [*more, "group.a.stops=[{ at = [14, 10], stay = 30 }]"]), 2)
-    last = motion.pos[-1]
-    gap = np.linalg.norm(last[:, None] - last[None], axis=2) + 9 * np.eye(len(last))
-    assert gap.min() > 0.45
-    assert np.linalg.norm(last - (14, 10), axis=1).max() < 3.0
-    assert (speeds(motion)[-50:] < 0.3).all()
 
 
 def test_an_order_ends_the_stops_of_its_group(path: Path) -> None:
@@ -83,32 +68,6 @@ def test_an_order_ends_the_stops_of_its_group(path: Path) -> None:
     split = f"event=[{{ id = 's', type = 'split', group = 'a', when = {{ time = 3 }}, parts = {parts} }}]"
     motion = run(load(path, [far, split]), 1)
     assert motion.pos[-1, :, 0].min() > 23
-
-
-def test_ends_and_stops_left_out() -> None:
-    def stop(stay: float, *until: float) -> PlannedStop:
-        return PlannedStop(np.zeros(2), stay, until, (0,), True)
-
-    assert stop(3.0).end(-2.0) == 1.0
-    assert stop(3.0, 4.0, 9.0).end(4.5) == 12.0
-    assert stop(0.0, 4.0).end(4.5) == np.inf
-    r = np.random.default_rng(0)
-    here = (1.0, 2.0)
-    given = (
-        Stop(at=here),
-        Stop(at=here, until=(5.0, 1.0)),
-        Stop(at=here, stay=2.0, members=0),
-        Stop(at=here, stay=1.0),
-    )
-    planned = draw_stops(given, 3, lambda point: np.array(point), r)
-    assert [(s.until, s.stay, s.members, s.whole) for s in planned] == [
-        ((1.0, 5.0), 0.0, (0, 1, 2), True),
-        ((), 1.0, (0, 1, 2), True),
-    ]
-    some = Stop(at=here, stay=1.0, members=Distribution(uniform=(1.6, 2.4)))
-    (drawn,) = draw_stops((some,), 3, lambda point: np.array(point), r)
-    assert len(set(drawn.members)) == 2
-    assert not drawn.whole
 
 
 def test_members_start_scattered_and_come_together(path: Path) -> None:
@@ -120,11 +79,3 @@ def test_members_start_scattered_and_come_together(path: Path) -> None:
     np.testing.assert_array_equal(motion.height, close.height)
     gap = np.linalg.norm(motion.pos[:, 0] - motion.pos[:, 1], axis=1)
     assert gap[100] == pytest.approx(0.8, abs=0.3)
-
-
-def test_people_enter_during_the_warm_up(path: Path) -> None:
-    motion = run(load(path, ["warmup=10", "group.a.enter=-4"]), 1)
-    assert motion.pos[0, :, 0].mean() == pytest.approx(5 + 4 * 1.25, abs=0.6)
-    late = run(load(path, ["warmup=10", "group.a.enter=4"]), 1)
-    assert not late.present[39].any()
-    assert late.present[42].all()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-import sim.crowd.forces as forces_names
 from sim.crowd.forces import (
     END,
     GATHER,
@@ -90,19 +88,12 @@ def at_the_edge_of_reach(state: np.ndarray) -> None:
 PLACES = (scattered, standing, half_standing, in_a_row, head_on, touching, at_the_edge_of_reach)
 
 
-@pytest.mark.parametrize("n", [2, 12, 48, 49, 150])
+@pytest.mark.parametrize("n", [2, 48, 49])
 @pytest.mark.parametrize("arrange", PLACES)
 def test_pairs_equal_the_slow_twin(arrange: Callable[[np.ndarray], None], n: int) -> None:
     state, people, _ = crowd(n, n, side=4 + n / 10)
     arrange(state)
     out = np.zeros((n, 2))
-    _pairs(state, people.tag, Steering().array(), out)
-    np.testing.assert_allclose(out, between_people(state, people.tag, Steering()), atol=1e-9)
-
-
-def test_very_many_equal_the_slow_twin() -> None:
-    state, people, _ = crowd(400, 0, side=32.0)
-    out = np.zeros((400, 2))
     _pairs(state, people.tag, Steering().array(), out)
     np.testing.assert_allclose(out, between_people(state, people.tag, Steering()), atol=1e-9)
 
@@ -165,10 +156,3 @@ def test_forces_are_capped_and_states_that_are_not_finite_are_noticed() -> None:
     state[5, 0] = np.nan
     out, push = np.zeros((100, 2)), np.zeros((len(groups.speed), 2))
     assert not accelerate(state, people, groups, NOTHING, 0.02, Steering().array(), push, out)
-
-
-def test_slots_are_named_for_the_fields_of_steering() -> None:
-    """A field that is added or moved without its slot would give the kernels another parameter's value."""
-    for k, f in enumerate(dataclasses.fields(Steering)):
-        assert getattr(forces_names, f.name.upper()) == k
-    assert len(Steering().array()) == len(dataclasses.fields(Steering))

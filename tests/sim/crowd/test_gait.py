@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.realism import OPEN_GROUND
-from scenarios.schema.scenario import Scenario
+from scenarios.schema.scenario import CrowdSpec, Scenario
+from sim.crowd.population import PLACE_TIME, WANDER_TIME, Person, fluctuations
 from sim.crowd.world import run
 from sim.types import Motion
 
@@ -43,18 +44,6 @@ def test_zero_switches_everything_off() -> None:
     np.testing.assert_allclose(motion.vel[:, 0, 0], 1.34, atol=1e-9)
 
 
-def test_the_sway_turns_with_the_way() -> None:
-    a, b = walk(sway=0.03).pos[:, 0] - [20, 10], walk(sway=0.03, goal=(20, 40)).pos[:, 0] - [20, 10]
-    np.testing.assert_allclose(b, np.stack([-a[:, 1], a[:, 0]], axis=1), atol=1e-6)
-
-
-def test_everybody_has_an_own_sway() -> None:
-    one, two = (walk(size=n, sway={"normal": [0.024, 0.007]}) for n in (1, 2))
-    sides = two.pos[:, :, 1] - two.pos[:, :, 1].mean(axis=0)
-    assert np.ptp(one.pos[:, 0, 1]) == pytest.approx(np.ptp(sides[:, 0]), rel=0.15)
-    assert abs(np.corrcoef(sides.T)[0, 1]) < 0.99
-
-
 def test_places_fluctuate_and_the_group_does_not() -> None:
     motion = walk(size=3, place_noise=[0.2, 0.1])
     middle = motion.pos.mean(axis=1)
@@ -70,6 +59,17 @@ def test_the_velocity_fluctuates_along_and_across_the_way() -> None:
     assert across.vel[:, 0, 1].std() > 0.03
 
 
-def test_who_stands_stands_still() -> None:
-    motion = walk(goal=(20, 10), size=2, sway=0.03, velocity_noise=[0.1, 0.1], place_noise=[0.2, 0.1])
-    assert np.abs(motion.vel).max() < 0.03
+FPS = 10.0
+CROWD = CrowdSpec(velocity_noise=(0.1, 0.2), place_noise=(0.3, 0.05))
+SD, TIME = np.array([0.1, 0.2, 0.3, 0.05]), np.array([WANDER_TIME, WANDER_TIME, PLACE_TIME, PLACE_TIME])
+
+
+def people(keys: list[tuple[int, int, int]]) -> list[Person]:
+    return [Person(k, key, 1.3, 1.7, 0.02, 0.0) for k, key in enumerate(keys)]
+
+
+def test_spread_and_memory_are_those_of_the_process_from_the_first_frame() -> None:
+    u = fluctuations(CROWD, people([(0, 0, k) for k in range(8000)]), 16, FPS, 1, 0) / SD
+    np.testing.assert_allclose(u.std(axis=1), 1, atol=0.05)
+    after = (u[0] * u[15]).mean(axis=0)  # 1.5 s later
+    np.testing.assert_allclose(after, np.exp(-15 / (FPS * TIME)), atol=0.04)

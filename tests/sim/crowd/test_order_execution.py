@@ -1,5 +1,8 @@
 """Orders about groups that other orders made, about groups named twice, and about groups in a queue."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +11,8 @@ from sim.crowd.forces import Steering
 from sim.crowd.formation import standing
 from sim.crowd.order_execution import ServiceQueue, concerned
 from sim.crowd.world import World, run
+from sim.io.store.truth_files import truth_files
+from sim.sequence import observe
 
 HEAD = """
 schema = 1
@@ -77,14 +82,6 @@ def test_a_merge_as_a_parent_arrives_keeps_the_places_of_the_new_group(tmp_path)
         assert sorted(kept.tolist()) == sorted(standing(4, world.groups.spacing[g]).tolist()), t
 
 
-def test_a_way_may_have_many_points(tmp_path):
-    via = ", ".join(f"[{3 + 0.25 * k}, {4 + k % 2}]" for k in range(40))
-    path = tmp_path / "scene.toml"
-    path.write_text(HEAD)
-    motion = run(load(path, set=[f"group.a.via=[{via}]", "duration=40"]), 0)
-    assert np.linalg.norm(motion.pos[-1, :2] - [14, 4], axis=1).max() < 1.0
-
-
 @pytest.mark.parametrize("place", ["joined", "coming"])
 def test_a_queue_forgets_a_group(place):
     queue = ServiceQueue(np.zeros(2), np.array([1.0, 0.0]), 1.0, {0: 1.0, 1: 1.0}, busy_until=5.0)
@@ -92,3 +89,30 @@ def test_a_queue_forgets_a_group(place):
     queue.remove(0)
     assert (queue.joined, queue.coming) == ([1], [])
     assert (queue.busy_until is None) == (place == "joined")
+
+
+MEASURED = ("gt/events.json", "gt/near.csv", "gt/groups.csv", "gt/groups.parquet", "gt/groups_px.parquet")
+DATED = {"merge": {"merge", "form"}, "split": {"split", "dissolve"}, "queue": {"queue"}}
+
+
+def measured(scenario, motion):
+    """The truth's files, measured anew from a motion."""
+    return truth_files(observe(scenario, motion, check=False).truth.replace(orders=()))
+
+
+@pytest.mark.parametrize("name", ["split", "queue", "party"])
+def test_times_deleted_from_the_script_change_no_onset(name):
+    scenario = load(name, ["camera.fps=5"])
+    motion = run(scenario, 0)
+    files = measured(scenario, motion)
+    events = json.loads(files["gt/events.json"])["events"]
+    assert {o.kind for o in motion.orders}
+    assert all(any(e["kind"] in DATED[o.kind] for e in events) for o in motion.orders), "there are onsets to be moved"
+    fired = {o.fired for o in motion.orders}
+    onsets = {e["start"] for e in events if e["kind"] in set().union(*DATED.values())}
+    assert not fired & onsets, "an onset is no order's time"
+    for fired, time in ((None, None), (1, 0.0), (7, 1.2)):
+        orders = tuple(replace(o, fired=fired, time=time) for o in motion.orders)
+        again = measured(scenario, motion.replace(orders=orders))
+        assert all(again[file] == files[file] for file in MEASURED)
+        assert again.keys() == files.keys()

@@ -16,8 +16,6 @@ from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset import generate as generating
 from sim.dataset.generate import generate
-from sim.io.files import atomic
-from sim.io.store.validate import validate
 from sim.workers.start import WorkerOptions
 from tests.loopback import Loopback, loopback
 
@@ -93,31 +91,12 @@ def test_the_same_bytes(tmp_path: Path, cluster: Loopback, here: dict[str, bytes
     monkeypatch.chdir(tmp_path)
     seen = []
     made = generate(
-        ENTRIES,
-        range(6),
-        "there",
-        streams=(),
-        workers=WorkerOptions(cluster=cluster.address),
+        ENTRIES, range(6), "there", streams=(), workers=WorkerOptions(cluster=cluster.address),
         progress=lambda *a: seen.append(a[:2]),
-    )
+    )  # fmt: skip
     assert made[0] == tmp_path / "there/flockscope-train/x-s00000"
     assert seen == [(k, 12) for k in range(1, 13)]
     assert content(tmp_path / "there") == here
-
-
-def test_workers_that_die_lose_nothing(tmp_path: Path, cluster: Loopback, here: dict[str, bytes]) -> None:
-    """One in the middle of a sequence, one with a sequence written beside its place; then it is run again."""
-    (cluster.folder / "deadly").touch()
-    generate(ENTRIES, range(6), tmp_path / "there", streams=(), workers=WorkerOptions(cluster=cluster.address))
-    assert sum(worker.poll() is not None for worker in cluster.workers) == 2
-    assert content(tmp_path / "there") == here
-    assert validate(tmp_path / "there") == []
-    times = {p: p.stat().st_mtime_ns for p in (tmp_path / "there").rglob("gt/*")}
-    (tmp_path / "there/flockscope-train/x-s00002/gt/gt.txt").write_text("")
-    generate(ENTRIES, range(6), tmp_path / "there", streams=(), workers=WorkerOptions(cluster=cluster.address))
-    assert content(tmp_path / "there") == here
-    again = {p.parts[-3] for p, ns in times.items() if p.stat().st_mtime_ns != ns}
-    assert again == {"x-s00002"}
 
 
 def test_nothing_is_left_of_a_folder_that_no_worker_sees(tmp_path: Path, cluster: Loopback, monkeypatch) -> None:
@@ -126,16 +105,3 @@ def test_nothing_is_left_of_a_folder_that_no_worker_sees(tmp_path: Path, cluster
     with pytest.raises(InputError, match=f"{tmp_path}/there: on .*: got another folder, or none"):
         generate(ENTRIES, range(2), tmp_path / "there", streams=(), workers=WorkerOptions(cluster=cluster.address))
     assert os.listdir(tmp_path) == []
-
-
-def test_a_folder_that_cannot_be_locked_is_written_all_the_same(tmp_path: Path, here, monkeypatch) -> None:
-    """NFS locks files that are open for writing, which no folder is."""
-    fcntl = pytest.importorskip("fcntl")
-
-    def refuse(descriptor: int, how: int) -> None:
-        raise OSError(9, "Bad file descriptor")
-
-    monkeypatch.setattr(fcntl, "flock", refuse)
-    generate(ENTRIES, range(6), tmp_path / "there", streams=())
-    assert content(tmp_path / "there") == here
-    assert list((tmp_path / "there").rglob(f"{atomic.PARTIAL}*")) == []

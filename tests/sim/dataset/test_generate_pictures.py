@@ -1,6 +1,5 @@
 """Datasets with pictures: the same bytes however they are made, also after a kill in the middle of them."""
 
-import json
 import os
 import signal
 import subprocess
@@ -9,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
 from sim.dataset.generate import generate
 from sim.io.files import atomic
@@ -92,31 +90,6 @@ def test_streams_are_asked_for_and_stored(tmp_path, simulate):
     simulate.asked.clear()
     generate([Entry("x", scenario())], range(2), tmp_path, streams=["right", "left"], images="png")
     assert simulate.asked == []
-
-
-def test_no_streams_draw_nothing(tmp_path, simulate):
-    (made,) = generate([Entry("x", scenario())], range(1), tmp_path, streams=())
-    assert not list(made.glob("img1*"))
-    assert json.loads((made / "manifest.json").read_text())["streams"] == []
-    assert not open_source(made)[0].has_images
-
-
-def test_other_streams_or_images_are_not_overwritten(tmp_path, simulate):
-    generate([Entry("x", scenario())], range(1), tmp_path, streams=("left",), images="jpg")
-    before = content(tmp_path)
-    others = ((("left", "ids"), "jpg", "streams"), ((), "jpg", "streams"), (("left",), "png", "images"))
-    for streams, images, word in others:
-        with pytest.raises(InputError, match=word) as error:
-            generate([Entry("x", scenario())], range(2), tmp_path, streams=streams, images=images)
-        assert "\n" not in str(error.value)
-    assert content(tmp_path) == before
-
-
-def test_words_that_are_no_streams_make_nothing(tmp_path, simulate):
-    for more, word in (({"streams": ("top",)}, "--streams"), ({"images": "gif"}, "--images")):
-        with pytest.raises(InputError, match=word):
-            generate([Entry("x", scenario())], range(1), tmp_path / "new", **more)
-    assert not (tmp_path / "new").exists()
 
 
 def alter(path: Path) -> None:

@@ -1,18 +1,19 @@
 """Rendered datasets: one content in every kind of pictures, one truth with and without, the same for any workers."""
 
+from __future__ import annotations
+
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from scenarios.loading.resolve import Entry
+from scenarios.loading.resolve import Entry, resolve
 from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate
-from sim.io.files.tables import read_table
-from sim.io.source import open_source
 from sim.io.store.validate import validate
-from sim.sequence import simulate
 from sim.workers.start import WorkerOptions
 
 pytestmark = pytest.mark.slow
@@ -50,26 +51,36 @@ def test_one_content_in_every_kind(tmp_path):
     assert found["jpg"][0]["pixels"]["left"] != found["jpg"][1]["pixels"]["left"]
 
 
-@pytest.mark.parametrize("images", ["jpg", "mp4"])
-def test_any_number_of_workers(tmp_path, images):
-    assert made(tmp_path / "1", images=images)[1] == made(tmp_path / "2", images=images, workers=2)[1]
+ROOT = Path(__file__).resolve().parents[3]
+SCENE = """
+schema = 1
+duration = 3.0
+world = { walls = [[2, 8, 14, 8]], pillars = [[8, 3, 0.3]] }
+camera = { fps = 5 }
+group = [
+    { id = "a", size = 3, start = [5, 5], goal = [11, 5] },
+    { id = "b", size = 2, start = [11, 4], goal = [5, 6], repeat = 1 },
+    { id = "alone", size = 1, start = [{ uniform = [6, 10] }, 2], goal = [8, 6], repeat = 3 },
+]
+"""
 
 
-def test_stored_is_what_was_drawn(tmp_path):
-    made(tmp_path, images="png")
-    live = simulate(SCENARIO, 0, 0, ALL)
-    (stored,) = open_source(tmp_path / "flockscope-train" / "x-s00000")
-    for a, b in zip(live, stored, strict=True):
-        assert np.array_equal(a.image, b.image)
-        assert np.array_equal(a.right, b.right)
-    assert np.array_equal(live.background(), stored.background())
-    for index in (1, live.length):
-        a, b = live.load_pixels(index), stored.load_pixels(index)
-        assert np.array_equal(a.ids, b.ids)
-        assert np.array_equal(np.isnan(a.disparity), np.isnan(b.disparity))
-        assert np.nanmax(np.abs(a.disparity - b.disparity)) <= 1 / 128
-        assert np.array_equal(a.box, b.box, equal_nan=True)
-    table = read_table(tmp_path / "flockscope-train/x-s00000/gt/pixels.parquet")
-    share = table.floats("visibility_px")
-    assert ((share >= 0) & (share <= 1)).all()
-    assert np.abs(share - stored.truth.visibility).mean() < 0.1
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_however_it_is_made(tmp_path: Path) -> None:
+    scene, here, there = tmp_path / "scene.toml", tmp_path / "here", tmp_path / "there"
+    scene.write_text(SCENE)
+    for entry in resolve(str(scene)):
+        generate([entry], range(2), here)
+    line = ["generate", str(scene), "--seeds", "0:2", "--out", str(there), "--workers", "2", "--json"]
+    other = {"PYTHONHASHSEED": "12345", "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-m", "tracking.app.cli", *line], env={**os.environ, **other}, capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stdout
+    assert content(here) == content(there)
+    assert validate(there) == []
+    first, second = (p.read_bytes() for p in sorted(there.rglob("truth.parquet")))
+    assert first != second

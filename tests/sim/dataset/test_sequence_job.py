@@ -16,9 +16,7 @@ from sim.dataset.sequence_job import (
     JobOutcome,
     SequenceJob,
     is_stored,
-    lost_job,
     run_job,
-    setting_differences,
     stored_manifest,
 )
 from sim.io.files import atomic
@@ -49,16 +47,6 @@ def test_what_is_whole_is_left_alone(job: SequenceJob, made: FakeSimulator) -> N
     assert run_job(job) == JobOutcome()
     assert made.made == [1]
     assert content(job) == before
-
-
-def test_what_is_altered_is_begun_but_not_done(job: SequenceJob, made: FakeSimulator) -> None:
-    run_job(job)
-    before = {name: body for name, (body, _) in content(job).items()}
-    (job.folder / "gt/gt.txt").write_text("")
-    assert stored_manifest(job) is not None
-    assert not is_stored(job)
-    run_job(job)
-    assert {name: body for name, (body, _) in content(job).items()} == before
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -97,20 +85,6 @@ def test_who_does_not_see_the_mark_writes_nothing(
     assert run_job(elsewhere) == JobOutcome()
 
 
-def test_a_machine_that_cannot_write_is_named(
-    job: SequenceJob, made: FakeSimulator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(path: Path, body: bytes) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(atomic, "write_unsynced", refuse)
-    monkeypatch.setattr(jobs.socket, "gethostname", lambda: "node7")
-    (tmp_path / "mark").write_text("")
-    outcome = run_job(SequenceJob(job.folder, job.entry, job.seed, marker=tmp_path / "mark"))
-    assert outcome.fatal
-    assert str(outcome.error).startswith(f"{job.folder}: on node7: got Permission denied")
-
-
 @pytest.mark.parametrize("error", [KeyError("k"), WorkError(got="a", expected="b", remedy="c")])
 def test_an_error_of_one_is_not_that_of_all(
     job: SequenceJob, monkeypatch: pytest.MonkeyPatch, made: FakeSimulator, error: Exception
@@ -125,33 +99,6 @@ def test_an_error_of_one_is_not_that_of_all(
     assert not outcome.fatal
 
 
-def test_given_up(job: SequenceJob) -> None:
-    outcome = lost_job(job, WorkError(got="an item that killed 3 workers", expected="b", remedy="c"))
-    assert outcome == JobOutcome(outcome.error)
-    assert str(outcome.error).startswith("x-s00001: got an item that killed 3 workers")
-
-
-@pytest.mark.parametrize("harm", ["nothing", "a file is altered", "no manifest"])
-def test_files_of_others_stay(job: SequenceJob, made: FakeSimulator, harm: str) -> None:
-    """Notes in a folder of ours stay with it; a folder that would have to be replaced is refused for them."""
-    run_job(job)
-    notes = job.folder / "gt" / "notes.txt"
-    notes.write_text("mine")
-    if harm != "nothing":
-        (job.folder / "gt/gt.txt").write_text("")
-    if harm == "no manifest":
-        (job.folder / "manifest.json").unlink()
-    before = content(job)
-    outcome = run_job(job)
-    if harm == "nothing":
-        assert outcome == JobOutcome()
-    else:
-        assert isinstance(outcome.error, InputError)
-        assert f"got {notes}, a file that flockscope did not write" in str(outcome.error)
-        assert not outcome.fatal
-    assert content(job) == before
-
-
 @pytest.mark.parametrize("name", ["", "thesis.tex", "a/b/thesis.tex"])
 def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: FakeSimulator, name: str) -> None:
     """Before: a folder or file with the name of the sequence was deleted. name: "" for a file."""
@@ -162,11 +109,6 @@ def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: F
         stored_manifest(job)
     assert isinstance(run_job(job).error, InputError)
     assert (mine.read_text(), made.made) == ("mine", [])
-
-
-def test_an_empty_folder_is_a_place(job: SequenceJob, made: FakeSimulator) -> None:
-    job.folder.mkdir(parents=True)
-    assert run_job(job) == JobOutcome()
 
 
 @pytest.mark.parametrize(
@@ -192,7 +134,3 @@ def test_what_differs_is_named(
             (job.folder / "scenario.toml").write_text(unreadable)
         with pytest.raises(InputError, match="scenario_hash"):
             stored_manifest(other)
-
-
-def test_texts_that_end_like_numbers_stay_whole() -> None:
-    assert setting_differences({"about": "v1.0", "a": 2.0}, {"about": "v1", "a": 2.5}) == "about v1.0 → v1, a 2 → 2.5"

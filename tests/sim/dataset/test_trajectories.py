@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
 
-from sim.dataset.trajectories import GAP, LIMIT, nearest_row, resample, smoothing_spline
+from sim.dataset.trajectories import GAP, LIMIT, resample, smoothing_spline
 
 RATE = 2.5
 
@@ -43,16 +43,6 @@ def test_jitter_is_smoothed_until_people_could_walk_so() -> None:
     assert np.median(away) < 0.06
 
 
-def test_smoothing_is_a_time_whatever_the_rate() -> None:
-    made = []
-    for rate in (10.0, 50.0):
-        way = curve(int(20 * rate) + 1, rate)
-        way[:, 0] += 0.12 * np.sin(6.0 * np.arange(len(way)) / rate)  # 4.3 m/s²
-        made.append(resample(*rows({1: way}), rate, 10.0, 0.0, 20.0))
-    assert made[0].smoothing == made[1].smoothing > 0.05
-    assert made[0].pos[20:-20] == pytest.approx(made[1].pos[20:-20], abs=0.01)
-
-
 def test_people_come_and_go_and_long_gaps_are_absence() -> None:
     away = int(GAP * RATE) + 2
     frame, id, pos = rows({1: curve(20), 2: curve(8), 3: curve(1)}, {2: 6, 3: 2})
@@ -66,13 +56,6 @@ def test_people_come_and_go_and_long_gaps_are_absence() -> None:
     assert np.array_equal(made.present[:, 1], (t >= 5 / RATE - 1e-9) & (t <= 12 / RATE + 1e-9))
     assert np.isnan(made.pos[~made.present]).all()
     assert np.isfinite(made.vel[made.present]).all()
-
-
-@pytest.mark.parametrize("labels", [2, 3, 4, 5])
-def test_few_labels_are_enough(labels: int) -> None:
-    made = resample(*rows({1: curve(labels)}), RATE, 10.0, 0.0, (labels - 1) / RATE)
-    assert made.pos[0, 0] == pytest.approx(curve(labels)[0], abs=0.02)
-    assert made.pos[-1, 0] == pytest.approx(curve(labels)[-1], abs=0.02)
 
 
 def test_a_part_is_the_part_of_the_whole() -> None:
@@ -92,10 +75,3 @@ def test_smoothing_is_that_of_scipy(weight: float) -> None:
     assert np.array_equal(smoothing_spline(t[:2], y[:2], weight), y[:2])
     line = np.stack([t, 2.0 - t], axis=1)
     assert smoothing_spline(t, line, weight) == pytest.approx(line)
-
-
-def test_nearest_rows() -> None:
-    frame, id, _ = rows({1: curve(3), 7: curve(1)}, {7: 2})
-    found = nearest_row(frame, id, np.array([1, 7]), RATE, np.array([-1.0, 0.1, 0.3, 0.79, 5.0]))
-    assert frame[found[:, 0]].tolist() == [1, 1, 2, 3, 3]
-    assert (id[found[:, 1]] == 7).all()

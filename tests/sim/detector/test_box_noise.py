@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from scenarios.schema.sensor import BoxNoise
+from scenarios.schema.sensor import BoxNoise, Memory
 from sim.detector.box_noise import box_errors, perturb_boxes
+from sim.detector.correlated_noise import correlated_normals
 from sim.scene.camera import foot_points, project
 from tests.reference_sense import above, pinhole
 
@@ -26,14 +27,6 @@ def test_errors_grow_with_occlusion() -> None:
     box, n = some()
     e = box_errors(perturb_boxes(box, np.full(len(box), 0.25), NOISE, n), box)
     assert e.std(axis=0) == pytest.approx(2.5 * np.array([0.05, 0.04, 0.06, 0.1]), rel=0.03)
-
-
-def test_scale_multiplies_all_errors() -> None:
-    box, n = some(500)
-    e, twice = (
-        box_errors(perturb_boxes(box, np.ones(500), NOISE.model_copy(update={"scale": k}), n), box) for k in (1, 2)
-    )
-    assert twice == pytest.approx(2 * e)
 
 
 def test_small_boxes_are_off_by_the_floor() -> None:
@@ -64,5 +57,16 @@ def test_feet_are_where_they_project_from(camera, z: float) -> None:
     assert foot_points(box, xyz[:, 2], camera) == pytest.approx(xyz[:, :2])
 
 
-def test_above_the_horizon_nobody_stands() -> None:
-    assert np.isnan(foot_points(np.array([[300.0, -2000.0, 10.0, 20.0]]), np.zeros(1), pinhole())).all()
+def drawn(memory: list[Memory], frames: int = 4000, first: int = 1, id: int = 1) -> np.ndarray:
+    fresh = np.random.default_rng(id).standard_normal((frames, 3))
+    return correlated_normals(fresh, memory, first, 10.0, 7, id, 0)
+
+
+def test_correlation_is_the_sum_of_the_parts() -> None:
+    memory = [Memory(share=0.3, time=0.3), Memory(share=0.5, time=2.0)]
+    z = np.stack([drawn(memory, id=k) for k in range(40)])
+    assert z.mean() == pytest.approx(0.0, abs=0.03)
+    assert z.std() == pytest.approx(1.0, abs=0.02)
+    for lag in (1, 3, 10, 30):
+        wanted = sum(m.share * np.exp(-lag / (10 * m.time)) for m in memory)
+        assert (z[:, lag:] * z[:, :-lag]).mean() == pytest.approx(wanted, abs=0.025)

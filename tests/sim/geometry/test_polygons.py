@@ -1,12 +1,17 @@
+"""Polygons: overlap, hulls, gaps; beside dense rasters, samples and scipy."""
+
+from __future__ import annotations
+
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from sim.geometry.footprints import FOOTPRINT, footprint_hull, footprint_hulls
+from sim.geometry.hull_kernels import convex_hulls
 from sim.geometry.polygons import (
     area,
     contains,
     convex_hull,
-    edge_distance_pairs,
     gap_pairs,
     intersection_pairs,
     iou_matrix,
@@ -44,50 +49,15 @@ def test_overlap_is_that_of_a_dense_raster():
 @pytest.mark.parametrize(
     ("moved", "common"),
     [
-        ((0.5, 0), 0.5),
-        ((0.5, 0.5), 0.25),
-        ((0, 0), 1),
-        ((1, 0), 0),
-        ((0, -1), 0),
-        ((1, 1), 0),
-        ((3, 0), 0),
+        ((0.5, 0), 0.5), ((0.5, 0.5), 0.25), ((0, 0), 1), ((1, 0), 0), ((0, -1), 0), ((1, 1), 0), ((3, 0), 0),
         ((1e-12, 0), 1),
     ],
-)
+)  # fmt: skip
 def test_squares(moved, common):
     zero = np.zeros(1, np.int64)
     a, b = pack([SQUARE]), pack([SQUARE + np.array(moved)])
     assert intersection_pairs(a, b, zero, zero)[0] == pytest.approx(common, abs=1e-9)
     assert iou_pairs(a, b, zero, zero)[0] == pytest.approx(common / (2 - common), abs=1e-9)
-
-
-def test_contained_turned_and_far_from_the_origin():
-    diamond = np.array([[0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]])
-    assert iou_matrix([SQUARE], [diamond])[0, 0] == pytest.approx(0.5)
-    assert iou_matrix([SQUARE + 1e6], [diamond + 1e6])[0, 0] == pytest.approx(0.5, abs=1e-9)
-    assert iou_matrix([SQUARE * 1e-3], [diamond * 1e-3])[0, 0] == pytest.approx(0.5)
-
-
-def test_same_hull_is_exactly_one_and_order_of_sides_is_nothing():
-    some = polygons(2, 30)
-    got = iou_matrix(some, some)
-    assert (np.diag(got) == 1.0).all()
-    np.testing.assert_allclose(got, got.T, atol=1e-14)
-    assert ((got >= 0) & (got <= 1)).all()
-
-
-def test_shared_edges_of_footprints():
-    """Hulls of {a, b, c} and {a, b}: their common part is the smaller."""
-    r = np.random.default_rng(3)
-    for _ in range(50):
-        places = r.uniform(0, 2, (3, 2))
-        whole, part = footprint_hull(places), footprint_hull(places[:2])
-        assert iou_matrix([whole], [part])[0, 0] == pytest.approx(area(part) / area(whole), abs=1e-9)
-        assert iou_matrix([part], [whole])[0, 0] == pytest.approx(area(part) / area(whole), abs=1e-9)
-    line = np.array([[0.0, 0], [0.7, 0.7], [1.4, 1.4]])
-    assert iou_matrix([footprint_hull(line)], [footprint_hull(line[:2])])[0, 0] == pytest.approx(
-        area(footprint_hull(line[:2])) / area(footprint_hull(line)), abs=1e-9
-    )
 
 
 def test_no_area_no_overlap():
@@ -98,12 +68,11 @@ def test_no_area_no_overlap():
 
 
 def test_hull_of_points():
-    scipy_hull = pytest.importorskip("scipy.spatial").ConvexHull
     for seed in range(50):
         points = np.random.default_rng(seed).normal(size=(12, 2))
         hull = convex_hull(points)
-        assert area(hull) == pytest.approx(scipy_hull(points).volume)
-        assert len(hull) == len(scipy_hull(points).vertices)
+        assert area(hull) == pytest.approx(ConvexHull(points).volume)
+        assert len(hull) == len(ConvexHull(points).vertices)
     assert convex_hull(np.array([[0, 0], [1, 1], [2, 2], [1, 1.0]])).tolist() == [[0, 0], [2, 2]]
     assert convex_hull(np.zeros((3, 2))).tolist() == [[0, 0]]
     assert convex_hull(np.zeros((0, 2))).shape == (0, 2)
@@ -135,12 +104,6 @@ def test_footprint_hull_is_the_hull_of_all_footprints(kind):
         assert contains(hull, places).all()
 
 
-def test_one_person_is_the_16_gon():
-    hull = footprint_hull(np.array([[3.0, 4]]))
-    assert len(hull) == 16
-    np.testing.assert_allclose(np.hypot(*(hull - [3, 4]).T), 0.25)
-
-
 def test_footprints_of_many_groups_at_once():
     r = np.random.default_rng(5)
     count = np.array([2, 1, 3, 2, 5])
@@ -168,15 +131,19 @@ def test_gap_of_one_inside_another_and_against_samples():
         assert polygon_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
 
 
-def test_edge_distance_of_lines_in_a_row():
-    a, b = np.array([[0.0, 0], [1, 0]]), np.array([[3.0, 0], [4, 0]])
-    assert edge_distance_pairs(pack([a]), pack([b]), *np.zeros((2, 1), np.int64))[0] == pytest.approx(2)
+@pytest.mark.parametrize("seed", range(6))
+def test_hulls_are_those_of_each_set_by_itself(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    sets = [r.integers(0, 6, (int(r.integers(0, 12)), 2)).astype(float) for _ in range(30)]
+    for points, found in zip(sets, convex_hulls(sets), strict=True):
+        if len(np.unique(points, axis=0)) == len(points):
+            np.testing.assert_array_equal(found, convex_hull(points))
 
 
-def test_points_in_a_dilated_hull():
-    points = np.array([[0.5, 0.5], [1, 0.5], [1.2, 0.5], [1.25, 1.25], [-0.31, 0.5]])
-    assert contains(SQUARE, points).tolist() == [True, True, False, False, False]
-    assert contains(SQUARE, points, 0.3).tolist() == [True, True, True, False, False]
-    assert contains(SQUARE, points, 0.36).tolist() == [True] * 5
-    assert contains(np.zeros((0, 2)), points, 1).tolist() == [False] * 5
-    assert contains(SQUARE[:2], points, 0.5).tolist() == [True, True, False, False, False]
+def test_points_lines_and_nothing() -> None:
+    point, line = np.array([[2.0, 1.0]]), np.array([[0.0, 0.0], [2.0, 2.0], [1.0, 1.0]])
+    nothing, unknown = np.zeros((0, 2)), np.array([[0.0, 0.0], [np.nan, 1.0], [1.0, 0.0]])
+    found = convex_hulls([point, nothing, line, unknown])
+    assert [f.tolist() for f in found] == [[[2.0, 1.0]], [], [[0.0, 0.0], [2.0, 2.0]], []]
+    assert convex_hulls([]) == ()
+    assert [len(f) for f in convex_hulls([nothing, nothing])] == [0, 0]

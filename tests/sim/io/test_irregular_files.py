@@ -37,9 +37,8 @@ def test_no_reader_opens_it(kind, what, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # a socket's path is short
     folder = write_texts(tmp_path)[kind]
     put(folder / next(iter(TEXTS[kind])), what)
-    with pytest.raises(InputError) as error:
+    with pytest.raises(InputError):
         READERS[kind](folder)
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("what", ["FIFO", "device", "folder", "circle"])
@@ -52,17 +51,6 @@ def test_among_pictures(what, tmp_path):
     put(tmp_path / "img1" / "2.png", what)
     with pytest.raises(InputError, match=r"2\.png"):
         open_source(tmp_path, fps=5)
-
-
-def test_a_link_to_a_missing_picture_is_a_lost_frame(tmp_path):
-    import cv2
-
-    (tmp_path / "img1").mkdir()
-    for k in (1, 3):
-        cv2.imwrite(str(tmp_path / "img1" / f"{k}.png"), np.zeros((8, 8, 3), np.uint8))
-    (tmp_path / "img1" / "2.png").symlink_to(tmp_path / "nowhere")
-    with pytest.warns(UserWarning, match="frame 2"):
-        assert [f.image is None for f in open_source(tmp_path, fps=5)[0].frames()] == [False, True, False]
 
 
 def test_videos(tmp_path):

@@ -1,11 +1,17 @@
+"""Bodies and stairs, and what boxes alone tell: the scale of the image, and who is visible."""
+
+from __future__ import annotations
+
 import numpy as np
 import pytest
 
-from sim.scene.body import BODY, HEAD, contour, ellipsoids, occlusion_distance, outlines, person_boxes
+from sim.scene.body import BODY, HEAD, ellipsoids, person_boxes
+from sim.scene.boxes import BOXES, scale_of_first_boxes, with_visibility
 from sim.scene.camera import project
 from sim.scene.terrain import height_at
-from sim.types import Camera, Scene, Stairs
-from tests.reference_sense import above, pinhole, surface
+from sim.truth.label import bodies
+from sim.types import Camera, Scene, Stairs, Truth
+from tests.reference_sense import above, crowd, pinhole, surface
 
 CAMERAS = [pinhole(), pinhole(0), pinhole(75, 200, (8, 5, 9)), pinhole(90, 0, (8, 5, 9)), above(), above(25)]
 
@@ -38,36 +44,9 @@ def test_a_person_is_as_tall_and_wide_as_the_contract_says() -> None:
     assert np.sqrt(shapes.shape[0, 0, 1, 1]) == pytest.approx(0.135 * 1.7)  # across the heading
 
 
-def test_turning_a_person_by_half_changes_nothing() -> None:
-    pos3 = np.array([[6.0, 4.0, 0.0]])
-    a = person_boxes(pinhole(), pos3, np.array([0.4]), np.array([1.7]))
-    assert person_boxes(pinhole(), pos3, np.array([0.4 + np.pi]), np.array([1.7])) == pytest.approx(a)
-
-
-def test_contours_touch_the_boxes() -> None:
-    pos3 = np.array([[6.0, 4.0, 0.0], [9.0, 7.0, 0.0]])
-    heading, height = np.array([0.3, 2.0]), np.array([1.6, 1.9])
-    edge = contour(outlines(pinhole(), ellipsoids(pos3, heading, height)), points=720)
-    box = person_boxes(pinhole(), pos3, heading, height)
-    assert edge.min(axis=1) == pytest.approx(box[:, :2], abs=0.01)
-    assert edge.max(axis=1) == pytest.approx(box[:, :2] + box[:, 2:], abs=0.01)
-
-
 def test_who_is_behind_the_camera_has_no_box() -> None:
     box = person_boxes(pinhole(0), np.array([[8.0, -9.0, 6.0], [8.0, -6.0, 6.0]]), np.zeros(2), np.full(2, 1.7))
     assert np.isnan(box).all()
-
-
-def test_nobody_has_no_boxes() -> None:
-    assert person_boxes(pinhole(), np.zeros((0, 3)), np.zeros(0), np.zeros(0)).shape == (0, 4)
-
-
-def test_near_is_near() -> None:
-    pos3 = np.array([[8.0, 2.0, 0.0], [8.0, 4.0, 0.0]])
-    near, far = occlusion_distance(pinhole(), pos3, np.full(2, 1.7))
-    assert near < far
-    tall, small = occlusion_distance(above(), pos3, np.array([1.9, 1.6]))
-    assert tall < small
 
 
 def stairs(steps: int = 10) -> Scene:
@@ -96,3 +75,37 @@ def test_beside_stairs_is_level_and_steps_are_felt() -> None:
         float(height_at(stairs(10), np.array([7.0, 5.0])))
     )
     assert height_at(Scene(np.array([5.0, 5.0])), np.zeros((3, 2, 2))).shape == (3, 2)
+
+
+def test_the_frames_that_hold_the_first_boxes_decide():
+    frame = np.repeat(np.arange(1, 61), 3)
+    height = np.where(frame <= 34, 17.0, 170.0)
+    assert scale_of_first_boxes(frame, height) == (pytest.approx(10.0), 34)
+    assert -(-BOXES // 3) == 34
+    shuffled = np.random.default_rng(0).permutation(len(frame))
+    assert scale_of_first_boxes(frame[shuffled], height[shuffled]) == (pytest.approx(10.0), 34)
+
+
+def test_few_boxes_all_count_and_unknown_ones_do_not():
+    frame = np.array([4, 4, 9, 30])
+    assert scale_of_first_boxes(frame, np.array([17.0, np.nan, 34.0, 51.0])) == (pytest.approx(20.0), 30)
+    scale, last = scale_of_first_boxes(frame, np.full(4, np.nan))
+    assert np.isnan(scale)
+    assert last == 0
+
+
+def stripped(truth: Truth) -> Truth:
+    return truth.replace(visible_box=None, visibility=np.ones(len(truth.id)), truncation=None)
+
+
+def test_boxes_tell_nearly_what_bodies_tell() -> None:
+    truth = bodies(crowd(3, people=25, frames=8), pinhole(20, 0, (8, -8, 4)))
+    found = with_visibility(stripped(truth), (640, 480))
+    hidden = truth.visibility < 0.95
+    assert hidden.sum() > 40
+    error = np.abs(found.visibility - truth.visibility)[hidden].mean()
+    assert error < 0.2 * (1.0 - truth.visibility)[hidden].mean()
+    assert (found.visibility[~hidden] > 0.8).all()
+    assert found.truncation == pytest.approx(truth.truncation, abs=0.1)
+    seen = np.isfinite(found.visible_box).all(axis=1) & np.isfinite(truth.visible_box).all(axis=1)
+    assert np.median(np.abs(found.visible_box - truth.visible_box)[seen]) < 1.0

@@ -3,7 +3,7 @@ import pytest
 
 from sim.scene.body import ellipsoids, occlusion_distance, outline_boxes, outlines, person_boxes
 from sim.scene.visibility import BodyVisibility, measure_visibility
-from sim.scene.visibility_kernels import COLUMNS, ROWS, visible_span
+from sim.scene.visibility_kernels import COLUMNS, ROWS
 from sim.types import Array, Camera, Scene
 from tests.reference_sense import above, pinhole, raster_visibility, twin_look
 
@@ -25,7 +25,7 @@ def crowded(seed: int, people: int = 14) -> tuple[Array, Array, Array]:
     return r.uniform([5, 2], [11, 7], (people, 2)), r.uniform(0, 6, people), r.uniform(1.5, 1.95, people)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_kernel_equals_its_twin(seed: int) -> None:
     xy, heading, height = crowded(seed, 40)
     for camera in (pinhole(), pinhole(15, 20), above()):
@@ -54,12 +54,9 @@ def test_people_against_rays(seed: int, camera: Camera) -> None:
 def test_walls_and_pillars_against_rays(seed: int) -> None:
     r = np.random.default_rng(seed)
     scene = Scene(
-        np.array([16.0, 10.0]),
-        walls=np.array([[[5.0, 4.0], [8.0, 4.6]], [[9.0, 3.0], [9.5, 6.0]]]),
-        pillars=np.array([[8.2, 2.0, 0.4], [6.0, 6.0, 0.3]]),
-        wall_height=1.2,
-        pillar_height=2.5,
-    )
+        np.array([16.0, 10.0]), walls=np.array([[[5.0, 4.0], [8.0, 4.6]], [[9.0, 3.0], [9.5, 6.0]]]),
+        pillars=np.array([[8.2, 2.0, 0.4], [6.0, 6.0, 0.3]]), wall_height=1.2, pillar_height=2.5,
+    )  # fmt: skip
     xy = r.uniform([5, 1], [11, 9], (10, 2))
     for wall in scene.walls:  # nobody stands in a wall
         along = (wall[1] - wall[0]) / np.linalg.norm(wall[1] - wall[0])
@@ -72,33 +69,6 @@ def test_walls_and_pillars_against_rays(seed: int) -> None:
     fast = see(camera, scene, xy, heading, height).visibility
     assert fast == pytest.approx(slow, abs=0.04)
     assert (see(camera, OPEN, xy, heading, height).visibility > fast + 0.2).any()  # they hide somebody
-
-
-def test_alone_in_view_is_seen_whole() -> None:
-    seen = see(pinhole(), OPEN, np.array([[8.0, 4.0]]))
-    assert seen.visibility == [1.0]
-    assert seen.truncation == [0.0]
-    assert seen.visible_box == pytest.approx(seen.box)
-
-
-def test_who_stands_behind_another_is_hidden_from_below_up() -> None:
-    seen = see(pinhole(5, 0, (8, -6, 1.7)), OPEN, np.array([[8.0, 3.0], [8.0, 0.0]]))
-    assert seen.visibility[1] == 1.0
-    assert seen.visibility[0] < 0.2
-    tilted = see(pinhole(), OPEN, np.array([[8.0, 3.0], [8.0, 2.2]]))
-    assert 0.2 < tilted.visibility[0] < 0.9
-    left, top, width, tall = tilted.box[0]
-    part = tilted.visible_box[0]
-    assert part[:3] == pytest.approx([left, top, width], abs=1e-9)  # head and shoulders are free
-    assert part[3] < 0.9 * tall  # the feet are not: the foot point moves
-
-
-def test_wholly_hidden_has_no_visible_box() -> None:
-    wall = Scene(np.array([16.0, 10.0]), walls=np.array([[[4.0, 3.0], [12.0, 3.0]]]), wall_height=30.0)
-    seen = see(pinhole(), wall, np.array([[8.0, 4.0], [8.0, 2.0]]))
-    assert seen.visibility.tolist() == [0.0, 1.0]
-    assert np.isnan(seen.visible_box[0]).all()
-    assert seen.truncation.tolist() == [0.0, 0.0]
 
 
 def test_a_door_is_an_opening() -> None:
@@ -129,25 +99,6 @@ def test_the_image_cuts_people() -> None:
     assert seen.box[0, 0] > 0  # the walk led from outside to inside
 
 
-def test_from_above_nothing_upright_hides_anybody() -> None:
-    scene = Scene(
-        np.array([16.0, 10.0]), walls=np.array([[[8.0, 0.0], [8.0, 10.0]]]), pillars=np.array([[6.0, 5.0, 0.5]])
-    )
-    xy = np.array([[8.5, 5.0], [7.0, 5.0], [3.0, 3.0]])
-    assert see(above(), scene, xy).visibility.tolist() == [1.0, 1.0, 1.0]
-    under = see(above(), OPEN, np.array([[5.0, 5.0], [5.0, 5.1]]), height=np.array([1.6, 1.9]))
-    assert under.visibility[1] == 1.0
-    assert under.visibility[0] < 0.7
-
-
-def test_behind_the_camera_is_unseen() -> None:
-    camera = pinhole(0, 0, (8, 5, 1.5))
-    seen = see(camera, OPEN, np.array([[8.0, 3.0], [8.0, 9.0]]))
-    assert seen.visibility.tolist() == [0.0, 1.0]
-    assert seen.truncation[0] == 1.0
-    assert np.isnan(seen.box[0]).all()
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_order_of_rows_and_further_frames_change_nothing(seed: int) -> None:
     xy, heading, height = crowded(seed)
@@ -164,32 +115,3 @@ def test_order_of_rows_and_further_frames_change_nothing(seed: int) -> None:
     )
     assert both.visibility == pytest.approx(np.concatenate([one.visibility, one.visibility]))
     assert one.box == pytest.approx(person_boxes(pinhole(), pos3, heading, height))
-
-
-def test_nobody() -> None:
-    seen = see(pinhole(), OPEN, np.zeros((0, 2)))
-    assert seen.visibility.shape == (0,)
-    assert seen.visible_box.shape == (0, 4)
-
-
-def test_a_wide_pillar_hides_who_stands_beyond_its_tangent() -> None:
-    """People close round a pillar 4 m thick, seen from 6 m off its middle: some are nearer than it and half hidden."""
-    scene = Scene(np.array([16.0, 30.0]), pillars=np.array([[8.0, 8.0, 4.0]]), pillar_height=9.0)
-    camera = pinhole(0, -30, (8, 2, 1.6))  # looks to the right, along the tangent
-    angle = np.deg2rad([-60, -30, -22, -18, -14, 0, 20])
-    xy = np.array([8.0, 8.0]) + 4.35 * np.column_stack([np.cos(angle), np.sin(angle)])
-    pos3 = np.column_stack([xy, np.zeros(len(xy))])
-    alone = [raster_visibility(camera, scene, p[None], np.zeros(1), np.full(1, 1.7), n=24)[0] for p in pos3]
-    fast = [see(camera, scene, p[None]).visibility[0] for p in xy]
-    assert fast == pytest.approx(alone, abs=0.05)
-    nearer = np.hypot(*(xy - camera.position[:2]).T) < 6
-    hidden = np.array(fast) < np.array([see(camera, OPEN, p[None]).visibility[0] for p in xy]) - 0.1
-    assert (nearer & hidden).any()
-    assert (nearer & ~hidden).any()
-
-
-def test_spans_reach_the_amodal_edge_and_end_with_the_image() -> None:
-    assert visible_span(10.0, 16.0, 16, 3, 5, 1, 9, 100.0) == (13.0, 3.0)
-    assert visible_span(10.0, 16.0, 16, 1, 5, 1, 9, 100.0) == (10.0, 6.0)  # nothing of the silhouette is in cell 0
-    assert visible_span(10.0, 16.0, 16, 3, 9, 1, 9, 100.0) == (13.0, 13.0)
-    assert visible_span(-4.0, 16.0, 16, 3, 9, 0, 15, 4.5) == (0.0, 4.5)

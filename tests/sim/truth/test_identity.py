@@ -1,6 +1,6 @@
 import pytest
 
-from sim.truth.identity import Identities, identify, lineage
+from sim.truth.identity import identify, lineage
 
 
 def parts(*words):
@@ -68,13 +68,3 @@ def test_coming_and_going_is_no_merge_or_split():
     assert change({}, {1: "12"}, "12", "12", entered="12") == [("enter", (), (1,), (1, 2))]
     again = [("leave", (1,), (), (1, 2)), ("enter", (), (1,), (1, 2))]
     assert change({1: "12"}, {1: "12"}, "12", "12", entered="12") == again, "the same people, and yet they came anew"
-
-
-def test_ids_are_never_used_again():
-    who = Identities()
-    everybody = frozenset(range(6))
-    seen = []
-    for t, now in enumerate((["01"], [], ["01"], ["01", "23"], ["0123"], ["01", "23"])):
-        who.step(t, everybody, parts(*now))
-        seen.append(sorted(who.groups))
-    assert seen == [[1], [], [2], [2, 3], [2], [2, 4]]

@@ -1,11 +1,15 @@
+"""Labels of a motion: rows, groups with hulls, means and extents, on the ground and in the image."""
+
 import numpy as np
 import pytest
 
+from sim.geometry.footprints import footprint_hull
 from sim.geometry.polygons import area, convex_hull
 from sim.scene.body import Ellipsoids, contour, ellipsoids, outlines, person_boxes
 from sim.scene.camera import project
+from sim.truth.group_hulls import box_groups, frame_groups, groups_over_time
 from sim.truth.label import POINTS, bodies, hulls, image_groups, image_velocities, label
-from sim.types import Array, Groups, Motion, Scene, Stairs
+from sim.types import Array, Groups, Motion
 from tests.reference_sense import above, crowd, pinhole, walkers
 
 
@@ -52,24 +56,11 @@ def test_groups_keep_ids_and_members_and_get_places_in_the_image() -> None:
     assert [g.id.tolist() for g in found] == [[3, 8], [], [3, 8], []]
     assert found[2].members[1].tolist() == [4, 5, 6]
     box = truth.at(3).box
-    assert box is not None
     middle = box[:, :2] + box[:, 2:] / 2
     assert found[2].pos == pytest.approx(np.stack([middle[:2].mean(axis=0), middle[3:].mean(axis=0)]))
     assert found[2].extent[1] == pytest.approx(np.cov(middle[3:].T, bias=True))
     assert found[2].size.tolist() == [2, 3]
     assert inside(found[2].hull[1], middle[3:]).min() > 0
-
-
-def test_who_is_behind_the_camera_leaves_no_hull() -> None:
-    pos3 = np.array([[8.0, 9.0, 0.0], [8.0, -9.0, 0.0], [8.0, 8.0, 0.0]])
-    shapes = ellipsoids(pos3, np.zeros(3), np.full(3, 1.7))
-    split, whole = hulls(outlines(pinhole(0, 0, (8, -6, 1.5)), shapes), np.array([0, 2, 3]))
-    assert split.shape == (0, 2)
-    assert len(whole) > 2
-
-
-def test_no_groups() -> None:
-    assert hulls(outlines(pinhole(), some(3, 0)), np.array([0])) == []
 
 
 @pytest.mark.parametrize("camera", [pinhole(), above(20)])
@@ -97,8 +88,6 @@ def test_rows_are_sorted_and_say_what_the_motion_says() -> None:
     truth = bodies(motion, pinhole())
     assert (np.lexsort((truth.id, truth.frame)) == np.arange(len(truth.id))).all()
     assert len(truth.id) == motion.present.sum()
-    assert truth.pos is not None
-    assert truth.height is not None
     assert truth.box is not None
     assert (truth.pos == motion.pos[truth.frame - 1, truth.id - 1]).all()
     assert (truth.height == motion.height[truth.id - 1]).all()
@@ -108,43 +97,12 @@ def test_rows_are_sorted_and_say_what_the_motion_says() -> None:
     assert now.id.tolist() == (np.flatnonzero(motion.present[6]) + 1).tolist()
 
 
-def test_people_on_stairs_stand_on_them() -> None:
-    stairs = (Stairs(np.array([4.0, 5.0]), np.array([8.0, 5.0]), 3.0, 1.6, 8, 4.0),)
-    scene = Scene(np.array([16.0, 10.0]), stairs=stairs)
-    still = walkers([[9.0, 5.0], [9.0, 8.0]], [[0, 0], [0, 0]], frames=1, scene=scene)
-    truth = bodies(still, pinhole())
-    assert truth.z == pytest.approx([1.6, 0.0])
-    level = bodies(still.replace(scene=Scene(np.array([16.0, 10.0]))), pinhole())
-    assert truth.box is not None
-    assert level.box is not None
-    assert truth.box[0, 1] < level.box[0, 1] - 20  # higher up in the image
-    assert truth.box[1] == pytest.approx(level.box[1])
-
-
-def test_without_a_camera_there_are_no_boxes() -> None:
-    truth = bodies(crowd(0), None)
-    assert truth.box is None
-    assert truth.visible_box is None
-    assert (truth.visibility == 1).all()
-    assert np.isnan(truth.px_per_m)
-
-
-def test_nobody_is_no_error() -> None:
-    truth = bodies(walkers([[8, 5]], [[0, 0]], present=np.zeros((40, 1), bool)), pinhole())
-    assert len(truth.id) == 0
-    assert truth.box is not None
-    assert truth.box.shape == (0, 4)
-
-
 def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> None:
-    pytest.importorskip("sim.truth.merge_split_events", exc_type=ImportError)
-    pytest.importorskip("sim.truth.crossing_events", exc_type=ImportError)
     motion, camera = meeting(), pinhole()
     truth = label(motion, camera)
     assert truth.events is not None
     assert truth.groups is not None
     assert truth.groups_px is not None
-    assert truth.labelled is not None
     assert truth.labelled.all()
     merged = [e for e in truth.events if e.kind in ("merge", "form")]
     assert len(merged) == 1
@@ -153,24 +111,9 @@ def test_groups_come_from_the_measurement_on_the_ground_and_in_the_image() -> No
     first, last = truth.at(1), truth.at(truth.length)
     assert first.group.tolist() == [first.group[0], first.group[0], -1, -1]
     assert last.group.tolist() == [last.group[0]] * 3 + [-1]
-    assert last.groups is not None
-    assert last.groups_px is not None
     assert last.groups.members[0].tolist() == last.groups_px.members[0].tolist() == [1, 2, 3]
-    assert last.box is not None
     middles = last.box[:3, :2] + last.box[:3, 2:] / 2
     assert last.groups_px.pos[0] == pytest.approx(middles.mean(axis=0))
-
-
-def test_the_orders_times_change_nothing() -> None:
-    pytest.importorskip("sim.truth.merge_split_events", exc_type=ImportError)
-    pytest.importorskip("sim.truth.crossing_events", exc_type=ImportError)
-    from sim.types import Order
-
-    ordered = meeting().replace(orders=(Order("m", "merge", 21, ((1, 2), (3,)), ((1, 2, 3),)),))
-    a, b = label(ordered, None), label(meeting(), None)
-    assert [(e.kind, e.start, e.members) for e in a.events or ()] == [
-        (e.kind, e.start, e.members) for e in b.events or ()
-    ]
 
 
 def test_a_sequence_without_groups_has_truth() -> None:
@@ -179,6 +122,42 @@ def test_a_sequence_without_groups_has_truth() -> None:
 
     alone = [f"group.{name}.size=1" for name in ("passers", "stop", "north", "south", "west", "east")]
     truth = simulate(load("crowd", [*alone, "duration=3"]), 1).truth
-    assert truth is not None
-    assert truth.groups_px is not None
     assert all(len(g.id) == 0 for g in truth.groups_px)
+
+
+def test_groups_of_a_frame():
+    id, group = np.array([9, 4, 7, 5, 8]), np.array([2, 1, 2, -1, 3])
+    pos, vel = np.array([[0.0, 0], [5, 5], [1, 0], [9, 9], [3, 3]]), np.arange(10.0).reshape(5, 2)
+    g = frame_groups(id, group, pos, vel)
+    assert g.id.tolist() == [2], "groups of one are none"
+    assert [m.tolist() for m in g.members] == [[7, 9]]
+    assert (g.pos.tolist(), g.vel.tolist(), g.size.tolist()) == ([[0.5, 0]], [[2, 3]], [2])
+    assert g.extent.tolist() == [[[0.25, 0], [0, 0]]]
+    np.testing.assert_allclose(g.hull[0], footprint_hull(pos[[0, 2]]))
+
+
+def test_groups_over_time_are_those_of_each_frame():
+    r = np.random.default_rng(1)
+    frame = np.sort(r.integers(2, 9, 60))
+    frame = frame[frame != 5]
+    id = np.arange(len(frame))
+    group, pos, vel = r.integers(-1, 3, len(frame)), r.normal(size=(len(frame), 2)), r.normal(size=(len(frame), 2))
+    many = groups_over_time(frame, id, group, pos, vel, 1, 10)
+    for t, g in enumerate(many, start=1):
+        one = frame_groups(*(x[frame == t] for x in (id, group, pos, vel)))
+        assert g.id.tolist() == one.id.tolist()
+        assert [m.tolist() for m in g.members] == [m.tolist() for m in one.members]
+        for name in ("pos", "vel", "extent", "size"):
+            np.testing.assert_allclose(getattr(g, name), getattr(one, name))
+        assert all(np.array_equal(a, b) for a, b in zip(g.hull, one.hull, strict=True))
+
+
+def test_groups_in_the_image():
+    frame, id, group = np.zeros(3, np.int64), np.array([1, 2, 3]), np.array([1, 1, -1])
+    pos = np.array([[10.0, 10], [30, 10], [90, 90]])
+    box = np.array([[5.0, 0, 10, 20], [25, 0, 10, 20], [85, 80, 10, 20]])
+    (g,) = box_groups(frame, id, group, pos, pos * 0, box, 0, 1)
+    assert g.hull[0].tolist() == [[5, 0], [35, 0], [35, 20], [5, 20]]
+    (g,) = groups_over_time(frame, id, group, pos, pos * 0, 0, 1, px_per_m=20.0)
+    assert g.hull[0][:, 0].min() == pytest.approx(5)
+    assert g.pos.tolist() == [[20, 10]]

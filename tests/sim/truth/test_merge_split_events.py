@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from sim.truth.merge_split_events import groups_and_events
-from sim.truth.merge_split_rules import frames_of, holds_for
 from tests.reference_groups import labels
 
 FPS = 10.0
@@ -48,14 +47,6 @@ def test_merge_at_the_frame_in_which_they_are_near():
     assert m.events[0].pos == pytest.approx((11.3, (-0.7 + 0 + 6 + 6.7 - 2 * 4.52) / 4))
 
 
-def test_merge_at_the_frame_in_which_velocities_agree():
-    """They come at 0.6 m/s, too fast, until 8.7 s; from frame 88 on they differ by nothing."""
-    m = groups_and_events(*merging(0.6, 0.8), meant((1, (3, 3, 3, 3)), frames=200), FPS)
-    assert (m.group == 1).all(), "together from the first frame when meant to be"
-    m = groups_and_events(*merging(0.6, 0.8), meant((1, (1, 1, 2, 2)), (40, (3, 3, 3, 3)), frames=200), FPS)
-    assert summary(m.events) == [("merge", 88, 107, (1, 2), (1,), (1, 2, 3, 4))]
-
-
 def test_merge_no_earlier_than_intent_and_not_without():
     m = groups_and_events(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (150, (3, 3, 3, 3)), frames=200), FPS)
     assert [e.start for e in m.events] == [150]
@@ -92,10 +83,6 @@ def test_split_at_the_frame_in_which_they_are_apart(speed, onset):
     assert summary(m.events) == [("split", onset, onset + 19, (1,), (1, 2), (1, 2, 3, 4))]
     assert (m.group[: onset - 1] == 1).all()
     assert (m.group[onset - 1 :] == [1, 1, 2, 2]).all()
-
-
-def test_no_split_without_intent():
-    assert groups_and_events(*parting(0.8), meant((1, (1, 1, 1, 1)), frames=150), FPS).events == ()
 
 
 def test_who_enters_together_counts_from_the_first_frame():
@@ -155,21 +142,6 @@ def test_events_tell_every_change_of_labels():
             assert not stay.any() or t + 1 in starts
 
 
-def test_order_of_people_and_place_of_the_scene_change_nothing():
-    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
-    for seed in range(20):
-        pos, vel, there, intent, fps = scene(seed)
-        m = groups_and_events(pos, vel, there, intent, fps)
-        moved = groups_and_events(pos @ turn + [30, -7], vel @ turn, there, intent, fps)
-        assert np.array_equal(m.group, moved.group)
-        assert summary(m.events) == summary(moved.events)
-        order = np.random.default_rng(seed).permutation(there.shape[1])
-        mixed = groups_and_events(pos[:, order], vel[:, order], there[:, order], intent[:, order], fps)
-        assert partition(m.group[:, order]) == partition(mixed.group)
-        assert sorted((e.kind, e.start) for e in m.events) == sorted((e.kind, e.start) for e in mixed.events)
-        assert len(m.near.a) == len(mixed.near.a)
-
-
 def test_near_lists_strangers_only_and_whole_stretches():
     for seed in range(30):
         pos, vel, there, intent, fps = scene(seed)
@@ -184,22 +156,3 @@ def test_near_lists_strangers_only_and_whole_stretches():
                 expected += [(s + 1, e, a + 1, b + 1) for s, e in edges.reshape(-1, 2) if e - s >= 8]
         got = zip(m.near.start, m.near.end, m.near.a, m.near.b, strict=True)
         assert sorted(tuple(map(int, row)) for row in got) == sorted(expected), seed
-
-
-def test_nobody_and_nothing():
-    none = np.zeros((0, 0, 2))
-    assert groups_and_events(none, none, none[..., 0] > 0, np.zeros((0, 0), np.int64), FPS).events == ()
-    empty = np.zeros((5, 0, 2))
-    m = groups_and_events(empty, empty, np.zeros((5, 0), bool), np.zeros((5, 0), np.int64), FPS)
-    assert m.group.shape == (5, 0)
-    gone = np.full((5, 2, 2), np.nan)
-    m = groups_and_events(gone, gone, np.zeros((5, 2), bool), np.full((5, 2), -1), FPS)
-    assert (m.group == -1).all()
-
-
-def test_stretches():
-    assert frames_of(2.0, 2.5) == 5
-    assert frames_of(0.3, 10) == 3
-    holds = np.array([1, 1, 0, 1, 1, 1, 1, 0], bool)
-    assert holds_for(holds, 3).tolist() == [0, 0, 0, 1, 1, 0, 0, 0]
-    assert not holds_for(holds[:2], 3).any()

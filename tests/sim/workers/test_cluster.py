@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
 import sys
 import threading
 import time
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from sim import versions
 from sim.workers import cluster
 from sim.workers.start import start_workers
 from tests.errands import complain, fall, process, profiled, refuse, root_of, tell_and_wait
@@ -48,21 +45,6 @@ def test_every_item_with_its_result(two: Loopback) -> None:
         who = dict(run(process, range(20), ahead=20))
     assert set(who) == set(range(20))
     assert set(who.values()) <= {worker.pid for worker in two.workers}
-
-
-def test_items_are_taken_when_there_is_somebody_to_do_them(two: Loopback) -> None:
-    taken, seen = [], []
-
-    def items() -> Iterator[int]:
-        for k in range(12):
-            assert len(taken) - len(seen) < 2 + 1
-            taken.append(k)
-            yield k
-
-    with start_workers(1, two.address) as run:
-        for k, _ in run(process, items(), ahead=1):
-            seen.append(k)
-    assert sorted(seen) == list(range(12))
 
 
 def test_an_error_there_is_raised_here(two: Loopback) -> None:
@@ -140,20 +122,6 @@ def test_a_worker_that_is_not_as_we_are(name: str, two: Loopback, monkeypatch: p
         list(run(root_of, [4.0]))
 
 
-def test_sources_are_told_apart_by_every_byte_and_name(tmp_path: Path) -> None:
-    for package in versions.packages():
-        (tmp_path / package).mkdir()
-    file = tmp_path / "sim" / "a.py"
-    found = [versions.source_hash(tmp_path)]
-    for change in (lambda: file.write_text("1"), lambda: file.write_text("2"),
-                   lambda: file.rename(tmp_path / "scenarios" / "a.toml")):  # fmt: skip
-        change()
-        found.append(versions.source_hash(tmp_path))
-    assert len(set(found)) == 4
-    (tmp_path / "sim" / "a.pyc").write_text("")
-    assert versions.source_hash(tmp_path) == found[-1]
-
-
 @pytest.mark.skipif(sys.version_info >= cluster.PROFILE_SAFE, reason="this Python does not stand still")
 def test_workers_do_without_the_profile_that_may_stop_them(two: Loopback) -> None:
     with start_workers(1, two.address) as run:
@@ -177,28 +145,12 @@ def test_nobody_there(monkeypatch: pytest.MonkeyPatch) -> None:
         pass
 
 
-def test_a_scheduler_without_workers_is_told_once(strict: Loopback, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "NO_WORKERS_WARNING", 0.0)
-    monkeypatch.setattr(cluster, "COUNT_INTERVAL", 0.05)
-    with start_workers(1, strict.address) as run, warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        pairs = run(process, iter([0]))
-        strict.add_worker()
-        assert len(list(pairs)) == 1
-    assert ["has no workers: waiting" in str(w.message) for w in told] == [True]
-
-
 @pytest.mark.parametrize(
     "address", ["", "127.0.0.1:8786", "tcp://host", "tcp://:1", "host", "tcp://a b:1", "tcp://::1:8786"]
 )
 def test_what_is_no_address(address: str) -> None:
     with pytest.raises(InputError, match=r"--cluster: got .*; expected tcp://HOST:PORT"), start_workers(1, address):
         pass
-
-
-@pytest.mark.parametrize("address", ["tcp://host:8786", "tls://10.0.0.7:1", "tcp://[::1]:8786", "tcp://a.b-c.de:80/"])
-def test_what_is_an_address(address: str) -> None:
-    assert re.fullmatch(cluster.ADDRESS, address)
 
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

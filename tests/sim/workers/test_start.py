@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import os
-import signal
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from scenarios.errors import InputError, WorkError
-from sim.workers.pool import MAX_LOSSES, THREAD_VARIABLES, RemoteTraceback, process_pool
+from scenarios.errors import WorkError
+from sim.workers.pool import MAX_LOSSES, THREAD_VARIABLES, process_pool
 from sim.workers.start import results_in_order, start_workers
-from tests.errands import complain, fall, fall_at_first, hide, process, refuse, root_of, told
+from tests.errands import complain, fall, fall_at_first, hide, process, root_of, told
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -21,18 +19,6 @@ def test_every_item_with_its_result(workers: int) -> None:
     with start_workers(workers) as run:
         assert sorted(run(root_of, [9.0, 4.0, 16.0])) == [(4.0, 2.0), (9.0, 3.0), (16.0, 4.0)]
         assert list(run(root_of, [])) == []
-
-
-def test_one_worker_is_this_process_and_two_are_others() -> None:
-    with start_workers(1) as run:
-        assert dict(run(process, [1])) == {1: os.getpid()}
-    with start_workers(2) as run:
-        assert os.getpid() not in dict(run(process, range(4))).values()
-
-
-def test_no_worker_is_refused() -> None:
-    with pytest.raises(InputError, match="workers"):
-        start_workers(0)
 
 
 @pytest.mark.parametrize("workers", [1, 3])
@@ -66,14 +52,6 @@ def test_the_work_of_dead_workers_is_done_again(tmp_path: Path) -> None:
         assert sorted(run(fall_at_first, markers)) == [(m, m.name) for m in markers]
 
 
-def test_a_worker_killed_while_it_waits_is_replaced() -> None:
-    with process_pool(1) as run:
-        ((_, first),) = run(process, [0])
-        os.kill(first, signal.SIGKILL)
-        ((_, second),) = run(process, [0])
-    assert second != first
-
-
 def test_an_item_that_kills_all_its_workers_is_one_clear_error() -> None:
     with (
         pytest.raises(WorkError, match=f"got an item that killed {MAX_LOSSES} workers, the last by exit code 3"),
@@ -82,49 +60,12 @@ def test_an_item_that_kills_all_its_workers_is_one_clear_error() -> None:
         list(run(fall, [0, 3, 2]))
 
 
-def test_or_has_a_result_of_its_own_and_the_others_theirs() -> None:
-    with process_pool(2) as run:
-        found = dict(run(fall, range(4), on_loss=lambda item, error: -item if "killed" in str(error) else 0))
-    assert found == {0: 0, 1: -1, 2: 2, 3: -3}
-
-
-def test_workers_that_only_die_are_not_started_for_ever() -> None:
-    with pytest.raises(WorkError, match="killed"), process_pool(1) as run:
-        list(run(fall, range(1, 99, 2), on_loss=lambda item, error: 0))
-
-
-def test_an_error_ends_what_the_others_are_at() -> None:
-    """Half an hour of it, here; a negative time is refused at once."""
-    with pytest.raises(ValueError, match="non-negative") as caught, process_pool(2) as run:
-        list(run(time.sleep, [1800.0, -1.0]))
-    assert isinstance(caught.value.__cause__, RemoteTraceback)
-    assert "Traceback" in str(caught.value.__cause__)
-
-
-def test_who_stops_looking_can_run_again() -> None:
-    with process_pool(2) as run:
-        for _ in run(time.sleep, [0.0, 1800.0]):
-            break
-        assert sorted(run(refuse, range(3))) == [(0, 0), (1, 1), (2, 2)]
-
-
 @pytest.mark.parametrize("workers", [1, 3])
 def test_results_in_the_order_of_the_items_whoever_was_first(workers: int, tmp_path: Path) -> None:
     items = [(tmp_path / str(k), seconds) for k, seconds in enumerate((0.5, 0.0, 0.2, 0.0))]
     with start_workers(workers) as run:
         assert list(results_in_order(run, told, items)) == ["0", "1", "2", "3"]
         assert list(results_in_order(run, told, [])) == []
-
-
-def test_once_the_taker_stops_what_is_under_way_ends_and_nothing_more_begins(tmp_path: Path) -> None:
-    items = [(tmp_path / str(k), 0.3) for k in range(20)]
-    with process_pool(2) as run:
-        coming = results_in_order(run, told, items)
-        next(coming)
-        coming.close()
-        found = [marker.read_text() for marker, _ in items if marker.exists()]
-    assert 2 <= len(found) <= 4
-    assert set(found) == {"done"}
 
 
 def test_what_cannot_be_sent_back_is_an_error_not_a_death() -> None:

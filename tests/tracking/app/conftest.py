@@ -12,13 +12,10 @@ from sim.types import Camera, Detections, Frame, GroupEvent, Groups, Near, Scene
 FPS, LENGTH = 10.0, 160
 MERGE, SPLIT = 50, 110
 SCENE = Scene(
-    size=np.array([16.0, 10.0]),
-    walls=np.array([[[0, 9.5], [16, 9.5]], [[15.5, 0], [15.5, 9.5]]], float),
-    pillars=np.array([[4.0, 2.0, 0.4]]),
-    doors=np.array([[[9.0, 9.5], [10.2, 9.5]]]),
-    service=np.array([[14.5, 8.5]]),
+    size=np.array([16.0, 10.0]), walls=np.array([[[0, 9.5], [16, 9.5]], [[15.5, 0], [15.5, 9.5]]], float),
+    pillars=np.array([[4.0, 2.0, 0.4]]), doors=np.array([[[9.0, 9.5], [10.2, 9.5]]]), service=np.array([[14.5, 8.5]]),
     stairs=(Stairs(np.array([11.0, 1.5]), np.array([13.0, 1.5]), 2.0, 1.0, 8, 1.0),),
-)
+)  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
@@ -66,14 +63,11 @@ def groups_of(ids: np.ndarray, group: np.ndarray, pos: np.ndarray, vel: np.ndarr
     if not rows:
         return Groups.none()
     return Groups(
-        names,
-        tuple(ids[r] for r in rows),
-        np.array([pos[r].mean(axis=0) for r in rows]),
-        np.array([vel[r].mean(axis=0) for r in rows]),
-        np.full((len(rows), 2, 2), np.nan),
+        names, tuple(ids[r] for r in rows), np.array([pos[r].mean(axis=0) for r in rows]),
+        np.array([vel[r].mean(axis=0) for r in rows]), np.full((len(rows), 2, 2), np.nan),
         np.array([float(len(r)) for r in rows]),
         tuple(pos[r].mean(axis=0) + np.array([[-1, -1], [1, -1], [1, 1], [-1, 1.0]]) for r in rows),
-    )
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -99,22 +93,12 @@ def truth() -> Truth:
     )
     frames = [np.flatnonzero(frame == k) for k in range(LENGTH)]
     return Truth(
-        "meeting",
-        FPS,
-        LENGTH,
-        60.0,
-        frame + 1,
-        ids,
-        group,
-        pos,
-        vel,
-        boxes(camera, pos),
+        "meeting", FPS, LENGTH, 60.0, frame + 1, ids, group, pos, vel, boxes(camera, pos),
         np.where((person == 2) & (frame < 30), 0.1, 1.0),
         groups=tuple(groups_of(ids[r], group[r], pos[r], vel[r]) for r in frames),
-        labelled=np.arange(LENGTH) < LENGTH - 10,
-        events=events,
+        labelled=np.arange(LENGTH) < LENGTH - 10, events=events,
         near=Near(np.array([20]), np.array([40]), np.array([6]), np.array([7])),
-    )
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -129,16 +113,9 @@ def sequence(truth: Truth) -> Sequence:
             yield Frame(k, now.t, detections=found)
 
     return Sequence(
-        "meeting",
-        FPS,
-        LENGTH,
-        frames,
-        lambda: truth,
-        image_size=(640, 480),
-        camera=look_at(),
-        scene=SCENE,
+        "meeting", FPS, LENGTH, frames, lambda: truth, image_size=(640, 480), camera=look_at(), scene=SCENE,
         has_detections=True,
-    )
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -161,19 +138,9 @@ def tracks(truth: Truth) -> list[Tracks]:
         n = len(ids)
         answers.append(
             Tracks(
-                k,
-                now.t,
-                "ground",
-                "person",
-                ids,
-                group,
-                pos,
-                now.vel,
-                np.tile(np.eye(4), (n, 1, 1)),
-                box=now.box + rng.normal(0, 2, (n, 4)),
-                score=np.ones(n),
-                groups=groups_of(ids, group, pos, now.vel),
+                k, now.t, "ground", "person", ids, group, pos, now.vel, np.tile(np.eye(4), (n, 1, 1)),
+                box=now.box + rng.normal(0, 2, (n, 4)), score=np.ones(n), groups=groups_of(ids, group, pos, now.vel),
                 events=(moved[k],) if k in moved else (),
             )
-        )
+        )  # fmt: skip
     return answers

@@ -10,11 +10,10 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from scenarios.errors import WorkError
@@ -91,10 +90,7 @@ COMMANDS = {
     "scenarios NAME": ("scenarios {scene}", "scenarios no-such-scene"),
     "scenarios --out": ("scenarios {scene} --out {out}/plan.svg", "scenarios {scene} --set a=1 --out {out}/plan.svg"),
     "scenarios --schema": ("scenarios --schema", "scenarios {scene} --schema --out {out}/plan.svg"),
-    "generate": (
-        "generate {scene} --seeds 5:7 --streams none --out {out}",
-        "generate {scene} --seeds 5:5 --out {out}",
-    ),
+    "generate": ("generate {scene} --seeds 5:7 --streams none --out {out}", "generate {scene} --seeds 5:5 --out {out}"),
     "generate pictures": (
         "generate {scene} --seeds 5 --set camera.image=[128,96] --out {out}",
         "generate {scene} --seeds 5 --streams left,centre --out {out}",
@@ -110,8 +106,7 @@ COMMANDS = {
         "fit relational no-such-scene --out {out}/mine.toml",
     ),
     "fit joint": (
-        "fit joint party --seeds 30000:30003 --out {out}/mine.toml",
-        "fit joint no-such-scene --out {out}/mine.toml",
+        "fit joint party --seeds 30000:30003 --out {out}/mine.toml", "fit joint no-such-scene --out {out}/mine.toml",
     ),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
@@ -120,13 +115,11 @@ COMMANDS = {
     "score one": ("score {one} {tracks}/scene-s40000", "score {one} {tracks}/scene-s40001"),
     "score text": ("score {one} {tracks}/scene-s40000/tracks.mot.txt", "score {one} {one}/gt/groups.csv"),
     "view": (
-        "view {one} {tracks}/scene-s40000 --out {out}/page.html",
-        "view {one} {out}/nothing --out {out}/page.html",
+        "view {one} {tracks}/scene-s40000 --out {out}/page.html", "view {one} {out}/nothing --out {out}/page.html",
     ),
     "view all": ("view {data} {tracks} --out {out}", "view {data} {tracks} --out {out}/page.html"),
     "view pictures": (
-        "view {seen} --video beside --out {out}/page.html",
-        "view {seen} --video outside --out {out}/page.html",
+        "view {seen} --video beside --out {out}/page.html", "view {seen} --video outside --out {out}/page.html",
     ),
     "overlay": (
         "overlay {seen} {tracks}-seen --out {out}/film.mp4",
@@ -139,13 +132,10 @@ COMMANDS = {
     "export coco": ("export coco {data} --out {out}/coco.json", "export coco {out}/nothing --out {out}/coco.json"),
     "export kitti": ("export kitti {seen} --out {out}", "export kitti {one} --out {out}"),
     "export webdataset": (
-        "export webdataset {data} --out {out}",
-        "export webdataset {data} --out {out} --shard-size 0",
+        "export webdataset {data} --out {out}", "export webdataset {data} --out {out} --shard-size 0",
     ),
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
-}
-SMALL = ("scenarios --out", "fit sensor", "fit relational", "fit joint")  # a few kB
-FEW = ("export coco", "fit grouping", "sheet", "track", "track blob")  # less than 12 kB
+}  # fmt: skip
 WRITING = [name for name, (good, _) in COMMANDS.items() if "--out {out}" in good]
 
 
@@ -311,17 +301,14 @@ def _leaves(group):
 @pytest.mark.parametrize(
     ("line", "got"),
     [
-        ("trak", "no such command 'trak'"),
-        ("track blob", "missing argument 'SOURCE'"),
-        ("track blob x", "missing option '--out'"),
-        ("track blob x --out y --colour red", "no such option: --colour"),
+        ("trak", "no such command 'trak'"), ("track blob", "missing argument 'SOURCE'"),
+        ("track blob x", "missing option '--out'"), ("track blob x --out y --colour red", "no such option: --colour"),
         ("track blob x --out y --seed one", "invalid value for '--seed'"),
         ("track blob x --out y --detections magic", "magic"),
         ("generate merge --seeds 0:2 --out y --workers 0", "invalid value for '--workers'"),
-        ("scenarios --out x.svg", "--out without a scenario to explain"),
-        ("export coc", "no such command 'coc'"),
+        ("scenarios --out x.svg", "--out without a scenario to explain"), ("export coc", "no such command 'coc'"),
     ],
-)
+)  # fmt: skip
 def test_usage(line, got, as_json, capsys):
     assert run(line.split() + ["--json"] * as_json) == 2
     printed = capsys.readouterr()
@@ -361,50 +348,11 @@ def test_an_unwritable_out_is_named_as_given(place, line, folder, capsys):
     assert len(shown.splitlines()) == 1
 
 
-def test_one_warning_for_many_recordings(tmp_path, capsys):
-    for name in ("a", "b", "c"):
-        (tmp_path / "data" / name / "gt").mkdir(parents=True)
-        (tmp_path / "data" / name / "gt" / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
-    for _ in range(2):
-        assert run(["view", str(tmp_path / "data"), "--out", str(tmp_path / "pages")]) == 0
-        assert len(capsys.readouterr().err.splitlines()) == 1
-
-
-def test_visible_boxes_of_a_recording_without_any(tmp_path, capsys):
-    (tmp_path / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
-    line = ["track", "blob", str(tmp_path / "gt.txt"), "--fps", "10", "--detections", "truth", "--out"]
-    for box in ("visible", "amodal"):
-        assert run([*line, str(tmp_path / box), "--set", f"sensor.box={box}"]) == 0
-    assert not capsys.readouterr().err
-
-
-def test_a_tracker_on_the_ground_is_scored_there(place, tmp_path, capsys):
-    """The truth as tracks without boxes: projected ones in the text are no measurement."""
-    from sim.io.source import open_source
-    from sim.io.store.track_files import write_tracks
-    from sim.types import Tracks
-
-    (sequence,) = open_source(place.one)
-    found = [sequence.truth.at(k) for k in range(1, sequence.length + 1)]
-    answers = [
-        Tracks(t.index, t.t, "ground", "person", t.id, t.group, t.pos, t.vel, np.zeros((len(t.id), 4, 4)))
-        for t in found
-    ]
-    seen = {"camera": sequence.camera, "scene": sequence.scene}
-    write_tracks(tmp_path / "t", answers, fps=sequence.fps, info={"sequence": sequence.name}, **seen)
-    assert run(["score", str(place.one), str(tmp_path / "t"), "--json"]) == 0
-    (shown,) = json.loads(capsys.readouterr().out)["sequences"]
-    assert (shown["similarity"], shown["HOTA"], shown["MOTA"]) == ("ground", 1.0, 1.0)
-
-
-def test_a_family_of_commands_alone_is_refused(capsys):
-    assert run(["export"]) == 2
-    assert "missing command" in capsys.readouterr().err
-
-
 def test_without_arguments_it_explains_itself(capsys):
     assert run([]) == 0
     assert "generate" in capsys.readouterr().out
+    assert run(["export"]) == 2
+    assert "missing command" in capsys.readouterr().err
 
 
 def test_ctrl_c_that_became_another_error(place, capsys, monkeypatch):
@@ -456,52 +404,6 @@ def test_ctrl_c_in_a_real_process(place, workers):
     sequences = [p for p in (place.out / "flockscope-train").iterdir() if p.is_dir()]
     assert 0 < len(sequences) < 400
     assert all(run(["validate", str(p)]) == 0 for p in sequences)
-
-
-@contextmanager
-def small_disk(folder, size):
-    """A file system of this size, as mount wants it; the test is skipped where mounting is not allowed."""
-    folder.mkdir(parents=True)
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], capture_output=True, check=False
-    )
-    if mounted.returncode:
-        pytest.skip("no right to mount a small disk")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", folder], check=True)
-
-
-@pytest.mark.slow
-def test_a_full_disk_of_its_own(place, tmp_path):
-    """A file system of 200 kB: exit code 1, one line, and every sequence there is whole."""
-    with small_disk(tmp_path / "disk", "200k") as disk:
-        assert run(words(f"generate {{scene}} --seeds 0:10 --out {disk}/out", place)) == 1
-        assert not list(disk.rglob(".partial-*"))
-        sequences = list(disk.glob("out/flockscope-train/*"))
-        assert len(sequences) < 10
-        assert all(run(["validate", str(p)]) == 0 for p in sequences)
-
-
-@pytest.fixture
-def tiny_disk(tmp_path):
-    """A file system of 12 kB, less than any command writes; for commands with a folder, their first file fits."""
-    with small_disk(tmp_path / "tiny", "12k") as disk:
-        yield disk
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in WRITING if name not in SMALL])
-def test_every_command_on_a_full_disk(name, place, tiny_disk, capsys):
-    """Exit code 1 and one line; no file is half there, and what is there is complete by its own rules."""
-    (tiny_disk / "filler").write_bytes(b"x" * 8192 if name in FEW else b"")
-    tiny = replace(place, out=tiny_disk / "out")
-    assert run(words(COMMANDS[name][0], tiny)) == 1
-    check_output(capsys, 1, as_json=False)
-    left = [p.name for p in tiny_disk.rglob("*") if p.is_file()]
-    assert not [n for n in left if n.startswith(".partial-")]
-    assert not set(left) & {"page.html", "film.mp4", "plan.svg", "toy.toml", "index.json", "manifest.json", "run.json"}
 
 
 def test_a_dataset_altered_is_told_by_every_reader(place, tmp_path, capsys):

@@ -189,30 +189,24 @@ LAMP = "light.switch=[{ at = 0.2, gain = 0.5 }]"
 PICTURES = {
     "light.sun_azimuth_deg": ("light.sun_azimuth_deg=0", "light.sun_azimuth_deg=90"),
     "light.sun_elevation_deg": ("light.sun_elevation_deg=30", "light.sun_elevation_deg=60"),
-    "light.shadow": ("", "light.shadow=0.6"),
-    "light.penumbra": ("", "light.penumbra=0.4"),
+    "light.shadow": ("", "light.shadow=0.6"), "light.penumbra": ("", "light.penumbra=0.4"),
     "light.drift": ("", "light.drift=0.1"),
     "light.drift_time": ("light.drift=0.1", "light.drift=0.1;light.drift_time=2"),
-    "light.flicker": ("", "light.flicker=0.05"),
-    "light.cloud": ("", "light.cloud=0.2"),
+    "light.flicker": ("", "light.flicker=0.05"), "light.cloud": ("", "light.cloud=0.2"),
     "light.cloud_size": ("light.cloud=0.2", "light.cloud=0.2;light.cloud_size=2"),
     "light.cloud_speed": ("light.cloud=0.2", "light.cloud=0.2;light.cloud_speed=3"),
     "light.switch[].at": (LAMP, LAMP.replace("0.2", "0.4")),
     "light.switch[].gain": (LAMP, LAMP.replace("0.5", "0.7")),
     "light.switch[].ramp": (LAMP, LAMP.replace("gain", "ramp = 0.6, gain")),
-    "picture.texture": ("", "picture.texture=0.9"),
-    "picture.samples": ("", "picture.samples=3"),
-    "picture.noise": ("", "picture.noise=6"),
-    "picture.blur_px": ("", "picture.blur_px=1.5"),
-    "picture.jpeg": ("", "picture.jpeg=50"),
-    "picture.shot": ("", "picture.shot=1"),
+    "picture.texture": ("", "picture.texture=0.9"), "picture.samples": ("", "picture.samples=3"),
+    "picture.noise": ("", "picture.noise=6"), "picture.blur_px": ("", "picture.blur_px=1.5"),
+    "picture.jpeg": ("", "picture.jpeg=50"), "picture.shot": ("", "picture.shot=1"),
     "picture.foliage": ("", "picture.foliage=0.3"),
     "picture.sway_px": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_px=4"),
     "picture.sway_time": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_time=2"),
-    "picture.right_gain": ("", "picture.right_gain=1.2"),
-    "picture.right_roll_deg": ("", "picture.right_roll_deg=1"),
+    "picture.right_gain": ("", "picture.right_gain=1.2"), "picture.right_roll_deg": ("", "picture.right_roll_deg=1"),
     "picture.right_down_px": ("", "picture.right_down_px=1"),
-}
+}  # fmt: skip
 """What pictures alone are made of: looked for in frame 3, at 0.4 s, without the noise; `right_` in right pictures."""
 
 TEXT_ONLY = {"schema", "about", "group[].id", "event[](merge).into", "event[](split).parts[].id"}
@@ -350,12 +344,7 @@ def seen_scene():
     from sim.sequence import observe
 
     size = ["camera.image=[320,240]", "camera.tilt_deg=25", "duration=10", "camera.fps=8"]
-    light = [
-        "light.shadow=0.5",
-        "light.drift=0.1",
-        "light.drift_time=4.0",
-        "light.switch=[{ at = 5.0, gain = 0.8 }]",
-    ]
+    light = ["light.shadow=0.5", "light.drift=0.1", "light.drift_time=4.0", "light.switch=[{ at = 5.0, gain = 0.8 }]"]
     scene = load("cross", ["group.passers.repeat=6", *size, *light])
     sequence = observe(scene, simulate(scene, 11), check=False, streams=("left",))
     return with_a_covered_picture(sequence)
@@ -448,112 +437,78 @@ def made(tmp_path_factory) -> Path:
     return folder
 
 
-BASE = {
-    "scenarios": "scenarios {0}/scene.toml",
-    "generate": "generate {0}/scene.toml --seeds 7 --streams none --out {1}",
-    "track": "track blob {0}/data/flockscope-demo/scene-s40000 --out {1}",
-    "score": "score {0}/data {0}/tracks",
-    "view": "view {0}/data/flockscope-demo/scene-s40000 --out {1}/page.html",
-    "sheet": "sheet {0}/data/flockscope-demo/scene-s40000 --out {1}/sheet.png",
-    "demo": "demo --out {1}",
-}
-SEEN = "generate {0}/scene.toml --seeds 7 --set camera.image=[128,96] --set duration=1 --out {1}"
-FILM = "track blob {0}/seen/flockscope-demo/scene-s40000/left.mp4 --px-per-m 12 --out {1}"
+ONE, SEEN = "{0}/data/flockscope-demo/scene-s40000", "{0}/seen/flockscope-demo/scene-s40000"
+SMALL = "generate {0}/scene.toml --seeds 7 --set camera.image=[128,96] --set duration=1 --out {1}"
 MOT = "track " + FAKE + " {0}/mot --out {1}"
+RUN = f"track blob {ONE} --out {{1}}"
+NOISY = RUN + " --detections truth --set sensor.box_noise.scale=4"
+SCORED = f"score {ONE} {{0}}/tracks"
+IN_IMAGE = "score {0}/mot {0}/mot-tracks --fps 5 --similarity image"
+TEXT = "view {0}/mot {0}/mot-tracks/tracks.mot.txt --fps 5 --out {1}/page.html"
+OVERLAY = f"overlay {SEEN}/left.mp4 {{0}}/pair.txt --out {{1}}/o.mp4"
 
-VIEW = "view {0}/seen/flockscope-demo/scene-s40000 --out {1}/page.html"
-DRAWN = "overlay {0}/seen/flockscope-demo/scene-s40000 {0}/pair.txt --out {1}/o.mp4"
-OVERLAY = "overlay {0}/seen/flockscope-demo/scene-s40000/left.mp4 {0}/pair.txt --out {1}/o.mp4"
-BARE = "overlay {0}/seen/flockscope-demo/scene-s40000/left.mp4 {0}/bare.txt --out {1}/o.mp4"
-
-RANKED = BASE["score"] + " {0}/perfect"
-
-# (command, option): what is run, then what is run instead.
+# what is run: of each option what is appended, or the words of the line that become others.
+FLIPS = {
+    "scenarios {0}/scene.toml": {"settings": "--set duration=9", "out": "--out {1}/plan.svg"},
+    "scenarios": {"schema": "--schema", "name": "{0}/scene.toml"},
+    "generate {0}/scene.toml --seeds 7 --streams none --out {1}": {
+        "names": ("{0}/scene.toml", "cross --set camera.fps=5"), "seeds": ("--seeds 7", "--seeds 8"),
+        "settings": "--set scenario.duration=3",
+    },
+    SMALL: {"streams": "--streams left,ids", "images": "--images png"},
+    f"track blob {SEEN}/left.mp4 --px-per-m 12 --out {{1}}": {"background": "--background first:5"},
+    RUN: {
+        "tracker": ("blob", FAKE), "source": ("40000", "40001"), "params": "--params {0}/params.toml",
+        "settings": "--set tracker.gate=0.6", "detections": "--detections truth",
+    },
+    NOISY: {"seed": "--seed 1"},
+    MOT: {"fps": "--fps 5", "px_per_m": "--px-per-m 10", "camera": f"--camera {ONE}/camera.json"},
+    "score {0}/data {0}/tracks": {
+        "truth": ("{0}/data ", "{0}/data/flockscope-demo/scene-s40001 "), "tracks": ("tracks", "perfect"),
+        "group_match": "--group-match members",
+    },
+    "score {0}/data {0}/tracks --similarity boxes": {"similarity": ("boxes", "ground")},
+    SCORED: {"blocks": "--blocks 5"},
+    "score {0}/data {0}/tracks {0}/perfect": {"by": "--by HOTA", "all": "--all", "csv": "--csv {1}/all.csv"},
+    "score {0}/mot {0}/mot-tracks": {"fps": "--fps 5"},
+    IN_IMAGE: {"px_per_m": "--px-per-m 5"},
+    f"view {ONE} --out {{1}}/page.html": {"source": ("40000", "40001"), "tracks": "{0}/tracks"},
+    "view {0}/mot --out {1}/page.html": {"fps": "--fps 5"},
+    TEXT: {"px_per_m": "--px-per-m 20"},
+    "view {0}/mot {0}/mot-tracks --fps 5 --out {1}/page.html": {"camera": "--camera {0}/camera.json"},
+    f"view {SEEN} --out {{1}}/page.html": {"video": "--video beside"},
+    OVERLAY: {
+        "source": ("left.mp4", "background.mp4"), "tracks": ("pair", "bare"), "fps": "--fps 7",
+        "px_per_m": "--px-per-m 40",
+    },
+    OVERLAY.replace("/left.mp4", ""): {"truth": "--truth over"},
+    OVERLAY.replace("pair", "bare"): {"camera": f"--camera {SEEN}/camera.json"},
+    f"sheet {ONE} --out {{1}}/sheet.png": {"source": ("40000", "40001"), "frames": "--frames 4"},
+    "sheet {0}/mot --out {1}/sheet.png": {"fps": "--fps 5"},
+    "validate {0}/data": {"folder": ("data", "tracks")},
+    "export webdataset {0}/data --out {1}": {
+        "folder": ("{0}/data", ONE), "shard_size": "--shard-size 1kB", "samples": "--samples frame",
+    },
+    "export coco {0}/data --out {1}/c.json": {"folder": ("data", "mot")},
+}  # fmt: skip
 OPTIONS = {
-    ("scenarios", "settings"): (BASE["scenarios"], BASE["scenarios"] + " --set duration=9"),
-    ("scenarios", "out"): (BASE["scenarios"], BASE["scenarios"] + " --out {1}/plan.svg"),
-    ("scenarios", "schema"): ("scenarios", "scenarios --schema"),
-    ("scenarios", "name"): ("scenarios", BASE["scenarios"]),
-    ("generate", "names"): (BASE["generate"], "generate cross --set camera.fps=5 --seeds 7 --streams none --out {1}"),
-    ("generate", "seeds"): (BASE["generate"], BASE["generate"].replace("--seeds 7", "--seeds 8")),
-    ("generate", "settings"): (BASE["generate"], BASE["generate"] + " --set scenario.duration=3"),
-    ("generate", "streams"): (SEEN, SEEN + " --streams left,ids"),
-    ("generate", "images"): (SEEN, SEEN + " --images png"),
-    ("track", "background"): (FILM, FILM + " --background first:5"),
-    ("track", "tracker"): (BASE["track"], BASE["track"].replace("blob", FAKE)),
-    ("track", "source"): (BASE["track"], BASE["track"].replace("40000", "40001")),
-    ("track", "params"): (BASE["track"], BASE["track"] + " --params {0}/params.toml"),
-    ("track", "settings"): (BASE["track"], BASE["track"] + " --set tracker.gate=0.6"),
-    ("track", "detections"): (BASE["track"], BASE["track"] + " --detections truth"),
-    ("track", "seed"): (
-        BASE["track"] + " --detections truth --set sensor.box_noise.scale=4",
-        BASE["track"] + " --detections truth --set sensor.box_noise.scale=4 --seed 1",
-    ),
-    ("track", "fps"): (MOT, MOT + " --fps 5"),
-    ("track", "px_per_m"): (MOT, MOT + " --px-per-m 10"),
-    ("track", "camera"): (MOT, MOT + " --camera {0}/data/flockscope-demo/scene-s40000/camera.json"),
-    ("score", "truth"): (BASE["score"], "score {0}/data/flockscope-demo/scene-s40001 {0}/tracks"),
-    ("score", "tracks"): (BASE["score"], "score {0}/data {0}/perfect"),
-    ("score", "similarity"): (BASE["score"] + " --similarity boxes", BASE["score"] + " --similarity ground"),
-    ("score", "group_match"): (BASE["score"], BASE["score"] + " --group-match members"),
-    ("score", "blocks"): (
-        "score {0}/data/flockscope-demo/scene-s40000 {0}/tracks",
-        "score {0}/data/flockscope-demo/scene-s40000 {0}/tracks --blocks 5",
-    ),
-    ("score", "by"): (RANKED, RANKED + " --by HOTA"),
-    ("score", "all"): (RANKED, RANKED + " --all"),
-    ("score", "csv"): (RANKED, RANKED + " --csv {1}/all.csv"),
-    ("score", "fps"): ("score {0}/mot {0}/mot-tracks", "score {0}/mot {0}/mot-tracks --fps 5"),
-    ("score", "px_per_m"): (
-        "score {0}/mot {0}/mot-tracks --fps 5 --similarity image",
-        "score {0}/mot {0}/mot-tracks --fps 5 --similarity image --px-per-m 5",
-    ),
-    ("view", "source"): (BASE["view"], BASE["view"].replace("40000", "40001")),
-    ("view", "tracks"): (BASE["view"], BASE["view"] + " {0}/tracks"),
-    ("view", "fps"): ("view {0}/mot --out {1}/page.html", "view {0}/mot --fps 5 --out {1}/page.html"),
-    ("view", "px_per_m"): (
-        "view {0}/mot {0}/mot-tracks/tracks.mot.txt --fps 5 --out {1}/page.html",
-        "view {0}/mot {0}/mot-tracks/tracks.mot.txt --fps 5 --px-per-m 20 --out {1}/page.html",
-    ),
-    ("view", "camera"): (
-        "view {0}/mot {0}/mot-tracks --fps 5 --out {1}/page.html",
-        "view {0}/mot {0}/mot-tracks --fps 5 --camera {0}/camera.json --out {1}/page.html",
-    ),
-    ("view", "video"): (VIEW, VIEW + " --video beside"),
-    ("overlay", "source"): (OVERLAY, OVERLAY.replace("left.mp4", "background.mp4")),
-    ("overlay", "tracks"): (OVERLAY, OVERLAY.replace("pair", "bare")),
-    ("overlay", "truth"): (DRAWN, DRAWN + " --truth over"),
-    ("overlay", "fps"): (OVERLAY, OVERLAY + " --fps 7"),
-    ("overlay", "px_per_m"): (OVERLAY, OVERLAY + " --px-per-m 40"),
-    ("overlay", "camera"): (BARE, BARE + " --camera {0}/seen/flockscope-demo/scene-s40000/camera.json"),
-    ("sheet", "source"): (BASE["sheet"], BASE["sheet"].replace("40000", "40001")),
-    ("sheet", "frames"): (BASE["sheet"], BASE["sheet"] + " --frames 4"),
-    ("sheet", "fps"): ("sheet {0}/mot --out {1}/sheet.png", "sheet {0}/mot --fps 5 --out {1}/sheet.png"),
-    ("validate", "folder"): ("validate {0}/data", "validate {0}/tracks"),
-    ("webdataset", "folder"): (
-        "export webdataset {0}/data --out {1}",
-        "export webdataset {0}/data/flockscope-demo/scene-s40000 --out {1}",
-    ),
-    ("webdataset", "shard_size"): (
-        "export webdataset {0}/data --out {1}",
-        "export webdataset {0}/data --shard-size 1kB --out {1}",
-    ),
-    ("webdataset", "samples"): (
-        "export webdataset {0}/data --out {1}",
-        "export webdataset {0}/data --samples frame --out {1}",
-    ),
-    ("coco", "folder"): ("export coco {0}/data --out {1}/c.json", "export coco {0}/mot --out {1}/c.json"),
+    (line.removeprefix("export ").split()[0], option): (
+        line,
+        line.replace(*how) if isinstance(how, tuple) else f"{line} {how}",
+    )
+    for line, options in FLIPS.items()
+    for option, how in options.items()
 }
 ELSEWHERE = {
-    ("generate", "workers"),  # the same bytes for any number: tests/sim/test_generate.py
-    ("track", "workers"),  # as well: test_sequence_workers.py
+    ("generate", "workers"),  # the same bytes for any number: tests/sim/dataset/test_generate.py
+    ("track", "workers"),  # as well: test_stored_tracks.py
     ("score", "workers"),
-    ("generate", "cluster"),  # and on a cluster: tests/sim/test_generate_cluster.py
+    ("generate", "cluster"),  # and on a cluster: tests/sim/dataset/test_generate_cluster.py
     ("kitti", "folder"),  # tests/sim/io/export/test_kitti.py
     ("demo", "quick"),  # the long one is for `make demo`
-    ("generate", "sensor"),  # tests/tracking/app/test_fit.py
+    ("generate", "sensor"),  # commands/test_fit.py
     ("track", "sensor"),
-    ("track", "grouping"),  # tests/tracking/tuning/test_rule.py
+    ("track", "grouping"),  # commands/test_fit.py
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("generate", "stride"),  # tests/sim/test_stride.py
     ("coco", "min_visibility"),  # tests/sim/io/export/test_coco.py
@@ -561,8 +516,7 @@ ELSEWHERE = {
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
 }
 OWN = ("group", "grouping", "joint", "relational", "replay", "sensor", "tune")
-"""Commands whose options are tested one by one in files of their own: commands/test_group.py, test_replay.py,
-test_fit.py, test_tune.py, and in tests/tracking/fitting."""
+"""Commands whose options are tested one by one in commands/, test_tune.py and test_cli_bad_input.py."""
 
 
 def commands(group) -> list[tuple[str, list[str]]]:

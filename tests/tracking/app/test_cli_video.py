@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.small_videos import SIZE, cut, damage, picture, write_jpegs, write_video
+from tests.small_videos import SIZE, damage, picture, write_video
 from tracking.app.cli import run
 
 
@@ -40,24 +40,8 @@ def sixteen(k: int) -> np.ndarray:
 
 # what is wrong with a video: how it is made, and what the line must say.
 BROKEN: dict[str, tuple[Callable[[Path], Path], list[str]]] = {
-    "missing": (lambda f: f / "no.mp4", ["no.mp4", "nothing there"]),
-    "empty": (lambda f: cut(film(f), 0), ["film.mp4", "an empty file"]),
-    "cut off, index gone": (lambda f: cut(film(f, name="film.mkv"), 0.02), ["film.mkv"]),
     "no video": (lambda f: text(f / "a.mp4"), ["a.mp4", "no readable video"]),
     "too short for any background": (lambda f: film(f, 6), ["film.mp4", "at least 10 frames"]),
-    "sizes change": (
-        lambda f: write_jpegs(f / "film.avi", [picture(k, SIZE if k < 40 else (64, 48)) for k in range(60)]),
-        ["film.avi", "frame 41", "64×48 px", "96×64 px"],
-    ),
-    "sizes change in a folder": (
-        lambda f: jpegs(f / "mot", [picture(k, SIZE if k < 40 else (64, 48)) for k in range(60)]),
-        ["000041.jpg", "64×48 px", "96×64 px"],
-    ),
-    "no picture can be read": (
-        lambda f: [p.write_bytes(b"no jpeg") for p in sorted((jpegs(f / "mot", [picture(1)] * 9) / "img1").iterdir())]
-        and f / "mot",
-        ["none of which can be read"],
-    ),
     "every pixel changes": (
         lambda f: jpegs(f / "mot", [noise(k) for k in range(60)]),
         ["/mot: ", "no background can be learned"],
@@ -66,17 +50,13 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], list[str]]] = {
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("as_json", [False, True], ids=["text", "json"])
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_recording_is_one_line(name, as_json, tmp_path, capsys):
+def test_a_broken_recording_is_one_line(name, tmp_path, capsys):
     make, expected = BROKEN[name]
     out = tmp_path / "out"
     line = ["track", "blob", str(make(tmp_path)), "--fps", "10", "--px-per-m", "20", "--out", str(out)]
-    assert run(line + ["--json"] * as_json) == 2
-    printed = capsys.readouterr()
-    shown = [text for text in printed.err.splitlines() if not text.startswith("warning: ")]
-    assert len(shown) == (0 if as_json else 1)
-    error = ": ".join(json.loads(printed.out)["error"].values()) if as_json else shown[0]
+    assert run(line) == 2
+    (error,) = [text for text in capsys.readouterr().err.splitlines() if not text.startswith("warning: ")]
     assert all(word in error for word in expected), error
     assert not out.exists()
 
@@ -84,13 +64,10 @@ def test_a_broken_recording_is_one_line(name, as_json, tmp_path, capsys):
 # pictures that are strange, and yet pictures: how they are made, and what a warning must say.
 STRANGE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "plain": (film, ""),
-    "no other speaks of its rate": (lambda f: jpegs(f / "mot", [picture(k) for k in range(60)]), ""),
     "16 bits": (lambda f: jpegs(f / "mot", [sixteen(k) for k in range(60)], ".png"), ""),
     "grey": (lambda f: jpegs(f / "mot", [picture(k)[..., 1] for k in range(60)]), ""),
-    "a grey video": (lambda f: film(f, pix_fmt="gray"), ""),
     "shorter than the sample": (lambda f: film(f, 30), "shorter than a background sample"),
     "damaged": (lambda f: damage(film(f), 0.7, 300), "lost"),
-    "cut off": (lambda f: cut(film(f, options={"g": "10"}), 0.9), "ends after|lost"),
 }
 
 
@@ -104,7 +81,7 @@ def test_strange_pictures_are_pictures(name, tmp_path, capsys):
     (shown,) = json.loads(printed.out)["runs"]
     assert shown["detections"] == "image"
     assert not shown["causal"]
-    assert any(part in printed.err for part in word.split("|"))
+    assert word in printed.err
     if not word:
         assert shown["frames"] == 60
     for command in (["sheet"], ["view"], ["overlay"]):
@@ -161,9 +138,3 @@ def test_a_background_for_a_tracker_that_needs_none(tmp_path, capsys):
     line = ["track", "blob", str(folder), "--fps", "10", "--out", str(tmp_path / "out")]
     assert run([*line, "--detections", "truth", "--background", "first:10"]) == 2
     assert "leave --background out" in capsys.readouterr().err
-
-
-def test_an_overlay_of_what_has_no_pictures(tmp_path, capsys):
-    (tmp_path / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n2,1,0,0,5,5,1,1,1\n")
-    assert run(["overlay", str(tmp_path / "gt.txt"), "--fps", "10", "--out", str(tmp_path / "o.mp4")]) == 2
-    assert "without pictures" in capsys.readouterr().err

@@ -76,18 +76,6 @@ def test_two_names_of_one_file_write_nothing(tmp_path: Path, capsys, one: str, o
     assert not (tmp_path / "out").exists()
 
 
-def test_the_name_in_a_manifest_is_a_label(tmp_path: Path, capsys) -> None:
-    line = ["generate", "quick", "--seeds", "40000:40002", "--streams", "none", "--out"]
-    assert run([*line, str(tmp_path / "deep" / "data")]) == 0
-    folder = min((tmp_path / "deep" / "data" / "flockscope-demo").iterdir())
-    manifest = read_manifest(folder)
-    manifest["sequence"]["name"] = "../../../escaped"
-    (folder / "manifest.json").write_text(json.dumps(with_hash(manifest)))
-    before = tree(tmp_path)
-    assert run(["track", "blob", str(tmp_path / "deep" / "data"), "--out", str(tmp_path / "deep" / "out")]) == 0
-    assert {name for name in tree(tmp_path) - before if not name.startswith("deep/out")} == set()
-
-
 def test_a_manifest_names_files_of_its_own_folder_only(tmp_path: Path, capsys) -> None:
     assert run(["generate", "quick", "--seeds", "40000", "--streams", "none", "--out", str(tmp_path / "data")]) == 0
     folder = min((tmp_path / "data" / "flockscope-demo").iterdir())

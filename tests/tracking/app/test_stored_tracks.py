@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from scenarios.errors import InputError
-from sim.hashing import file_hash
+from scenarios.errors import InputError, WorkError
 from sim.io.files.atomic import lock_folder
 from sim.io.source import open_source
-from sim.io.store import seal
 from sim.io.store.run_seal import read_run
 from sim.io.store.validate import validate
+from sim.types import Sequence
 from tests.refusals import refused
-from tests.sealing import seal_again
+from tests.short_scene import write_short_scene
 from tracking.app.cli import run
+from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.running.run import track
 
 SCENE = """
@@ -138,15 +139,6 @@ def recording(folder: Path, rows: str) -> Path:
     return folder
 
 
-def test_another_recording_of_that_name(tmp_path, capsys):
-    one, two = (recording(tmp_path / k / "walk", rows) for k, rows in (("1", ROWS), ("2", ROWS.replace("12,", "13,"))))
-    options = ["--detections", "truth", "--fps", "5", "--out"]
-    assert run(["track", "blob", str(one), *options, str(tmp_path / "t")]) == 0
-    assert run(["score", str(one), str(tmp_path / "t"), "--fps", "5"]) == 0
-    assert run(["score", str(one), str(tmp_path / "t"), "--fps", "5", "--px-per-m", "30"]) == 0
-    assert "tracks of another walk" in refused(capsys, "score", two, tmp_path / "t", "--fps", "5")
-
-
 def test_python_stores_what_was_tracked(tmp_path, capsys):
     """The same run.json as the command's, so that tracks of another recording are refused."""
     walk = recording(tmp_path / "walk", ROWS)
@@ -162,15 +154,6 @@ def test_python_stores_what_was_tracked(tmp_path, capsys):
     assert "tracks of another walk" in refused(capsys, "score", walk, tmp_path / "t", "--fps", "5")
 
 
-def test_score_hashes_each_file_once(made, capsys, monkeypatch):
-    hashed = []
-    monkeypatch.setattr(seal, "_hash_of", lambda path: hashed.append(path) or file_hash(path.read_bytes()))
-    assert run(["score", str(made / "data"), str(made / "blob")]) == 0
-    capsys.readouterr()
-    files = [path for path in hashed if path.is_relative_to(made / "blob")]
-    assert sorted(files) == sorted(p for p in (made / "blob").rglob("*.*") if p.name != "run.json")
-
-
 def test_what_was_tracked_before_anybody_labelled_it(tmp_path):
     """Tracks of a recording without labels are scored with labels of that name."""
     walk = tmp_path / "walk"
@@ -181,31 +164,6 @@ def test_what_was_tracked_before_anybody_labelled_it(tmp_path):
     assert json.loads((tmp_path / "t" / "run.json").read_text())["truth_hash"] is None
     recording(walk, ROWS)
     assert run(["score", str(walk), str(tmp_path / "t"), "--fps", "5"]) == 0
-
-
-def test_labels_that_cannot_be_read_stop_track_before_the_first_frame(tmp_path, capsys):
-    walk = recording(tmp_path / "walk", ROWS + "3,1,x,10,20,40,1,1,1\n")
-    (walk / "seqinfo.ini").write_text("[Sequence]\nseqLength=8\nframeRate=5\n")
-    (walk / "det").mkdir()
-    (walk / "det" / "det.txt").write_text("1,-1,10,10,20,40,1\n")
-    text = refused(capsys, "track", "blob", walk, "--px-per-m", "24", "--out", tmp_path / "t")
-    assert "gt.txt: line 17" in text
-    assert not (tmp_path / "t").exists()
-
-
-def test_a_text_of_others_is_what_it_was(made, tmp_path, capsys):
-    """A folder of texts, one text, and a folder with a tracks.txt alone; none has a run.json."""
-    texts = tmp_path / "texts"
-    texts.mkdir()
-    for folder in (made / "blob").iterdir():
-        shutil.copy(folder / "tracks.mot.txt", texts / f"{folder.name}.txt")
-        (tmp_path / "folders" / folder.name).mkdir(parents=True)
-        shutil.copy(folder / "tracks.txt", tmp_path / "folders" / folder.name / "tracks.txt")
-    assert run(["score", str(made / "data"), str(texts)]) == 0
-    assert run(["score", str(made / "data"), str(tmp_path / "folders")]) == 0
-    (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())
-    assert run(["score", str(one), str(texts / "scene-s40001.txt")]) == 0
-    capsys.readouterr()
 
 
 def test_validate_says_whether_a_run_is_whole(made, tracks, capsys):
@@ -224,23 +182,8 @@ def test_validate_says_whether_a_run_is_whole(made, tracks, capsys):
     assert run(["validate", str(made)]) in (0, 1)  # data and tracks together
 
 
-def test_a_sealed_fault_is_named_with_its_frame(made, tracks, tmp_path, capsys, monkeypatch):
-    """NaN in a table with right hashes, as a broken writer could make it."""
-    from sim.io.store.track_files import read_tracks, write_tracks
-
-    folder = tracks / "scene-s40000"
-    info = json.loads((folder / "run.json").read_text())
-    wrong = [t.replace(pos=t.pos * (np.nan if t.index == 7 else 1.0)) for t in read_tracks(folder)]
-    with monkeypatch.context() as patch:
-        patch.setattr("sim.io.store.track_tables.RunRows.reject_faults", lambda *_: None)
-        write_tracks(folder, wrong, fps=5.0, info=info)
-    seal_again(folder)
-    assert "tracks.parquet: frame 7, id " in refused(capsys, "score", made / "data", tracks)
-
-
 def test_one_run_at_a_time_writes_to_a_folder(made, tmp_path, capsys):
     """The second command fails at once; a writer in Python fails, too, and inside the command it does not."""
-    pytest.importorskip("fcntl")
     (source,) = (made / "data").rglob("*-s40000")
     with lock_folder(tmp_path / "out"):
         line = ["track", "blob", str(source), "--detections", "file", "--out", str(tmp_path / "out")]
@@ -256,26 +199,6 @@ def test_one_run_at_a_time_writes_to_a_folder(made, tmp_path, capsys):
     assert run(line) == 0
 
 
-def test_writers_of_one_folder_leave_a_whole_run(made, tmp_path):
-    """Each writer ends with success or with one clear error, and those with success leave a run."""
-    pytest.importorskip("fcntl")
-    (sequence,) = open_source(next((made / "data").rglob("*-s40000")))
-    tracked = track("blob", sequence, detections="file")
-
-    def write(_):
-        try:
-            tracked.write(tmp_path / "out", sequence)
-        except InputError as error:
-            return str(error).partition(": ")[2].partition(";")[0]
-        return "done"
-
-    with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(write, range(60)))
-    assert set(found) <= {"got another run that writes here", "done"}
-    assert "done" in found
-    assert validate(tmp_path / "out") == []
-
-
 @pytest.mark.parametrize("below", ["", "tracks"])
 def test_tracks_are_not_written_into_a_stored_sequence(made, tmp_path, capsys, below):
     data = Path(shutil.copytree(made / "data", tmp_path / "data"))
@@ -288,22 +211,55 @@ def test_tracks_are_not_written_into_a_stored_sequence(made, tmp_path, capsys, b
     assert sorted(data.rglob("*")) == before
 
 
-def test_side_files_are_no_tracks(made, tmp_path, capsys):
-    (tmp_path / "texts").mkdir()
-    name = next((made / "blob").iterdir()).name
-    shutil.copy(made / "blob" / name / "tracks.mot.txt", tmp_path / "texts" / f"{name}.txt")
-    (tmp_path / "texts" / f"._{name}.txt").write_bytes(b"\0\5\x16\7")
-    (source,) = (made / "data").rglob(name)
-    assert run(["score", str(source), str(tmp_path / "texts")]) == 0
+@pytest.fixture(scope="module")
+def data(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("workers")
+    write_short_scene(folder, "0:4")
+    return folder / "data"
 
 
-def test_a_renamed_folder_is_named_as_the_cause(tmp_path, capsys):
-    """seqinfo.ini still has the name of before; tracks have that of the folder."""
-    ini = recording(tmp_path / "data" / "cam1", "1,1,5,5,10,20,1,1,1\n2,1,6,5,10,20,1,1,1\n") / "seqinfo.ini"
-    ini.write_text("[Sequence]\nname=video_1\nframeRate=25\nseqLength=2\n")
-    (tmp_path / "results").mkdir()
-    for name in ("cam1", "cam2"):
-        (tmp_path / "results" / f"{name}.txt").write_text("1,1,5,5,10,20,1,-1,-1,-1\n")
-    line = refused(capsys, "score", tmp_path / "data", tmp_path / "results")
-    assert "got tracks of cam1, cam2; expected tracks of video_1" in line
-    assert f"name=video_1 in {ini} is another than its folder's, cam1: correct it" in line
+def named(sequence: Sequence, job: str) -> str:
+    warnings.warn(f"{sequence.name} warns", stacklevel=2)
+    if job == "fail":
+        raise InputError(got=sequence.name, expected="a", remedy="b")
+    if job == "die":
+        os._exit(3)
+    return f"{job} on {sequence.name}"
+
+
+def outcome(data: Path, jobs: list[str], workers: int) -> tuple[list[str], list[str], str]:
+    """Results, warnings and error."""
+    source, found, error = OpenedAs(data), list[str](), ""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            for one in over_sequences(named, source.open(), jobs, source, workers):
+                found.append(one)
+        except (InputError, WorkError) as failure:
+            error = failure.line()
+    return found, [str(w.message) for w in caught], error
+
+
+@pytest.mark.parametrize("jobs", [["a", "b", "c", "d"], ["a", "b", "fail", "d"]])
+def test_two_workers_are_one(data: Path, jobs: list[str]) -> None:
+    alone, both = (outcome(data, jobs, n) for n in (1, 2))
+    assert alone == both
+    assert alone[0][:2] == ["a on scene-s00000", "b on scene-s00001"]
+
+
+def test_a_sequence_that_kills_its_worker_is_named(data: Path) -> None:
+    found, _, error = outcome(data, ["a", "die", "c", "d"], 2)
+    assert found == ["a on scene-s00000"]
+    assert error.startswith("scene-s00001: got an item that killed 3 workers")
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_the_files_of_track_are_the_same(data: Path, tmp_path: Path) -> None:
+    tracker = f"{Path(__file__).resolve().parents[2] / 'fake_tracker.py'}:Nearest"
+    for n in "12":
+        assert run(["track", tracker, str(data), "--workers", n, "--out", str(tmp_path / n)]) == 0
+    files = [p.relative_to(tmp_path / "1") for p in sorted((tmp_path / "1").rglob("*")) if p.is_file()]
+    assert len(files) > 4 * 4
+    for file in files:
+        if file.name != "run.json":  # it holds speeds
+            assert (tmp_path / "1" / file).read_bytes() == (tmp_path / "2" / file).read_bytes(), file

@@ -75,21 +75,6 @@ def test_a_key_given_twice_is_refused(line: str, tmp_path: Path, capsys, monkeyp
     assert f"error: --set {key}: got it twice: {values};" in capsys.readouterr().err
 
 
-def test_a_setting_may_replace_one_of_the_profile(tmp_path: Path, capsys) -> None:
-    """--sensor is a file of keys; --set is stronger."""
-    write_short_scene(tmp_path, "0:1")
-    profile = tmp_path / "sensor.toml"
-    profile.write_text("[sensor]\nclutter_rate = 1.5\nnoise_m = 3\n")
-    options = ["--sensor", str(profile), "--set", "sensor.clutter_rate=0.5", "--streams", "none"]
-    line = ["generate", str(tmp_path / "scene.toml"), "--seeds", "7", "--out", str(tmp_path / "data"), *options]
-    assert run(line) == 0
-    text = next((tmp_path / "data").glob("*/*-s00007/scenario.toml"))
-    assert "clutter_rate = 0.5" in text.read_text()
-    assert "noise_m = 3" in text.read_text()
-    tracked = ["track", "blob", str(tmp_path / "data"), "--out", str(tmp_path / "run"), "--detections", "truth"]
-    assert run([*tracked, *options[:4]]) == 0, capsys.readouterr().err
-
-
 NUMBERS = {
     "generate cross --out x --seeds {}": ("--seeds", "1_0", "1:3"),
     "generate cross --out x --seeds 1 --workers {}": ("--workers", "1_0"),
@@ -117,3 +102,47 @@ def test_a_number_is_written_in_digits_0_to_9(line: str, text: str, tmp_path: Pa
 def test_a_number_of_a_setting_is_written_in_digits_0_to_9(text: str, capsys) -> None:
     assert run(["track", "blob", "x", "--out", "y", "--set", f"gate={text}"]) == 2
     assert f"got '{text}'" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scene, a dataset of it with two sequences and without pictures, and a run on it."""
+    folder = tmp_path_factory.mktemp("mistakes")
+    write_short_scene(folder, "0:2")
+    assert run(["track", "blob", str(folder / "data"), "--out", str(folder / "run")]) == 0
+    return folder
+
+
+MISTAKES = {
+    "score {0}/data {0}/data": (
+        "{0}/data: got a generated dataset, no tracks;", "give the --out of `flockscope track`",
+    ),
+    "score {0}/data {0}/data/flockscope-train": ("got a generated dataset, no tracks;",),
+    "score {0}/data {0}/data/flockscope-train/scene-s00000": ("got a generated dataset, no tracks;",),
+    "score {0}/data {0}/run {0}/data": ("got a generated dataset, no tracks;",),
+    "score {0}/run {0}/data": ("{0}/run: got tracks, what `flockscope track` wrote;", "swap the arguments"),
+    "score {0}/run/scene-s00000 {0}/data": ("scene-s00000: got tracks, what", "swap the arguments"),
+    "view {0}/run {0}/data --out {0}/x": ("{0}/run: got tracks, what", "swap the arguments"),
+    "score {0}/data {0}/scene.toml": ("{0}/scene.toml: got a .toml file, no tracks;", "made by `flockscope track`"),
+    "track blob {0}/data --detections image --out {0}/x": (
+        "and scene-s00000 with detections, truth, without pictures; expected a sequence with pictures;",
+        "try --detections file",
+    ),
+    "track blob {0}/data --camera {0}/scene.toml --out {0}/x": (
+        "{0}/scene.toml: --camera: got a TOML file; expected a camera.json", "describes a view",
+    ),
+    "generate crossing --seeds 0": ("flockscope generate: got missing option '--out'; expected --out DIR: ",),
+    "track blob": ("flockscope track: got missing argument 'SOURCE'; expected SOURCE: ",),
+    "score {0}/data {0}/run {0}/run": ("TRACKS: got", "twice; expected each run once",),
+    "score {0}/data {0}/run {0}/run/scene-s00000 --by HOTAA": ("--by: got HOTAA", "such as HOTA"),
+    "score {0}/data {0}/run none.py:Mine": ("none.py",),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("line", MISTAKES)
+def test_a_mistaken_argument_is_named(line: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([word.format(place) for word in line.split()]) == 2
+    shown = capsys.readouterr().err
+    assert shown.count("\n") == 1
+    for words in MISTAKES[line]:
+        assert words.format(place) in shown, shown

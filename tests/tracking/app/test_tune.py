@@ -18,14 +18,6 @@ def line(tmp_path) -> list[str]:
     return ["tune", TOY, "--suite", one, "--check", two, *seeds, *goal, "--out", str(tmp_path / "new" / "toy.toml")]
 
 
-def changed(line: list[str], option: str, value: str) -> list[str]:
-    """The line with another value of an option, or with one more of an option that is not in it or can be repeated."""
-    if option not in line or option in ("--set", "--suite", "--objective"):
-        return [*line, option, value]
-    at = line.index(option) + 1
-    return [*line[:at], value, *line[at + 1 :]]
-
-
 def test_it_says_what_was_gained(line, tmp_path, capsys):
     assert run(line) == 0
     printed = capsys.readouterr()
@@ -52,50 +44,3 @@ def test_the_same_again_as_one_object_with_more_trials(line, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["counts"]["trials"] == 13
     assert run(["track", TOY, "tests/nothing", "--params", str(tmp_path / "new" / "toy.toml"), "--out", "x"]) == 2
     assert "tests/nothing" in capsys.readouterr().err
-
-
-def test_settings_of_scenes_detector_and_tracker(line, tmp_path, capsys):
-    (tmp_path / "sensor.toml").write_text("[sensor]\ndetect_prob = 0.9\n")
-    more = ["--set", "scenario.duration=3", "--set", "skip=1", "--sensor", str(tmp_path / "sensor.toml")]
-    assert run([*changed(line, "--check", "none"), *more, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert set(told["settings"]["set"]) == {"sensor.detect_prob=0.9", "duration=3"}
-    assert told["params"]["skip"] == 1
-    assert told["settings"]["check"] is None
-
-
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        (["--seeds", "0-5"], "--seeds: got '0-5'"),
-        (["--validation", "x"], "--validation: got 'x'"),
-        (["--test", "0:5"], "--test: got 0:5; expected test seeds"),
-        (["--trials", "none"], "invalid value for '--trials'"),
-        (["--objective", "HOTTA"], "did you mean HOTA?"),
-        (["--only", "reach,skipp"], "did you mean skip?"),
-        (["--set", "reech=1"], "did you mean reach?"),
-        (["--set", "weather.sun=1"], "weather.sun"),
-        (["--suite", "no-such"], "--suite: got 'no-such'"),
-        (["--prune", "2"], "--prune: got 2.0"),
-        (["--workers", "0"], "invalid value for '--workers'"),
-        (["--storage", "nonsense://x"], "--storage"),
-        (["--detections", "image"], "--detections"),
-        (["--sensor", "no-such.toml"], "no-such.toml"),
-        (["--out", "toy.json"], "--out: got toy.json"),
-    ],
-)
-def test_wrong_options_are_one_line(line, more, words, capsys):
-    assert run(changed(line, *more)) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert len(printed.err.splitlines()) == 1
-    assert words in printed.err
-
-
-def test_another_search_on_the_same_study_is_one_line(line, capsys):
-    assert run(line) == 0
-    capsys.readouterr()
-    assert run([*line, "--seed", "4"]) == 2
-    told = capsys.readouterr().err
-    assert "another search: seed differ" in told
-    assert len(told.splitlines()) == 1

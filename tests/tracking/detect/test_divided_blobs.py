@@ -55,12 +55,6 @@ def test_people_who_cover_each_other_are_as_many_as_are_tracked():
     np.testing.assert_allclose(found, [[48, 100], [60, 100]], atol=3)
 
 
-def test_four_in_a_square():
-    mask = person(50) | person(64) | person(50, 136) | person(64, 136)
-    found = centres(mask, [box(50)])
-    np.testing.assert_allclose(found, [[50, 100], [50, 136], [64, 100], [64, 136]], atol=2)
-
-
 def test_parts_of_people_are_left_out_and_unknown_sizes_are_one_person():
     part = np.zeros((200, 300), bool)
     part[20:28, 20:28] = True

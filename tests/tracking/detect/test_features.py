@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 import pytest
 
-from sim.scene.camera import project
 from sim.scene.stereo import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import FeatureRules, Features, slopes
@@ -86,17 +85,6 @@ def test_a_point_without_disparity_is_not_returned() -> None:
     assert (160 + 246 * u[:, 0] / u[:, 2] > 108).all()
 
 
-def test_slopes_are_those_of_numpy_with_gaps() -> None:
-    r, times = np.random.default_rng(0), np.arange(6) / 10
-    points, known = r.standard_normal((4, 6, 3)), r.uniform(size=(4, 6)) < 0.7
-    known[:, [0, -1]] = True
-    found, spread, _ = slopes(np.where(known[..., None], points, np.nan), known, times)
-    for k in range(4):
-        t = times[known[k]]
-        assert found[k] == pytest.approx(np.polyfit(t, points[k, known[k]], 1)[0])
-        assert spread[k] == pytest.approx(np.square(t - t.mean()).sum())
-
-
 def test_the_stated_covariance_of_a_velocity_is_that_of_its_errors() -> None:
     """At 8 m with the paper's camera and 0.25 px: 1.7 m/s along the line of sight, over 10 frames."""
     from sim.scene.stereo import back_project, point_covariances, project_pair
@@ -126,17 +114,3 @@ def test_a_feature_lies_in_space_where_the_camera_sees_it() -> None:
         found = features.step(image, mask, np.full((240, 320), D, np.float32), RULES)
     nearest = np.linalg.norm(project_pair(camera, found.pos) - spot, axis=1).min()
     assert nearest < 0.1
-
-
-def test_a_disparity_that_is_mostly_noise_is_not_used() -> None:
-    camera = rig(0.0, baseline=0.5)
-    features, mask = Features(camera, FPS), np.zeros((240, 320), bool)
-    mask[60:180, 60:160] = True
-    sd = RULES.deviations[2]
-    disparity = np.full((240, 320), 3.9 * sd, np.float32)
-    disparity[:, :110] = 4.1 * sd
-    for _ in range(10):
-        found = features.step(picture(0.0), mask, disparity, RULES)
-    assert len(found) > 10
-    uv, _ = project(camera, found.pos)
-    assert uv[:, 0].max() < 112

@@ -11,7 +11,7 @@ from tests.painted import TALL
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
-from tracking.detect.foreground import ASSUMED_HEIGHT, Foreground, convex_areas
+from tracking.detect.foreground import ASSUMED_HEIGHT, Foreground
 from tracking.detect.person_size import PersonSize
 
 SCALE, PERSON = TALL / 1.7, (160.0, 180.0, TALL)
@@ -59,18 +59,6 @@ def test_a_picture_with_more_foreground_than_people_can_cover_is_implausible(mon
     assert made(background="trained").segment(picture(PERSON)).plausible
 
 
-def test_protected_places_are_not_learned(monkeypatch):
-    monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)
-    quick = {"background_time": 1.0}
-    kept, learned = made(**quick), made(**quick)
-    everywhere, nowhere = np.ones(kept.shape, bool), np.zeros(kept.shape, bool)
-    for k in range(60):
-        for pipeline, protected in ((kept, everywhere), (learned, nowhere)):
-            pipeline.adapt(pipeline.segment(picture(PERSON, seed=k)), protected)
-    assert len(kept.person_blobs(kept.segment(picture(PERSON)).mask)) == 1
-    assert not learned.segment(picture(PERSON)).mask.any()
-
-
 @pytest.mark.parametrize("unknown", [np.nan, 0.0])
 def test_an_unknown_scale_is_guessed_from_the_images_height(unknown):
     assert made(unknown).scale == painted.HIGH / ASSUMED_HEIGHT
@@ -82,11 +70,3 @@ def test_the_sample_shows_how_large_people_are():
     size = PersonSize(shown)
     Foreground(shown, BackgroundSettings()).learn_person_size(size, shown.background)
     assert size.px_per_m == pytest.approx(SCALE, rel=0.06)
-
-
-def test_convex_areas_are_the_hulls_insides():
-    square = np.array([[10.0, 20], [30, 20], [30, 40], [10, 40], [20, 30]])
-    mask = convex_areas((60, 50), [square, square + np.array([5.0, 0])])
-    assert mask.sum() == 21 * 26
-    assert mask[20:41, 10:36].all()
-    assert not convex_areas((60, 50), []).any()

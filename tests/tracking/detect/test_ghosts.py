@@ -12,7 +12,6 @@ from tests.painted import TALL
 from tracking.detect import ghosts_kernels
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.foreground import Foreground
-from tracking.detect.ghosts import has_left
 
 SCALE, PERSON, OTHER = TALL / 1.7, (160.0, 180.0, TALL), (240.0, 200.0, TALL)
 LOOKS = ["colour", "grey"]
@@ -26,8 +25,7 @@ def picture(people, seed, look="colour"):
 def made(people, look="colour", fps=10.0, **settings):
     sample = np.stack([picture(people, seed, look) for seed in range(20)])
     return Foreground(
-        Context(fps, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample),
-        BackgroundSettings(**settings),
+        Context(fps, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample), BackgroundSettings(**settings)
     )
 
 
@@ -63,12 +61,6 @@ def test_who_comes_and_stands_is_not_absorbed(fps, look):
     assert np.array_equal(pipeline.model.mean, never.model.mean)
 
 
-def test_a_ghost_goes_while_another_person_stands():
-    found = watch(made([PERSON]), [OTHER], 3.0)
-    assert len(found) == 1
-    assert found.ellipse[0, 0] == pytest.approx(OTHER[0], abs=5)
-
-
 def test_a_ghost_that_a_track_protects_goes_too():
     """A ghost has a confirmed track, as it never moves."""
     pipeline = made([PERSON])
@@ -82,22 +74,6 @@ def test_a_queue_that_stands_for_a_minute_beside_a_ghost_is_kept():
     people = np.any([painted.shape(person) for person in queue], axis=0)
     assert (found.label[people] > 0).mean() > 0.95
     assert not found.label[painted.shape(PERSON) & ~people].any()
-
-
-def test_a_ghost_waits_until_its_edge_is_free():
-    """Somebody stands in front of the ghost: its edge is theirs."""
-    x, foot, h = PERSON
-    larger = (x, foot + 8, 1.3 * h)
-    assert len(watch(made([PERSON]), [larger], 3.0)) == 1
-
-
-def test_a_part_of_a_larger_region_is_no_ghost():
-    """The free half of its edge happens to lie on a step of the ground."""
-    columns = np.broadcast_to(np.arange(40), (20, 40))
-    model = np.where(columns < 10, 100, 200).astype(np.float32)[None].repeat(3, 0)
-    region, mask = (columns >= 10) & (columns < 20), (columns >= 10) & (columns < 30)
-    assert not has_left(region, mask, model, np.full_like(model, 100.0), 2)
-    assert has_left(region, region, model, np.full_like(model, 100.0), 2)
 
 
 def test_the_kernel_equals_its_twin():

@@ -8,8 +8,8 @@ import pytest
 from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Context
 from tracking.detect import typical_person
-from tracking.detect.person_size import ENOUGH, SMALLEST, PersonSize
-from tracking.papers.group_pda import from_pixels
+from tracking.detect.person_size import ENOUGH, PersonSize
+from tracking.detect.person_size_kernels import look_up
 
 BARE = Context(10.0, float("nan"), image_size=(480, 360))
 
@@ -62,22 +62,6 @@ def test_people_wider_or_narrower_than_the_typical_one_are_learned_with_a_camera
     assert size.at(foot)[:, 1] == pytest.approx(right, rel=0.1)
 
 
-def test_the_simulators_body_is_not_the_trackers(monkeypatch):
-    """The shares of the drawn body change nothing that a tracker expects."""
-    context = Context(10.0, 60.0, camera=camera(0.4), image_size=(480, 360))
-    foot = np.array([[240.0, 300.0]])
-    before, of_groups = PersonSize(context).at(foot), from_pixels._person(camera(0.4), 60.0)
-    monkeypatch.setattr("sim.scene.body.SHOULDER_SHARE", 0.5)
-    monkeypatch.setattr("sim.scene.body.DEPTH_SHARE", 0.5)
-    assert PersonSize(context).at(foot) == pytest.approx(before)
-    assert from_pixels._person(camera(0.4), 60.0) == pytest.approx(of_groups)
-
-
-def test_nobody_stands_in_the_sky():
-    size = PersonSize(Context(10.0, 60.0, camera=camera(0.1), image_size=(480, 360)))
-    assert np.isnan(size.at(np.array([[240.0, 20.0]]))).all()
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_the_line_is_found_among_groups_and_pieces(seed):
     r = np.random.default_rng(seed)
@@ -89,15 +73,6 @@ def test_the_line_is_found_among_groups_and_pieces(seed):
     assert size.reliable
     foot = np.array([[240.0, 120.0], [240.0, 320.0]])
     assert size.at(foot)[:, 0] == pytest.approx(15 + 0.2 * foot[:, 1], rel=0.08)
-
-
-def test_who_stands_still_counts_once():
-    r = np.random.default_rng(0)
-    box, stands = blobs(r, 60), np.tile([[200.0, 160.0, 20.0, 32.0]], (150, 1))
-    size = PersonSize(BARE)
-    every = np.concatenate([box, stands])
-    size.learn(every, ellipses(every), np.ones(len(every), bool))
-    assert size.at(np.array([[210.0, 192.0]]))[0, 0] == pytest.approx(15 + 0.2 * 192, rel=0.08)
 
 
 def test_few_or_wild_blobs_are_not_relied_on():
@@ -116,21 +91,20 @@ def test_few_or_wild_blobs_are_not_relied_on():
     assert not size.reliable
 
 
-def test_people_too_small_to_see_are_nobody():
-    r, size = np.random.default_rng(0), PersonSize(BARE)
-    box = blobs(r, 80, level=-20.0, slope=0.3)
-    size.learn(box, ellipses(box), np.ones(80, bool))
-    assert np.isnan(size.at(np.array([[240.0, (SMALLEST + 17) / 0.3]]))).all()
-    assert size.px_per_m == pytest.approx(np.median(box[:, 3]) / 1.7, rel=0.1)
+def slow(table, at):
+    """Bilinear values, all points at once."""
+    at = np.clip(np.nan_to_num(at), 0.0, np.array(table.shape[:0:-1]) - 1.001)
+    (u, v), (a, b) = at.astype(int).T, (at - np.floor(at)).T
+    low = table[:, v, u] * (1 - a) + table[:, v, u + 1] * a
+    high = table[:, v + 1, u] * (1 - a) + table[:, v + 1, u + 1] * a
+    return (low * (1 - b) + high * b).T
 
 
-def test_specks_are_nobody_where_a_camera_says_how_high_people_are():
-    """Hundreds of specks a fifth as high, as narrow as people: compression flickers."""
-    r, seen = np.random.default_rng(0), camera(0.5)
-    context = Context(10.0, 40.0, camera=seen, image_size=seen.image)
-    size, alike = PersonSize(context), PersonSize(context)
-    foot = np.column_stack([r.uniform(60, 420, 400), r.uniform(200, 340, 400)])
-    h, w = size.at(foot).T * 0.25
-    specks = np.column_stack([foot[:, 0] - w / 2, foot[:, 1] - h, w, h])
-    size.learn(specks, ellipses(specks), np.ones(400, bool))
-    assert size.at(foot) == pytest.approx(alike.at(foot))
+@pytest.mark.parametrize("n", [0, 1, 50])
+def test_values_between_nodes_are_the_slow_way(n):
+    r = np.random.default_rng(n)
+    table = r.random((2, 6, 8))
+    table[:, 0] = np.nan
+    at = r.uniform(-3, 11, (n, 2))
+    at[: n // 10, 0], at[n // 5 : n // 4] = np.nan, (np.inf, -np.inf)
+    assert np.array_equal(look_up(table, at), slow(table, at), equal_nan=True)

@@ -79,24 +79,6 @@ def test_what_another_hides_from_the_right_camera_has_no_disparity() -> None:
     assert np.isfinite(found[30:90, 93:96]).mean() < 0.2
 
 
-def test_what_is_compared_are_the_rows_that_blocks_touch() -> None:
-    left, right = pair(5.3)
-    stereo, mask = SubtractionStereo(14.0, 9), three_regions()
-    tall = (15 * (40 + 8)) + (12 * (40 + 8)) + (20 * (40 + 8)) - 7 * 28
-    assert stereo.match(left, right, mask).evaluated == 16 * tall
-    assert stereo.match(left, right, np.ones_like(mask)).evaluated == 16 * HIGH * (WIDE - 15 - 8)
-    nothing = stereo.match(left, right, np.zeros_like(mask))
-    assert nothing.evaluated == 0
-    assert np.isnan(nothing.disparity).all()
-
-
-@pytest.mark.parametrize("size", [(3, 200), (120, 20), (9, 24)])
-def test_pictures_without_room_for_a_block_have_no_disparities(size: tuple[int, int]) -> None:
-    left, right = (image[: size[0], : size[1]].copy() for image in pair(5.3))
-    found = SubtractionStereo(14.0, 9).match(left, right, np.ones(size, bool)).disparity
-    assert np.isfinite(found).sum() <= (1 if size == (9, 24) else 0)
-
-
 def test_the_disparity_at_a_point_is_the_median_of_what_is_known() -> None:
     d = np.full((10, 10), np.nan, np.float32)
     d[4, 4:7] = [2.0, 8.0, 3.0]

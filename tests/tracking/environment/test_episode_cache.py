@@ -2,14 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-import weakref
-
-import numpy as np
-import pytest
-
-from scenarios.errors import InputError
-from tracking.environment.episode_cache import SourceCache, array_bytes
+from tracking.environment.episode_cache import SourceCache
 from tracking.environment.episodes import play, sources
 
 SOURCES = sources("cross", range(4), ["camera.fps=5", "duration=4"])
@@ -37,53 +30,3 @@ def test_it_is_bounded_and_drops_what_was_used_longest_ago():
         play("blob", source, cache=cache)
         assert cache.bytes <= cache.limit * 2
     assert before <= len(cache) < 4
-
-
-def test_without_room_only_the_last_stays():
-    cache = SourceCache(0)
-    for source in SOURCES:
-        play("blob", source, cache=cache)
-    assert len(cache) == 1
-    with pytest.raises(InputError, match="bytes"):
-        SourceCache(-1)
-
-
-def test_bytes_of_arrays():
-    a, b = np.zeros(1000), np.zeros(10)
-    assert array_bytes([a, (a[:5], {"b": b}), a.reshape(2, 500)]) == 8080
-
-    def closes_over():
-        return b
-
-    assert array_bytes(closes_over) == 80
-
-
-def test_bytes_of_a_held_source_are_those_of_motion_truth_and_detections():
-    cache = SourceCache()
-    held = cache.open(SOURCES[0])
-    motion = sum(a.nbytes for a in (held.truth.pos, held.truth.vel))
-    before = cache.bytes
-    play("blob", SOURCES[0], cache=cache)
-    assert motion < before < cache.bytes < 2_000_000
-
-
-def test_the_sample_of_the_background_counts():
-    small = sources("cross", [1], ["camera.fps=5", "duration=1", "camera.image=[80,60]"])[0]
-    cache = SourceCache()
-    play("group-pda", small, detections="image", cache=cache)
-    assert cache.bytes > 50 * 80 * 60 * 3
-    before = cache.open(small, ("left", "background")).sequence.background()
-    assert before is cache.open(small, ("left", "background")).sequence.background()
-
-
-def test_what_is_dropped_is_gone():
-
-    cache = SourceCache(0)
-    gc.disable()
-    try:
-        first = weakref.ref(cache.open(SOURCES[0]))
-        play("blob", SOURCES[0], cache=cache)
-        play("blob", SOURCES[1], cache=cache)
-        assert first() is None
-    finally:
-        gc.enable()

@@ -4,28 +4,18 @@ from __future__ import annotations
 
 import pickle
 
-import numpy as np
 import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
-from sim.dataset.generate import generate
 from sim.sequence import simulate
-from tracking.environment.episode_source import Source, sources
+from tracking.environment.episode_source import sources
 
 
 def test_a_suite_with_seeds_in_order():
     found = sources("quick", [4, 5])
     assert [(s.name, s.seed) for s in found][:3] == [("merge", 4), ("merge", 5), ("split", 4)]
     assert all(s.simulated for s in found)
-
-
-def test_settings_reach_the_scenario():
-    (source,) = sources("cross", [3], ["camera.fps=5", "duration=4"])
-    sequence = source.open()
-    assert (sequence.fps, sequence.length) == (5.0, 20)
-    same = simulate(load("cross", ["camera.fps=5", "duration=4"]), 3, 0, ())
-    assert np.array_equal(same.truth.pos, sequence.truth.pos)
 
 
 def test_they_are_small_and_travel():
@@ -36,14 +26,6 @@ def test_they_are_small_and_travel():
     assert again.key == source.key
     assert again.key != sources("cross", [4])[0].key
     assert again.key != sources("cross", [3], ["duration=5"])[0].key
-
-
-def test_stored_sequences_are_paths(tmp_path):
-    generate(["cross"], range(7, 9), tmp_path, set=["camera.fps=5", "duration=4"], streams=())
-    found = sources(tmp_path)
-    assert [(s.name, s.seed, s.simulated) for s in found] == [("cross-s00007", 7, False), ("cross-s00008", 8, False)]
-    assert pickle.loads(pickle.dumps(found[1])).open().name == "cross-s00008"
-    assert sources(found[1].path)[0].key == found[1].key
 
 
 def test_sequences_in_memory_and_lists():
@@ -71,7 +53,3 @@ def test_settings_without_a_scenario_are_refused():
     sequence = simulate(load("cross", ["duration=4"]), 3, 0, ())
     with pytest.raises(InputError, match="leave the settings out"):
         sources(sequence, set=["camera.fps=5"])
-
-
-def test_a_source_says_its_name():
-    assert "cross" in repr(Source("cross", 3))

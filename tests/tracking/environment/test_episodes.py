@@ -47,27 +47,8 @@ def test_the_objective_of_a_beginning(name, cache):
     assert rollout.episode().objective == play(name, CROSS, cache=cache).objective
 
 
-def test_parameters_reach_the_tracker(cache):
-    plain = play("blob", CROSS, cache=cache)
-    late = play("blob", CROSS, {"report_delay": 4.0, "report_coast": 0.0}, cache=cache)
-    assert late.objective < plain.objective
-    assert late.seconds_tracking > 0
-    assert late.seconds_scoring > 0
-
-
-def test_a_source_in_memory_and_one_that_travels_agree(cache):
-    inside = sources(simulate(load("cross", SHORT), 3, 0, ()))[0]
-    assert play("blob", inside, cache=cache).objective == play("blob", CROSS, cache=cache).objective
-
-
 def test_no_labels_no_episode():
     sequence = simulate(load("cross", SHORT), 3, 0, ())
     bare = sources(type(sequence)(**{**sequence.__dict__, "load_truth": None, "has_detections": True}))[0]
     with pytest.raises(InputError, match="nothing to score by"):
         play("blob", bare)
-
-
-def test_which_pictures_are_drawn():
-    assert streams_for("blob", None) == ()
-    assert streams_for("group-pda", "truth") == ()
-    assert streams_for("blob", "image") == ("left", "background")

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.types import Detections, Frame, GroupEvent, Groups, Tracks
+from sim.types import Detections, Frame, Tracks
 from tracking.environment import observation
-from tracking.environment.observation import NAMES, STATISTICS, Observer, Statistic, squashed
-from tracking.environment.observation_window import track_rows
+from tracking.environment.observation import NAMES, STATISTICS, Observer
 
 FPS = 10.0
 
@@ -81,15 +80,6 @@ def test_what_is_off_is_measured():
     assert seen["births"] == seen["deaths"] == 0
 
 
-def test_births_and_deaths_across_a_decision():
-    observer = Observer(FPS)
-    looked([(frame(1), tracks(1, walk(1, 3), ids=[4, 5, 6]))], observer=observer)
-    seen = looked([(frame(k), tracks(k, walk(k, 2), ids=[5, 7])) for k in (2, 3)], observer=observer)
-    assert seen["deaths"] == pytest.approx(2 / 0.2)
-    assert seen["births"] == pytest.approx(1 / 0.2)
-    assert seen["age"] == pytest.approx(0.15)  # median of 0.2 (5) and 0.1 (7)
-
-
 def test_in_the_image_lengths_are_metres_and_unknown_without_a_scale():
     places = [[100, 100], [300, 100]]
     pairs = [(frame(k, places, "image"), tracks(k, places, (100, 0), plane="image")) for k in (1, 2)]
@@ -99,60 +89,6 @@ def test_in_the_image_lengths_are_metres_and_unknown_without_a_scale():
     assert seen["innovation"] == pytest.approx(0.2)
     assert blind["speed"] == blind["crowding"] == blind["innovation"] == 0
     assert blind["tracks"] == blind["detections"] == pytest.approx(2)
-
-
-def test_groups_that_the_tracker_names():
-    grouped = tracks(1, walk(1, 4), group=[3, 3, -1, -1])
-    event = GroupEvent("merge", 1, 1, 1, (-1, -1), (3,), (0, 1), (0.0, 0.0))
-    seen = looked([(frame(1), grouped.replace(events=(event,)))])
-    assert (seen["grouped"], seen["group_size"]) == (0.5, pytest.approx(2))
-    assert seen["merges"] == pytest.approx(600)
-    assert seen["splits"] == 0
-
-
-@pytest.mark.parametrize("scale", [1.0, 50.0])
-def test_reach_of_whole_groups_is_in_metres(scale):
-    two, none = np.array([[0.0, 0.0], [9.0, 0.0]]) * scale, (np.zeros(0, np.int64),) * 2
-    extent, hull = np.tile(np.eye(2) * 0.25 * scale**2, (2, 1, 1)), (np.zeros((0, 2)),) * 2
-    groups = Groups(np.arange(2), none, two, two * 0, extent, np.array([3.0, 1.0]), hull)
-    made = tracks(1, two.tolist(), (0, 0), group=[0, 1], groups=groups).replace(unit="group")
-    assert track_rows([made], scale).reach == pytest.approx([2.0, 2.0])
-
-
-def test_groups_as_wholes_reach_as_far_as_they_are_wide():
-    places, size, extent = [[0.0, 0.0], [9.0, 0.0]], np.array([3.0, 1.0]), np.tile(np.eye(2) * 0.25, (2, 1, 1))
-    two, hull = np.array(places), (np.zeros((0, 2)),) * 2
-    shapes = Groups(np.arange(2), (np.zeros(0, np.int64),) * 2, two, two * 0, extent, size, hull)
-
-    def answer(index):
-        made = tracks(index, places, (0, 0), group=[0, 1], groups=shapes)
-        return made.replace(unit="group")
-
-    found = [[1.8, 0], [-1.8, 0], [9, 2.2]]
-    seen = looked([(frame(1), answer(1)), (frame(2, found), answer(2))])
-    assert (seen["grouped"], seen["group_size"]) == (0.5, pytest.approx(2))
-    assert seen["orphans"] == pytest.approx(1 / 3)
-    assert seen["innovation"] == pytest.approx(0, abs=1e-9)
-    assert seen["missed"] == 0.5
-
-
-def test_pictures():
-    pairs = [
-        (Frame(k, k / FPS, np.full((32, 48, 3), 51 * k, np.uint8)), tracks(k, walk(k), plane="ground")) for k in (1, 2)
-    ]
-    seen = looked(pairs)
-    assert seen["brightness"] == pytest.approx(0.4)
-    assert seen["lights"] == pytest.approx(1)
-    assert seen["seen"] == seen["detections"] == 0
-
-
-def test_nothing_at_all():
-    observer = Observer(FPS)
-    assert not observer.statistics(float("nan")).any()
-    empty = [(frame(k), tracks(k, [])) for k in (1, 2, 3)]
-    seen = looked(empty)
-    assert {k for k, v in seen.items() if v} == {"time", "seen"}
-    assert not any(v for k, v in looked([], observer=observer).items())
 
 
 def test_bounds_and_kind():
@@ -166,13 +102,6 @@ def test_bounds_and_kind():
             assert seen.dtype == np.float32
             assert seen.shape == (len(STATISTICS),)
             assert ((seen >= 0) & (seen <= 1)).all()
-
-
-def test_squashed():
-    statistic = Statistic("x", 2.0, "m", "")
-    assert [squashed(statistic, v) for v in (0, 2, 6, np.inf, -1)] == [0, 0.5, 0.75, 1, 0]
-    assert squashed(statistic, np.nan) == 0
-    assert [squashed(Statistic("x", None, "", ""), v) for v in (-0.1, 0.5, 1.5)] == [0, 0.5, 1]
 
 
 def test_it_knows_nothing_of_the_truth():

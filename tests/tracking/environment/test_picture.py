@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
-from scenarios.loading.resolve import load
-from sim.sequence import simulate
 from tracking.drawing.canvas import FLOOR, colour
 from tracking.environment.env import TuningEnv
 
@@ -57,25 +53,6 @@ def test_places_are_where_they_belong():
         v = 32 + 240 - (y - size[1] / 2) * scale
         around = picture[max(int(v) - 12, 0) : int(v) + 12, max(int(u) - 12, 0) : int(u) + 12]
         assert of_colour(around, colour(id)) > 5
-
-
-def test_the_picture_itself():
-    made = env(set=[*SHORT, "camera.image=[160,120]"], detections="image")
-    pictures = stepped(made, 1)
-    assert [p.shape for p in pictures] == [(152, 160, 3)] * 2
-    shown = made.rollout.last.image
-    same = (pictures[1][32:] == shown[..., ::-1]).all(axis=2)
-    assert same.mean() > 0.5
-
-
-def test_in_the_image_plane_and_without_a_scene():
-    plain = simulate(load("cross", SHORT), 3, 0, ())
-    flat = dataclasses.replace(plain, camera=None, px_per_m=40.0)
-    assert flat.image_size is not None
-    for sequence in (flat, dataclasses.replace(plain, scene=None)):
-        pictures = stepped(env(sequence, set=(), tracker="blob"), 2)
-        assert all(p.shape == (512, 640, 3) for p in pictures)
-        assert not np.array_equal(pictures[1][32:], pictures[2][32:])
 
 
 def test_without_a_render_mode_there_is_no_picture():

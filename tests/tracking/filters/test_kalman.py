@@ -1,14 +1,13 @@
-"""The bank against filterpy, the asymptote against the Riccati solver, gates against chi2, angles in a circle."""
+"""Kalman filters beside filterpy, the Riccati solver and chi2; pairing beside all pairings."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from filterpy.common import Q_discrete_white_noise
 from scipy.special import chdtri
 
-from tests.reference_tracking import filterpy_bank, riccati_innovation
-from tracking.filters import kalman
+from tests.reference_tracking import best_pairing, filterpy_bank, riccati_innovation
+from tracking.filters import assignment, kalman
 
 
 def make(r, n=5, d=4):
@@ -19,30 +18,7 @@ def make(r, n=5, d=4):
     return dt, sigma, noise, var, rate_var, place
 
 
-def test_process_noise_is_filterpys():
-    q = kalman.white_acceleration(0.3, 2.0)
-    expected = Q_discrete_white_noise(2, 0.3, 4.0)
-    assert np.allclose(q, [expected[0, 0], expected[0, 1], expected[1, 1]], rtol=1e-14)
-
-
-@pytest.mark.parametrize("dt", [0.04, 1 / 7, 0.4])
-def test_constant_velocity_by_hand(dt):
-    """To the last bit: filterpy's factors 0.25 and 0.5 are powers of two."""
-    A, Q = kalman.constant_velocity(dt, 2)
-    expected, block = np.eye(4), np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
-    expected[0, 2] = expected[1, 3] = dt
-    assert np.array_equal(A, expected)
-    assert np.array_equal(Q, np.kron(block, np.eye(2)))
-
-
-@pytest.mark.parametrize("sigma", [0.3, 7.0])
-def test_entries_of_q_by_hand(sigma):
-    for dt in (0.04, 1 / 7, 0.4):
-        expected = [sigma**2 * dt**4 / 4, sigma**2 * dt**3 / 2, sigma**2 * dt**2]
-        assert kalman.white_acceleration(dt, sigma).tolist() == expected
-
-
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(5))
 def test_bank_equals_filterpy_over_random_misses(seed):
     r = np.random.default_rng(seed)
     dt, sigma, noise, var, rate_var, place = make(r)
@@ -95,10 +71,6 @@ def test_asymptote_is_the_riccati_solution_and_the_limit_of_updates(index):
     assert s == pytest.approx(closed, rel=1e-9)
 
 
-def test_asymptote_by_hand():
-    assert kalman.asymptote(1.0, np.array([0.1, 1.0]), 1.0) == pytest.approx([1.5625, 4.0])
-
-
 @pytest.mark.parametrize("p", [0.9, 0.99, 0.999])
 def test_gate_holds_its_share(p):
     r = np.random.default_rng(1)
@@ -107,29 +79,6 @@ def test_gate_holds_its_share(p):
     z = bank[kalman.PLACE] + r.normal(size=(n, 4)) * np.sqrt(bank[kalman.VAR] + noise)
     share = np.mean(kalman.distances(bank, z, noise)[0] <= chdtri(4, 1 - p))
     assert abs(share - p) < 3 * np.sqrt(p * (1 - p) / n)
-
-
-def test_distances_know_no_unit_and_no_origin():
-    r = np.random.default_rng(2)
-    bank, z, noise = kalman.born(r.normal(0, 5, (6, 4)), 0.5, 1.0), r.normal(0, 5, (9, 4)), r.uniform(0.1, 1, 4)
-    d2 = kalman.distances(bank, z, noise)
-    large = bank.copy()
-    large[:, :, 0] *= np.array([10, 10, 100, 100, 100])[:, None]
-    factor = np.array([10.0, 1, 1, 1])
-    assert np.allclose(kalman.distances(large, z * factor, noise * factor**2), d2, rtol=1e-9)
-    moved = bank.copy()
-    moved[kalman.PLACE] += 5000.0
-    assert np.allclose(kalman.distances(moved, z + 5000.0, noise), d2, rtol=1e-9, atol=1e-9)
-    assert np.allclose(kalman.distances(bank, z, np.tile(noise, (9, 1))), d2, rtol=1e-9, atol=1e-9)
-    scaled = bank.copy()
-    scaled[kalman.PLACE] *= 7
-    assert np.allclose(kalman.distances(scaled, z * 7, noise, np.full(6, 7.0)), d2, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize("shape", [(0, 3), (3, 0), (0, 0)])
-def test_distances_of_nothing(shape):
-    n, m = shape
-    assert kalman.distances(np.zeros((5, n, 4)), np.zeros((m, 4)), np.ones(4)).shape == shape
 
 
 @pytest.mark.parametrize("flip", [0.0, np.pi])
@@ -148,8 +97,28 @@ def test_angle_follows_an_ellipse_round(flip):
     assert np.allclose(angle, plain, rtol=0, atol=1e-12)
 
 
-def test_near_circle_has_no_direction():
-    angle = np.array([[0.3], [0.1]])
-    kalman.angle_update(angle, np.array([0]), np.array([1.2]), np.array([np.radians(31.0) ** 2]))
-    assert angle[0, 0] == 0.3
-    assert angle[1, 0] == 0.1
+def test_nearest_takes_each_measurement_to_its_deepest_gate():
+    cost = np.array([[1.0, 4.0, np.inf, np.inf], [2.0, 3.0, np.inf, 0.5]])
+    rows, columns = assignment.nearest(cost)
+    assert rows.tolist() == [0, 1, 1]
+    assert columns.tolist() == [0, 1, 3]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_optimal_is_the_best_of_all_pairings(seed):
+    r = np.random.default_rng(seed)
+    cost = r.uniform(0, 14, (r.integers(1, 5), r.integers(1, 5)))
+    cost[r.random(cost.shape) < 0.5] = np.inf
+    rows, columns = assignment.optimal(cost, 10.0)
+    assert len(set(rows)) == len(rows)
+    assert len(set(columns)) == len(columns)
+    assert (cost[rows, columns] < 10).all()
+    total = cost[rows, columns].sum() + 10 * (len(cost) - len(rows))
+    assert total == pytest.approx(best_pairing(np.minimum(cost, 1e6), 10.0))
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (3, 0), (0, 0), (2, 2)])
+def test_nothing_in_any_gate(shape):
+    cost = np.full(shape, np.inf)
+    for rows, columns in (assignment.nearest(cost), assignment.optimal(cost, 5.0)):
+        assert len(rows) == len(columns) == 0

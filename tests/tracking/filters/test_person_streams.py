@@ -1,14 +1,16 @@
-"""Random numbers of people: what they depend on, and what their distributions are."""
+"""Random numbers of people: what they depend on and their distributions; resampling beside filterpy."""
 
 from __future__ import annotations
 
 import copy
 
+import filterpy.monte_carlo
 import numpy as np
 import pytest
+from filterpy.monte_carlo import resampling
 from scipy import stats
 
-from sim.elementary import normal_quantile
+from tracking.filters.particles import effective_number, residual_resample, systematic_resample_rows
 from tracking.filters.person_streams import NOBODY, PersonStreams, birth_keys
 
 PLACES = np.random.default_rng(0).uniform(-50, 50, (400, 2))
@@ -35,33 +37,6 @@ def test_numbers_differ_by_seed_role_frame_person_and_index():
     assert np.array_equal(copy.deepcopy(later).normals(0, keys, 5, 1), later.normals(0, keys, 5, 1))
 
 
-def test_keys_are_those_of_the_place_to_a_millimetre():
-    keys = birth_keys(PLACES, 3)
-    assert len(np.unique(keys)) == len(keys)
-    assert np.array_equal(birth_keys(PLACES[::-1], 3)[::-1], keys)
-    assert np.array_equal(birth_keys(np.round(PLACES, 3), 3), keys)
-    assert not np.isin(birth_keys(PLACES, 4), keys).any()
-    assert not np.isin(birth_keys(PLACES + np.array([0, 0.001]), 3), keys).any()
-    assert not np.isin(birth_keys(PLACES[:, ::-1], 3), keys).any()
-
-
-def test_people_at_one_place_have_different_keys():
-    twice = birth_keys(np.repeat(PLACES[:3], 2, axis=0), 3)
-    assert len(np.unique(twice)) == 6
-    assert np.array_equal(
-        np.sort(twice)[np.isin(np.sort(twice), birth_keys(PLACES[:3], 3))], np.sort(birth_keys(PLACES[:3], 3))
-    )
-    assert len(birth_keys(np.zeros((0, 2)), 3)) == 0
-
-
-def test_normals_are_the_quantiles_of_uniforms():
-    """The bits of both are the same, but that normals are taken in the middle of a step."""
-    streams, keys = PersonStreams(1), birth_keys(PLACES, 1)
-    u, z = streams.uniforms(0, keys, 500, 2), streams.normals(0, keys, 500, 2)
-    np.testing.assert_allclose(z, normal_quantile(u + 2.0**-53), rtol=1e-12, atol=1e-15)
-    assert np.abs(z).max() > 4.5
-
-
 @pytest.mark.parametrize("of", ["people", "rows", "frames", "roles"])
 def test_the_distributions_and_no_correlation(of):
     """Along each way in which numbers are counted."""
@@ -80,3 +55,47 @@ def test_the_distributions_and_no_correlation(of):
     for lag in (1, 2, 3):
         assert abs(np.corrcoef(z[:-lag], z[lag:])[0, 1]) < 4 / n**0.5
         assert abs(np.corrcoef(z[:-lag] ** 2, z[lag:] ** 2)[0, 1]) < 4 / n**0.5
+
+
+def random_weights(seed, count=40):
+    weights = np.random.default_rng(seed).exponential(size=count) ** 3
+    return weights / weights.sum()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_systematic_is_filterpy(seed, monkeypatch):
+    weights, u = random_weights(seed), np.random.default_rng(seed).random()
+    monkeypatch.setattr(resampling, "random", lambda *_: u)
+    (chosen,) = systematic_resample_rows(weights[None], np.array([u]))
+    assert chosen.tolist() == filterpy.monte_carlo.systematic_resample(weights).tolist()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_residual_takes_filterpys_copies_and_draws_the_rest_by_its_multinomial_scheme(seed, monkeypatch):
+    """filterpy's own remainders are negative, so the rest is compared with its multinomial scheme."""
+    weights, u = random_weights(seed), np.random.default_rng(seed).random(40)
+    copies = np.floor(40 * weights).astype(int)
+    rest = 40 * weights - copies
+    missing = 40 - copies.sum()
+    monkeypatch.setattr(resampling, "random", lambda *_: u[:missing])
+    drawn = filterpy.monte_carlo.multinomial_resample(rest / rest.sum())
+    certain = np.repeat(np.arange(40), copies)
+    assert residual_resample(weights, u).tolist() == sorted([*certain, *drawn])
+
+
+def test_equal_weights_keep_every_particle():
+    weights = np.full(7, 1 / 7)
+    assert residual_resample(weights, np.zeros(7)).tolist() == list(range(7))
+    assert systematic_resample_rows(weights[None], np.array([0.5])).tolist() == [list(range(7))]
+
+
+@pytest.mark.parametrize("u", [0.0, np.nextafter(1, 0)])
+def test_particles_without_weight_are_never_taken(u):
+    weights = np.array([0.0, 0.45, 0.0, 0.55, 0.0])
+    assert set(residual_resample(weights, np.full(5, u)).tolist()) <= {1, 3}
+    assert set(systematic_resample_rows(weights[None], np.array([u]))[0].tolist()) <= {1, 3}
+
+
+def test_effective_number():
+    assert effective_number(np.full(8, 1 / 8)) == pytest.approx(8)
+    assert effective_number(np.array([0.0, 1.0])) == 1

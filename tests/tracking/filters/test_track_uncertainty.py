@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from filterpy.common import Q_discrete_white_noise, kinematic_kf
 
 from scenarios.errors import InputError
 from tracking.filters import kalman, track_uncertainty
@@ -36,34 +33,6 @@ def test_steady_state_in_closed_form():
     assert track_uncertainty.after_misses(MADE, 0) == pytest.approx(1.0, rel=1e-12)
 
 
-def filterpy_rho(pattern):
-    """rho at each prediction of a new track, from one filterpy filter per coordinate; pattern of hits."""
-    filters = []
-    for sigma, noise, rate_var in zip(MADE.sigma, MADE.noise, MADE.birth_rate_var, strict=True):
-        f = kinematic_kf(1, 1, MADE.dt)
-        f.Q, f.R = Q_discrete_white_noise(2, MADE.dt, sigma**2), np.array([[noise]])
-        f.P = np.diag([noise, rate_var])
-        filters.append(f)
-    found = []
-    for hit in pattern:
-        for f in filters:
-            f.predict()
-        s = np.array([(f.H @ f.P @ f.H.T + f.R)[0, 0] for f in filters])
-        found.append(np.sqrt(np.prod(s / MADE.asymptote)))
-        if hit:
-            for f in filters:
-                f.update(np.zeros((1, 1)))
-    return np.array(found)
-
-
-def test_thresholds_are_those_of_filterpys_filters():
-    assert filterpy_rho([True])[0] == pytest.approx(track_uncertainty.at_birth(MADE), rel=1e-12)
-    steady = filterpy_rho([True] * 400 + [False] * 10)
-    assert [track_uncertainty.after_misses(MADE, k) for k in range(10)] == pytest.approx(steady[400:], rel=1e-9)
-    hits = track_uncertainty.hits_to_confirm(MADE, 1.25)
-    assert np.flatnonzero(filterpy_rho([True] * 50) <= 1.25)[0] + 2 == hits
-
-
 def test_rho_falls_with_hits_and_rises_with_misses():
     r = np.random.default_rng(0)
     hits = follow(MADE, [True] * 40, r)
@@ -78,14 +47,6 @@ def test_rho_does_not_see_the_measured_values(seed):
     pattern = np.random.default_rng(seed).random(80) < 0.5
     first, second = (follow(MADE, pattern, np.random.default_rng(k)) for k in (1, 2))
     assert np.array_equal(first, second)
-
-
-def test_larger_q_confirms_sooner_and_larger_r_later():
-    def hits(dynamics):
-        return track_uncertainty.hits_to_confirm(dynamics, 1.25)
-
-    assert hits(replace(MADE, sigma=MADE.sigma * np.sqrt(10))) < hits(MADE)
-    assert hits(replace(MADE, noise=MADE.noise * 10)) > hits(MADE)
 
 
 def test_a_newborn_that_would_be_confirmed_at_once_is_refused():

@@ -1,4 +1,4 @@
-"""Who is whose detection: small scenes by hand."""
+"""Who is whose detection, in small scenes by hand; correlations of errors over time come back."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
+from scipy.stats import multivariate_normal
 
 from scenarios.loading.resolve import load
+from scenarios.schema.sensor import Memory
+from sim.detector.correlated_noise import correlated_normals
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
@@ -18,6 +22,13 @@ from tracking.fitting.detection_matching import (
     box_iou,
     match_detections,
     match_sequence,
+)
+from tracking.fitting.error_correlation import (
+    Correlations,
+    bivariate_normal_cdf,
+    correlations,
+    fit_memory,
+    miss_correlations,
 )
 from tracking.fitting.error_statistics import error_statistics, miss_runs
 from tracking.fitting.false_alarms import alarm_tracks
@@ -57,17 +68,6 @@ def test_hits_misses_and_false_alarms() -> None:
     assert m.hit.tolist() == [True, False, False, True, False]  # frames 1 (1, 2), 2 (1, 2), 3 (2)
     assert m.owner.tolist() == [0, 3, -1]
     assert miss_runs(m).tolist() == [1, 1, 1]
-
-
-def test_boxes_that_are_all_too_wide_are_matched_all_the_same() -> None:
-    wide = [60.0, 60.0, 120.0, 180.0]  # overlap 4000 / 21600 = 0.19
-    m = match_detections(truth_of({1: [HERE] * 6, 2: [THERE] * 6}), found(*[[wide, THERE]] * 6), SIZE)
-    assert not m.hit[m.truth.id == 1].any()  # one of two: not usual
-    near = [90.0, 80.0, 70.0, 130.0]  # overlap 0.44, off by the same for everybody
-    both = [near, [290.0, 80.0, 70.0, 130.0]]
-    far = [75.0, 65.0, 85.0, 165.0]  # 0.29 as it is, more once what all are off by is taken off
-    m = match_detections(truth_of({1: [HERE] * 6, 2: [THERE] * 6}), found(*[both] * 5, [far, both[1]]), SIZE)
-    assert m.hit.all()
 
 
 @pytest.mark.filterwarnings("ignore:.*rows of class 7 are left out")
@@ -112,7 +112,6 @@ def test_detections_in_frames_without_labels_are_no_false_alarms() -> None:
     """Labels in every 5th frame of 10 frames/s: the profile is that of these frames, 2 a second."""
     scene = simulate(load("street", set=["sensor.clutter_rate=1"]), 30_000, streams=())
     dense, found = scene.truth, [f.detections for f in scene.without_pictures() if f.detections is not None]
-    assert dense is not None
     kept = (dense.frame - 1) % 5 == 0
     rows = {
         name: getattr(dense, name)[kept]
@@ -127,3 +126,51 @@ def test_detections_in_frames_without_labels_are_no_false_alarms() -> None:
     assert got.match.tolist() == expected.match.tolist()
     assert got.owner.tolist() == expected.owner.tolist()
     assert 0.5 < got.false.sum() / got.truth.length < 1.5
+
+
+def people(count: int = 30, frames: int = 300) -> Truth:
+    frame = np.repeat(np.arange(1, frames + 1), count)
+    id = np.tile(np.arange(1, count + 1), frames)
+    n = len(frame)
+    return Truth("x", 10.0, frames, 40.0, frame, id, np.full(n, -1), None, None, np.ones((n, 4)), np.ones(n))
+
+
+def drawn(truth: Truth, parts: list[Memory]) -> np.ndarray:
+    z = np.empty((len(truth.id), 1))
+    for one in np.unique(truth.id):
+        fresh = np.random.default_rng(int(one)).standard_normal((truth.length, 1))
+        z[truth.id == one] = correlated_normals(fresh, parts, 1, truth.fps, 5, int(one), 0)
+    return z
+
+
+@pytest.mark.parametrize("rho", [-0.4, 0.0, 0.5, 0.99])
+def test_two_normals_together(rho: float) -> None:
+    a, b = np.array([-1.0, 0.3, 2.0, 0.0]), np.array([-0.5, 0.3, -1.0, 0.0])
+    law = multivariate_normal([0.0, 0.0], [[1.0, rho], [rho, 1.0]])
+    assert bivariate_normal_cdf(a, b, rho) == pytest.approx(law.cdf(np.stack([a, b], axis=1)), abs=2e-4)
+
+
+PARTS = [Memory(share=0.4, time=0.3), Memory(share=0.4, time=4.0)]
+
+
+def wanted(lag: np.ndarray) -> np.ndarray:
+    return sum(m.share * np.exp(-lag / m.time) for m in PARTS)  # type: ignore[return-value]
+
+
+def test_correlations_of_errors_and_of_what_is_behind_misses() -> None:
+    truth = people(240)
+    z = drawn(truth, PARTS)
+    seen = correlations(truth, z, np.ones(len(z), bool))
+    assert seen.lag[0] == pytest.approx(0.1)
+    assert seen.rho == pytest.approx(wanted(seen.lag), abs=0.08)
+    p_miss = np.where(truth.id % 2 == 0, 0.15, 0.4)  # the chance differs from person to person, the memory does not
+    behind = miss_correlations(truth, ndtr(z[:, 0]) < p_miss, p_miss)
+    assert behind.rho == pytest.approx(wanted(behind.lag), abs=0.12)
+
+
+def test_exponentials_come_back() -> None:
+    lag = np.geomspace(0.1, 10.0, 14)
+    found = fit_memory([Correlations(lag, wanted(lag), np.full(14, 1000.0))])
+    at = np.array([0.1, 0.5, 2.0, 8.0])
+    assert sum(m.share * np.exp(-at / m.time) for m in found) == pytest.approx(wanted(at), abs=0.01)
+    assert sum(m.share for m in found) <= 1.0

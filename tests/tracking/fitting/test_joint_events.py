@@ -8,23 +8,18 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading.resolve import load, resolve
-from sim.sequence import simulate
-from tests.short_scene import SCENE
-from tracking.app.cli import run
 from tracking.fitting.joint_events import (
     MERGE,
     NONE,
     SPLIT,
     EventRows,
-    event_rows,
     event_scores,
     fit_events,
     log_probabilities,
     partition_rows,
 )
-from tracking.papers.joint.config import FITTED, JointConfig
-from tracking.papers.joint.group_events_kernels import event_probabilities
+from tracking.fitting.relational import fit_relational, logistic
+from tracking.papers.relational.config import RelationalConfig
 
 
 def state(pos):
@@ -69,70 +64,25 @@ def test_without_events_nothing_is_fitted():
         fit_events(EventRows.joined([]))
 
 
-@pytest.mark.slow
-def test_the_classifier_beats_the_frequencies_on_unseen_scenes():
-    """E8: log loss on seeds that nothing was fitted to, on true partitions and with wrong copies."""
-    entries = [e for e in resolve("suite:friends-meet") if e.repeat == 2 and "queue" not in e.name]
-    truths = [(simulate(e.scenario, 30_200, e.repeat, ()).truth, 30_200) for e in entries]
-    true, both = (
-        event_scores(EventRows.joined(event_rows(t, JointConfig().lag, s, wrong=wrong) for t, s in truths), FITTED)
-        for wrong in (False, True)
-    )
-    assert true["merges"] > 10
-    assert true["log_loss"] < 0.8 * true["prior_log_loss"]
-    assert both["log_loss"] < both["prior_log_loss"]
+ENDS = RelationalConfig().speed_ends
 
 
-def test_rates_of_events_do_not_depend_on_the_frame_rate(monkeypatch):
-    """E8: a sequence of which every second frame is left out has as many expected events per minute."""
-    monkeypatch.setattr("tracking.fitting.joint_events.PLACE_ERROR", 0.0)
-    monkeypatch.setattr("tracking.fitting.joint_events.VELOCITY_ERROR", 0.0)
-    truth = simulate(load("cross", ["duration=8"]), 30_300, 0, ()).truth
-    odd = truth.frame % 2 == 1
-    halved = truth.replace(
-        length=(truth.length + 1) // 2, fps=truth.fps / 2, labelled=None, frame=(truth.frame[odd] + 1) // 2,
-        **{k: getattr(truth, k)[odd] for k in ("id", "group", "pos", "vel")},
-    )  # fmt: skip
-    config, rates = JointConfig(), []
-    for one in (truth, halved):
-        rows = event_rows(one, config.lag, 0, wrong=False)
-        assert (rows.event == NONE).all()
-        p = [
-            sum(event_probabilities(f, 1.0 + splits, float(merges), config.classifier, config.rules(1 / one.fps, 0.4)))
-            for f, (merges, splits, _) in zip(rows.features, rows.possible, strict=True)
-        ]
-        rates.append(sum(p) * one.fps / len(p))
-    assert rates[0] == pytest.approx(rates[1], rel=0.2)
-    assert 0 < rates[0] < 0.05
+def test_logistic_regression_finds_its_weights():
+    rng = np.random.default_rng(0)
+    design = np.stack([np.ones(40_000), -rng.exponential(2, 40_000), -rng.exponential(0.5, 40_000)], axis=1)
+    true = np.array([3.0, 1.5, 4.0])
+    same = rng.random(40_000) < 1 / (1 + np.exp(-design @ true))
+    np.testing.assert_allclose(logistic(design, same), true, rtol=0.05)
 
 
-def test_the_command_writes_weights(tmp_path, capsys):
-    script = """
-[[event]]
-id = "m"
-type = "merge"
-groups = ["a", "b"]
-into = "ab"
-goal = [8, 6]
-when = { time = 0.5 }
+def test_pairs_that_a_line_separates_have_finite_weights():
+    distance = np.linspace(0, 4, 400)
+    weights = logistic(np.stack([np.ones(400), -distance, np.zeros(400)], axis=1), distance < 1.5)
+    assert weights[0] / weights[1] == pytest.approx(1.5, abs=0.05)
+    assert weights[2] == 0
+    assert 3 < weights[1] < 30
 
-[[event]]
-id = "p"
-type = "split"
-group = "ab"
-when = { after = "m", delay = 3.0 }
-parts = [{ id = "c", size = 2, goal = [3, 10] }, { id = "d", goal = [13, 10] }]
-"""
-    people = (
-        '{ id = "a", size = 2, start = [5, 5], goal = [12, 4] }, { id = "b", size = 1, start = [9, 5], goal = [4, 6] }'
-    )
-    crowd = SCENE.replace("duration = 2.0", "duration = 16.0")
-    scene, out = tmp_path / "scene.toml", tmp_path / "fitted.toml"
-    scene.write_text(crowd[: crowd.index("\ngroup")] + f"\ngroup = [{people}]\n{script}")
-    line = ["fit", "joint", str(scene), "--seeds", "30000:30014", "--check", "30020:30022"]
-    assert run([*line, "--out", str(out)]) == 0
-    fitted = JointConfig.from_toml(out)
-    assert fitted.merge_weights != JointConfig().merge_weights
-    assert out.read_text().startswith("# flockscope fit joint")
-    assert "checked, seeds 30020:30022" in out.read_text()
-    assert "--params" in capsys.readouterr().out
+
+def test_without_scenes_nothing_is_fitted():
+    with pytest.raises(InputError, match="0 changes of velocity"):
+        fit_relational([], ENDS)

@@ -13,8 +13,11 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from scenarios.schema.sensor import BoxNoise, FalseAlarms, Memory, Sensor
 from sim.detector.sense import sense
+from sim.geometry.polygons import iou_matrix, pack
 from sim.sequence import simulate
-from sim.types import Frame, Sequence, Truth
+from sim.types import Detections, Frame, Sequence, Truth
+from tracking.app.pictures.contact_sheet import choose_frames, sheet_picture
+from tracking.app.pictures.overlay import write_overlay
 from tracking.fitting.detection_matching import MatchedRecording, match_detections, match_sequence
 from tracking.fitting.error_statistics import error_statistics, simulated_detections
 from tracking.fitting.false_alarms import fit_false_alarms
@@ -52,7 +55,6 @@ def scenes() -> tuple[tuple[Truth, Any], ...]:
             "street", set=["camera.tilt_deg=15", "camera.yaw_deg=0", "camera.image=[1280, 720]", "duration=25.0"]
         )
         sequence = simulate(scenario, seed, streams=())
-        assert sequence.truth is not None
         made.append((sequence.truth, sequence.camera))
     return tuple(made)
 
@@ -76,10 +78,8 @@ def near(found: Any, wanted: Any, absolute: float) -> None:
 def test_misses_come_back() -> None:
     found = fitted()
     near(found.detect_prob, KNOWN.detect_prob, 0.03)
-    assert found.by_visibility is not None
     near(found.by_visibility, KNOWN.by_visibility, 0.12)
     assert found.small_px == 0.0
-    assert found.miss_memory is not None
     for lag in (0.1, 0.5, 1.5):
         near(correlation(found.miss_memory, lag), 0.7 * np.exp(-lag / 0.6), 0.1)
 
@@ -88,25 +88,24 @@ def correlation(memory: tuple[Memory, ...], lag: float) -> float:
     return sum(part.share * float(np.exp(-lag / part.time)) for part in memory)
 
 
+@pytest.mark.slow
 def test_noise_comes_back() -> None:
     found, known = fitted().box_noise, KNOWN.box_noise
     for name, absolute in (("across", 0.004), ("foot", 0.006), ("top", 0.006), ("width", 0.02)):
         near(getattr(found, name), getattr(known, name), absolute)
     near(found.occluded, 1.0, 0.25)
     assert found.tails <= 0.5
-    assert found.memory is not None
     for lag in (0.1, 1.0, 3.0):
         near(correlation(found.memory, lag), 0.6 * np.exp(-lag / 1.0), 0.07)
     assert fitted().box == "amodal"
 
 
+@pytest.mark.slow
 def test_false_alarms_come_back() -> None:
     busy = KNOWN.model_copy(update={"clutter_rate": 4.0})
     rate, found = fit_false_alarms(seen(busy, seed=50))
     alone = seen(busy.model_copy(update={"detect_prob": 0.0}), seed=50)  # the same alarms, nobody detected
     known = KNOWN.false_alarms
-    assert found is not None
-    assert known is not None
     near(rate, sum(len(m.box) for m in alone) / sum(m.truth.length for m in alone), 0.2)
     near(found.life, 1.5, 0.35)
     near(found.seen, 0.8, 0.08)
@@ -118,39 +117,14 @@ def test_false_alarms_come_back() -> None:
     near(found.jitter, 0.02, 0.006)
 
 
-def test_places_of_false_alarms_come_back() -> None:
-    left = KNOWN.false_alarms.model_copy(update={"near": 0.0, "at": ((0.2, 0.3), (0.3, 0.7)), "drift": 0.0})
-    found = fit_false_alarms(seen(KNOWN.model_copy(update={"false_alarms": left})))[1]
-    assert found is not None
-    assert found.at is not None
-    near(np.mean([x for x, _ in found.at]), 0.25, 0.04)
-    near(np.mean([y for _, y in found.at]), 0.5, 0.12)
-    assert found.near < 0.15
-
-
+@pytest.mark.slow
 def test_scores_come_back() -> None:
     found = fitted()
-    assert found.true_scores is not None
-    assert found.false_scores is not None
     near(np.array(found.true_scores)[[1, 5, 9]], (0.4, 0.8, 0.96), 0.03)
     near(np.array(found.false_scores)[[1, 5, 9]], (0.22, 0.3, 0.54), 0.06)
 
 
-def test_small_people_and_tails_and_visible_parts_are_told() -> None:
-    truth = scenes()[0][0]
-    assert truth.box is not None
-    small = float(np.quantile(truth.box[:, 3], 0.5)) / 2 * 1.3
-    noise = BoxNoise(foot=(0.0, 0.05), top=(0.0, 0.05), across=(0.0, 0.03), width=(0.0, 0.1), tails=6.0)
-    other = Sensor(detect_prob=0.95, clutter_rate=0.0, box="visible", small_px=small, min_visibility=0.0,
-                   by_visibility=(0.3, 0.5, 0.7, 0.9, 1.0), box_noise=noise)  # fmt: skip
-    found = fit_matched(seen(other))
-    assert found.small_px == pytest.approx(small, rel=0.25)
-    assert found.box == "visible"
-    assert 3.0 <= found.box_noise.tails <= 14.0
-    assert found.miss_memory is None or correlation(found.miss_memory, 0.3) < 0.1
-    assert found.false_alarms is None or found.clutter_rate < 0.1
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize(("points", "box"), [("own", "visible"), ("seen", "visible"), ("foot", "amodal")])
 def test_points_are_told(points: Any, box: Any) -> None:
     small = BoxNoise(scale=0.3)  # with large errors of boxes people are matched with their neighbours' detections
@@ -159,21 +133,7 @@ def test_points_are_told(points: Any, box: Any) -> None:
     near(found.noise_m, Sensor().noise_m if points == "foot" else 0.1, 0.01)
 
 
-def test_who_never_errs_has_a_clean_profile() -> None:
-    perfect = Sensor(detect_prob=1.0, clutter_rate=0.0, box_noise=BoxNoise(scale=0.0), noise_m=0.0, box="amodal",
-                     occlusion_power=0.0, min_visibility=0.0, small_px=0.0)  # fmt: skip
-    found = fit_matched(seen(perfect))
-    assert found.detect_prob > 0.999
-    assert min(found.by_visibility or (0.0,)) > 0.97
-    assert found.clutter_rate == 0.0
-    assert found.false_alarms is None
-    assert found.miss_memory is None
-    assert max(abs(x) for name in ("across", "foot", "top", "width") for x in getattr(found.box_noise, name)) < 1e-6
-    assert found.box_noise.floor_px == 0.0
-    assert found.noise_m == 0.0
-    assert found.points == "own"
-
-
+@pytest.mark.slow
 def test_synthetic_errors_look_like_those_they_were_fitted_to() -> None:
     """Statistics of new draws of the fitted sensor lie among those of new draws of the true one."""
     first = seen(KNOWN)[:2]
@@ -190,13 +150,6 @@ def as_sequence(truth: Truth, camera: Any, sensor: Sensor, **changes: Any) -> Se
     frames = lambda: iter([Frame(d.index, d.t, detections=d) for d in found])  # noqa: E731
     made = Sequence("made", truth.fps, truth.length, frames, lambda: truth, camera.image, camera, has_detections=True)
     return replace(made, **changes)
-
-
-def test_sequences_are_taken_one_or_many() -> None:
-    truth, camera = scenes()[0]
-    one = as_sequence(truth, camera, KNOWN)
-    assert fit_sensor(one) == fit_sensor([one])
-    near(fit_sensor([one, one]).detect_prob, fit_sensor(one).detect_prob, 0.01)
 
 
 def test_what_cannot_be_fitted_is_refused() -> None:
@@ -216,3 +169,37 @@ def test_what_cannot_be_fitted_is_refused() -> None:
     short = truth.replace(length=1, **{f: getattr(truth, f)[few] for f in fields})
     with pytest.raises(InputError, match="labelled people"):
         fit_sensor([as_sequence(short, camera, KNOWN)])
+
+
+NONE = np.zeros(0, np.int64)
+EMPTY = Truth("none", 10.0, 0, 40.0, NONE, NONE, NONE, None, None, np.zeros((0, 4)), np.zeros(0))
+
+
+def test_a_recording_without_frames():
+    matched = match_detections(EMPTY, [], (64, 48))
+    assert fit_false_alarms([matched]) == (0.0, None)
+    assert all(np.isnan(v) for v in error_statistics([matched]).values())
+    assert choose_frames(EMPTY, 8) == []
+
+
+def test_boxes_without_scores():
+    box = np.array([[10.0, 10, 8, 20]])
+    one = np.ones(1, np.int64)
+    truth = Truth("one", 10.0, 1, 40.0, one, one, -one, None, None, box, np.ones(1))
+    matched = match_detections(truth, [Detections(1, 0.0, "image", box[:, :2], None, box)], (64, 48))
+    assert matched.score.tolist() == [1.0]
+
+
+def test_polygons_without_vertices():
+    empty = np.zeros((0, 2))
+    assert iou_matrix([empty, empty], [empty]).tolist() == [[0.0], [0.0]]
+    assert len(pack([empty], 0).vertex) == 1
+
+
+def test_pictures_of_a_sequence_without_frames(tmp_path):
+    nothing = Sequence("none", 10.0, 0, lambda: iter(()), load_truth=lambda: EMPTY, has_images=True, image_size=(8, 8))
+    with pytest.raises(InputError, match="no frame"):
+        write_overlay(nothing, None, tmp_path / "o.mp4")
+    with pytest.raises(InputError, match="no frame"):
+        sheet_picture(nothing, EMPTY)
+    assert not list(tmp_path.iterdir())

@@ -13,7 +13,6 @@ from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import Sequence, Tracks
 from tracking import evaluate, track
-from tracking.grouping.foot_points import completed
 from tracking.grouping.grouped_tracks import without_groups
 from tracking.objective import ObjectiveScorer
 from tracking.scoring.evaluation import Scorer
@@ -72,28 +71,6 @@ def test_a_class_and_its_text_score_the_same(scene, run, tmp_path, similarity) -
     assert mine["group_F1"] > 0
 
 
-def test_the_scale_of_the_image_has_no_influence(scene, run) -> None:
-    where = {"camera": scene.camera, "scene": scene.scene, "pixels": False}
-    bare = without_groups(run)
-    near, far = (completed(bare, scene.fps, scale, **where) for scale in (10.0, 200.0))
-    assert [t.group.tolist() for t in near] == [t.group.tolist() for t in far] == [t.group.tolist() for t in run]
-    seen = [completed(bare, scene.fps, scale, **{**where, "pixels": True}) for scale in (10.0, 200.0)]
-    assert [t.group.tolist() for t in seen[0]] != [t.group.tolist() for t in seen[1]]
-
-
-def test_groups_lie_in_the_image(run) -> None:
-    """Hulls go round boxes, and events lie among the members' boxes."""
-    for t in run:
-        for members, hull in zip(t.groups.members, t.groups.hull, strict=True):
-            box = t.box[np.isin(t.id, members)]
-            assert hull.min(axis=0) == pytest.approx(box[:, :2].min(axis=0))
-            assert hull.max(axis=0) == pytest.approx((box[:, :2] + box[:, 2:]).max(axis=0))
-        for event in t.events:
-            there = np.isin(t.id, event.members)
-            if there.any():
-                assert event.pos == pytest.approx(t.pos[there].mean(axis=0))
-
-
 @pytest.mark.parametrize("similarity", [None, "image"])
 def test_the_objective_of_boxes_is_that_of_all_scores(scene, run, similarity) -> None:
     bare = without_groups(run)
@@ -102,14 +79,3 @@ def test_the_objective_of_boxes_is_that_of_all_scores(scene, run, similarity) ->
         found = scorer.scores(bare[:last], scene.px_per_m, similarity=similarity)
         expected = Scorer(scene.truth).evaluate(bare[:last], similarity=similarity, frames=last)
         assert [found[k] for k in KEYS] == pytest.approx([expected[k] for k in KEYS], abs=1e-12, nan_ok=True)
-
-
-def test_boxes_are_lifted_once(scene, run, monkeypatch) -> None:
-    from tracking.grouping import foot_points
-
-    lifted = []
-    feet = foot_points.feet
-    monkeypatch.setattr(foot_points, "feet", lambda *a: lifted.append(1) or feet(*a))
-    bare = without_groups(run)
-    ObjectiveScorer(scene.truth).scores(bare, scene.px_per_m)
-    assert len(lifted) == len(bare)

@@ -3,7 +3,6 @@ import math
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from sim.types import GroupEvent, Groups, Tracks
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
@@ -83,39 +82,6 @@ def test_split_after_two_seconds_apart():
     assert events(made) == [(116, "split", 97, (1,), (-1, 1), (1, 2, 3))]
 
 
-def test_nobody_looks_ahead():
-    whole = derive(tracks(joining()), FPS)
-    for length in (50, 120, 128, 129, 160):
-        part = derive(tracks(joining())[:length], FPS)
-        assert [t.group.tolist() for t in part] == [t.group.tolist() for t in whole[:length]]
-        assert events(part) == events(whole[:length])
-
-
-def test_strangers_who_pass_are_no_group():
-    made = derive(tracks([walk((20, (1, 0))), walk((20, (-1, 0)), start=(20, 1))]), FPS)
-    assert all((t.group == -1).all() for t in made)
-
-
-def test_in_the_image_lengths_are_multiplied():
-    for scale in (25.0, 400.0):
-        made = derive(tracks(joining(), scale=scale), FPS, px_per_m=scale, rule=RULE)
-        assert events(made) == events(derive(tracks(joining()), FPS, rule=RULE))
-        assert made[150].groups.pos[0] == pytest.approx(
-            derive(tracks(joining()), FPS, rule=RULE)[150].groups.pos[0] * scale
-        )
-        assert made[128].events[0].pos[0] == pytest.approx(
-            derive(tracks(joining()), FPS, rule=RULE)[128].events[0].pos[0] * scale
-        )
-    boxed = derive(tracks(side_by_side(), scale=100.0, boxes=True), FPS, px_per_m=100.0, rule=RULE)
-    assert boxed[20].groups.hull[0].tolist() == pytest.approx(np.array([[195, -10], [205, -10], [205, 80], [195, 80]]))
-
-
-def test_in_the_image_without_a_scale():
-    with pytest.raises(InputError, match="px_per_m"):
-        derive(tracks(side_by_side(), scale=20.0), FPS, math.nan)
-    assert len(derive(tracks(side_by_side()), FPS, math.nan)) == 200
-
-
 def naming(own):
     """A pair whose tracker names its groups, own (T, 2), from the first frame on, where there is none yet."""
     return [t.replace(groups=Groups.none() if (t.group < 0).all() else None) for t in tracks(side_by_side(), group=own)]
@@ -169,40 +135,6 @@ def test_a_group_waits_for_a_member_who_is_not_seen():
     assert events(made) == [(131, "leave", 120, (1,), (-1,), (1, 2))]
 
 
-def test_velocities_from_positions_when_a_tracker_has_none():
-    made, known = derive(tracks(joining(), vel=False), FPS), derive(tracks(joining()), FPS)
-    assert [e[1:2] + e[3:] for e in events(made)] == [e[1:2] + e[3:] for e in events(known)]
-
-
-def test_ids_order_and_place_change_nothing():
-    base = derive(tracks(leaving()), FPS)
-    renamed = derive(tracks(leaving(), ids=[70, 30, 50]), FPS)
-    assert [e[:5] for e in events(base)] == [e[:5] for e in events(renamed)]
-    assert events(renamed)[0][5] == (30, 50, 70)
-    shuffled = [
-        t.replace(**{k: getattr(t, k)[::-1].copy() for k in ("id", "group", "pos", "vel", "cov", "score")})
-        for t in tracks(leaving())
-    ]
-    for a, b in zip(base, derive(shuffled, FPS), strict=True):
-        assert a.group.tolist() == b.group[::-1].tolist()
-    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
-    moved = [t.replace(pos=t.pos @ turn + 5, vel=t.vel @ turn) for t in tracks(leaving())]
-    assert events(derive(moved, FPS)) == events(base)
-
-
-def test_nothing_to_group():
-    assert derive([], FPS) == []
-    empty = derive(tracks(side_by_side(), there=np.zeros((200, 2), bool)), FPS)
-    assert all(len(t.groups.id) == 0 and t.events == () for t in empty)
-    alone = derive(tracks(side_by_side(n=1)), FPS)
-    assert all(t.group.tolist() == [-1] for t in alone)
-
-
-def test_groups_without_people_are_left_alone():
-    given = [t.replace(unit="group", group=t.id) for t in tracks(side_by_side())]
-    assert all(a is b for a, b in zip(derive(given, FPS), given, strict=True))
-
-
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
@@ -217,19 +149,10 @@ def test_parameters_of_joining(changed, told):
 
 
 @pytest.mark.parametrize(
-    ("changed", "told"),
-    [(LinkRule(apart=2.0), 103), (LinkRule(patience=1.0), 106), (LinkRule(diverge=0.3), 91)],
+    ("changed", "told"), [(LinkRule(apart=2.0), 103), (LinkRule(patience=1.0), 106), (LinkRule(diverge=0.3), 91)]
 )
 def test_parameters_of_parting(changed, told):
     assert [e[0] for e in events(derive(tracks(leaving()), FPS, rule=changed))] == [told]
-
-
-def test_standing_side_by_side_links_nobody_if_told_so():
-    still = [walk((10, (0, 0)), start=(0, 0.7 * k)) for k in range(2)]
-    assert derive(tracks(still), FPS)[-1].group.tolist() == [1, 1]
-    assert derive(tracks(still), FPS, rule=LinkRule(idle=0.3))[-1].group.tolist() == [-1, -1]
-    walked = [walk((5, (1, 0)), (5, (0, 0)), start=(0, 0.7 * k)) for k in range(2)]
-    assert derive(tracks(walked), FPS, rule=LinkRule(idle=0.3))[-1].group.tolist() == [1, 1]
 
 
 def passing():
@@ -251,16 +174,6 @@ def test_named_groups_without_events_get_them():
     assert events(with_groups(named, FPS, 1.0)) == [(31, "form", 31, (-1, -1), (7,), (1, 2))]
 
 
-def test_groups_named_by_their_members_alone():
-    pairs = np.tile([3, 3, 8, 8], (120, 1))
-    named = [
-        t.replace(events=(), group=np.full(4, -1), derived=False) for t in derive(tracks(passing(), group=pairs), FPS)
-    ]
-    made = with_groups(named, FPS, 1.0)
-    assert [e[1] for e in events(made)] == ["cross"]
-    assert made[0].group.tolist() == [3, 3, 8, 8]
-
-
 def test_a_kind_that_is_told_is_not_derived_but_the_others_are():
     named = derive(tracks(passing()), FPS)
     merge = GroupEvent("merge", 5, 5, 6, (-1, -1), (7,), (1, 2), (0.0, 0.0))
@@ -279,18 +192,3 @@ def test_deriving_again_changes_nothing(people):
         again = derive(made[:length], FPS)
         assert events(again) == events(made[:length])
         assert [t.group.tolist() for t in again] == [t.group.tolist() for t in made[:length]]
-
-
-def test_what_is_derived_is_not_derived_again(monkeypatch):
-    made = with_groups(tracks(passing()), FPS, 1.0)
-    assert all(t.derived for t in made)
-    monkeypatch.setattr("tracking.grouping.grouped_tracks.derive", None)
-    assert with_groups(made, FPS, 1.0) == made
-    with pytest.raises(TypeError):
-        with_groups([*made[:-1], made[-1].replace(derived=False)], FPS, 1.0)
-
-
-def test_the_end_tells_what_is_then_known():
-    """The hulls part after frame 58: known in frame 78, or in the last one before."""
-    made = derive(tracks(passing())[:70], FPS)
-    assert [(i, kind) for i, kind, *_ in events(made)] == [(70, "cross")]

@@ -77,12 +77,9 @@ CORNER = 22.5
 @both
 @settings(max_examples=15, deadline=None)
 @given(
-    scenes(),
-    st.floats(-500, 500),
-    st.one_of(st.floats(0, 360), st.integers(0, 15).map(lambda k: k * CORNER)),
-    st.booleans(),
-    st.sampled_from([1.0, 18.8, 250.0]),
-)
+    scenes(), st.floats(-500, 500), st.one_of(st.floats(0, 360), st.integers(0, 15).map(lambda k: k * CORNER)),
+    st.booleans(), st.sampled_from([1.0, 18.8, 250.0]),
+)  # fmt: skip
 def test_place_turn_and_unit_do_not_matter(grouping, plots, x, degrees, mirror, scale):
     """Of scenes a little beside the plots, whose round numbers lie on thresholds, where rounding would decide."""
     scene = look(plots, FPS)

@@ -6,12 +6,18 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Groups
+from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouped_tracks import with_groups
+from tracking.grouping.link_rule import LinkRule, find_links
+from tracking.grouping.merge_split_events import TrackedMotion
 from tracking.objective import ObjectiveScorer
+from tracking.objective import derived_members_kernels as kernels
 from tracking.scoring import evaluate
 
 KEYS = ("objective", "HOTA", "group_F1")
@@ -112,3 +118,26 @@ def test_nothing_answered_and_nothing_labelled(crowd):
     same(ObjectiveScorer(bare).scores(made, scale), evaluate(bare, made))
     part = dataclasses.replace(crowd.truth, labelled=np.arange(crowd.truth.length) % 3 == 0)
     same(ObjectiveScorer(part).scores(made, scale), evaluate(part, with_groups(made, crowd.fps, scale)))
+
+
+@settings(deadline=None)
+@given(st.integers(0, 10_000))
+def test_partitions_are_those_of_the_rule(seed):
+    """Who is with whom in each frame, names apart; people come, go, and are not seen for a while."""
+    rng = np.random.default_rng(seed)
+    length, people = 40, 7
+    walk = np.cumsum(rng.normal(0, 0.12, (length, people, 2)), 0) + rng.uniform(0, 3, (people, 2))
+    seen = rng.random((length, people)) < 0.8
+    frame, column = np.nonzero(seen)
+    pos, rule, fps = walk[frame, column], LinkRule(window=0.6, patience=0.4, acquaintance=0.2, memory=0.3), 10.0
+    links = find_links(frame, column, pos, np.zeros_like(pos), length, fps, rule)
+    places = np.where(seen[..., None], walk, np.nan)
+    expected = label_people(frame, column, TrackedMotion(places, np.zeros_like(places), fps), links, rule)[0]
+    made = kernels.connected_people(frame, column, length, people, 3, links.frame, links.a, links.b, links.on)
+    for t in range(length):
+        here = frame == t
+        assert together(column[here], made[here]) == together(column[here], expected[here])
+
+
+def together(who, label):
+    return {frozenset(who[label == g].tolist()) for g in set(label[label >= 0].tolist())}

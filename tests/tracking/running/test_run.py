@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
 from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import load
-from sim.io.store.track_files import write_tracks
+from sim.scene.camera import px_per_m_at_centre
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.tracker import Blob
 from tracking.running.prepare import prepare
-from tracking.running.run import TrackingRun, track
+from tracking.running.run import TrackingRun, grouped, track
 
 FPS, LENGTH = 10.0, 30
 
@@ -133,10 +130,6 @@ def test_hiding_a_group_by_its_name(tmp_path):
         )
 
 
-def test_default_is_truth_where_there_is_nothing_else():
-    assert prepare("blob", source(has_detections=False, load_truth=truth)).mode == "truth"
-
-
 def test_image_mode_hides_the_files_detections():
     class Eyes(Stranger):
         needs = ("pixels", "boxes")
@@ -167,14 +160,6 @@ def test_params_by_config_values_and_file(tmp_path):
         track(Stranger, source(), params={"gate": 0.9})
 
 
-def test_strangers_by_class_and_instance():
-    for stranger in (Stranger, Stranger()):
-        run = track(stranger, source())
-        assert run.info["tracker"] == "Stranger"
-        assert run[0].score.tolist() == [1.0, 1.0]
-    assert track(Blob(BlobConfig(gate=0.9)), source()).info["config"]["gate"] == 0.9
-
-
 def test_a_strangers_wrong_answer_is_named():
     with pytest.raises(WorkError, match="Wrong: frame 3: got vel of shape"):
         track(Wrong, source())
@@ -192,14 +177,8 @@ def test_a_stranger_that_raises_is_named_in_one_line(method, words):
     def boo(self, *given):
         raise ValueError("boo\nand more")
 
-    with pytest.raises(WorkError, match=words) as caught:
+    with pytest.raises(WorkError, match=words):
         track(type("Raises", (Stranger,), {method: boo}), source())
-    assert "\n" not in str(caught.value)
-
-
-def test_a_class_that_is_no_tracker_is_refused():
-    with pytest.raises(InputError, match="no needs, reset, step"):
-        track(dict, source())
 
 
 def test_combinations_that_cannot_work():
@@ -209,63 +188,10 @@ def test_combinations_that_cannot_work():
         track("blob", source(), sensor={"detect_prob": 0.5})
 
 
-def test_nan_is_named():
-    def bad():
-        for frame in frames():
-            box = frame.detections.box.copy()
-            if frame.index == 5:
-                box[1, 0] = np.nan
-            yield frame.replace(detections=frame.detections.replace(box=box))
-
-    with pytest.raises(InputError, match="frame 5: detection 2"):
-        track("blob", Sequence("bad", FPS, LENGTH, bad, has_detections=True))
-
-
 def test_empty_sequences():
     assert len(track("blob", Sequence("none", FPS, 0, lambda: iter(()), has_detections=True))) == 0
     bare = Sequence("bare", FPS, 3, lambda: (Frame(k, k / FPS) for k in (1, 2, 3)), has_detections=True)
     assert [len(t.id) for t in track("blob", bare)] == [0, 0, 0]
-
-
-def test_slices_and_repetition():
-    run, again = track("blob", source()), track("blob", source())
-    assert len(run[3:7]) == 4
-    assert all(a.pos.tobytes() == b.pos.tobytes() for a, b in zip(run, again, strict=True))
-
-
-class Placed(Stranger):
-    """Knows places on the ground, or in the image, and no boxes."""
-
-    plane = "image"
-
-    def step(self, frame, detections):
-        return super().step(frame, detections).replace(plane=self.plane, box=None)
-
-
-class Grounded(Placed):
-    plane = "ground"
-
-
-class OfGroups(Grounded):
-    """Its rows are groups, which are no upright people."""
-
-    def step(self, frame, detections):
-        made = super().step(frame, detections)
-        return made.replace(unit="group", group=made.id.copy(), groups=None, events=())
-
-
-@pytest.mark.parametrize(
-    ("tracker", "seen", "expected"),
-    [
-        (Placed, True, "none"), (Grounded, True, "projected"), (Grounded, False, "none"), (OfGroups, True, "none"),
-        ("blob", True, "measured"),
-    ],
-)  # fmt: skip
-def test_the_run_and_its_files_agree_on_where_boxes_come_from(tmp_path, tracker, seen, expected):
-    camera = simulate(load("merge"), seed=3).camera if seen else None
-    run = track(tracker, source(camera=camera))
-    write_tracks(tmp_path, run, fps=FPS, camera=camera, info=run.info)
-    assert run.info["boxes"] == json.loads((tmp_path / "run.json").read_text())["boxes"] == expected
 
 
 def test_one_plane_in_a_run_and_again_in_the_next():
@@ -353,17 +279,6 @@ def test_groups_named_late_are_replaced_with_a_warning():
     assert "grouping" in run.info
 
 
-def test_groups_named_from_the_first_frame_are_kept(recwarn):
-    run = track(NamingAlways, standing(90))
-    assert run[40].group.tolist() == [-1, -1]
-    assert run[80].group.tolist() == [7, 7]
-    assert not recwarn.list
-
-
-def test_events_of_declared_kinds_are_not_derived():
-    assert [(e.kind, e.emitted) for t in track(NamingDeclared, standing(90)) for e in t.events] == [("merge", 60)]
-
-
 def scored(score):
     """The source with detections of this score."""
 
@@ -381,7 +296,33 @@ def test_detections_that_start_no_track() -> None:
     assert any(len(t.id) for t in track("blob", scored(0.2), params={"score_start": 0.2}))
 
 
-@pytest.mark.parametrize("tracker", ["blob", "group-pda"])
-def test_detections_that_start_tracks(tracker) -> None:
-    """Also of a tracker that does not use scores."""
-    track(tracker, scored(0.2 if tracker == "group-pda" else 0.5))
+def side_by_side(index: int) -> Tracks:
+    """Two people at rest, 60 px apart in the image."""
+    pos = np.array([[200.0, 200.0], [260.0, 200.0]])
+    known = np.zeros((2, 2)), np.tile(np.eye(4), (2, 1, 1))
+    alone = np.full(2, -1)
+    return Tracks(index, index / 10, "image", "person", np.array([1, 2]), alone, pos, *known, groups=Groups.none())
+
+
+def recording(camera, px_per_m: float, **source) -> Sequence:
+    truth = simulate(load("merge", ["camera.fps=2"]), 40_001).truth.replace(px_per_m=20.0)
+    return Sequence(
+        "made", 10.0, 30, lambda: iter(()), load_truth=lambda: truth, camera=camera, px_per_m=px_per_m, source=source
+    )
+
+
+def test_stored_tracks_are_grouped_by_the_scale_of_the_tracker(monkeypatch):
+    """The camera's, else the one that the user states, else that of all labels; as for `track`, but for the last."""
+    camera = simulate(load("merge", ["camera.fps=2"]), 40_001).camera
+    used = []
+    monkeypatch.setattr(
+        "tracking.grouping.foot_points.with_groups", lambda tracks, fps, scale, rule: used.append(scale) or tracks
+    )
+    unknown = float("nan")
+    for made in (
+        recording(camera, unknown), recording(camera, 55.0), recording(None, 55.0), recording(None, unknown),
+        recording(None, 55.0, px_per_m_frames=12), recording(camera, 55.0, px_per_m_frames=12),
+    ):  # fmt: skip
+        grouped([side_by_side(1)], made)
+    seen = px_per_m_at_centre(camera)
+    assert used == [seen, seen, 55.0, 20.0, 20.0, seen]

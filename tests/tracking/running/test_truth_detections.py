@@ -1,4 +1,4 @@
-"""Detections made from labels: their order tells nothing, and their arrays lead to no other frame."""
+"""Which detections a tracker gets; those made from labels tell nothing by their order or their arrays."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from sim.types import Sequence, Tracks
+from sim.types import Detections, Sequence, Tracks
+from tracking.running.detection_mode import check_detections, choose_mode
 from tracking.running.prepare import prepare
 from tracking.running.run import track
-from tracking.running.truth_detections import from_truth, perfect
-from tracking.scoring import evaluate
+from tracking.running.truth_detections import from_truth
 
 
 @pytest.fixture(scope="module")
@@ -35,14 +35,6 @@ class RowNumbers:
         return Tracks(frame.index, frame.t, plane, "person", np.arange(n), alone, pos, unknown, cov, box)
 
 
-class RandomNumbers(RowNumbers):
-    """Numbers the people of each frame at random: association by chance."""
-
-    def step(self, frame, detections):
-        made = super().step(frame, detections)
-        return made.replace(id=np.random.default_rng(frame.index).permutation(len(made.id)))
-
-
 class Writing(RowNumbers):
     """Tries to overwrite everything that it is given and all arrays behind it."""
 
@@ -53,27 +45,6 @@ class Writing(RowNumbers):
                 array[...] = -1.0
                 array = array.base
         return super().step(frame, detections)
-
-
-@pytest.mark.parametrize("mode", ["truth", "file"])
-def test_the_number_of_a_row_is_worth_no_more_than_chance(merge, mode):
-    rows, chance = (evaluate(merge.truth, track(kind, merge, detections=mode)) for kind in (RowNumbers, RandomNumbers))
-    assert rows["AssA"] < chance["AssA"] + 0.02
-    assert rows["IDF1"] < chance["IDF1"] + 0.02
-
-
-def test_rows_of_one_group_do_not_stand_together(merge):
-    """The mean number of rows between two members of a group is that of a random order, (n + 1) / 3 for n rows."""
-    apart, expected = [], []
-    for index, found in enumerate(from_truth(merge, {}, 0), 1):
-        now = merge.truth.at(index)
-        at = [int(np.flatnonzero((now.pos == p).all(1))[0]) for p in found.pos]
-        group = now.group[at]
-        for g in set(group[group >= 0].tolist()):
-            members = np.flatnonzero(group == g)
-            apart += [abs(a - b) for k, a in enumerate(members) for b in members[:k]]
-            expected += [(len(group) + 1) / 3] * (len(members) * (len(members) - 1) // 2)
-    assert np.mean(apart) == pytest.approx(np.mean(expected), rel=0.15)
 
 
 def test_the_order_depends_on_seed_and_frame_alone(merge):
@@ -108,6 +79,50 @@ def test_what_a_tracker_writes_reaches_neither_truth_nor_the_next_run(merge, mod
     assert all(np.array_equal(a.pos, b.pos) for a, b in zip(clean, again, strict=True))
 
 
+def source(**has):
+    return Sequence("s", 10.0, 1, lambda: iter(()), **has)
+
+
+@pytest.mark.parametrize(
+    ("needs", "has", "expected"),
+    [
+        (("boxes",), {"has_detections": True, "load_truth": lambda: None}, "file"),
+        (("boxes",), {"has_images": True, "load_truth": lambda: None}, "truth"),
+        (("pixels", "boxes"), {"has_images": True, "has_detections": True}, "image"),
+        (("pixels", "boxes"), {"has_detections": True}, "file"),
+        (("stereo", "points"), {"has_images": True, "load_truth": lambda: None}, "truth"),
+        (("stereo",), {"has_images": True, "has_right": True}, "image"),
+    ],
+)
+def test_default_mode(needs, has, expected):
+    assert choose_mode(needs, source(**has), None) == expected
+
+
+@pytest.mark.parametrize(
+    ("needs", "has", "asked"),
+    [
+        (("boxes",), {"has_images": True}, None),
+        (("boxes",), {"has_detections": True}, "truth"),
+        (("boxes",), {"has_images": True, "has_detections": True}, "image"),
+        (("stereo",), {"has_images": True, "load_truth": lambda: None}, None),
+    ],
+)
+def test_what_cannot_work_names_both_sides(needs, has, asked):
+    with pytest.raises(InputError) as caught:
+        choose_mode(needs, source(**has), asked)
+    assert needs[0] in str(caught.value)
+    assert "images" in str(caught.value) or "detections" in str(caught.value)
+
+
+def test_nan_names_frame_and_row():
+    box = np.ones((3, 4))
+    box[1, 2] = np.nan
+    with pytest.raises(InputError, match="frame 7: detection 2"):
+        check_detections(Detections(7, 0.6, "image", np.ones((3, 2)), None, box, np.ones(3)), ("boxes",))
+    with pytest.raises(InputError, match="got points; expected boxes"):
+        check_detections(Detections(7, 0.6, "ground", np.ones((3, 2))), ("boxes",))
+
+
 def test_settings_with_dots_are_keys_of_a_table(merge):
     """One key of box_noise brings its defaults; without any, boxes are exact."""
     exact, whole, dotted = (
@@ -119,17 +134,3 @@ def test_settings_with_dots_are_keys_of_a_table(merge):
     for sensor, words in (({"noise_px": 3}, "set box_noise.scale"), ({"noise_m.x": 3}, "sensor.noise_m")):
         with pytest.raises(InputError, match=words):
             from_truth(merge, sensor, 0)
-
-
-def test_people_without_a_box_are_not_detected(merge):
-    """Somebody behind the camera has a position but no box; the other people's rows stay whole."""
-    here = merge.truth.at(3)
-    box = here.box.copy()
-    box[1] = np.nan
-    found = perfect(here.replace(box=box))
-    rest = np.arange(len(here.id)) != 1
-    assert np.array_equal(found.pos, here.pos[rest])
-    assert np.array_equal(found.box, here.box[rest])
-    assert len(found.score) == rest.sum()
-    found = perfect(here.replace(box=box, pos=None, vel=None))
-    assert np.array_equal(found.box, here.box[rest])

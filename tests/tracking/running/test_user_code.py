@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import pickle
-import signal
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
-from scenarios.errors import FlockscopeError, InputError, WorkError
+from scenarios.errors import InputError, WorkError
 from sim.types import Detections, Frame, Sequence
-from sim.workers.pool import run_pickled
 from tracking.app.cli import run
 from tracking.config import Config, param
-from tracking.running.interrupts import is_interruption, recorded_interrupts
+from tracking.running.interrupts import recorded_interrupts
 from tracking.running.run import track
-from tracking.running.tracker_registry import find
-from tracking.running.user_code import user_code
 
 ABRUPT = [SystemExit(0), SystemExit("done"), GeneratorExit(), BaseException("what"), StopIteration(), ValueError("no")]
 
@@ -65,14 +60,9 @@ def command(tmp_path, part, statement):
     tmp_path.joinpath("mine.py").write_text(TRACKER.format(part=part, statement=statement))
     tmp_path.joinpath("gt.txt").write_text("".join(f"{k},1,10,10,20,50,1,1,1\n" for k in range(1, 9)))
     return [
-        "track",
-        f"{tmp_path}/mine.py:Tracker",
-        str(tmp_path / "gt.txt"),
-        "--fps",
-        "10",
-        "--out",
+        "track", f"{tmp_path}/mine.py:Tracker", str(tmp_path / "gt.txt"), "--fps", "10", "--out",
         str(tmp_path / "out"),
-    ]
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("statement", STATEMENTS)
@@ -136,32 +126,6 @@ def test_in_python_a_keyboard_interrupt_passes_where_it_may_be_ctrl_c():
         track(tracker, nobody())
 
 
-def test_whose_interrupt():
-    raised = KeyboardInterrupt()
-    assert is_interruption(raised)
-    assert not is_interruption(SystemExit())
-    with recorded_interrupts():
-        assert not is_interruption(raised)
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        assert is_interruption(raised)
-        assert is_interruption(SystemExit())
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        assert not is_interruption(raised)
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def test_errors_of_ours_pass_unchanged():
-    ours = InputError(place="here", got="this", expected="that", remedy="change it")
-    with pytest.raises(InputError) as caught, user_code(lambda error: WorkError(got="x", expected="y", remedy="z")):
-        raise ours
-    assert caught.value is ours
-    with user_code(lambda error: ours):
-        pass
-
-
 def test_no_exit_from_within_ends_a_command_as_if_all_were_well(tmp_path, capsys, monkeypatch):
     """Whatever code of a user is reached by another way, as a property that a command reads."""
 
@@ -171,6 +135,26 @@ def test_no_exit_from_within_ends_a_command_as_if_all_were_well(tmp_path, capsys
     monkeypatch.setattr("tracking.app.commands.track.track", leave)
     assert run(command(tmp_path, "", "pass")) == 1
     assert "SystemExit: 0" in capsys.readouterr().err
+
+
+def search(tmp_path, statement, part, *options):
+    tmp_path.joinpath("mine.py").write_text(TRACKER.format(part=part, statement=statement))
+    line = [
+        "tune", f"{tmp_path}/mine.py:Tracker", "--suite", "merge", "--set", "scenario.camera.fps=2", "--trials", "3",
+    ]  # fmt: skip
+    line += ["--seeds", "0:2", "--validation", "10000:10001", "--test", "20000:20001", "--check", "none", *options]
+    return run([*line, "--out", str(tmp_path / "best.toml"), "--json"])
+
+
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
+def test_in_a_search_the_trial_fails_and_the_search_goes_on(tmp_path, capsys, workers):
+    assert search(tmp_path, "sys.exit(0)", "step of others", "--workers", workers) == 0
+    assert '"impossible": 2' in capsys.readouterr().out
+
+
+def test_a_search_whose_configs_exit_ends_with_an_error(tmp_path, capsys):
+    assert search(tmp_path, "sys.exit(0)", "check of others") == 1
+    assert '"got": "SystemExit: 0"' in capsys.readouterr().out
 
 
 @dataclass(frozen=True)
@@ -185,40 +169,6 @@ class Exiting(Config):
 def test_the_check_of_a_config():
     with pytest.raises(WorkError, match="exiting: its parameters: got SystemExit: 0"):
         Exiting()
-
-
-def test_a_module_whose_names_cannot_be_read(tmp_path):
-    file = tmp_path / "odd.py"
-    file.write_text("def __getattr__(name):\n    raise SystemExit(0)\n")
-    with pytest.raises(FlockscopeError, match=r"odd\.py"):
-        find(f"{file}:Tracker")
-
-
-def search(tmp_path, statement, part, *options):
-    tmp_path.joinpath("mine.py").write_text(TRACKER.format(part=part, statement=statement))
-    line = [
-        "tune",
-        f"{tmp_path}/mine.py:Tracker",
-        "--suite",
-        "merge",
-        "--set",
-        "scenario.camera.fps=2",
-        "--trials",
-        "3",
-    ]
-    line += ["--seeds", "0:2", "--validation", "10000:10001", "--test", "20000:20001", "--check", "none", *options]
-    return run([*line, "--out", str(tmp_path / "best.toml"), "--json"])
-
-
-@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
-def test_in_a_search_the_trial_fails_and_the_search_goes_on(tmp_path, capsys, workers):
-    assert search(tmp_path, "sys.exit(0)", "step of others", "--workers", workers) == 0
-    assert '"impossible": 2' in capsys.readouterr().out
-
-
-def test_a_search_whose_configs_exit_ends_with_an_error(tmp_path, capsys):
-    assert search(tmp_path, "sys.exit(0)", "check of others") == 1
-    assert '"got": "SystemExit: 0"' in capsys.readouterr().out
 
 
 class Unreadable(Exception):
@@ -239,24 +189,6 @@ def test_an_exception_whose_text_cannot_be_read(error):
     assert caught.value.__cause__ is error
 
 
-def fails_unreadably(item):
-    class Local(Unreadable):
-        """It cannot be pickled either."""
-
-    raise Local()
-
-
-def test_an_unreadable_exception_passes_through_a_worker():
-    result = pickle.loads(run_pickled(pickle.dumps((fails_unreadably, 1))))
-    assert str(result.error) == "Local"
-
-
-def test_an_interrupt_that_a_tracker_makes_is_its_own(tmp_path, capsys):
-    """_thread.interrupt_main() runs the handler of Ctrl-C without a signal."""
-    assert run(command(tmp_path, "step", "__import__('_thread').interrupt_main()")) == 1
-    assert "gt, frame 3: got KeyboardInterrupt" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("seed", [2**63, 10**30, -1, 1.5, True])
 def test_a_wrong_seed_is_found_before_the_tracker_is_made(seed):
     class Never(Abrupt):
@@ -265,8 +197,3 @@ def test_a_wrong_seed_is_found_before_the_tracker_is_made(seed):
 
     with pytest.raises(InputError, match=r"--seed: got .* expected a whole number from 0 to 9223372036854775807"):
         track(Never, nobody(), seed=seed)
-
-
-def test_the_largest_seed():
-    for name in ("particle", "joint"):
-        assert len(track(name, nobody(), seed=2**63 - 1)) == 1

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from sim.types import Groups, Truth, Unscored
-from tests.hand_made import Scene, event, tracks, truth
+from sim.types import Groups, Truth
 from tracking import track
-from tracking.app.cli import run
 from tracking.objective import ObjectiveScorer
 from tracking.scoring import evaluate, score_arrays
 from tracking.scoring.annotated_frames import annotated_frames
@@ -60,11 +55,6 @@ def test_sparse_labels_are_found(kind: str) -> None:
     assert found.step == step
 
 
-def test_evenly_spaced_labels_of_ever_new_people_are_sparse() -> None:
-    found = annotated_frames(labelled_in(range(1, LENGTH, 50), lambda frame: (frame,)))
-    assert (found.step, found.frames.sum()) == (50, 12)
-
-
 def visits(seed: int) -> list[int]:
     """The frames of people who come now and then for 2 to 40 frames."""
     r = np.random.default_rng(seed)
@@ -92,21 +82,11 @@ def test_absent_people_are_no_sparse_labels(kind: str) -> None:
     assert found.frames.sum() == found.count == LENGTH
 
 
-def test_rows_that_are_not_scored_and_group_labels_annotate_a_frame() -> None:
-    """Distractors in all frames: nobody else was there. Frames with group labels have nobody, or people."""
-    every = np.arange(1, LENGTH + 1)
-    beside = Unscored(every, np.tile([0.0, 0.0, 9.0, 9.0], (LENGTH, 1)), np.ones(LENGTH, bool))
-    sparse = labelled_in(range(1, LENGTH, 10))
-    assert annotated_frames(sparse.replace(unscored=beside)).step == 1
-    assert annotated_frames(sparse.replace(labelled=np.ones(LENGTH, bool))).step == 1
-
-
 @pytest.fixture(scope="module")
 def merge() -> tuple[Truth, tuple]:
     """A scene with a merge, and the tracks of a tracker in it."""
     sequence = simulate(load("merge"), 5)
     run = track("blob", sequence, detections="file")
-    assert sequence.truth is not None
     return sequence.truth, run.tracks
 
 
@@ -145,39 +125,6 @@ def test_sparse_labels_score_as_these_frames_of_both_sides(merge: tuple[Truth, t
     assert dict(zip(CATALOGUE, weighted, strict=True)) == pytest.approx(dict(found), nan_ok=True)
 
 
-def test_irregular_labels_score_as_these_frames_of_both_sides(merge: tuple[Truth, tuple]) -> None:
-    dense, run = merge
-    frames = np.arange(1, dense.length, 7) + np.arange(len(range(1, dense.length, 7))) % 3
-    kept = [t for t in run if t.index in frames]
-    found, expected = evaluate(thinned(dense, frames), run), evaluate(thinned(dense, frames), kept)
-    assert found.step is None
-    assert found.frames == len(frames)
-    for key in ("HOTA", "MOTA", "IDF1", "GOSPA", "FP", "FN", "IDSW"):
-        assert found[key] == expected[key], key
-
-
-def test_a_prefix_of_sparse_labels_is_scored_as_far_as_it_goes(merge: tuple[Truth, tuple]) -> None:
-    dense, run = merge
-    sparse = thinned(dense, np.arange(1, dense.length + 1, 10))
-    assert evaluate(sparse, run, frames=95).frames == 10
-    known = ObjectiveScorer(sparse).scores(run[:95], float("nan"))
-    assert known["HOTA"] == evaluate(sparse, run[:95], frames=95)["HOTA"]
-
-
-def test_events_start_in_the_next_frame_that_is_scored() -> None:
-    """A merge between two labelled frames, told between two others: matched, with its parents and children."""
-    pair, length = {1: (0.0, 0.0), 2: (0.8, 0.0)}, 101
-    apart, together = Scene(pair), Scene(pair, {7: ((1, 2), None)})
-    scenes = [apart if f < 44 else together for f in range(1, length + 1)]
-    happened, told = event("merge", 44, (1, 2)), event("merge", 46, (1, 2), emitted=63)
-    sparse = thinned(truth(scenes, [happened]).replace(groups_px=truth(scenes).groups), np.arange(1, length + 1, 10))
-    run = [t.replace(own_events=("merge",), derived=True) for t in tracks(scenes, [told])]
-    found = evaluate(sparse, run)
-    assert (found["merge_TP"], found["merge_FP"], found["merge_FN"]) == (1, 0, 0)
-    assert found["lineage_accuracy"] == 1
-    assert found["merge_latency"] == pytest.approx((71 - 51) / 10)
-
-
 def columns(t: Truth, group: bool = True, step: int = 1, frames: int = 1) -> dict:
     """The rows of every `step`-th frame as columns, these frames numbered 1, 1 + frames, …"""
     kept = (t.frame - 1) % step == 0
@@ -196,44 +143,3 @@ def test_sparse_arrays_score_as_these_frames_numbered_anew(merge: tuple[Truth, t
     assert (anew.step, found.step, found.frames) == (1, 5, anew.frames)
     assert dict(found) == pytest.approx(dict(anew), nan_ok=True)
     assert found["event_F1"] == found["event_F1"]
-
-
-def test_dense_tracks_of_sparse_arrays_are_scored_where_labels_are(merge: tuple[Truth, tuple]) -> None:
-    dense, _ = merge
-    anew = score_arrays(columns(dense, step=5), columns(dense, step=5), fps=2)
-    found = score_arrays(columns(dense, step=5, frames=5), columns(dense), fps=10)
-    for key in ("HOTA", "MOTA", "IDF1", "GOSPA", "group_F1", "pairwise_F1", "event_F1", "lineage_accuracy"):
-        assert found[key] == pytest.approx(anew[key]), key
-
-
-def written(folder: Path, frames, length: int = LENGTH) -> tuple[Path, Path]:
-    """A MOTChallenge folder labelled in these frames, and tracks of the same people in all frames."""
-    labels, every = labelled_in(frames, length=length), labelled_in(range(1, length + 1), length=length)
-    text = folder / "S" / "gt" / "gt.txt"
-    text.parent.mkdir(parents=True)
-    (folder / "S" / "seqinfo.ini").write_text(f"[Sequence]\nname=S\nframeRate=25\nseqLength={length}\n")
-    for path, rows in ((text, labels), (folder / "S.txt", every)):
-        lines = np.column_stack([rows.frame, rows.id, rows.box, np.ones((len(rows.id), 3))]).tolist()
-        path.write_text("".join(",".join(f"{v:g}" for v in line[: 9 if path == text else 7]) + "\n" for line in lines))
-    return folder / "S", folder / "S.txt"
-
-
-def test_the_command_says_how_many_frames_are_scored(tmp_path: Path, capsys) -> None:
-    folder, results = written(tmp_path, range(1, LENGTH, 10))
-    assert run(["score", str(folder), str(results)]) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert "labels are sparse (1 frame in 10): only annotated frames are scored, 60 of 600" in out
-    assert run(["score", str(folder), str(results), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    (row,) = found["sequences"]
-    assert (row["frames_scored"], row["label_step"], row["MOTA"], row["FP"]) == (60, 10, 1, 0)
-    assert len(found["notes"]) == 1
-
-
-def test_the_command_counts_false_alarms_while_people_are_absent(tmp_path: Path, capsys) -> None:
-    folder, results = written(tmp_path, [*range(1, 200), *range(400, LENGTH)])
-    assert run(["score", str(folder), str(results), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    (row,) = found["sequences"]
-    assert (row["frames_scored"], row["label_step"], row["FP"]) == (LENGTH, 1, 2 * 201)
-    assert found["notes"] == []

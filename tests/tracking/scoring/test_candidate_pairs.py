@@ -7,8 +7,8 @@ import pytest
 
 from tests.reference_trackeval import box_similarity
 from tracking.scoring import candidate_pairs as module
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, matrix_pairs, point_pairs
-from tracking.scoring.rows import FrameRows, numbered
+from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
+from tracking.scoring.rows import FrameRows, RowLookup
 
 
 def random_rows(r: np.random.Generator, frames: int = 12, most: int = 9) -> FrameRows:
@@ -47,7 +47,7 @@ def expected(true: FrameRows, est: FrameRows, table: np.ndarray) -> dict[tuple[i
 
 
 @pytest.mark.parametrize("broken", [False, True])
-@pytest.mark.parametrize("seed", range(15))
+@pytest.mark.parametrize("seed", range(5))
 def test_places_and_boxes_of_every_frame(seed: int, broken: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "CHUNK", 7)  # many portions
     r = np.random.default_rng(seed)
@@ -63,54 +63,31 @@ def test_places_and_boxes_of_every_frame(seed: int, broken: bool, monkeypatch: p
     assert as_dict(box_pairs(true, est, a, b)) == pytest.approx(expected(true, est, overlap), abs=1e-12)
 
 
-@pytest.mark.parametrize("spread", [0.0, 0.3])
-def test_frames_stay_apart_where_all_stand_close(spread: float) -> None:
-    r = np.random.default_rng(0)
-    true, est = random_rows(r), random_rows(r)
-    a, b = (spread * places(r, rows, False) for rows in (true, est))
-    near = np.maximum(0, 1 - np.linalg.norm(a[:, None] - b[None], axis=2) / 9)
-    assert as_dict(point_pairs(true, est, a, b, 9.0)) == pytest.approx(expected(true, est, near), abs=1e-12)
+def best(rows, only, id, away, reach):
+    """The row of this id with the least `away` (R,), which is at most reach and not below 0; -1 if there is none."""
+    found = np.flatnonzero(only & (rows.id == id) & (away >= 0) & (away <= reach))
+    return int(found[away[found].argmin()]) if len(found) else -1
 
 
-def test_overlap_of_two_boxes() -> None:
-    one = FrameRows(np.array([1]), np.array([1]))
-    found = box_pairs(one, one, np.array([[0.0, 0, 4, 2]]), np.array([[2.0, 0, 4, 2]]))
-    assert found.s == pytest.approx([4 / 12])
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_part_of_the_frames(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("reach", [0, 3, 100])
+def test_lookup_is_the_slow_way(seed, reach):
     r = np.random.default_rng(seed)
-    true, est = random_rows(r), random_rows(r)
-    a, b = places(r, true, False), places(r, est, False)
-    whole = point_pairs(true, est, a, b, 4.0)
-    mask = r.random(13) < 0.5
-    for kept in (mask, np.arange(13) <= 6):
-        part, i, j = whole.in_frames(kept), kept[true.frame], kept[est.frame]
-        alone = point_pairs(true.keep(i), est.keep(j), a[i], b[j], 4.0)
-        assert as_dict(part) == as_dict(alone)
-        assert part.true.id.tolist() == alone.true.id.tolist()
-        assert part.est.frame.tolist() == alone.est.frame.tolist()
+    frame, id = np.nonzero(r.random((30, 6)) < 0.4)
+    rows, only = FrameRows(frame, 7 * id - 7), r.random(len(frame)) < 0.7
+    every = np.ones(len(frame), bool)
+    for lookup, some in ((RowLookup(rows), every), (RowLookup(rows, only), only)):
+        for who in (-7, 0, 14, 28, 3, 99):
+            for at in (-3, 0, 11, 12, 13, 29, 40):
+                assert lookup.last(who, at, reach) == best(rows, some, who, at - frame, reach)
+                assert lookup.next(who, at, reach) == best(rows, some, who, frame - at, reach)
+                assert lookup.nearest(who, at, reach) == best(rows, some, who, np.abs(frame - at), reach)
 
 
-def test_tables_of_each_frame() -> None:
-    pairs = matrix_pairs(
-        [[5], [], [6, 7]], [[1, 2], [3], [4]], [np.array([[0.0, 0.5]]), np.zeros((0, 1)), [[0.25], [1]]]
-    )
-    assert as_dict(pairs) == {(0, 1): 0.5, (1, 3): 0.25, (2, 3): 1.0}
-    assert pairs.frame.tolist() == [0, 2, 2]
-    assert pairs.true.id.tolist() == [5, 6, 7]
+def test_of_two_as_near_the_earlier():
+    assert RowLookup(FrameRows(np.array([3, 7]), np.array([1, 1]))).nearest(1, 5, 2) == 0
 
 
-def test_links_are_pairs_of_identities() -> None:
-    pairs = matrix_pairs([[5, 9], [9, 5]], [[8, 3], [3]], [np.ones((2, 2)), np.ones((2, 1))])
-    true_id, est_id, which = pairs.links
-    seen = [(int(pairs.true_ids[0][true_id[k]]), int(pairs.est_ids[0][est_id[k]])) for k in which.tolist()]
-    assert seen == [(5, 8), (5, 3), (9, 8), (9, 3), (9, 3), (5, 3)]
-    assert len(true_id) == 4
-
-
-@pytest.mark.parametrize("values", [[], [7], [-3, 7, -3], [10**15, 0, 10**15, 5], list(range(50, 0, -1))])
-def test_numbered_as_unique(values: list[int]) -> None:
-    distinct, place = numbered(np.array(values, np.int64))
-    assert (distinct.tolist(), place.tolist()) == (sorted(set(values)), [sorted(set(values)).index(v) for v in values])
+def test_nobody_has_no_rows():
+    lookup = RowLookup(FrameRows(np.zeros(0, int), np.zeros(0, int)))
+    assert (lookup.last(1, 5, 9), lookup.next(1, 5, 9), lookup.nearest(1, 5, 9)) == (-1, -1, -1)

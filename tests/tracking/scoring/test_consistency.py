@@ -3,33 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from tracking.scoring.consistency import mean_band, normalised, normalised_square, whiteness, whiteness_band
-
-
-def test_normalised_by_hand() -> None:
-    covariances = np.array([[[4.0, 0.0], [0.0, 9.0]], [[2.0, 1.0], [1.0, 2.0]]])
-    errors = np.array([[2.0, 3.0], [1.0, 0.0]])
-    assert normalised_square(errors, covariances) == pytest.approx([2.0, 2 / 3])  # inverse of [[2, 1], [1, 2]] is …/3
-    assert normalised(errors, covariances)[0] == pytest.approx([1.0, 1.0])
-
-
-def test_bands_by_tables() -> None:
-    """Chi-square with 100 degrees of freedom has its 2.5 and 97.5 % points at 74.22 and 129.56."""
-    assert mean_band(50, 2) == pytest.approx((74.22 / 50, 129.56 / 50), abs=1e-3)
-    assert whiteness_band(101, 1) == pytest.approx(0.196, abs=1e-3)
-    assert whiteness_band(401, 2, level=0.99) == pytest.approx(2.5758 / np.sqrt(800), abs=1e-4)
-
-
-def test_autocorrelation_by_hand() -> None:
-    v = np.array([[1.0], [-1.0], [1.0], [-1.0]])
-    assert whiteness(v, lags=2) == pytest.approx([-1.0, 1.0])
-    v = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
-    assert whiteness(v, lags=4)[:2] == pytest.approx([0.0, 1.0])
-    assert np.isnan(whiteness(v, lags=4)[2:]).all()
-    assert np.isnan(whiteness(np.zeros((0, 2)))).all()
-    assert np.isnan(whiteness(np.zeros((5, 2)))).all()
 
 
 def run(r: np.random.Generator, frames: int, runs: int, believed: float, lasting: float = 0.0):

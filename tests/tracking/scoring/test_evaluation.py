@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Set
 from pathlib import Path
 
@@ -18,7 +20,7 @@ from sim.types import EVENT_KINDS, Tracks, Truth
 from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.scoring import evaluate
-from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.catalogue import ALL, CATALOGUE, CORE
 from tracking.scoring.evaluation import IncomparableError, Scores
 
 NAMES = sorted(path.stem for path in Path(scenarios.__file__).parent.glob("*.toml"))
@@ -48,8 +50,7 @@ def truth_as_tracks(true: Truth, plane: str = "ground", late: int = 0) -> list[T
 
 @pytest.mark.parametrize("name", NAMES)
 def test_truth_as_tracks_is_perfect(name: str) -> None:
-    true = simulate(load(name), 5).truth
-    assert true is not None
+    true = simulate(load(name, ["camera.fps=5"]), 5, streams=()).truth
     for plane, by in (("ground", "hull"), ("ground", "members"), ("image", "hull")):
         found = evaluate(true, truth_as_tracks(true, plane), group_match=by)
         # What a tracker does not tell is measured where it follows people: who passes by may cross in the picture.
@@ -70,25 +71,6 @@ def assert_perfect(found: Scores, without: Set[str] = frozenset()) -> None:
             assert value == pytest.approx(best, abs=1e-6), (key, found.surface, found.group_match)
 
 
-@pytest.mark.filterwarnings("ignore:CAVIAR's recordings are taken at 25 fps")
-@pytest.mark.parametrize(("place", "plane"), [("biwi/seq_hotel", "ground"), ("caviar/mwt1gt.xml", "image")])
-def test_labels_of_recordings_as_tracks_are_perfect(shared_data: Path, place: str, plane: str) -> None:
-    (sequence,) = open_source(shared_data / place)
-    for by in ("hull", "members"):
-        found = evaluate(sequence.truth, truth_as_tracks(sequence.truth, plane), group_match=by)
-        assert found["objective"] == found["group_F1"] == found["pairwise_F1"] == 1
-        assert_perfect(found)
-
-
-@pytest.mark.parametrize("name", ["merge", "split"])
-def test_a_second_late_is_not_perfect_but_the_core_is(name: str) -> None:
-    true = simulate(load(name), 5).truth
-    found = evaluate(true, truth_as_tracks(true, late=round(true.fps)))
-    assert found["group_GDSR"] < 0.99
-    assert found["group_F1"] < 0.99
-    assert found["group_F1_core"] == found["group_GDSR2_core"] == found["group_MOTA_core"] == 1
-
-
 @pytest.mark.parametrize("detections", ["file", "truth"])
 def test_files_are_memory(tmp_path: Path, detections: str) -> None:
     sequence = simulate(load("party"), 5, streams=())
@@ -103,13 +85,6 @@ def test_files_are_memory(tmp_path: Path, detections: str) -> None:
         assert (was.similarity, was.surface) == (now.similarity, now.surface)
         for key, value in was.items():
             assert now[key] == pytest.approx(value, abs=1e-12, nan_ok=True), key
-
-
-def test_every_key_of_the_catalogue_and_no_other_is_returned() -> None:
-    scene = [Scene(TWO, {1: ((1, 2), None)})] * 30
-    for groups, unit in ((None, "person"), (truth(scene).groups, "person"), (truth(scene).groups, "group")):
-        found = evaluate(truth(scene, groups=groups), tracks(scene, unit=unit))
-        assert list(found) == list(CATALOGUE)
 
 
 def test_every_score_lies_in_its_range() -> None:
@@ -163,27 +138,6 @@ def test_a_beginning_is_not_told_what_comes_later() -> None:
         assert dict(found) == pytest.approx(dict(expected), abs=1e-12, nan_ok=True)
 
 
-def test_errors_of_places() -> None:
-    # Four frames. Person 1 is told 0.3 m off, person 2 0.4 m off in two of them and in none of the others, where
-    # somebody 9 m away is told instead once. RMSE² = (4 x 0.09 + 2 x 0.16)/6. GOSPA² = that sum / 4 frames + 2 missed
-    # and 1 false at 2²/2 each / 4.
-    near = Scene({1: (0.3, 0.0), 2: (1.0, 0.4)})
-    est = [near, near, Scene({1: (0.0, 0.3)}), Scene({1: (0.0, 0.3), 2: (9.0, 0.0)})]
-    found = evaluate(truth([Scene(TWO)] * 4), tracks(est))
-    assert found["RMSE_pos"] == pytest.approx((0.68 / 6) ** 0.5, abs=1e-12)
-    assert found["RMSE_vel"] == 0
-    assert found["GOSPA_localisation"] == pytest.approx((0.68 / 4) ** 0.5, abs=1e-12)
-    assert found["GOSPA_missed"] == pytest.approx(1, abs=1e-12)
-    assert found["GOSPA_false"] == pytest.approx(0.5**0.5, abs=1e-12)
-    assert found["GOSPA"] == pytest.approx((0.17 + 1 + 0.5) ** 0.5, abs=1e-12)
-
-
-def test_frames_without_an_answer_are_empty() -> None:
-    scene = [Scene(TWO, {1: ((1, 2), None)})] * 4
-    found = evaluate(truth(scene), [t for t in tracks(scene) if t.index != 2])
-    assert (found["FN"], found["group_FN"], found["group_1-FN"]) == (2, 1, 0.75)
-
-
 def test_nothing_said_and_nothing_there() -> None:
     # Empty output: no false group, all missed.
     scene = [Scene(TWO, {1: ((1, 2), None)})] * 4
@@ -191,16 +145,6 @@ def test_nothing_said_and_nothing_there() -> None:
     assert (found["group_1-FP"], found["group_1-FN"], found["group_GDSR"], found["group_MOTA"]) == (1, 0, 0, 0)
     assert np.isnan(evaluate(truth([Scene(TWO)] * 4), tracks([Scene(TWO)] * 4))["group_HOTA"])  # no groups at all
     assert evaluate(truth([Scene({})] * 4), tracks([Scene({})] * 4))["FP"] == 0
-
-
-def test_the_similarity_is_the_one_asked_for() -> None:
-    box = np.array([[0, 0, 10, 20], [100, 0, 10, 20]], float)
-    true = truth([Scene(TWO)], box=box)
-    seen = [t.replace(box=box + np.array([5, 0, 0, 0])) for t in tracks([Scene(TWO)])]
-    assert evaluate(true, seen).similarity == "ground"
-    assert evaluate(true, seen, similarity="boxes")["MOTA"] == -1  # IoU 1/3
-    assert evaluate(true, seen, similarity="ground")["MOTA"] == 1
-    assert evaluate(true, seen, similarity="image")["MOTA"] == 1  # 5 px of 80
 
 
 @pytest.mark.parametrize(("similarity", "lacking"), [("boxes", "no boxes"), ("image", "in the image")])
@@ -213,3 +157,30 @@ def test_an_id_twice_in_a_frame_is_refused() -> None:
     (told,) = tracks([Scene(TWO)])
     with pytest.raises(ValueError, match="tracks: id 1 is twice in frame 1"):
         evaluate(truth([Scene(TWO)]), [told.replace(id=np.array([1, 1]))])
+
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGE = ROOT / "docs" / "reference" / "metrics.md"
+
+
+def test_every_key_of_the_page_is_returned_and_the_other_way_round() -> None:
+    scene = [Scene(TWO, {1: ((1, 2), None)})] * 3
+    returned = set(evaluate(truth(scene), tracks(scene)))
+    rows = set(re.findall(r"^\| `([^`]+)` \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
+    assert returned == rows | {f"{key}_core" for key in rows if CATALOGUE[key].family == "groups"}
+
+
+def test_keys_are_unique_and_said_in_full() -> None:
+    assert len(CATALOGUE) == len(ALL)
+    for score in ALL:
+        assert score.meaning, score.key
+        assert score.low < score.high
+        assert (score.better == "neither") <= math.isnan(score.best)
+    core = [score.key for score in ALL if score.family == CORE]
+    assert core == [f"{score.key}_core" for score in ALL if score.family == "groups"]
+
+
+def test_the_command_shows_scores_that_there_are() -> None:
+    from tracking.app.commands.score_tables import SHOWN, TABLES
+
+    assert {*SHOWN, *(key for keys in TABLES.values() for key in keys)} <= set(CATALOGUE)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.types import Tracks
 from tests.hand_made import Scene, event, tracks, truth
 from tests.reference_social import event_hits
 from tracking.scoring import evaluate
@@ -56,42 +55,6 @@ def test_half_of_all_people_concerned(members, hit):
     assert hits("split", found) == (hit, 1 - hit, 1 - hit)
 
 
-def test_two_tracks_that_are_one_person_are_one():
-    # Track 20 takes over from track 1 in frame 31: at the start it is not seen, a frame later it is person 1. So the
-    # tracks 1, 2, 20 are the people 1, 2 and one too many: 2/3. Tracks 1 and 20 are person 1 and one too many: 1/3.
-    people = [Scene({(1 if k <= 30 else 20): CROWD[1], 2: CROWD[2]}) for k in range(1, FRAMES + 1)]
-    said = [event("merge", 30, (1, 2, 20), emitted=32)]
-    found = evaluate(truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2))]), tracks(people, said))
-    assert hits("merge", found) == (1, 0, 0)
-    alone = evaluate(
-        truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2))]),
-        tracks(people, [event("merge", 30, (1, 20), emitted=32)]),
-    )
-    assert hits("merge", alone) == (0, 1, 1)
-
-
-def test_an_event_is_told_once():
-    # ComparableEvent twice: 1 hit, 1 false: F1 2/3. Two events and one told: F1 2/3, too, with a recall of 1/2.
-    once, twice = [event("merge", 30, (1, 2))], [event("merge", k, (1, 2), emitted=k) for k in (28, 30)]
-    found = scores(once, twice)
-    assert (found["merge_F1"], found["merge_precision"], found["merge_recall"]) == (near(2 / 3), near(1 / 2), near(1))
-    again = [event("merge", 28, (1, 2)), event("merge", 34, (1, 2))]
-    found = scores(again, [event("merge", 30, (1, 2), emitted=30)])
-    assert (found["merge_F1"], found["merge_precision"], found["merge_recall"]) == (near(2 / 3), near(1), near(1 / 2))
-
-
-def test_as_many_as_possible_are_paired():
-    # True ones start at 20 and 30, told ones at 25 (could be either) and 34 (only the second): taking the first one
-    # that fits for each, or the most alike first, must not leave one alone.
-    happened = [event("merge", 20, (1, 2, 3)), event("merge", 30, (1, 2))]
-    said = [event("merge", 25, (1, 2), emitted=26), event("merge", 34, (1, 2), emitted=35)]
-    assert hits("merge", scores(happened, said)) == (2, 0, 0)
-    # The first two are the very same, 1 together; each is half like the other side's second (2 of 4, a second later).
-    happened = [event("split", 30, (1, 2)), event("split", 40, (1, 2, 5, 6))]
-    said = [event("split", 30, (1, 2), emitted=31), event("split", 40, (1, 2, 3, 4), emitted=41)]
-    assert hits("split", scores(happened, said)) == (2, 0, 0)
-
-
 def test_kinds_are_kept_apart_but_forming_is_merging():
     happened = [event(kind, 30, (1, 2)) for kind in ("merge", "dissolve", "cross", "queue", "enter", "leave")]
     said = [event(kind, 30, (1, 2), emitted=30) for kind in ("form", "split", "cross", "queue", "enter", "leave")]
@@ -99,24 +62,6 @@ def test_kinds_are_kept_apart_but_forming_is_merging():
     for kind in ("merge", "split", "cross", "queue", "enter", "leave"):
         assert hits(kind, found) == (1, 0, 0), kind
     assert hits("cross", scores(happened, [event("queue", 30, (1, 2), emitted=30)])) == (0, 0, 1)
-
-
-def test_the_headline_is_the_mean_of_merge_and_split():
-    # Merges: 1 of 1. Splits: 1 of 3, nothing false: F1 2/4. The mean of 1 and 1/2, whereas all together were 2 x 2/6.
-    # Crossings (missed) do not matter.
-    happened = [
-        event("merge", 10, (1, 2)),
-        *(event("split", k, (1, 2)) for k in (10, 25, 40)),
-        event("cross", 9, (1, 2)),
-    ]
-    said = [event("merge", 10, (1, 2), emitted=15), event("split", 25, (1, 2), emitted=28)]
-    found = scores(happened, said)
-    assert found["event_F1"] == near(3 / 4)
-    assert found["event_precision"] == near(1)
-    assert found["event_recall"] == near((1 + 1 / 3) / 2)
-    assert scores(happened[:1], said[:1])["event_F1"] == near(1)  # no splits on either side: not known, not 0
-    assert np.isnan(scores([], [])["event_F1"])
-    assert scores([], said[:1])["event_F1"] == 0
 
 
 def test_latency_is_from_the_true_start_to_the_telling():
@@ -131,16 +76,6 @@ def test_latency_is_from_the_true_start_to_the_telling():
     found = scores(happened, said)
     assert (found["merge_latency"], found["split_latency"], found["event_latency"]) == (near(1.5), near(0.5), near(1.0))
     assert np.isnan(found["cross_latency"])
-
-
-def test_members_are_who_they_were_at_the_start():
-    # The tracks of 1, 2 and of 5, 6 change places in frame 35: the event began at 30, when 1 and 2 were themselves.
-    after = CROWD | {1: CROWD[5], 2: CROWD[6], 5: CROWD[1], 6: CROWD[2]}
-    told = tracks(
-        [Scene(CROWD if k < 35 else after) for k in range(1, FRAMES + 1)], [event("merge", 30, (1, 2), emitted=50)]
-    )
-    assert hits("merge", evaluate(truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2))]), told)) == (1, 0, 0)
-    assert hits("merge", evaluate(truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (5, 6))]), told)) == (0, 1, 1)
 
 
 @pytest.mark.parametrize(("gone", "hit"), [(9, 1), (10, 1), (11, 0)])
@@ -161,17 +96,6 @@ def test_without_members_the_place_decides(x, hit):
     happened, said = [event("merge", 30, (1, 2))], [event("merge", 30, (), emitted=31, pos=(x, 0.0))]
     told = tracks([Scene({}, {})] * FRAMES, said, unit="group")
     assert hits("merge", evaluate(truth([Scene(CROWD)] * FRAMES, happened), told)) == (hit, 1 - hit, 1 - hit)
-
-
-def test_in_the_image_places_are_in_pixels():
-    # True people 1 and 2 are at (160, 0) and (320, 0) px: middle (240, 0). 40 px per metre: 60 px are 1.5 m.
-    px = np.array([(40 * x - 10, -10, 20, 20) for x, _ in CROWD.values()], float)
-    true = truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2), pos=(6.0, 0.0))], box=np.tile(px, (FRAMES, 1)))
-    for x, hit in ((299.0, 1), (301.0, 0)):
-        said = [event("merge", 30, (), emitted=31, pos=(x, 0.0))]
-        seen = [Scene({}, {9: ((), (0, 0, 9, 9))})] * FRAMES
-        found = evaluate(true, tracks(seen, said, unit="group", plane="image"))
-        assert hits("merge", found) == (hit, 1 - hit, 1 - hit)
 
 
 def test_events_that_begin_without_labels_do_not_count():
@@ -209,27 +133,6 @@ def test_lineage_of_a_merge(before, after, right):
     assert found["lineage_accuracy"] == found["lineage_accuracy_found"] == right
 
 
-def test_lineage_of_labels_for_life() -> None:
-    # Two people are labelled as one group before they meet: who forms came from being alone, whatever labels say; of a
-    # merge such labels tell nothing, and it does not count.
-    scenes = [Scene(CROWD, {1: (AB, None), 2: (CD, None)})] * FRAMES
-    happened = [event("form", 30, AB), event("merge", 40, ABCD)]
-    said = [event("form", 30, AB, emitted=30), event("merge", 40, ABCD, emitted=40)]
-    assert evaluate(truth(scenes, happened), tracks(scenes, said))["lineage_accuracy"] == 1
-    gradual = [Scene(CROWD, {1: (AB, None), 2: (CD, None)} if k >= 30 else {2: (CD, None)}) for k in range(1, 61)]
-    assert evaluate(truth(scenes, happened), tracks(gradual, said))["lineage_accuracy"] == 1
-
-
-def test_lineage_counts_all_that_happened():
-    # A merge at 20 told rightly, a split at 45 not told: 1 of 2; of those found 1 of 1.
-    scenes = [Scene(CROWD, {1: (ABCD, None)} if 20 <= k < 45 else {1: (AB, None), 2: (CD, None)}) for k in range(1, 61)]
-    happened = [event("merge", 20, ABCD), event("split", 45, ABCD)]
-    told = tracks(scenes, [event("merge", 20, ABCD, emitted=20)])
-    found = evaluate(truth(scenes, happened), told)
-    assert found["lineage_accuracy"] == near(0.5)
-    assert found["lineage_accuracy_found"] == near(1)
-
-
 def test_lineage_does_not_mind_ids_nor_a_late_word():
     # The tracker changes its groups in frame 32 and tells so in 40; its ids have nothing to do with the truth's.
     true = truth(changing([AB, CD], [ABCD], 30), [event("merge", 30, ABCD)])
@@ -239,19 +142,7 @@ def test_lineage_does_not_mind_ids_nor_a_late_word():
     assert evaluate(true, tracks(said, [event("merge", 31, ABCD, emitted=40)]))["lineage_accuracy"] == 1
 
 
-def test_lineage_without_members_is_by_who_is_in_the_hulls():
-    people = {1: (0.5, 0.5), 2: (1.5, 0.5), 3: (3.5, 0.5), 4: (4.5, 0.5)}
-    apart, joint = {1: (AB, (0, 0, 2, 1)), 2: (CD, (3, 0, 5, 1))}, {3: (ABCD, (0, 0, 5, 1))}
-    scenes = [Scene(people, apart if k < 30 else joint) for k in range(1, FRAMES + 1)]
-    merge = event("merge", 30, ABCD, pos=(2.5, 0.5))
-    true = truth(scenes, [merge])
-    for before, right in (((1, 2), 1), ((1,), 0), ((1, -1), 0)):
-        said = type(merge)("merge", 30, 30, 30, before, (3,), (), (2.5, 0.5))
-        found = evaluate(true, tracks(scenes, [said], unit="group"))
-        assert found["lineage_accuracy"] == right, before
-
-
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_as_many_hits_as_there_can_be(seed):
     r = np.random.default_rng(seed)
 
@@ -272,11 +163,6 @@ def test_as_many_hits_as_there_can_be(seed):
     )
     found = unweighted(weighted_events(match_events(true, told, 10.0, 1.0), 10.0, 60), 60)
     assert found["merge_TP"] == event_hits(happened, said, 10.0)
-
-
-def test_no_answer_at_all_is_no_error():
-    found = evaluate(truth([Scene(CROWD, {1: (AB, None)})] * 3, [event("merge", 2, AB)]), list[Tracks]())
-    assert (found["merge_FN"], found["group_FN"], found["objective"]) == (1, 3, 0)
 
 
 def test_latency_is_to_the_answer_that_told_whatever_it_claims():

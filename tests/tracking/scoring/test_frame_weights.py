@@ -17,6 +17,7 @@ from tracking import track
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.frame_weights import weighted_scorers
+from tracking.scoring.weighted_sums import FrameSums
 
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
 PAIR = {1: ((1, 2), None)}
@@ -64,31 +65,6 @@ def test_frames_of_weight_n_count_n_times(weight: list[int]) -> None:
         assert found[key] == pytest.approx(expected[key], abs=1e-12, nan_ok=True), key
 
 
-def test_a_switch_has_the_weight_of_its_frame() -> None:
-    """The old resampling joined frames, and each join of an early with a late block was a switch."""
-    answers = [FOUND] * 50 + [Scene({1: (0.0, 0.0), 5: (1.0, 0.0)}, {4: ((1, 5), None)})] * 50
-    true = truth([FOUND] * 100)
-    weights = np.ones(100)
-    assert scored(true, tracks(answers), weights)["IDSW"] == 1
-    weights[[10, 90]] = 0, 2
-    assert scored(true, tracks(answers), weights)["IDSW"] == 1
-    weights[50] = 3
-    found = scored(true, tracks(answers), weights)
-    assert (found["IDSW"], found["group_IDSW"]) == (3, 3)
-
-
-def test_events_have_the_weight_of_their_start() -> None:
-    true = truth([FOUND] * 60, [event("merge", 10, (1, 2)), event("merge", 40, (1, 2))])
-    told = [event("merge", 12, (1, 2), emitted=15), event("merge", 25, (1, 2), emitted=26)]
-    answers = tracks([FOUND] * 60, told)
-    weights = np.ones(60)
-    weights[[9, 11, 24, 39]] = 2, 7, 3, 5  # the true start counts, not that of the matched report
-    found = scored(true, answers, weights)
-    assert (found["merge_TP"], found["merge_FP"], found["merge_FN"]) == (2, 3, 5)
-    assert found["merge_F1"] == pytest.approx(4 / 12)
-    assert found["merge_latency"] == pytest.approx(0.5)
-
-
 def test_no_weight_where_a_score_is_defined_makes_it_unknown() -> None:
     true = truth([FOUND] * 20, [event("merge", 10, (1, 2))])
     weights = np.ones(20)
@@ -99,12 +75,14 @@ def test_no_weight_where_a_score_is_defined_makes_it_unknown() -> None:
     assert nothing["HOTA"] == 0
 
 
-def test_each_draw_is_by_itself() -> None:
-    true, answers = simulated()
-    r = np.random.default_rng(0)
-    weights = r.exponential(1.0, (3, true.length))
-    score = weighted_scorers(true, [answers["people"]])[0]
-    together = score(weights)
-    for row, expected in zip(weights, together, strict=True):
-        assert np.allclose(score(row[None])[0], expected, rtol=1e-12, atol=1e-12, equal_nan=True)
-    assert score(np.zeros((0, true.length))).shape == (0, len(CATALOGUE))
+def test_a_stated_total_stands_at_weights_of_one_and_changes_with_them() -> None:
+    sums = FrameSums(3)
+    frame, values = np.array([1, 2, 2]), np.array([0.1, 0.2, 0.3])
+    sums.add("plain", frame, values)
+    sums.add("number", frame)
+    sums.add("exact", frame, values, 0.6)
+    found = sums.of(np.array([[1.0, 1.0, 1.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.5]]))
+    assert found["exact"][0] == 0.6 != 0.1 + 0.2 + 0.3
+    for name in ("plain", "exact"):
+        assert found[name] == pytest.approx([0.6, 0.2, 0.25])
+    assert found["number"].tolist() == [3, 2, 1]

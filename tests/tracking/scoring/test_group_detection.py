@@ -9,7 +9,6 @@ from tests.hand_made import Scene, tracks, truth
 from tracking.scoring import evaluate
 
 SIX = {k: (3.0 * k, 0.0) for k in range(1, 7)}
-FAR = (0.0, 90.0)
 Sets = tuple[tuple[int, ...], ...]
 
 
@@ -49,32 +48,6 @@ def test_gmitre_of_one_frame(true: Sets, est: Sets, right: int, of_est: int, of_
     assert found([scene(*true)], [scene(*est)], "GMITRE") == expected
 
 
-def test_people_alone_count_in_gmitre() -> None:
-    """MITRE itself would call it perfect that a giant group holds everybody: recall 1 without a link of 3 … 6."""
-    assert found([scene((1, 2))], [scene((1, 2, 3, 4, 5, 6))], "GMITRE") == near(1 / 5, 1 / 5, 1 / 5)
-
-
-def test_missed_people_and_false_tracks_have_wrong_links() -> None:
-    # {1, 2, 3} is told as {1, 2, 9}, 9 being nobody: of 2 links on either side 1 is right. 4 is alone in truth only, 8
-    # in the tracks only.
-    true = [scene((1, 2, 3), people={k: SIX[k] for k in (1, 2, 3, 4)})]
-    est = [scene((1, 2, 9), people={1: SIX[1], 2: SIX[2], 9: FAR, 8: (0.0, 120.0)})]
-    assert found(true, est, "GMITRE") == near(1 / 3, 1 / 3, 1 / 3)
-    assert found(true, est, "right_groups") == (1, 1, 1)  # 2 of 3 found, 1 false one
-    assert found(true, est, "exact_groups") == (0, 0, 0)
-
-
-def test_one_missed_member_of_several_is_one_part_each() -> None:
-    # Of {1, 2, 3, 4} only 1 and 2 are tracked, together: 1 of 3 links. 3 and 4, both missed, are two parts.
-    two = {1: SIX[1], 2: SIX[2]}
-    true = [scene((1, 2, 3, 4), people={k: SIX[k] for k in (1, 2, 3, 4)})]
-    assert found(true, [scene((1, 2), people=two)], "GMITRE") == near(1, 1 / 3, 1 / 2)
-
-
-def test_a_person_in_two_estimated_groups_makes_no_link_twice() -> None:
-    assert found([scene((1, 2))], [scene((1, 2), (1, 2))], "GMITRE") == near(5 / 6, 1, 10 / 11)
-
-
 @pytest.mark.parametrize(
     ("n", "inside", "others", "right"),
     [
@@ -93,49 +66,6 @@ def test_a_group_is_right_with_two_thirds(n: int, inside: int, others: int, righ
     assert found(true, est, "exact_groups") == (exact, exact, exact)
 
 
-@pytest.mark.parametrize(
-    ("true", "est", "precision", "recall"),
-    [
-        pytest.param(((1, 2), (3, 4)), ((1, 2, 3, 4),), 0, 0, id="merged"),
-        pytest.param(((1, 2, 3, 4),), ((1, 2), (3, 4)), 0, 0, id="split in halves"),
-        pytest.param(((1, 2, 3, 4),), ((1, 2, 3), (4, 5)), 1 / 2, 1, id="split, 3 of 4 left"),
-        pytest.param(((1, 2), (3, 4, 5)), ((1, 2, 6),), 1, 1 / 2, id="a person alone attached"),
-        pytest.param(((1, 2), (3, 4)), ((1, 2), (3, 4), (5, 6)), 2 / 3, 1, id="a false group"),
-        pytest.param(((1, 2),), (), 1, 0, id="nothing reported"),
-        pytest.param((), ((1, 2),), 0, 1, id="nothing to find"),
-        pytest.param((), (), 1, 1, id="nothing on either side"),
-    ],
-)
-def test_groups_right_of_one_frame(true: Sets, est: Sets, precision: float, recall: float) -> None:
-    p, r, f1 = found([scene(*true)], [scene(*est)], "right_groups")
-    assert (p, r) == near(precision, recall)
-    assert f1 == pytest.approx(2 * p * r / (p + r) if p + r else 0)
-
-
-def test_frames_count_alike_however_many_groups_they_have() -> None:
-    # Frame 1: three groups, all right. Frame 2: one group of two, told as one of four: P = R = 0. Frame 3: only a false
-    # group: P 0, R 1. Means P 1/3, R 2/3; F1 is of the means, not the mean of 1, 0, 0.
-    three = scene((1, 2), (3, 4), (5, 6))
-    true, est = [three, scene((1, 2)), scene()], [three, scene((1, 2, 3, 4)), scene((1, 2))]
-    assert found(true, est, "right_groups") == near(1 / 3, 2 / 3, 4 / 9)
-    # G-MITRE, right / estimated, true: 3 / 3, 3; 1 + 2 / 3 + 2, 1 + 4; 4 / 1 + 4, 6. Its F1 is the mean of those of the
-    # frames.
-    f1 = (1 + 6 / 10 + 8 / 11) / 3
-    assert found(true, est, "GMITRE") == near((1 + 3 / 5 + 4 / 5) / 3, (1 + 3 / 5 + 4 / 6) / 3, f1)
-
-
-def test_frames_without_people_or_without_tracks() -> None:
-    nobody, pair = Scene({}), scene((1, 2), people={1: SIX[1], 2: SIX[2]})
-    assert found([pair, nobody], [nobody, nobody], "GMITRE") == (1, 0.5, 0.5)
-    assert found([nobody, nobody], [pair, nobody], "GMITRE") == (0.5, 1, 0.5)
-
-
-def test_frames_without_labels_are_left_out() -> None:
-    right, wrong = scene((1, 2)), scene((3, 4))
-    got = evaluate(truth([right] * 2, labelled=np.array([True, False])), tracks([right, wrong]))
-    assert got["GMITRE_F1"] == got["right_groups_F1"] == got["exact_groups_F1"] == 1
-
-
 def test_hulls_without_members() -> None:
     """The people inside are the members; of two hulls round one group only one is right. Who is alone is not said."""
     true = [scene((1, 2))]
@@ -144,14 +74,3 @@ def test_hulls_without_members() -> None:
     assert found(true, hulls, "exact_groups", unit="group") == near(1 / 2, 1, 2 / 3)
     assert np.isnan(found(true, hulls, "GMITRE", unit="group")).all()
     assert np.isnan(found(true, [Scene({})], "GMITRE", unit="group")).all()
-
-
-def test_people_with_hulls_without_members_have_no_gmitre() -> None:
-    """A tracker of people whose groups name nobody does not say who is alone."""
-    made = tracks([scene((1, 2))])
-    bare = made[0].groups
-    none = (np.zeros(0, np.int64),)
-    unnamed = [made[0].replace(groups=type(bare)(bare.id, none, bare.pos, bare.vel, bare.extent, bare.size, bare.hull))]
-    got = evaluate(truth([scene((1, 2))]), unnamed)
-    assert np.isnan(got["GMITRE_F1"])
-    assert got["exact_groups_F1"] == 1

@@ -63,8 +63,8 @@ def test_of_equally_good_matchings_the_one_of_scipy(given: list[np.ndarray]) -> 
     assert set(zip(pairs.i[chosen].tolist(), pairs.j[chosen].tolist(), strict=True)) == expected
 
 
-@pytest.mark.parametrize("seed", range(30))
-@pytest.mark.parametrize("reach", [0.3, 0.7, 1.5])
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("reach", [0.3, 1.5])
 def test_gated_crowds_with_rounded_similarities(seed: int, reach: float) -> None:
     """People on a coarse grid, similarity 0 beyond a reach: gates and ties as sequences have them."""
     r = np.random.default_rng(seed)
@@ -77,24 +77,6 @@ def test_gated_crowds_with_rounded_similarities(seed: int, reach: float) -> None
     check(given, pairs, match_as_table(pairs, pairs.s))
 
 
-def test_weights_are_counts_of_a_whole_sequence_for_identities() -> None:
-    given = [np.array([[3.0, 5.0, 5.0], [5.0, 5.0, 0.0], [4.0, 0.0, 0.0]])]
-    pairs = pairs_of(given)
-    chosen = match(pairs.frame, pairs.i, pairs.j, pairs.s)
-    assert pairs.s[chosen].sum() == 14.0
-
-
-def test_nothing_to_match() -> None:
-    pairs = pairs_of([np.zeros((3, 0)), np.zeros((2, 2))])
-    assert match(pairs.frame, pairs.i, pairs.j, pairs.s).tolist() == []
-    assert match_as_table(pairs, pairs.s).tolist() == []
-
-
-def test_the_total_counts_and_not_the_nearest_first() -> None:
-    pairs = matrix_pairs([[7, 8]], [[1, 2]], [np.array([[0.9, 0.8], [0.75, 0.0]])])
-    assert mapped_people(pairs).tolist() == [1, 0]  # 0.8 + 0.75 > 0.9
-
-
 def test_one_metre_is_near_enough_and_more_is_not() -> None:
     rows = FrameRows(np.array([1, 2]), np.array([5, 5]))
     there = np.array([[1.0, 0.0], [1.001, 0.0]])
@@ -102,12 +84,7 @@ def test_one_metre_is_near_enough_and_more_is_not() -> None:
     assert mapped_people(point_pairs(rows, rows, np.zeros((2, 2)), there, 2.0), least=0.6).tolist() == [-1, -1]
 
 
-def test_mapping_of_nobody_on_either_side() -> None:
-    assert mapped_people(matrix_pairs([[], [3]], [[4], []], [np.zeros((0, 1)), np.zeros((1, 0))])).tolist() == [-1]
-    assert mapped_people(matrix_pairs([], [], [])).tolist() == []
-
-
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_mapping_equals_the_assignment_of_each_frame(seed: int) -> None:
     r = np.random.default_rng(seed)
     sizes = r.integers(0, 9, (12, 2))

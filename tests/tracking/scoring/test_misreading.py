@@ -5,8 +5,7 @@ import pytest
 
 from sim.types import Tracks, Truth
 from tracking.app.cli import run
-from tracking.scoring import score_arrays
-from tracking.scoring.misreading import BOX_ORDERS, likely_misreading
+from tracking.scoring.misreading import likely_misreading
 
 SIZE = (1920, 1080)
 FRAMES, PEOPLE = 40, 7
@@ -37,19 +36,10 @@ def tracks_of(frame, id, box=None, pos=None):
         n, here = int(r.sum()), box[r, :2] + box[r, 2:] / 2 if pos is None else pos[r]
         found.append(
             Tracks(
-                k,
-                k / 25,
-                "image" if pos is None else "ground",
-                "person",
-                id[r].astype(int),
-                np.full(n, -1),
-                here,
-                np.full((n, 2), np.nan),
-                np.full((n, 4, 4), np.nan),
-                None if box is None else box[r],
-                np.ones(n),
+                k, k / 25, "image" if pos is None else "ground", "person", id[r].astype(int), np.full(n, -1), here,
+                np.full((n, 2), np.nan), np.full((n, 4, 4), np.nan), None if box is None else box[r], np.ones(n),
             )
-        )
+        )  # fmt: skip
     return found
 
 
@@ -68,13 +58,10 @@ def centres(box):
 
 
 WRITTEN = {
-    "x1,y1,x2,y2": corners,
-    "cx,cy,width,height": centres,
-    "y1,x1,y2,x2": lambda box: corners(box)[:, [1, 0, 3, 2]],
+    "x1,y1,x2,y2": corners, "cx,cy,width,height": centres, "y1,x1,y2,x2": lambda box: corners(box)[:, [1, 0, 3, 2]],
     "x1,x2,y1,y2": lambda box: corners(box)[:, [0, 2, 1, 3]],
-    "top,left,height,width": lambda box: box[:, [1, 0, 3, 2]],
-    "left,top,width,height": lambda box: box,
-}
+    "top,left,height,width": lambda box: box[:, [1, 0, 3, 2]], "left,top,width,height": lambda box: box,
+}  # fmt: skip
 SCALES = {(1.0, 1.0): "", (2.0, 2.0): "2", (1.5, 1.5): "1.5", (0.5, 0.5): "0.5", (3.0, 1.6875): "3,1.6875"}
 """Factors that make the boxes pixels again, and the value of --box-scale."""
 
@@ -93,13 +80,6 @@ def test_columns_and_scales(columns, scale):
     assert (f"--box-scale {SCALES[scale]}" in text) == (scale != (1.0, 1.0))
 
 
-def test_every_order_is_tested():
-    assert WRITTEN.keys() == BOX_ORDERS.keys()
-    box = walk()[:, 2:]
-    for columns, order in BOX_ORDERS.items():
-        assert order(WRITTEN[columns](box)) == pytest.approx(box)
-
-
 def test_shares_of_the_picture():
     rows = walk()
     found = seen(rows)
@@ -108,26 +88,6 @@ def test_shares_of_the_picture():
     )
     assert "read as cx,cy,width,height and multiplied by 1920,1080, 100% would" in text
     assert "--box-scale 1920,1080 (shares of the picture)" in text
-
-
-def test_scales_of_pictures_of_unknown_size():
-    rows = walk()
-    text = likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:] / 2))
-    assert text.endswith("Add --box-scale 2")
-
-
-def test_labels_in_corners():
-    rows = walk()
-    labels = np.c_[rows[:, :2], corners(rows[:, 2:])]
-    text = likely_misreading(truth_of(labels), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:]))
-    assert "with labels read as x1,y1,x2,y2" in text
-    assert "a first line of the labels" in text
-
-
-def test_runs_of_ours_are_tracked_again():
-    rows = walk()
-    text = likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:] / 2), given="run")
-    assert "--box-scale 2 to `flockscope track`" in text
 
 
 @pytest.mark.parametrize(("shift", "words"), [(1, "-1"), (-1, "+1"), (-20, "+20")])
@@ -147,29 +107,6 @@ def test_frames_at_another_rate():
     assert "with frames numbered 1, 6, 11, …" in text
 
 
-def test_frames_in_the_column_of_ids():
-    rows = walk()
-    order = np.argsort(rows[:, 1], kind="stable")
-    swapped = rows[order][:, [1, 0, 2, 3, 4, 5]]
-    text = likely_misreading(truth_of(rows), tracks_of(swapped[:, 0], swapped[:, 1], swapped[:, 2:]))
-    assert "with ids in column 1 and frames in column 2, 100% would" in text
-    assert "id,frame,left,top,width,height," in text
-
-
-def test_no_frame_in_common():
-    rows = walk()
-    late = rows.copy()
-    late[:, 0] += 100
-    text = likely_misreading(truth_of(late), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:]))
-    assert text.startswith("no frame in common: labels in frames 101 to 140, tracks in frames 1 to 40; with +100")
-
-
-def test_another_sequence():
-    text = likely_misreading(truth_of(walk()), tracks_of(*walk(9)[:, :2].T, walk(9)[:, 2:] * (1, 0.2, 0.2, 0.2)))
-    assert text.startswith("0% of the tracked boxes match labels (IoU 0.5). No other columns")
-    assert "tracks of this very sequence" in text
-
-
 @pytest.mark.parametrize("share", [1, 0.3])
 def test_no_warning_for_weak_trackers(share):
     """False alarms and misses alone are no misreading."""
@@ -177,14 +114,6 @@ def test_no_warning_for_weak_trackers(share):
     rng = np.random.default_rng(3)
     box = np.where(rng.random((len(rows), 1)) < share, rows[:, 2:], rows[:, 2:] + (200, 0, 0, 0))
     assert likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], box), size=SIZE) == ""
-
-
-def test_no_warning_without_people():
-    rows = walk()
-    nobody = np.zeros((0, 6))
-    assert likely_misreading(truth_of(rows), []) == ""
-    empty = Truth("x", 25.0, 5, 1.0, *(np.zeros(0, int),) * 3, None, None, nobody[:, 2:], np.zeros(0))
-    assert likely_misreading(empty, tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:])) == ""
 
 
 @pytest.mark.parametrize(
@@ -235,46 +164,3 @@ def test_the_warning_of_score_and_its_remedy(tmp_path, capsys):
     text.write_text("frame,id,x1,y1,x2,y2,score\n" + text.read_text())
     high, told = score(capsys, folder, text, "--box-scale", "2")
     assert (high, told) == (pytest.approx(1, abs=1e-3), "")
-
-
-def test_the_scale_of_detections(tmp_path, capsys):
-    """A detector that ran on pictures of half the size: `track` and its run.json know the factor."""
-    import json
-
-    rows = walk()
-    folder = recording(tmp_path, rows)
-    (folder / "det").mkdir()
-    wrong = np.c_[rows[:, :1], np.full(len(rows), -1), rows[:, 2:] / 2, np.ones(len(rows))]
-    np.savetxt(folder / "det" / "det.txt", wrong, fmt="%.6g", delimiter=",")
-    words = ["track", "blob", str(folder), "--detections", "file", "--out"]
-    assert run([*words, str(tmp_path / "a")]) == 0
-    low, told = score(capsys, folder, tmp_path / "a")
-    assert low < 0.05
-    assert "Add --box-scale 2 to `flockscope track`" in told
-    assert run([*words, str(tmp_path / "b"), "--box-scale", "2"]) == 0
-    assert json.loads((tmp_path / "b" / "run.json").read_text())["box_scale"] == [2, 2]
-    high, told = score(capsys, folder, tmp_path / "b")
-    assert high > 0.8
-    assert "match labels" not in told
-    capsys.readouterr()
-    assert run(["score", str(folder), str(tmp_path / "b"), "--box-scale", "2"]) == 2
-    assert "--box-scale: got runs of `flockscope track`" in capsys.readouterr().err
-
-
-def test_arrays():
-    rows = walk()
-    truth, found = ({"frame": rows[:, 0].astype(int), "id": rows[:, 1].astype(int), "box": b} for b in (
-        rows[:, 2:], corners(rows[:, 2:])))  # fmt: skip
-    with pytest.warns(UserWarning, match="read as x1,y1,x2,y2, 100% would. Give left, top, width, height in px"):
-        assert score_arrays(truth, found, fps=25)["HOTA"] < 0.05
-
-
-def test_unknown_boxes_are_left_out():
-    """As of people behind the camera."""
-    rows = walk()
-    labels = np.where(rows[:, 1:2] == 2, np.nan, rows)
-    labels[:, :2] = rows[:, :2]
-    text = likely_misreading(truth_of(labels), tracks_of(rows[:, 0], rows[:, 1], corners(rows[:, 2:])))
-    assert "read as x1,y1,x2,y2, 100% would" in text
-    nobody = np.c_[rows[:, :2], np.full((len(rows), 4), np.nan)]
-    assert likely_misreading(truth_of(nobody), tracks_of(rows[:, 0], rows[:, 1], rows[:, 2:])) == ""

@@ -63,23 +63,3 @@ def test_a_generated_dataset(tmp_path: Path, capsys) -> None:
             assert ours[key] == pytest.approx(value, abs=1e-6), (name, key)
         # Text has boxes to 0.01 px, the tables beside it exactly: a pair next to a threshold may fall to either side.
         assert exact[name]["HOTA"] == pytest.approx(scores["HOTA"], abs=1e-3), name
-
-
-@pytest.mark.parametrize("name", ["PETS09-S2L1-first200", "TUD-Campus"])
-def test_real_recordings(shared_data: Path, tmp_path: Path, name: str) -> None:
-    recording = shared_data / "mot" / name
-    assert run(["track", "blob", str(recording), "--detections", "file", "--out", str(tmp_path / "tracks")]) == 0
-    (sequence,) = open_source(recording)
-    gt = tmp_path / "gt" / name
-    shutil.copytree(recording / "gt", gt / "gt")
-    texts = tmp_path / "trackers" / "blob" / "data"
-    texts.mkdir(parents=True)
-    shutil.copy(tmp_path / "tracks" / "tracks.mot.txt", texts / f"{name}.txt")
-    info = {name: sequence.length}
-    config = {"BENCHMARK": "MOT15", "SEQ_INFO": info, "SKIP_SPLIT_FOL": True, "DO_PREPROC": False}
-    expected = theirs(tmp_path / "gt", tmp_path / "trackers", info, **config)[name]
-    told = read_tracks(texts / f"{name}.txt", fps=sequence.fps, length=sequence.length)
-    ours = evaluate(sequence.truth, told)
-    assert ours.similarity == "boxes"
-    for key, value in expected.items():
-        assert ours[key] == pytest.approx(value, abs=1e-6), key

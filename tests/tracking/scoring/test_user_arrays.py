@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,10 +9,9 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Truth
 from tracking import track
-from tracking.scoring import evaluate, score_arrays, user_arrays
+from tracking.scoring import evaluate, score_arrays
 from tracking.scoring.people_comparison import IncomparableError
 
-ROOT = Path(__file__).resolve().parents[3]
 ROWS = {"frame": [1, 1, 2, 2], "id": [1, 2, 1, 2], "pos": [[0, 0], [1, 0], [0, 0], [1, 0]], "group": [7, 7, 7, 7]}
 
 
@@ -79,13 +74,6 @@ def test_groups_that_are_not_given_are_derived_or_unknown(merge: Truth) -> None:
     assert alone["pairwise_precision"] == 0  # so does the truth: it is not to be derived
 
 
-def test_rows_may_stand_in_any_order(merge: Truth) -> None:
-    true = columns(merge, "pos", "box", "group")
-    order = np.random.default_rng(0).permutation(len(merge.frame))
-    mixed = {name: values[order] for name, values in true.items()}
-    assert dict(score_arrays(mixed, true, fps=10)) == pytest.approx(dict(score_arrays(true, true, fps=10)), nan_ok=True)
-
-
 def test_empty_sides_are_no_error() -> None:
     none = {"frame": [], "id": [], "pos": [], "group": []}
     assert score_arrays(ROWS, none, fps=10)["FN"] == 4
@@ -96,27 +84,22 @@ def test_empty_sides_are_no_error() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"grp": [1, 1, 1, 1]}, "'grp'"),
-        ({"pos": None}, "frame, id, and pos or box"),
-        ({"pos": [0, 1, 0, 1]}, r"pos of shape \(4,\)"),
-        ({"id": [1, 2, 1]}, "3 rows of id"),
+        ({"grp": [1, 1, 1, 1]}, "'grp'"), ({"pos": None}, "frame, id, and pos or box"),
+        ({"pos": [0, 1, 0, 1]}, r"pos of shape \(4,\)"), ({"id": [1, 2, 1]}, "3 rows of id"),
         ({"frame": [0, 0, 1, 1]}, "got 0 in frame, expected numbers from 1 on"),
         ({"frame": [1, 1, 2, 10**7]}, "got 10000000.* in frame, expected numbers from 1 on, to 1,000,000"),
         ({"frame": [1, 1, 2, 1e300]}, "1e.300 in frame"),
-        ({"id": [1, -2, 1, 2]}, "-2 in id, expected numbers from 0"),
-        ({"group": [7, -2, 7, 7]}, "-2 in group"),
+        ({"id": [1, -2, 1, 2]}, "-2 in id, expected numbers from 0"), ({"group": [7, -2, 7, 7]}, "-2 in group"),
         ({"id": ["a", "b", "a", "b"]}, "'a' in id, expected whole numbers: number them"),
-        ({"id": [None, 1, 2, 3]}, "None"),
-        ({"pos": [["x", "y"]] * 4}, "'x' in pos, expected numbers"),
+        ({"id": [None, 1, 2, 3]}, "None"), ({"pos": [["x", "y"]] * 4}, "'x' in pos, expected numbers"),
         ({"pos": [[0, 0], [1e200, 0], [0, 0], [1, 0]]}, "1e.200 in pos, expected numbers from -1e.06 to 1,000,000"),
         ({"pos": None, "box": [[0, 0, 1, 0]] * 4}, "box without area"),
         ({"frame": np.ones(5001), "id": np.arange(5001), "pos": np.zeros((5001, 2)), "group": None}, "5001 rows"),
-        ({"id": [1, 2.5, 1, 2]}, "not whole"),
-        ({"pos": [[0, 0], [np.nan, 0], [0, 0], [1, 0]]}, "not finite"),
+        ({"id": [1, 2.5, 1, 2]}, "not whole"), ({"pos": [[0, 0], [np.nan, 0], [0, 0], [1, 0]]}, "not finite"),
         ({"frame": [1, 1, 1, 1]}, "id 1 is twice in frame 1"),
         ({"pos": None, "box": [[0, 0, 1, 1]] * 4}, "one of them on both"),
     ],
-)
+)  # fmt: skip
 def test_wrong_columns(change: dict, said: str) -> None:
     wrong = {name: values for name, values in (ROWS | change).items() if values is not None}
     with pytest.raises(ValueError, match=said):
@@ -127,42 +110,6 @@ def test_wrong_columns(change: dict, said: str) -> None:
 def test_wrong_frame_rate(fps: float) -> None:
     with pytest.raises(ValueError, match=f"fps: got {fps!r}, expected a number from 0.01 to 1000"):
         score_arrays(ROWS, ROWS, fps=fps)
-
-
-def test_work_is_sparse_in_frames() -> None:
-    """A million frames with rows in four of them make a few thousand `Tracks`."""
-    far = ROWS | {"frame": [1, 1, 10**6, 10**6]}
-    table = user_arrays._table(far, "tracks")
-    assert len(user_arrays._tracks(table, np.arange(1, 10**6 + 1), 10.0, float("nan"), "ground", False)) < 500
-    assert score_arrays(far, far, fps=10)["HOTA"] == 1
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_frames_that_are_left_out_change_nothing(seed: int, monkeypatch) -> None:
-    r = np.random.default_rng(seed)
-    frame = np.repeat(np.flatnonzero(np.repeat(r.random(12) < 0.5, 80)) + 1, 6)
-    rows = {"frame": frame, "id": np.tile(np.arange(6), len(frame) // 6)}
-    place = np.array([[0, 0], [0.8, 0], [1.6, 0], [4, 4], [4.8, 4], [9, 9]])[rows["id"]]
-    pos, group = place + r.normal(0, 0.02, place.shape), np.array([1, 1, 1, 2, 2, -1])[rows["id"]]
-    true, est = rows | {"pos": pos, "group": np.where(frame > 500, group, -1)}, rows | {"pos": pos}
-    sparse = dict(score_arrays(true, est, fps=5))
-    monkeypatch.setattr(user_arrays, "_live_frames", lambda frame, length, fps: np.arange(1, length + 1))
-    assert dict(score_arrays(true, est, fps=5)) == pytest.approx(sparse, nan_ok=True)
-
-
-def test_the_lines_of_the_readme_run(merge: Truth, tmp_path: Path, monkeypatch, capsys) -> None:
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
-    (block,) = (text for text in blocks if "score_arrays" in text)
-    assert sum(not line.startswith("#") for line in block.splitlines()) == 5
-    table = np.column_stack([merge.frame, merge.id, merge.pos, merge.group])
-    for name in ("truth.csv", "mine.csv"):
-        np.savetxt(tmp_path / name, table, delimiter=",")
-    (tmp_path / "lines.py").write_text(block, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    runpy.run_path("lines.py")
-    said = capsys.readouterr().out
-    assert re.search(r"^HOTA +1$", said, re.MULTILINE)
-    assert re.search(r"^pairwise_F1 +1$", said, re.MULTILINE)
 
 
 @pytest.mark.parametrize("scale", [0.0, -20.0, float("nan"), float("inf")])

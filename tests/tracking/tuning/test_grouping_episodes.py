@@ -12,9 +12,7 @@ from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
 from tracking.environment.episodes import SourceCache, sources
 from tracking.grouping.grouped_tracks import derive
-from tracking.grouping.grouping_choice import default_grouping
 from tracking.grouping.link_rule import LinkRule
-from tracking.running.run import track
 from tracking.scoring import evaluate
 from tracking.tuning import tune
 from tracking.tuning.grouping_episodes import (
@@ -76,29 +74,6 @@ def test_labels_err_for_a_while_and_do_not_change_who_is_there():
         assert other.tobytes() != here.tobytes()
 
 
-def test_one_person_more_moves_nobody_elses_errors():
-    truth = sources("crossing", (0,))[0].open().truth
-    others = truth.id != truth.id[0]
-    rows = (
-        "frame",
-        "id",
-        "group",
-        "pos",
-        "vel",
-        "box",
-        "visibility",
-        "z",
-        "heading",
-        "height",
-        "truncation",
-        "visible_box",
-    )
-    fewer = truth.replace(**{name: a[others] for name in rows if (a := getattr(truth, name)) is not None})
-    every, rest = (with_label_errors(t, SURVEYED, 7).pos for t in (truth, fewer))
-    assert every[others].tobytes() == rest.tobytes()
-    assert with_label_errors(truth, SURVEYED, 7, repeat=2).pos.tobytes() != every.tobytes()
-
-
 def test_filmed_people_are_grouped_in_the_image():
     """Boxes alone, at one scale: those who walk behind each other look nearer than they are."""
     truth = sources("crossing", (0,))[0].open().truth
@@ -106,12 +81,6 @@ def test_filmed_people_are_grouped_in_the_image():
     assert {t.plane for t in answers} == {"image"}
     assert all(np.isnan(t.vel).all() for t in answers)
     assert evaluate(truth, derive(answers, truth.fps, truth.px_per_m), similarity="image").surface == "image"
-
-
-def test_a_rule_that_links_nobody_scores_nothing(source):
-    """The pair walks 0.75 m apart: at half a metre nobody is together."""
-    assert play_rule(source, LinkRule(), SourceCache()).scores["pairwise_F1"] > 0.5
-    assert play_rule(source, LinkRule(near=0.5), SourceCache()).scores["pairwise_F1"] == 0.0
 
 
 def test_the_rule_is_tuned_like_a_tracker(tmp_path):
@@ -124,18 +93,6 @@ def test_the_rule_is_tuned_like_a_tracker(tmp_path):
     assert found.plan.goals[0].key == "pairwise_F1"
     assert "near" not in found.trials[0].params
     assert LinkRule.from_toml(tmp_path / "rule.toml") == found.config
-
-
-def test_a_rule_of_ones_own_groups_what_is_tracked(source, tmp_path):
-    """From Python, from a file; run.json says which; who says nothing gets the usual one."""
-    rule = LinkRule(near=0.5)
-    (tmp_path / "rule.toml").write_text(rule.to_toml())
-    sequence = source.open()
-    usual, own, read = (track("blob", sequence, grouping=g) for g in (None, rule, str(tmp_path / "rule.toml")))
-    assert any((t.group >= 0).any() for t in usual)
-    assert not any((t.group >= 0).any() for t in own)
-    assert own.info["grouping"] == read.info["grouping"] == rule.as_dict()
-    assert usual.info["grouping"] == default_grouping().as_dict()
 
 
 def test_a_rule_on_the_command_line(source, tmp_path, capsys):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -11,8 +10,6 @@ import pytest
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import toy_plan
 from tracking.tuning.comparison import Candidate, TrialRecord
-from tracking.tuning.goals import Goal
-from tracking.tuning.plots import BLUE, ORANGE, Axes, ticks
 from tracking.tuning.result import TuningResult
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -56,46 +53,3 @@ def test_trials_given_up_are_hollow(found):
     near = tuple(replace(t, values=(0.45,)) if t.pruned else t for t in found.trials)
     shown = dots(replace(found, trials=near).plots()[".history.svg"])
     assert [fill for _, _, fill in shown].count("#fff") == 1
-
-
-def test_importance_has_a_bar_for_each_parameter(found):
-    bars = [r.attrib for r in ElementTree.fromstring(found.plots()[".importance.svg"]).iter(f"{SVG}rect")][1:]
-    assert [b["fill"] for b in bars] == [ORANGE, BLUE, BLUE, BLUE]
-    assert float(bars[0]["width"]) / float(bars[1]["width"]) == pytest.approx(7 / 3, rel=1e-3)
-    assert "0.1 → 1 m" in found.plots()[".importance.svg"]
-
-
-def test_nothing_to_show_is_not_drawn(found):
-    assert set(replace(found, importance=dict.fromkeys(DEFAULTS, 0.0)).plots()) == {".history.svg"}
-    one = replace(found, trials=found.trials[:1])
-    assert len(dots(one.plots()[".history.svg"])) == 1
-
-
-def test_front_is_drawn_for_two_goals(found):
-    made = replace(found.plan, goals=(Goal("HOTA"), Goal("GOSPA", False)))
-    configs = [found.default, ToyConfig(skip=1), ToyConfig(skip=2)]
-    points = [(0.5, 2.0), (0.7, 3.0), (0.4, 4.0)]
-    three = [Candidate(k, config, (), p) for k, (config, p) in enumerate(zip(configs, points, strict=True))]
-    two = replace(found, plan=made, candidates=tuple(three), front=tuple(three[:2]))
-    text = two.plots()[".front.svg"]
-    assert [fill for _, _, fill in dots(text)] == [ORANGE, ORANGE, BLUE]
-    assert "defaults" in text
-
-
-@pytest.mark.parametrize(("low", "high"), [(0, 1), (0.7, 0.7001), (-3e4, 5e6), (0.123, 0.987)])
-def test_ticks_are_round_and_inside(low, high):
-    found = ticks(low, high)
-    assert 2 <= len(found) <= 11
-    assert all(low - 1e-9 <= v <= high * (1 + 1e-9) for v in found)
-    step = found[1] - found[0]
-    assert step / 10 ** math.floor(math.log10(step) + 1e-9) == pytest.approx(
-        round(step / 10 ** math.floor(math.log10(step) + 1e-9))
-    )
-
-
-def test_axes_put_the_corners_where_they_belong():
-    axes = Axes((0.0, 2.0), (1.0, 3.0))
-    (u0, v0), (u1, v1) = axes.to_page(0.0, 1.0), axes.to_page(2.0, 3.0)
-    assert u0 < u1
-    assert v0 > v1
-    assert axes.to_page(1.0, 2.0) == ((u0 + u1) / 2, (v0 + v1) / 2)

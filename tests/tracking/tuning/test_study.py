@@ -8,10 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import optuna
 import pytest
 from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
-from optuna.trial import TrialState
 
 from scenarios.errors import InputError
 from sim.versions import runtime
@@ -20,7 +18,7 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.tuning.journal import LockedJournal, TrialLocks
-from tracking.tuning.sampler import distribution, place_in_search
+from tracking.tuning.sampler import distribution
 from tracking.tuning.study import FINISHED, open_study
 
 
@@ -71,38 +69,6 @@ def test_a_trial_moves_few_parameters_of_the_best(tmp_path):
     assert min(near) >= 1
     assert 2 <= sum(near) / len(near) <= 7
     assert min(far) > len(first) / 2
-
-
-def test_the_search_learns(tmp_path):
-    """Later trials are better than the first ones on a simple slope."""
-    values = [params["reach"] - params["skip"] for params in tried(tmp_path, 40)]
-    assert sum(values[30:]) / 10 > sum(values[:10]) / 10 + 0.5
-
-
-def test_no_more_than_wanted(tmp_path):
-    with open_study(toy_plan(tmp_path, trials=2), None, "x") as study:
-        assert [study.ask() is not None for _ in range(3)] == [True, True, False]
-        study.tell(study.optuna.trials[0].number, None)
-        assert [t.state for t in study.finished()] == [TrialState.PRUNED]
-
-
-def test_a_trial_done_again_keeps_its_place(tmp_path):
-    made = toy_plan(tmp_path, trials=3)
-    with open_study(made, tmp_path / "j", "x") as study:
-        study.tell(study.ask(), [0.1])
-        left = study.ask()
-    with open_study(made, tmp_path / "j", "x") as study:
-        again = study.ask()
-        assert again.params == left.params
-        assert study.place(again) == 1
-        study.tell(again, [0.2])
-        fresh = study.ask()
-        assert (fresh.number, study.place(fresh)) == (3, 2)
-        study.tell(fresh, [0.3])
-        assert study.ask() is None
-        assert [t.number for t in study.records()] == [0, 1, 2]
-        assert [t.state.name for t in study.trials()] == ["COMPLETE", "FAIL", "COMPLETE", "COMPLETE"]
-        assert [place_in_search(study.trials(), t) for t in study.trials()] == [0, 1, 1, 2]
 
 
 def test_killed_between_two_lines(tmp_path):
@@ -165,40 +131,6 @@ def test_a_lock_lives_as_long_as_its_process(tmp_path):
     other.communicate()
     assert locks.is_abandoned(7)
     locks.close()
-
-
-def test_optuna_is_as_loud_as_before(tmp_path):
-    before = optuna.logging.get_verbosity()
-    with open_study(toy_plan(tmp_path), None, "x"):
-        pass
-    assert optuna.logging.get_verbosity() == before
-
-
-def test_importance_finds_what_matters(tmp_path):
-    with open_study(toy_plan(tmp_path, trials=40, objective="GOSPA"), None, "x") as study:
-        assert set(study.importance().values()) == {0.0}
-        while (asked := study.ask()) is not None:
-            study.tell(asked, [asked.params["skip"]])
-        found = study.importance()
-    assert next(iter(found)) == "skip"
-    assert sum(found.values()) == pytest.approx(1.0)
-
-
-def test_settings_are_compared_when_they_are_stored(tmp_path, monkeypatch):
-    """Of two commands with different settings that begin at once the later one is told so."""
-    mine, theirs = (toy_plan(tmp_path, objective=key) for key in ("MOTA", "HOTA"))
-    others = []
-
-    def meanwhile(param):
-        if not others:
-            others.append(1)
-            with open_study(theirs, tmp_path / "j", "x"):
-                pass
-        return distribution(param)
-
-    monkeypatch.setattr("tracking.tuning.study.distribution", meanwhile)
-    with pytest.raises(InputError, match="another search: objective differ"), open_study(mine, tmp_path / "j", "x"):
-        pass
 
 
 @pytest.mark.parametrize("what", ["sources", "numpy"])

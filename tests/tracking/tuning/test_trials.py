@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from tests.tuning_toys import toy_plan
-from tracking.environment.episodes import Episode
+from tests.tuning_toys import TOY, toy_plan, write_scenes
+from tracking.environment.episodes import Episode, sources
+from tracking.tuning.parallel_episodes import EpisodeTask, play_task
 from tracking.tuning.study import open_study
 from tracking.tuning.trials import run_trials
+from tracking.tuning.tuned_tracker import tuned_tracker
 
 
 class Game:
@@ -48,30 +52,11 @@ def test_a_trial_that_loses_everywhere_is_given_up(tmp_path, objective, better):
     assert better(t.values[0] for t in trials) == trials[0].values[0]
 
 
-def test_what_was_given_up_is_worth_what_it_lost(tmp_path):
-    """0.02 for each one left out, whichever four of the very different scenes it was played on."""
-    trials, _ = played(tmp_path)
-    for t in trials:
-        assert t.values[0] == pytest.approx(trials[0].values[0] - 0.02 * t.params["skip"])
-
-
 def test_with_p_zero_everything_is_played(tmp_path):
     game = Game()
     trials, _ = played(tmp_path, game, prune=0.0)
     assert not any(t.pruned for t in trials)
     assert game.played == 12 * 12
-
-
-def test_scenes_come_in_another_order_in_each_trial(tmp_path):
-    orders = []
-
-    def game(sources, values, every):
-        orders.append([s.seed for s in sources])
-        yield from Game()(sources, values, every)
-
-    played(tmp_path, game, trials=4)
-    assert len({tuple(order) for order in orders}) == 4
-    assert all(sorted(order) == list(range(12)) for order in orders)
 
 
 def test_parameters_that_cannot_be_played_are_a_trial_without_value(tmp_path):
@@ -92,16 +77,28 @@ def test_a_score_that_no_scene_has_is_an_error(tmp_path):
         played(tmp_path, objective="queue_F1")
 
 
-def test_several_goals_are_played_to_the_end(tmp_path):
-    trials, _ = played(tmp_path, objective=["HOTA", "frames/s"], trials=3)
-    assert {t.episodes for t in trials} == {12}
-    assert all(t.values[1] == 10.0 for t in trials)
+def test_a_worker_whose_tracker_is_another_one_ends_it_all(tmp_path: Path) -> None:
+    """An answer would be taken for one about the parameters."""
+    (source,) = sources(write_scenes(tmp_path)[0], (1,))
+    same, other = (EpisodeTask(TOY, source, {}, "file", False, code) for code in (tuned_tracker(TOY).code, "another"))
+    assert play_task(same).frames == 20
+    with pytest.raises(WorkError, match=r"another .*toy_tracker.py:Toy in a worker; .* start the workers anew"):
+        play_task(other)
 
 
-def test_progress_is_told(tmp_path):
-    _, told = played(tmp_path, trials=3)
-    assert [(done, total) for done, total, _ in told] == [(0, 3), (1, 3), (2, 3), (3, 3)]
-    assert "best in training 0.6533" in told[-1][2]
+def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
+    """Else all episodes would be tuned to one and the same luck."""
+    text = Path(TOY.rpartition(":")[0]).read_text()
+    lucky = text.replace("self.fps = context.fps", "self.fps, self.config = context.fps, ToyConfig(skip=seed % 5)")
+    assert lucky != text
+    (tmp_path / "lucky.py").write_text(lucky)
+    name = f"{tmp_path / 'lucky.py'}:Toy"
+    for source in sources(write_scenes(tmp_path)[0], (5, 9)):
+        own, fixed = (
+            play_task(EpisodeTask(name, source, {}, "file", True, tuned_tracker(name).code)),
+            play_task(EpisodeTask(TOY, source, {"skip": source.seed % 5}, "file", True, tuned_tracker(TOY).code)),
+        )
+        assert own.scores == fixed.scores
 
 
 def test_errors_of_who_plays_say_nothing_of_the_parameters(tmp_path):
@@ -118,23 +115,3 @@ def test_errors_of_who_plays_say_nothing_of_the_parameters(tmp_path):
     undisturbed, _ = played(tmp_path, trials=6)
     assert found == undisturbed
     assert not any(t.error for t in found)
-
-
-@pytest.mark.slow
-def test_a_trial_that_others_took_as_left_is_theirs(tmp_path):
-    """Without a journal nobody knows who is at work: of two processes one may play what the other is at, too."""
-    made, url = toy_plan(tmp_path, seeds=range(12), trials=2, only=["skip"]), f"sqlite:///{tmp_path}/s.db"
-
-    def interrupted(sources, values, every):
-        for k, answer in enumerate(Game()(sources, values, every)):
-            if k == 5 and not others:
-                with open_study(made, url, "x") as other:
-                    others.append(other.ask(retry_unfinished=True))
-                    run_trials(other, Game(), lambda *now: None)
-            yield answer
-
-    others = []
-    with open_study(made, url, "x") as study:
-        run_trials(study, interrupted, lambda *now: None)
-        assert len(study.records()) >= 2
-        assert not any(t.error for t in study.records())

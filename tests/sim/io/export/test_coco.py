@@ -142,30 +142,3 @@ def test_run_lengths(ids):
     assert sorted(found) == sorted({int(k) for k in ids.ravel() if k > 0})
     for person, counts in found.items():
         assert np.array_equal(decoded({"size": ids.shape, "counts": counts}), ids == person)
-
-
-def test_nothing_to_export(tmp_path):
-    (tmp_path / "a.txt").write_text("1,-1,0,0,4,6,1,-1,-1,-1\n")
-    with pytest.warns(UserWarning, match="25 fps"), pytest.raises(InputError, match="no labelled boxes"):
-        coco(tmp_path / "a.txt", tmp_path / "coco.json")
-    assert not (tmp_path / "coco.json").exists()
-
-
-@pytest.mark.parametrize(
-    ("images", "name"), [("jpg", "img1/000002.jpg"), ("png", "img1/000002.png"), ("mp4", "left.mp4")]
-)
-def test_coco_names_the_pictures_that_are_there(tmp_path, make_pictured, images, name):
-    live = make_pictured(1, ("left",))
-    folder = tmp_path / "data" / live.name
-    sequence_folder.write_sequence(folder, live, scenario="schema = 1\n", seed=1, streams=("left",), images=images)
-    coco(tmp_path / "data", tmp_path / "coco.json")
-    image = json.loads((tmp_path / "coco.json").read_text())["images"][1]
-    assert (image["file_name"], image["frame"]) == (f"{live.name}/{name}", 2)
-    assert (tmp_path / "data" / image["file_name"]).is_file()
-
-
-def test_the_way_to_a_dataset_is_no_part_of_its_names(tmp_path, make_sequence):
-    """The content hash is by <split>/<name>: the same from a path with `..` in it."""
-    live = replace(make_sequence(1), name="a")
-    sequence_folder.write_sequence(tmp_path / "train" / "a", live, scenario="schema = 1\n", seed=1)
-    assert content_hash(tmp_path / "train" / "a" / "..") == content_hash(tmp_path / "train")

@@ -29,26 +29,6 @@ def test_the_calibration_projects_as_the_camera_does() -> None:
     assert left[:, 0] / left[:, 2] - right[:, 0] / right[:, 2] == pytest.approx(uvd[:, 2])
 
 
-def test_the_calibration_is_complete_for_tools_of_kitti() -> None:
-    """pykitti.odometry takes P0 to P3 and Tr; tools for object data take the seven matrices in this order."""
-    camera = rig(40.0)
-    text = calibration(camera)
-    names = [line.split(":")[0] for line in text.splitlines()]
-    assert names == ["P0", "P1", "P2", "P3", "R0_rect", "Tr_velo_to_cam", "Tr_imu_to_velo", "Tr"]
-    found = matrices(text)
-    assert np.array_equal(found["P0"], found["P2"])
-    assert np.array_equal(found["P1"], found["P3"])
-    assert np.array_equal(found["R0_rect"], np.eye(3))
-    assert np.array_equal(found["Tr_velo_to_cam"], found["Tr"])
-    centres = []
-    for name in ("P2", "P3"):  # as pykitti: the camera's centre in the world
-        shift = np.eye(4)
-        shift[0, 3] = found[name][0, 3] / found[name][0, 0]
-        centres.append(np.linalg.inv(shift @ np.vstack([found["Tr"], [0, 0, 0, 1]]))[:3, 3])
-    assert centres[0] == pytest.approx(camera.position)
-    assert np.linalg.norm(centres[1] - centres[0]) == pytest.approx(camera.baseline)
-
-
 def test_pairs_and_disparities_are_those_of_the_dataset(tmp_path, make_pictured) -> None:
     live = make_pictured(3, ("left", "right", "disparity"))
     folder = tmp_path / "flockscope-train/a"

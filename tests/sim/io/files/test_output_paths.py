@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -12,6 +14,9 @@ from hypothesis import strategies as st
 from scenarios.errors import InputError
 from sim.io.files.atomic import PARTIAL
 from sim.io.files.output_paths import file_name, output_path, output_paths
+from sim.io.files.own_files import GENERATOR, is_ours, marked_png, refuse_foreign_file
+from sim.io.files.tables import TABLE, TEXT, Column, table_bytes
+from sim.io.pictures.video_encoding import write_video
 
 EVIL = (
     "../../x", "/etc/passwd", "..", ".", "", "a\0b", "a/b", "a\\b", "C:x", "con", "NUL.txt", "\u202egnp.exe", "x" * 300,
@@ -38,18 +43,6 @@ def test_no_label_leaves_the_folder(label: str, ending: str) -> None:
     check(Path("/some/folder"), label, ending)
 
 
-@pytest.mark.parametrize("label", EVIL)
-def test_every_such_file_can_be_made(tmp_path: Path, label: str) -> None:
-    path = output_path(tmp_path, label, ".html")
-    path.write_text("x")
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]
-
-
-@pytest.mark.parametrize("label", ["merge-s00003", "seq_hotel", "Über 1 (b)", "a.b", "A-1", "PETS09-S2L1", "日本"])
-def test_harmless_labels_are_file_names(label: str) -> None:
-    assert file_name(label) == label
-
-
 @given(st.lists(labels, max_size=5))
 def test_no_two_labels_share_a_path(names: list[str]) -> None:
     try:
@@ -67,3 +60,46 @@ def test_two_labels_of_one_file_are_refused(a: str, b: str) -> None:
 
 def test_long_labels_with_one_beginning_stay_apart() -> None:
     assert file_name("x" * 300) != file_name("x" * 301)
+
+
+META = '<meta name="generator" content="flockscope">'
+PAGE = f"<!doctype html><head>{META}</head>".encode()
+MARKS = {"a": TEXT, "b": TABLE}
+
+
+def png() -> bytes:
+    return bytes(cv2.imencode(".png", np.arange(48, dtype=np.uint8).reshape(4, 4, 3))[1])
+
+
+def test_a_marked_picture_shows_the_same():
+    shown = (cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_COLOR) for body in (png(), marked_png(png())))
+    assert np.array_equal(*shown)
+
+
+@pytest.mark.parametrize(
+    ("name", "body", "expected"),
+    [
+        ("x.json", b'{"a": "t", "b": {}, "c": 1}', True), ("x.json", b'{"a": "t", "b": []}', False),
+        ("x.json", b'["a", "b"]', None), ("x.json", b'{"a": "t", "b": {}', None),
+        ("x.parquet", table_bytes([Column("a", np.arange(3))], {}), True), ("x.parquet", b"PAR1", None),
+        ("x.html", PAGE, True), ("x.html", f"<!-- {META} -->".encode(), False), ("x.html", b"", False),
+        ("x.png", marked_png(png()), True), ("x.png", png(), False), ("x.png", b"", False),
+        ("x.mp4", b"flockscope", False), ("x.mp4", b"", False), ("x.txt", PAGE, False),
+    ],
+)  # fmt: skip
+def test_files(tmp_path, name, body, expected):
+    path = tmp_path / name
+    assert is_ours(path, MARKS) is None
+    refuse_foreign_file(path, MARKS)
+    path.write_bytes(body)
+    assert is_ours(path, MARKS) is expected
+    if not expected:
+        with pytest.raises(InputError, match="did not write"):
+            refuse_foreign_file(path, MARKS)
+
+
+@pytest.mark.parametrize("comment", [GENERATOR, "another", ""])
+def test_videos(tmp_path, comment):
+    with write_video(tmp_path / "x.mp4", (32, 32), 10.0, comment=comment) as video:
+        video.add(np.zeros((32, 32, 3), np.uint8))
+    assert is_ours(tmp_path / "x.mp4") is (comment == GENERATOR)

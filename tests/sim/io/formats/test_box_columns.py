@@ -43,31 +43,6 @@ def test_rows_without_ids_are_no_guess(tmp_path, score):
     assert "as the first line" in error.value.remedy
 
 
-def test_rows_without_ids_and_with_classes(tmp_path):
-    rows = np.c_[without_ids((0.3, 0.9)), np.ones(FRAMES * PEOPLE)]
-    with pytest.raises(InputError, match="without an id"):
-        open_source(written(tmp_path, rows), fps=10)
-
-
-def test_a_left_edge_with_decimals_is_no_id(tmp_path):
-    rows = without_ids((0.5,))
-    rows[:, 1] += 0.25
-    with pytest.raises(InputError, match=r"like 48 of 48 lines\)") as error:
-        open_source(written(tmp_path, rows), fps=10)
-    assert "name the columns in the first line" in error.value.remedy
-
-
-@pytest.mark.parametrize("ids", [True, False])
-def test_rows_with_ids_are_read(tmp_path, ids):
-    assert open_source(written(tmp_path, people(ids)), fps=10)[0].length == FRAMES
-
-
-def test_numbered_detections_are_read(tmp_path):
-    rows = people()
-    rows[:, 1] = np.arange(len(rows))
-    assert open_source(written(tmp_path, rows), fps=10)[0].length == FRAMES
-
-
 def test_shares_of_the_picture_are_refused_and_scaled(tmp_path):
     rows = people(ids=False)
     scaled = written(tmp_path, np.c_[rows[:, :2], rows[:, 2:] / (1920, 1080, 1920, 1080)])
@@ -82,12 +57,6 @@ def test_tracks_are_scaled(tmp_path):
     plain, doubled = (read_track_text(path, 10, None, None, scale) for scale in (None, (2, 3)))
     assert doubled[3].box.tolist() == (plain[3].box * (2, 3, 2, 3)).tolist()
     assert doubled[3].pos.tolist() == (plain[3].pos * (2, 3)).tolist()
-
-
-def test_boxless_rows_are_not_scaled(tmp_path):
-    path = tmp_path / "a.txt"
-    path.write_text("1,-1,-1,-1,-1,-1,1,3,4,0\n")
-    assert read_detections(path, None, None, (2, 2)).pos.tolist() == [[3, 4]]
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "a", "1,2,3", "", "1,", "nan", "1e9", "1_0"])
@@ -141,14 +110,6 @@ def test_corners(tmp_path, ids):
         written(tmp_path / "gt", rows, "gt.txt")
         with pytest.warns(UserWarning, match="look like x1,y1,x2,y2"):
             _ = open_source(tmp_path, fps=10)[0].truth
-
-
-def test_people_at_the_left_edge_are_no_corners(tmp_path):
-    """Widths above the left edge that do not vary with it."""
-    rows = people(ids=False)
-    rows[:, 2] = np.resize((3, 20, 9, 15, 6), len(rows))
-    rows[:, 3] = 5
-    open_source(written(tmp_path, rows), fps=10)
 
 
 @pytest.mark.parametrize(

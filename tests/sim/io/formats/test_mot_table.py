@@ -22,12 +22,6 @@ def test_named_boxes(tmp_path, header):
     assert truth.box.tolist() == [[10, 20, 30, 40]] * 2
 
 
-def test_named_positions(tmp_path):
-    path = tmp_path / "five.csv"
-    path.write_text("frame,id,x,y\n1,1,0.5,1\n2,1,0.6,1\n")
-    assert open_source(path, fps=25)[0].truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
-
-
 @pytest.mark.parametrize(("unit", "factor"), [("m", 1), ("cm", 100), ("mm", 1000)])
 def test_units_of_positions(tmp_path, unit, factor):
     path = tmp_path / "walk.csv"

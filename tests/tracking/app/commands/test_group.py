@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
@@ -20,7 +19,7 @@ from sim.io.store.run_seal import NAMES, check_run
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import Tracks
-from tests.refusals import refused
+from tests.refusals import answer, refused
 from tests.sealing import seal_again
 from tests.short_scene import write_short_scene
 from tracking import group
@@ -30,13 +29,10 @@ FPS = 10.0
 Place = Callable[[float], tuple[float, float]]
 
 WALK: dict[int, Place] = {
-    1: lambda t: (1 + 1.2 * t, 2.0),
-    2: lambda t: (1 + 1.2 * t, 2.8),
-    3: lambda t: (1 + 1.2 * t, 3.6 + 0.8 * max(0.0, 4 - t)),
-    4: lambda t: (26 - 1.1 * t, 2.4),
-    5: lambda t: (1 + 1.2 * t, 9.0),
-    6: lambda t: (26 - 1.1 * t, 3.2),
-}
+    1: lambda t: (1 + 1.2 * t, 2.0), 2: lambda t: (1 + 1.2 * t, 2.8),
+    3: lambda t: (1 + 1.2 * t, 3.6 + 0.8 * max(0.0, 4 - t)), 4: lambda t: (26 - 1.1 * t, 2.4),
+    5: lambda t: (1 + 1.2 * t, 9.0), 6: lambda t: (26 - 1.1 * t, 3.2),
+}  # fmt: skip
 """Two people walk together, a third joins them, two others walk through them, one stays away."""
 
 
@@ -75,14 +71,6 @@ def walk(tmp_path: Path) -> Path:
     return path
 
 
-def done(capsys, *words: object) -> dict:
-    capsys.readouterr()
-    code = run([*map(str, words), "--json"])
-    found = json.loads(capsys.readouterr().out)
-    assert code == 0, found
-    return found
-
-
 def told(tracks: Tracks) -> list[dict]:
     return [event_dict(e) for e in tracks.events]
 
@@ -95,7 +83,7 @@ def content(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_text(walk, tmp_path, capsys):
-    found = done(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
+    found = answer(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
     (row,) = found["runs"]
     assert (row["sequence"], row["people"], row["people_in_groups"], row["plane"]) == ("walk", 6, 5, "ground")
     one, other = row["groups"]
@@ -124,7 +112,7 @@ def test_other_commands_take_the_run(walk, tmp_path, capsys):
     rows = [(k + 1, p, *at(0.4 * k)) for k in range(50) for p, at in WALK.items()]
     (tmp_path / "slow" / "walk.txt").write_text("".join(f"{k},{p},-1,-1,-1,-1,1,{x},{y},0\n" for k, p, x, y in rows))
     assert run(["group", str(tmp_path / "slow" / "walk.txt"), "--fps", "2.5", "--out", str(tmp_path / "h")]) == 0
-    (row,) = done(capsys, "score", labels, tmp_path / "h")["sequences"]
+    (row,) = answer(capsys, "score", labels, tmp_path / "h")["sequences"]
     assert row["pairwise_F1"] > 0.7
     assert row["HOTA"] == 1
 
@@ -133,11 +121,11 @@ def test_other_commands_take_the_run(walk, tmp_path, capsys):
 def test_labels_of_groups_are_never_read(tmp_path, capsys, groups):
     labelled = [biwi(tmp_path / k / "walk", labels) for k, labels in (("a", "1 2 3\n"), ("b", groups))]
     for folder in labelled:
-        done(capsys, "group", folder, "--out", folder.parent / "g")
-        assert "error" not in done(capsys, "view", folder, folder.parent / "g", "--out", folder.parent / "g.html")
+        answer(capsys, "group", folder, "--out", folder.parent / "g")
+        assert "error" not in answer(capsys, "view", folder, folder.parent / "g", "--out", folder.parent / "g.html")
     first, second = (content(folder.parent / "g") for folder in labelled)
     assert first == second
-    (row,) = done(capsys, "score", labelled[0], tmp_path / "a" / "g")["sequences"]
+    (row,) = answer(capsys, "score", labelled[0], tmp_path / "a" / "g")["sequences"]
     assert row["pairwise_F1"] > 0.7
     assert "tracks of another walk" in refused(capsys, "score", labelled[0], tmp_path / "b" / "g") or groups is None
 
@@ -169,7 +157,7 @@ def test_nothing_later_is_used(tmp_path, capsys, form):
             source.parent.mkdir(parents=True)
             source.write_text(text(frames) if form == "ground text" else boxes(frames))
             source = source if form == "ground text" else folder / "walk"
-        done(capsys, "group", source, *options, "--out", folder / "g")
+        answer(capsys, "group", source, *options, "--out", folder / "g")
         found.append(read_tracks(folder / "g")[: cut - 1])
     for a, b in zip(*found, strict=True):
         assert np.array_equal(a.group, b.group)
@@ -185,17 +173,17 @@ def test_a_run(walk, tmp_path, capsys):
     (tmp_path / "far.toml").write_text("[params]\nnear = 0.5\n")
     (tmp_path / "soon.toml").write_text("[params]\nacquaintance = 0.2\n")
     line = ["blob", data, "--detections", "truth", "--grouping", tmp_path / "far.toml"]
-    done(capsys, "track", *line, "--out", first)
-    found = done(capsys, "group", first, "--grouping", tmp_path / "soon.toml", "--out", tmp_path / "again")
+    answer(capsys, "track", *line, "--out", first)
+    found = answer(capsys, "group", first, "--grouping", tmp_path / "soon.toml", "--out", tmp_path / "again")
     assert [row["sequence"] for row in found["runs"]] == ["scene-s40000", "scene-s40001"]
     assert [len(row["groups"]) for row in found["runs"]] == [1, 1]
     before, after = (check_run(folder / "scene-s40001") for folder in (first, tmp_path / "again"))
     assert (before["grouping"]["near"], after["grouping"]["near"], after["grouping"]["acquaintance"]) == (0.5, 1.5, 0.2)
     assert all(before[key] == after[key] for key in ("tracker", "config", "truth_hash", "detections", "px_per_m"))
-    scored = done(capsys, "score", data, tmp_path / "again", first)
+    scored = answer(capsys, "score", data, tmp_path / "again", first)
     assert scored["settings"]
     assert all(d["what"].startswith("grouping") for d in scored["settings"])
-    done(capsys, "group", tmp_path / "again" / "scene-s40000" / "tracks.parquet", "--out", tmp_path / "third")
+    answer(capsys, "group", tmp_path / "again" / "scene-s40000" / "tracks.parquet", "--out", tmp_path / "third")
     assert check_run(tmp_path / "third")["grouping"]["grouping"] == "belief", "the default"
     for folder in (first, first / "scene-s40000"):
         assert "the folder of the tracks themselves" in refused(capsys, "group", folder, "--out", folder)
@@ -204,7 +192,7 @@ def test_a_run(walk, tmp_path, capsys):
 def test_probabilities(walk, tmp_path, capsys):
     """A table of pairs, sealed with the run; a run without the option has none."""
     line = ["group", walk, "--fps", 10, "--out", tmp_path / "g"]
-    (row,) = done(capsys, *line, "--probabilities")["runs"]
+    (row,) = answer(capsys, *line, "--probabilities")["runs"]
     table = pq.read_table(tmp_path / "g" / "pairs.parquet")
     assert table.column_names == ["frame", "a", "b", "probability"]
     frame, a, b, p = (table[name].to_numpy() for name in table.column_names)
@@ -216,48 +204,20 @@ def test_probabilities(walk, tmp_path, capsys):
     assert frame.min() <= 10
     assert run(["validate", str(tmp_path / "g")]) == 0
     assert (tmp_path / "g" / "pairs.parquet").is_file()
-    (row,) = done(capsys, *line)["runs"]
+    (row,) = answer(capsys, *line)["runs"]
     assert row["pairs"] is None
     assert not (tmp_path / "g" / "pairs.parquet").exists()
-
-
-def test_probabilities_know_nothing_later(tmp_path, capsys):
-    found = []
-    for frames in (200, 120):
-        (tmp_path / "walk.txt").write_text(text(frames))
-        line = ["group", tmp_path / "walk.txt", "--fps", 10, "--probabilities"]
-        done(capsys, *line, "--out", tmp_path / str(frames))
-        table = pq.read_table(tmp_path / str(frames) / "pairs.parquet")
-        found.append(table.filter(pc.less_equal(table["frame"], 120)))
-    assert found[0].equals(found[1])
-
-
-def test_a_dataset(tmp_path, capsys):
-    write_short_scene(tmp_path, "40000:40002")
-    assert run(["group", str(tmp_path / "data"), "--out", str(tmp_path / "g")]) == 0
-    assert "all" in capsys.readouterr().out
-    found = done(capsys, "score", tmp_path / "data", tmp_path / "g")
-    assert found["mean"]["HOTA"]["mean"] == 1
-    assert {check_run(tmp_path / "g" / f"scene-s4000{k}")["tracker"] for k in (0, 1)} == {"group"}
-
-
-def test_texts_of_a_folder(tmp_path, capsys):
-    """As trackers write them: one text for each sequence."""
-    for name in ("a", "b"):
-        (tmp_path / f"{name}.txt").write_text(text(30))
-    found = done(capsys, "group", tmp_path, "--fps", 10, "--out", tmp_path / "out" / "g")
-    assert [row["sequence"] for row in found["runs"]] == ["a", "b"]
 
 
 def test_boxes(tmp_path, capsys):
     """In the image by the scale that is given, or that of the first boxes; on the ground by a camera."""
     (tmp_path / "walk.txt").write_text(boxes())
-    (row,) = done(capsys, "group", tmp_path / "walk.txt", "--fps", 10, "--out", tmp_path / "a")["runs"]
+    (row,) = answer(capsys, "group", tmp_path / "walk.txt", "--fps", 10, "--out", tmp_path / "a")["runs"]
     assert (row["plane"], row["px_per_m"], row["px_per_m_frames"]) == ("image", 40, 17)
     assert [g["members"] for g in row["groups"]] == [[1, 2, 3], [4, 6]]
     assert check_run(tmp_path / "a")["causal_from"] == 17
     options = ["--fps", 10, "--px-per-m", 400]
-    (row,) = done(capsys, "group", tmp_path / "walk.txt", *options, "--out", tmp_path / "b")["runs"]
+    (row,) = answer(capsys, "group", tmp_path / "walk.txt", *options, "--out", tmp_path / "b")["runs"]
     assert (row["px_per_m"], row["px_per_m_frames"], row["people_in_groups"]) == (400, 0, 6)
     camera = {
         "kind": "top", "image": [1600, 800], "focal_px": [40, 40], "centre_px": [800, 400], "position": [20, 10, 10],
@@ -265,7 +225,7 @@ def test_boxes(tmp_path, capsys):
     }  # fmt: skip
     (tmp_path / "camera.json").write_text(json.dumps(camera))
     options = ["--fps", 10, "--camera", tmp_path / "camera.json"]
-    (row,) = done(capsys, "group", tmp_path / "walk.txt", *options, "--out", tmp_path / "c")["runs"]
+    (row,) = answer(capsys, "group", tmp_path / "walk.txt", *options, "--out", tmp_path / "c")["runs"]
     assert row["plane"] == "ground"
     assert [g["members"] for g in row["groups"]] == [[1, 2, 3], [4, 6]]
 
@@ -304,10 +264,10 @@ def test_without_people(tmp_path, capsys):
     (tmp_path / "walk" / "gt").mkdir(parents=True)
     (tmp_path / "walk" / "gt" / "gt.txt").write_text("")
     (tmp_path / "walk" / "seqinfo.ini").write_text("[Sequence]\nseqLength=3\n")
-    found = done(capsys, "group", tmp_path / "walk", "--fps", 10, "--out", tmp_path / "g")
+    found = answer(capsys, "group", tmp_path / "walk", "--fps", 10, "--out", tmp_path / "g")
     assert (found["runs"][0]["people"], found["runs"][0]["groups"]) == (0, [])
     line = ["group", tmp_path / "walk", "--fps", 10, "--probabilities", "--out", tmp_path / "h"]
-    assert done(capsys, *line)["runs"][0]["pairs"] == 0
+    assert answer(capsys, *line)["runs"][0]["pairs"] == 0
     assert run(["group", str(tmp_path / "walk"), "--fps", "10", "--out", str(tmp_path / "g")]) == 0
 
 
@@ -361,11 +321,11 @@ def test_wrong_options(walk, tmp_path, capsys):
 
 
 def test_wrong_runs(walk, tmp_path, capsys):
-    done(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
+    answer(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
     line = ["group", tmp_path / "g", "--out", tmp_path / "h"]
     for option in (["--fps", "10"], ["--px-per-m", "40"]):
         assert f"got {option[0]}; expected none for a run" in refused(capsys, *line, *option)
-    done(capsys, "track", "group-pda", walk, "--fps", 10, "--out", tmp_path / "wholes")
+    answer(capsys, "track", "group-pda", walk, "--fps", 10, "--out", tmp_path / "wholes")
     assert "tracks of whole groups" in refused(capsys, "group", tmp_path / "wholes", "--out", tmp_path / "h")
     (tmp_path / "g" / "events.json").unlink()
     assert "events.json: got missing" in refused(capsys, *line)
@@ -373,48 +333,20 @@ def test_wrong_runs(walk, tmp_path, capsys):
 
 def test_a_run_in_the_image_without_scale(tmp_path, capsys):
     (tmp_path / "walk.txt").write_text(boxes(30))
-    done(capsys, "group", tmp_path / "walk.txt", "--fps", 10, "--out", tmp_path / "g")
+    answer(capsys, "group", tmp_path / "walk.txt", "--fps", 10, "--out", tmp_path / "g")
     tracks = [t.replace(box=None) for t in read_tracks(tmp_path / "g")]
     write_tracks(tmp_path / "mine", tracks, fps=FPS, info={"tracker": "mine.py:Mine", "plane": "image"})
     line = ["group", tmp_path / "mine", "--fps", 10, "--out", tmp_path / "h"]
     assert "give --px-per-m" in refused(capsys, *line)
-    (row,) = done(capsys, *line, "--px-per-m", 40)["runs"]
+    (row,) = answer(capsys, *line, "--px-per-m", 40)["runs"]
     assert row["px_per_m"] == 40
     seal_again(tmp_path / "mine", px_per_m=40.0)
-    (row,) = done(capsys, *line)["runs"]
+    (row,) = answer(capsys, *line)["runs"]
     assert row["px_per_m"] == 40
-
-
-def test_keys_of_run_json(walk, tmp_path, capsys):
-    """Those of a tracker's run, but its speeds; and always the grouping."""
-    done(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
-    done(capsys, "track", "group-pda", walk, "--fps", 10, "--out", tmp_path / "t")
-    mine, theirs = (check_run(tmp_path / name).keys() for name in "gt")
-    assert theirs - mine == {"frames_per_second", "whole_frames_per_second"}
-    assert mine - theirs == {"grouping"}
-
-
-def test_recorded_people(shared_data, tmp_path, capsys):
-    """The street that all figures are about, by one line each."""
-    folder = shared_data / "biwi" / "seq_hotel"
-    done(capsys, "group", folder, "--out", tmp_path / "g")
-    (row,) = done(capsys, "score", folder, tmp_path / "g")["sequences"]
-    assert row["pairwise_F1"] > 0.6
-    assert open_source(folder)[0].name == row["name"]
 
 
 LOW_CAMERA = [f"camera.{setting}" for setting in ("tilt_deg=0", "height=2.5", "position=[12,12]", "crop=true")]
 """Settings of a camera among the people, with the horizon in the middle of the picture of 640 × 480."""
-
-
-def test_people_behind_the_camera(tmp_path, capsys):
-    """Their boxes are unknown, their positions are not."""
-    sequence = simulate(load("merge", LOW_CAMERA), 90001)
-    assert not np.isfinite(sequence.truth.box).all()
-    made = group(sequence)
-    assert sum(len(t.id) for t in made) == len(sequence.truth.id)
-    made.write(tmp_path / "g", sequence)
-    assert run(["group", str(tmp_path / "g"), "--out", str(tmp_path / "again")]) == 0
 
 
 def test_boxes_above_the_horizon_of_a_camera(tmp_path, capsys):

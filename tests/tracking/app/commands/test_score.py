@@ -73,19 +73,6 @@ def test_files_are_memory_for_groups_as_wholes(made: Path, scene: Sequence, tmp_
             assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
 
 
-def test_tables_of_a_tracker_of_groups(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
-    """There is no table of people; the objective is in the table of groups."""
-    folder = tmp_path / "merge-s00005"
-    write_tracks(folder, wholes(scene, "ground"), fps=scene.fps)
-    capsys.readouterr()
-    assert run(["score", str(made / "data" / "flockscope-train" / "merge-s00005"), str(folder)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].strip() == "groups, strict"
-    assert lines[1].split()[:3] == ["sequence", "objective", "1-FP"]
-    assert "people are not tracked" in lines
-    assert not any("DetA" in line for line in lines)
-
-
 def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, capsys) -> None:
     """A seed tracked from its sensor's boxes, one from labels, one from noisy ones, one as a text without run.json."""
     line = ["generate", "merge", "--seeds", "3:7", "--streams", "none", "--out", str(tmp_path / "data")]
@@ -108,23 +95,6 @@ def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, 
     for words in ("file", "truth", "truth (box_noise.scale = 2)", "unknown (no run.json)"):
         assert f"1 of 4 sequences, detections {words}\n" in text
     assert "95 % low" not in text
-
-
-@pytest.mark.slow
-def test_files_are_memory_from_pixels(tmp_path: Path, capsys) -> None:
-    """Through pictures without loss."""
-    settings = ["camera.fps=5", "camera.image=[320,240]"]
-    data, tracks = tmp_path / "data", tmp_path / "tracks"
-    line = ["generate", "merge", "--seeds", "3", "--images", "png", "--out", str(data)]
-    assert run([*line, *(word for text in settings for word in ("--set", text))]) == 0
-    assert run(["track", "blob", str(data), "--out", str(tracks)]) == 0
-    (row,) = scored(capsys, data, tracks)["sequences"]
-    sequence = simulate(load("merge", settings), 3)
-    answers = track("blob", sequence)
-    assert answers.info["detections"] == "image"
-    assert sum(len(t.id) for t in answers) > 100
-    for key, value in evaluate(sequence.truth, answers).items():
-        assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
 
 
 def test_the_mean_has_every_key_and_an_interval(made: Path, capsys) -> None:
@@ -168,26 +138,6 @@ def test_boxes_are_compared_by_their_feet_where_the_camera_is_known(
         assert (row["similarity"], row["surface"]) == ("ground", "ground")
         assert row["HOTA"] == pytest.approx(ground["HOTA"], abs=0.1)
         assert row["HOTA"] > scored(capsys, data, path, "--similarity", "boxes")["sequences"][0]["HOTA"] + 0.05
-
-
-def test_a_short_recording_is_an_indication_only(made: Path, capsys, monkeypatch) -> None:
-    """The scene lasts under a minute; with the border below its length it is long enough."""
-    one = [made / "data" / "flockscope-train" / "merge-s00005", made / "file"]
-    (note,) = scored(capsys, *one, "--blocks", "2")["notes"]
-    assert "indicative under 60 s" in note
-    assert run(["score", *map(str, one), "--blocks", "2"]) == 0
-    assert "indicative under 60 s" in " ".join(capsys.readouterr().out.split())
-    assert scored(capsys, *one)["notes"] == []
-    monkeypatch.setattr("tracking.app.commands.score_ranking.SURE", 5.0)
-    assert scored(capsys, *one, "--blocks", "2")["notes"] == []
-    assert run(["score", *map(str, one), "--blocks", "2"]) == 0
-    assert "indicative" not in capsys.readouterr().out
-
-
-def test_blocks_are_for_a_single_recording(made: Path, capsys) -> None:
-    for runs in ([made / "file"], [made / "file", made / "truth"]):
-        assert run(["score", str(made / "data"), *map(str, runs), "--blocks", "5"]) == 2
-        assert "2 sequences" in capsys.readouterr().err
 
 
 def test_two_runs_of_one_recording(made: Path, capsys) -> None:
@@ -235,20 +185,6 @@ def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, 
     assert run(["score", str(data), str(folder), str(made / "file")]) == 0
 
 
-def test_tables(made: Path, capsys) -> None:
-    capsys.readouterr()
-    assert run(["score", str(made / "data"), str(made / "file")]) == 0
-    output = capsys.readouterr().out
-    for words in (
-        "groups, strict", "groups, core", "\nmembers\n", "\nevents\n",
-        "people compared by 1 - distance / 2 m on the ground",
-        "groups compared by overlap (IoU) of hulls (group_F1: common members), on the ground, m",
-        "FP ↓", "↓ lower is better",
-    ):  # fmt: skip
-        assert words in output
-    assert max(map(len, output.splitlines())) <= 160
-
-
 def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:
     gt = made / "data" / "flockscope-train" / "merge-s00005" / "gt" / "gt.txt"
     shown = made / "file" / "merge-s00005" / "tracks.mot.txt"
@@ -260,11 +196,3 @@ def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:
     output = capsys.readouterr().out
     assert "groups are not labelled" in output
     assert "strict" not in output
-
-
-def test_lengths_are_printed_with_their_unit(made: Path, tmp_path: Path, capsys) -> None:
-    (tmp_path / "S.txt").write_text("1,1,10,20,40,100,1\n2,1,12,20,40,100,1\n")
-    assert run(["score", str(tmp_path / "S.txt"), str(tmp_path / "S.txt"), "--fps", "10"]) == 0
-    assert "GOSPA (px)" in capsys.readouterr().out
-    assert run(["score", str(made / "data"), str(made / "truth")]) == 0
-    assert "GOSPA (m)" in capsys.readouterr().out

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 import cv2
@@ -12,10 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.errors import InputError
-from sim.types import GroupEvent, Sequence, Truth
-from tracking.app.pictures.contact_sheet import choose_frames, write_sheet
-from tracking.drawing.canvas import FLOOR, Canvas, colour
-from tracking.drawing.plan_view import draw_ids
+from sim.types import GroupEvent, PixelTruth, Sequence, Truth
+from tests.coded_pictures import SIZE, number, sequence
+from tracking.app.pictures.contact_sheet import (
+    HEAD,
+    TITLE,
+    WIDTH,
+    choose_frames,
+    empty_truth,
+    write_sheet,
+)
+from tracking.app.pictures.panel_pictures import OBJECTS, PanelPictures, coloured_disparity, coloured_ids
+from tracking.drawing.canvas import FLOOR, GRID, colour
 
 
 def bare(length: int, starts: dict[int, str]) -> Truth:
@@ -32,58 +39,6 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
     assert chosen == sorted(chosen)
 
 
-def test_fuller_frames_fill_the_gaps(truth: Truth) -> None:
-    few = truth.replace(frame=np.array([70, 70, 71]), id=np.array([1, 2, 1]), events=())
-    assert choose_frames(few, 1) == [70]
-
-
-def test_onsets_close_to_one_another_share_a_picture() -> None:
-    chosen = choose_frames(bare(200, {50: "cross", 55: "cross", 58: "merge", 120: "cross"}), 4)
-    assert {58, 120} <= set(chosen)
-    assert not {50, 55} & set(chosen)
-
-
-def test_the_part_of_the_world_where_people_are_is_shown(sequence: Sequence, truth: Truth) -> None:
-    """With pillars, doors, stairs and service points, and not beyond the walls round it."""
-    from tracking.app.pictures.contact_sheet import sheet_area
-
-    wide = dataclasses.replace(sequence, scene=dataclasses.replace(sequence.scene, size=np.array([60.0, 40.0])))
-    low, high = sheet_area(wide, truth)
-    np.testing.assert_allclose(high, truth.pos.max(axis=0) + 2)
-    low, high = sheet_area(sequence, truth.replace(pos=np.clip(truth.pos, 0, sequence.scene.size)))
-    assert (low >= -1).all()
-    assert (high <= sequence.scene.size + 1).all()
-
-
-def test_a_ring_holds_all_whom_an_event_concerns(truth: Truth) -> None:
-    from tracking.app.pictures.contact_sheet import event_ring
-
-    merge = next(event for event in truth.events if event.kind == "merge")
-    rows = truth.rows(merge.start)
-    centre, radius = event_ring(merge, truth.id[rows], truth.pos[rows])
-    apart = np.linalg.norm(truth.pos[rows] - centre, axis=1)
-    assert 0.5 < radius - apart[np.isin(truth.id[rows], merge.members)].max() < 1
-
-
-def test_names_stand_clear_of_discs_and_of_one_another() -> None:
-    """Five in a huddle: no name covers a disc (a covered one would lose its colour), and all are there."""
-    view = Canvas.fit(np.full((300, 300, 3), 255, np.uint8), np.zeros(2), np.array([10.0, 10.0]), upwards=True)
-    ids, places = np.arange(1, 6), np.array([[5, 5], [5.9, 5], [4.1, 5], [5, 5.9], [5, 4.1]])
-    for identity, at in zip(ids.tolist(), places, strict=True):
-        view.disc(at, 7, colour(identity))
-    before = view.image.copy()
-    draw_ids(view, ids, places, 7)
-    for identity, at in zip(ids.tolist(), places, strict=True):
-        x, y = view.map(at)[0].astype(int)
-        np.testing.assert_array_equal(view.image[y, x], before[y, x])
-        assert (np.abs(view.image.astype(int) - colour(identity)).max(axis=2) < 12).sum() > 150
-
-
-def test_merges_and_splits_outrank_the_rest() -> None:
-    events = dict.fromkeys(range(10, 100, 10), "form") | {5: "merge", 150: "split"}
-    assert {5, 150} <= set(choose_frames(bare(200, events), 3))
-
-
 @settings(deadline=None)
 @given(
     length=st.integers(1, 300),
@@ -95,12 +50,6 @@ def test_frames_are_distinct_and_inside(length: int, frames: int, starts: dict[i
     assert len(chosen) == len(set(chosen)) == min(frames, length)
     assert chosen[0] >= 1
     assert chosen[-1] <= length
-
-
-def test_a_plan_puts_y_up_and_keeps_the_aspect() -> None:
-    view = Canvas.fit(np.zeros((100, 300, 3), np.uint8), np.zeros(2), np.array([20.0, 10.0]), upwards=True)
-    assert view.scale == 10
-    np.testing.assert_allclose(view.map(np.array([[0, 0], [20, 10], [10, 5]])), [[50, 100], [250, 0], [150, 50]])
 
 
 def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
@@ -118,22 +67,6 @@ def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_p
     np.testing.assert_allclose(picture[round(v) + 30, round(u) + 30], FLOOR, atol=12)
 
 
-@pytest.mark.parametrize("frames", [1, 3, 8, 11])
-def test_size_follows_the_number_of_frames(sequence: Sequence, tmp_path: Path, frames: int) -> None:
-    picture = cv2.imread(str(write_sheet(sequence, tmp_path / "sheet.png", frames=frames)))
-    assert picture.shape[1] == 10 + min(frames, 4) * 450
-
-
-def test_the_same_sequence_gives_the_same_bytes(sequence: Sequence, tmp_path: Path) -> None:
-    a, b = write_sheet(sequence, tmp_path / "a.png"), write_sheet(sequence, tmp_path / "b.png")
-    assert a.read_bytes() == b.read_bytes()
-
-
-def test_boxes_alone_are_drawn_in_the_image(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
-    boxes = Sequence("boxes", 10.0, truth.length, sequence.frames, lambda: truth.replace(pos=None, vel=None))
-    assert write_sheet(boxes, tmp_path / "boxes.png").stat().st_size > 5000
-
-
 def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) -> None:
     for load in (None, lambda: bare(10, {})):
         with pytest.raises(InputError, match="no labelled people"):
@@ -141,7 +74,38 @@ def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) ->
     assert not (tmp_path / "none.png").exists()
 
 
-def test_an_unwritable_place_is_one_clear_line(sequence: Sequence, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="choose another --out"):
-        write_sheet(sequence, tmp_path / "file" / "sheet.png", frames=1)
+def pixels(index: int) -> PixelTruth:
+    ids = np.zeros(SIZE[::-1], np.int64)
+    ids[30:50, 5:15], ids[:10] = index, -2
+    disparity = np.full(SIZE[::-1], 2.0)
+    disparity[:, :5] = np.nan
+    disparity[30:50, 5:15] = 9.0
+    one = np.ones(1)
+    return PixelTruth(ids, disparity, one, one, np.ones((1, 4)), np.ones(1, np.int64))
+
+
+def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
+    """Without labels too: frames spread over the recording."""
+    bare = sequence(60)
+    truth = empty_truth(bare)
+    chosen = choose_frames(truth, 4)
+    pictures = PanelPictures(bare, truth, chosen)
+    assert pictures.kinds() == ()
+    for index in chosen:
+        area = np.zeros((SIZE[1] * 4, SIZE[0] * 4, 3), np.uint8)
+        pictures.draw_large(area, index)
+        assert number(area, 0, 4) == index
+    read = cv2.imread(str(write_sheet(bare, tmp_path / "s.png", 4)))
+    shrunk = WIDTH / 2 / SIZE[0]
+    top = (HEAD + TITLE) // 2
+    first = cv2.resize(read[top : top + round(SIZE[1] * shrunk), 10 : 10 + WIDTH // 2], SIZE)
+    assert number(first) == chosen[0]
+
+
+def test_colours() -> None:
+    here = pixels(3)
+    ids = coloured_ids(here.ids)
+    assert (tuple(ids[40, 10]), tuple(ids[2, 2]), tuple(ids[25, 40])) == (colour(3), OBJECTS, FLOOR)
+    shown = coloured_disparity(here.disparity, 2.0, 9.0).astype(int)
+    assert tuple(shown[40, 2]) == GRID
+    assert shown[40, 10].sum() > shown[25, 40].sum() + 100

@@ -15,10 +15,10 @@ from sim.scene.camera import project
 from sim.types import Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tests.coded_pictures import SIZE, coded, number, sequence
 from tests.groups_as_wholes import wholes
-from tracking.app.pictures.overlay import banner_words, overlay_pictures, write_overlay
+from tracking.app.pictures.overlay import overlay_pictures, write_overlay
 from tracking.drawing.canvas import colour
 from tracking.drawing.layer_painting import LayerStyle
-from tracking.drawing.layers import layer_of_tracks, plan_layer_of_tracks
+from tracking.drawing.layers import layer_of_tracks
 
 STRIP = 32
 
@@ -108,21 +108,6 @@ def test_what_a_frame_lacks_is_told() -> None:
     assert [number(p, STRIP, 2) for p in made] == [1, 1, 3]
 
 
-def test_trails_end_at_a_gap() -> None:
-    tracks = [answer(k, {1: [k, 0, 2, 4], 2: [k, 20, 2, 4]} if k != 5 else {1: [k, 0, 2, 4]}) for k in range(1, 9)]
-    side = layer_of_tracks(tracks, None, None)
-    found = dict(side.trails(8, 100))
-    np.testing.assert_array_equal(found[1][:, 0], np.arange(8, 0, -1) + 1)
-    np.testing.assert_array_equal(found[2][:, 0], [9, 8, 7])
-    assert dict(side.trails(8, 2))[1].shape == (3, 2)
-
-
-def test_ellipses_hold_95_percent() -> None:
-    ring = layer_of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None).at(1).ellipse[0]
-    offset = ring - [45, 40]
-    np.testing.assert_allclose((offset**2 / [4.0, 1.0]).sum(axis=1), 5.991, rtol=1e-6)
-
-
 def test_people_on_the_ground_stand_upright_in_the_picture(sequence: Sequence, tracks: list[Tracks]) -> None:
     """Without boxes of their own; ellipses lie on the ground round their feet."""
     plain = [t.replace(box=None) for t in tracks]
@@ -132,25 +117,6 @@ def test_people_on_the_ground_stand_upright_in_the_picture(sequence: Sequence, t
     assert (wide > seen.box[:, 2]).all()
     assert (np.abs(seen.ellipse.mean(axis=1) - seen.at) < 60).all()
     assert np.isnan(layer_of_tracks(plain, None, None).at(1).box).all()
-
-
-def test_groups_without_people_show_their_hulls() -> None:
-    square = np.array([[10.0, 10], [30, 10], [30, 30], [10, 30]])
-    one, two = np.array([4]), np.zeros((1, 2))
-    groups = Groups(one, (np.zeros(0, np.int64),), two, two, np.zeros((1, 2, 2)), np.array([3.0]), (square,))
-    output = Tracks(1, 0.0, "image", "group", one, one, two, two, np.full((1, 4, 4), np.nan), groups=groups)
-    (region,) = layer_of_tracks([output], None, None).at(1).groups
-    assert (region.id, region.size) == (4, 3.0)
-    np.testing.assert_array_equal(region.hull, square)
-
-
-def test_events_stand_for_a_while_from_when_they_are_known() -> None:
-    merge = GroupEvent("merge", 2, 4, 6, (1, 2), (1,), (1, 2), (0.0, 0.0))
-    enter = GroupEvent("enter", 6, 6, 6, (), (1,), (1,), (0.0, 0.0))
-    tracks = [answer(k, {}, events=(merge, enter) if k == 6 else ()) for k in range(1, 20)]
-    side = layer_of_tracks(tracks, None, None)
-    assert [k for k in range(1, 20) if side.recent_events(k, 5.0)] == [6, 7, 8, 9, 10]
-    assert [e.kind for e in side.recent_events(6, 5.0)] == ["merge"]
 
 
 def coloured(picture: np.ndarray, group: int) -> np.ndarray:
@@ -199,44 +165,3 @@ def test_groups_on_the_ground_lie_there_in_the_picture(sequence: Sequence) -> No
     assert not any(len(part) for r in blind.groups for part in (r.hull, r.extent, r.motion))
     behind = layer_of_tracks([a_group((8.0, -40.0), "ground")], sequence.camera, None).at(1)
     assert not any(len(part) for r in behind.groups for part in (r.hull, r.extent, r.motion))
-
-
-def without_velocity(group: Tracks) -> Tracks:
-    return group.replace(vel=np.full((1, 2), np.nan), groups=None)
-
-
-def test_a_group_of_unknown_velocity_has_its_place_and_no_arrow() -> None:
-    side = layer_of_tracks([without_velocity(a_group((40, 30)))], None, None)
-    assert side.at(1).at.tolist() == [[40, 30]]
-    (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
-    assert len(coloured(picture, 4)) > 20
-
-
-def test_a_group_of_unknown_velocity_has_its_place_on_the_ground(sequence: Sequence) -> None:
-    given = a_group((8.0, 5.0), "ground")
-    known, unknown = (layer_of_tracks([g], sequence.camera, None).at(1).at for g in (given, without_velocity(given)))
-    assert np.isfinite(known).all()
-    np.testing.assert_array_equal(unknown, known)
-    (region,) = plan_layer_of_tracks([without_velocity(given)]).at(1).groups
-    assert region.motion.tolist() == [[8.0, 5.0]]
-
-
-def test_what_is_unknown_of_a_group_is_left_out() -> None:
-    plain = a_group((40, 30))
-    unknown = plain.groups.replace(hull=(), extent=np.full((1, 2, 2), np.nan), size=np.array([np.nan]))
-    for given in (plain.replace(groups=None), plain.replace(groups=unknown)):
-        side = layer_of_tracks([given], None, None)
-        (region,) = side.at(1).groups
-        assert (len(region.hull), len(region.extent), np.isnan(region.size)) == (0, 0, True)
-        (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
-        assert len(coloured(picture, 4)) > 20
-
-
-def test_groups_that_are_tracked_are_counted_as_such() -> None:
-    assert overlay_words([a_group((40, 30))]) == "coded   frame 1 of 1   0.00 s   tracked 1 groups"
-
-
-def overlay_words(tracks: list[Tracks]) -> str:
-    case = sequence(1)
-    side = layer_of_tracks(tracks, None, None)
-    return banner_words(case, next(iter(case)), [[(side, LayerStyle())]])

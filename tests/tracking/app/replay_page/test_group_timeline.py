@@ -24,21 +24,6 @@ def test_bars_are_unbroken_lives_in_free_lanes() -> None:
     assert made == [Bar(2, 1, 4, 0, 2), Bar(1, 1, 9, 1, 3), Bar(3, 6, 9, 0, 2)]
 
 
-def test_a_bar_that_follows_at_once_takes_another_lane() -> None:
-    assert [bar.lane for bar in bars(*rows((1, 1, 3, 2), (2, 4, 6, 2), (3, 8, 9, 2)))] == [0, 1, 0]
-
-
-def test_one_person_is_no_group_unless_a_row_is_one() -> None:
-    assert bars(*rows((5, 1, 3, 1))) == []
-    assert bars(*rows((5, 1, 3, 1)), least=1) == [Bar(5, 1, 3, 0, 1)]
-    assert bars(*rows()) == []
-
-
-def test_an_id_that_returns_gets_its_lane_again() -> None:
-    made = bars(*rows((1, 1, 9, 2), (2, 1, 3, 2), (2, 7, 9, 2)))
-    assert [(bar.id, bar.start, bar.lane) for bar in made] == [(2, 1, 0), (1, 1, 1), (2, 7, 0)]
-
-
 @given(st.lists(st.tuples(st.integers(1, 40), st.integers(0, 10)), max_size=12))
 def test_bars_of_a_lane_never_overlap(spans: list[tuple[int, int]]) -> None:
     made = bars(*rows(*((k, a, a + n, 2) for k, (a, n) in enumerate(spans))))
@@ -61,9 +46,3 @@ def test_links_join_and_fork() -> None:
         ]
     )
     assert made == [Link(10, 2, 1), Link(14, 1, 3)]
-
-
-def test_a_row_may_stand_for_many() -> None:
-    frame, group = rows((7, 1, 3, 1))
-    assert bars(frame, group, least=0, people=np.array([3.2, 4.6, 0.3])) == [Bar(7, 1, 3, 0, 5)]
-    assert bars(frame, group, least=0, people=np.zeros(3)) == [Bar(7, 1, 3, 0, 0)]

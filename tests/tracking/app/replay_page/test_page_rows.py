@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.geometry.footprints import footprint_hull, footprint_hulls
+from sim.geometry.footprints import footprint_hull
 from sim.geometry.polygons import area, convex_hull
-from sim.types import Groups, Sequence, Tracks
+from sim.types import Sequence
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page import page_rows
-from tracking.app.replay_page.page import page_data, write_page
+from tracking.app.replay_page.page import page_data
 from tracking.app.replay_page.page_rows import NIL
 
 
@@ -73,39 +73,6 @@ def test_bars_and_links_of_groups(sequence: Sequence) -> None:
     assert data["truth"]["links"] == [[50, 2, 1], [110, 1, 3]]
 
 
-def test_what_a_tracker_of_groups_leaves_out(sequence: Sequence) -> None:
-    """No groups, no hulls, or nan: the rows are there, what is unknown is NIL; one without a row is of groups too."""
-    answers = wholes(sequence, "ground")
-    bare = [
-        answers[0].replace(groups=None),
-        answers[1].replace(groups=answers[1].groups.replace(hull=())),
-        answers[2].replace(
-            groups=answers[2].groups.replace(size=np.full(2, np.nan), extent=np.full((2, 2, 2), np.nan))
-        ),
-    ]
-    rows = rows_of(page_data(sequence, bare)["tracks"])
-    np.testing.assert_array_equal(np.isnan(rows["size"]), rows["frame"] != 2)
-    np.testing.assert_array_equal(np.isnan(rows["axes"][:, 0]), rows["frame"] != 2)
-    assert [len(h) > 0 for h in rows["hull"]] == (rows["frame"] == 3).tolist()
-    two, none = np.zeros((0, 2)), np.zeros(0, np.int64)
-    empty = [Tracks(1, 0.0, "image", "group", none, none, two, two, np.zeros((0, 4, 4)), groups=Groups.none())]
-    side = page_data(sequence, empty)["tracks"]
-    assert (side["plane"], side["wholes"]["size"], side["bars"]) == ("image", [], [])
-
-
-def test_the_page_shows_all_of_their_hulls(sequence: Sequence) -> None:
-    """The sizes of plan and image follow from the tracks alone."""
-    alone = Sequence("alone", 10.0, 160, lambda: iter(()))
-    corners = np.concatenate([h for t in wholes(sequence, "ground") for h in t.groups.hull])
-    x0, y0, x1, y1 = page_data(alone, wholes(sequence, "ground"))["bounds"]
-    assert (corners >= [x0, y0]).all()
-    assert (corners <= [x1, y1]).all()
-    data = page_data(alone, wholes(sequence, "image"))
-    corners = np.concatenate([h for t in wholes(sequence, "image") for h in t.groups.hull])
-    assert data["bounds"] is None
-    np.testing.assert_allclose(data["image"], np.ceil(corners.max(axis=0)))
-
-
 @given(st.lists(st.tuples(st.floats(0, 8), st.floats(0, 8)), min_size=1, max_size=9))
 def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) -> None:
     """Never outside, no more than two steps of tolerance inside, in their order."""
@@ -118,33 +85,3 @@ def test_thinned_hulls_are_nearly_the_same(places: list[tuple[float, float]]) ->
     normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.hypot(*edge.T)[:, None]
     beyond = ((hull[:, None] - less[None]) * normal[None]).sum(axis=2).max(axis=1)
     assert beyond.max() <= 0.0401
-
-
-def test_a_hull_of_few_corners_stays() -> None:
-    for n in range(4):
-        corners = np.array([[0, 0], [1e-4, 0], [0, 1e-4]])[:n]
-        np.testing.assert_array_equal(page_rows.simplified(corners, 1.0), corners)
-
-
-def test_a_long_recording_of_groups_stays_small(tmp_path) -> None:
-    """1000 frames with ten groups, in bytes for each row."""
-    rng, names = np.random.default_rng(0), np.arange(1, 11)
-    place = rng.uniform(0, 20, (10, 1, 2)) + rng.normal(0, 0.6, (10, 4, 2))
-    cov = np.tile(np.eye(4), (10, 1, 1))
-    answers = []
-    for k in range(1, 1001):
-        place = place + rng.normal(0, 0.03, place.shape)
-        off = place - place.mean(axis=1, keepdims=True)
-        extent = np.einsum("gmi,gmj->gij", off, off) / 4
-        hull = tuple(footprint_hulls(place.reshape(-1, 2), np.full(10, 4)))
-        groups = Groups(names, (), place.mean(axis=1), rng.normal(size=(10, 2)), extent, rng.normal(4, 0.2, 10), hull)
-        answers.append(Tracks(k, k / 10, "ground", "group", names, names, groups.pos, groups.vel, cov, groups=groups))
-    alone = Sequence("alone", 10.0, 1000, lambda: iter(()))
-    assert write_page(alone, answers, tmp_path / "page.html").stat().st_size < 1.1e6
-
-
-def test_events_of_groups_are_told(sequence: Sequence) -> None:
-    events = page_data(sequence, wholes(sequence, "ground"))["tracks"]["events"]
-    assert [(e[0], list(e[4]), list(e[5]), e[6]) for e in events] == [
-        ("merge", [1, 2], [1], ()), ("split", [1], [1, 3], ()),
-    ]  # fmt: skip

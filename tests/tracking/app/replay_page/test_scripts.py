@@ -30,12 +30,9 @@ def ran(data: dict, scripts: tuple[str, ...], what: str) -> list:
     page = f"const document = {{ getElementById: () => ({{ textContent: {json.dumps(json.dumps(data))} }}) }};"
     code = "\n".join([page, *((HERE / name).read_text(encoding="utf-8") for name in scripts)])
     done = subprocess.run(
-        [str(NODE), "-"],
-        input=f"{code}\nconsole.log(JSON.stringify({what}));",
-        capture_output=True,
-        text=True,
+        [str(NODE), "-"], input=f"{code}\nconsole.log(JSON.stringify({what}));", capture_output=True, text=True,
         check=True,
-    )
+    )  # fmt: skip
     return json.loads(done.stdout)
 
 

@@ -7,7 +7,9 @@ import pytest
 
 from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context
+from tracking.detect import blobs
 from tracking.filters import kalman
+from tracking.papers.blob import blob_pieces
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 
@@ -35,28 +37,6 @@ def test_a_direction_far_off_is_a_distance_and_one_that_is_none_is_not():
     again = people([100, 100, 68, 24, UP])
     assert again.update(np.array([0]), z, noise, np.array([np.inf]))[0] == 0.0
     assert again.angle[0, 0] == UP
-
-
-def test_what_is_expected_of_a_size_is_no_new_evidence_in_each_frame():
-    one, var = people([100, 100, 90, 40, UP]), 0.15**2
-    for _ in range(200):
-        one.relax_axes(np.array([0]), np.array([[68.0, 24.0]]), var)
-    assert one.bank[kalman.PLACE, 0, 2:] == pytest.approx([68, 24])
-    assert one.bank[kalman.VAR, 0, 2:] == pytest.approx(var)
-    assert one.bank[kalman.PLACE, 0, :2] == pytest.approx([100, 100])
-
-
-def test_settling_takes_as_long_at_any_frame_rate():
-    left = []
-    for fps in (5.0, 25.0):
-        settings = BlobConfig()
-        one = TrackedEllipses(settings, settings.dynamics(fps), Context(fps, SCALE))
-        one.start_tracks(np.array([[100.0, 100, 90, 40, UP]]), np.ones(1), 0.0)
-        for _ in range(int(fps)):
-            one.relax_axes(np.array([0]), np.array([[68.0, 24.0]]), 0.02)
-        left.append(one.bank[kalman.PLACE, 0, 2] - 68)
-    assert left[0] == pytest.approx(left[1])
-    assert 0 < left[0] < 0.2 * (90 - 68)
 
 
 @pytest.mark.parametrize(("x", "wide", "hidden"), [(123, 34, True), (100, 16, False)])
@@ -87,3 +67,30 @@ def test_from_straight_above_nobody_is_behind_anybody():
     one.record_measured(np.array([1]), np.ones(1, bool), np.ones(1))
     one.explain_misses()
     assert not one.miss_explained.any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_union_of_pieces_is_the_blob_of_their_pixels(seed):
+    r = np.random.default_rng(seed)
+    mask = np.zeros((80, 90), bool)
+    for k in range(3):
+        top, left, high, wide = 25 * k + 2, *r.integers(4, 30, 1), *r.integers(8, 20, 2)
+        mask[top : top + high, left : left + wide] = True
+    pieces = blobs.find(mask, 1)
+    assert len(pieces) == 3
+    found, var = blob_pieces.union(pieces.area, pieces.ellipse)
+    v, u = np.nonzero(mask)
+    at = np.stack([u, v], 1) + 0.5
+    n, cov = np.array([float(len(at))]), np.cov(at.T, bias=True)[None] + np.eye(2) / 12
+    expected, expected_var = blobs.ellipses(n, at.mean(0)[None], cov)
+    assert found == pytest.approx(expected[0])
+    assert var == pytest.approx(expected_var[0])
+
+
+def test_a_piece_belongs_to_the_nearest_track_that_holds_it():
+    boxes = np.array([[100.0, 100, 60, 20], [104, 100, 60, 20], [300, 100, 60, 20]])
+    centre = np.array([[102.0, 90], [300, 120], [200, 100], [101, 100]])
+    d2 = np.array([[30.0, 9, 9, 1], [20, 9, 9, 2], [99, 50, 9, 9]])
+    free = np.array([True, True, True, False])
+    assert blob_pieces.owners(centre, boxes, d2, free).tolist() == [1, 2, -1, -1]
+    assert blob_pieces.owners(centre, boxes[:0], d2[:0], free).tolist() == [-1] * 4

@@ -9,8 +9,6 @@ from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context, Frame
 from tests import painted
 from tests.painted import overlap
-from tracking.detect import typical_person
-from tracking.detect.person_size import PersonSize
 from tracking.papers.blob.tracker import Blob
 
 HIGH, WIDE, FPS = 120, 160, 10.0
@@ -19,14 +17,9 @@ COLOURS = (30, 20, 190), (190, 30, 20), (20, 170, 40)
 
 def camera(scale):
     return Camera(
-        "top",
-        (WIDE, HIGH),
-        (scale, scale),
-        (WIDE / 2, HIGH / 2),
-        np.array([0.0, 0, 10]),
-        camera_rotation(np.pi / 2, 0.0),
-        px_per_m=scale,
-    )
+        "top", (WIDE, HIGH), (scale, scale), (WIDE / 2, HIGH / 2), np.array([0.0, 0, 10]),
+        camera_rotation(np.pi / 2, 0.0), px_per_m=scale,
+    )  # fmt: skip
 
 
 def box(scale, x, y, heading):
@@ -86,21 +79,3 @@ def test_who_turns_on_the_spot_stays_the_same():
     made = track(40.0, [[(60, 60, 0.0 if k < 12 else 1.57)] for k in range(24)])
     assert len(ids(made)) == 1
     assert all(len(t.id) == 1 for t in made[2:])
-
-
-def test_a_person_half_in_the_colour_of_shadow_is_seen():
-    made = track(40.0, [[(30 + 3 * k, 60, 0.0)] for k in range(25)], shade=0)
-    assert len(ids(made)) == 1
-    assert all(len(t.id) == 1 for t in made[3:])
-
-
-def test_expected_from_above_is_a_turned_ellipse():
-    size = PersonSize(Context(FPS, 40.0, camera=camera(40.0), image_size=(WIDE, HIGH)))
-    assert size.reliable
-    axes = 40 * np.array([typical_person.SHOULDERS, typical_person.DEPTH])
-    assert size.axes(np.zeros((1, 2)))[0] == pytest.approx(axes)
-    assert size.at(np.zeros((1, 2)))[0] == pytest.approx(np.full(2, np.sqrt(np.square(axes).mean())))
-    for heading in (0.0, 0.8, 1.6):
-        lying = np.array([[50.0, 50, *axes, heading]])
-        assert size.one_person(box(40.0, 50, 50, heading)[None], lying)[0]
-        assert not size.one_person(box(40.0, 50, 50, heading)[None], lying * [1, 1, 1.5, 1, 1])[0]

@@ -7,7 +7,7 @@ import pytest
 
 from tests import reference_templates as slow
 from tracking.detect import blobs
-from tracking.papers.blob import new_people, new_people_kernels, person_template_kernels
+from tracking.papers.blob import new_people, person_template_kernels
 from tracking.papers.blob.person_template import ExplainedForeground
 
 HIGH, WIDE = 90, 120
@@ -48,13 +48,6 @@ def test_guesses_are_the_slow_way(seed):
     assert np.array_equal(got, np.concatenate(slow.guesses(found.label == 1, 6, Fixed(h, w))))
 
 
-@pytest.mark.parametrize("n", [1, 2, 7, 40])
-def test_a_quantile_is_numpys(n):
-    values = np.random.default_rng(n).integers(5, 30, n)
-    for q in (0.0, 0.3, 0.5, 0.98, 0.999):
-        assert new_people_kernels.quantile(np.bincount(values - 5), n, q, 5) == np.quantile(values, q)
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_who_enters_is_the_slow_way(seed):
     mask, (h, w) = region(seed)
@@ -67,15 +60,6 @@ def test_who_enters_is_the_slow_way(seed):
     assert np.array_equal(scene.cover, slow.painted(mask.shape, got))
 
 
-def test_no_more_are_tried_than_there_are_sizes_for():
-    """Beyond the count whose guesses know a person's size none is tried."""
-    mask = mask_of([40.0, 80.0, 60.0, 24.0], [60.0, 80.0, 60.0, 24.0])
-    guesses = np.concatenate(slow.guesses(mask, 3, Fixed(60.0, 24.0)))
-    guesses[2, 2] = np.nan
-    found = new_people._in_region(ExplainedForeground(mask), guesses, float(np.pi / 4 * 60 * 24), 0.3)
-    assert len(found) == 1
-
-
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
 def test_as_many_come_in_as_there_are(count):
     """Side by side, a head's width of each hidden behind the next."""
@@ -84,13 +68,6 @@ def test_as_many_come_in_as_there_are(count):
     found = new_people.find_new_people(scene, Fixed(60.0, 24.0), 0.5)
     assert len(found) == count
     assert np.abs(np.sort(found[:, 0]) - true[:, 0]).max() < 4
-
-
-def test_half_a_person_and_less_is_nobody_new():
-    one = np.array([60.0, 80.0, 60.0, 24.0])
-    cut = mask_of(one)
-    cut[45:] = False
-    assert not len(new_people.find_new_people(ExplainedForeground(cut), Fixed(60.0, 24.0), 0.5))
 
 
 def test_what_is_explained_brings_nobody():

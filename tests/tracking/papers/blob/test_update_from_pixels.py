@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from tests import painted
 from tests.painted import TALL, box, overlap, track
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.person_template import ExplainedForeground
 
 
 def walk(x, foot, step, frames):
@@ -53,89 +51,6 @@ def test_a_person_in_two_pieces_for_ten_frames_stays_one_track():
     assert all(overlap(t.box[0], box(p)) > 0.5 for t, p in zip(made[5:], way[5:], strict=True))
 
 
-PAPER = BlobConfig.preset("paper")
-
-
-@pytest.mark.parametrize(
-    "config", [BlobConfig(split=False), PAPER, BlobConfig()], ids=["no split", "paper", "defaults"]
-)
-@pytest.mark.parametrize("broken", [range(20, 21), range(20, 26)], ids=["one frame", "six frames"])
-def test_pieces_of_a_person_lie_in_the_gate_and_start_no_track(config, broken):
-    """Frame 367 in the paper's own cascade and with the default noises: the waist hides."""
-    way, frames, r, known = walk(60, 180, 4, 34), [], np.random.default_rng(5), []
-    for k, p in enumerate(way):
-        image = painted.picture([p], r)
-        if k in broken:
-            waist = slice(int(p[1] - 0.5 * TALL) - 4, int(p[1] - 0.5 * TALL) + 4)
-            image[waist] = painted.picture([], r)[waist]
-        frames.append(image)
-    track(frames, config, watch=lambda tracker, _: known.append(tracker.people.next_id - 1))
-    assert known[-1] == 1
-
-
-@pytest.mark.parametrize("scale", [0.0, -1.0])
-def test_a_scale_that_is_none_is_refused(scale):
-    sample = painted.sample(np.random.default_rng(0))
-    with pytest.raises(InputError, match=r"context\.px_per_m"):
-        painted.Blob().reset(painted.Context(painted.FPS, scale, background=sample), 0)
-
-
-def test_a_ghost_that_is_pruned_hides_nobody():
-    """The template of a track that is lost, before one person: he is measured as wholly seen."""
-    last = []
-    track([[p] for p in walk(60, 180, 4, 20)], watch=lambda tracker, _: last.append(tracker))
-    people, updater = last[-1].people, last[-1].updater
-    x, y, h, w = people.upright_boxes()[0]
-    people.start_tracks(np.array([[x + 0.3 * w, y + 2, h, w, np.pi / 2]]), np.ones(1), 2.0)
-    people.confirmed[:] = True
-    scene = ExplainedForeground(painted.shape((x, y + h / 2, h)))
-    made = updater._measure_by_templates(scene, people.upright_boxes(), np.zeros(0, np.int64), True)
-    assert len(made.rows) == 1
-    assert made.noise[0, :2] == pytest.approx(people.noise[:2], rel=0.1)
-
-
-def two_tracks_at_one_blob(first_var, second_var):
-    """A tracker with two confirmed steady tracks, and a blob between them, nearer to the first in px. Variances are
-    those of the filters' places, m^2."""
-    last = []
-    track([[p] for p in walk(60, 180, 4, 20)], watch=lambda tracker, _: last.append(tracker))
-    people = last[-1].people
-    x, y, h, w = people.bank[kalman.PLACE, 0]
-    people.start_tracks(np.array([[x + 30, y, h, w, people.angle[0, 0]]]), np.ones(1), 2.0)
-    people.confirmed[:], people.rho[:], people.scale[:] = True, 1.0, 40.0
-    people.angle[1] = people.angle[1, 0]
-    people.bank[kalman.VAR, 0, :2], people.bank[kalman.VAR, 1, :2] = first_var, second_var
-    people.bank[kalman.VAR, 1, 2:] = people.bank[kalman.VAR, 0, 2:]
-    return last[-1], np.array([[x + 10, y, h, w, people.angle[0, 0]]])
-
-
-def test_a_blob_goes_to_the_likelier_track_not_to_the_vaguer():
-    """d^2 + ln |S|: rho is the same for both, but the second was measured by a template, with more noise."""
-    tracker, z = two_tracks_at_one_blob(0.003, 0.09)
-    people, angle_var = tracker.people, np.array([0.01])
-    d2 = kalman.distances(people.bank, z[:, :4], people.noise, people.scale)[:, 0]
-    assert d2[1] < d2[0]
-    assert d2[0] + np.log(0.003 + 0.0081) * 2 < d2[1] + np.log(0.09 + 0.0081) * 2
-    made, columns, _ = tracker.updater._associate(z, angle_var)
-    assert (made.rows.tolist(), columns.tolist()) == ([0], [0])
-
-
-@pytest.mark.parametrize("directed", [True, False])
-def test_the_cost_of_a_pair_is_its_log_likelihood(directed):
-    """Differences of d^2 + ln |S| between tracks are those of -2 ln N(z; prediction, S) in px and rad."""
-    tracker, z = two_tracks_at_one_blob(0.01, 0.03)
-    people, angle_var = tracker.people, np.array([0.01 if directed else np.inf])
-    people.angle[1], people.scale[:] = [0.05, 0.2], [38.0, 44.0]
-    expected = []
-    for k in range(2):
-        y = (z[0] - np.append(people.bank[kalman.PLACE, k], people.angle[0, k]))[: 5 if directed else 4]
-        s = (people.bank[kalman.VAR, k] + people.noise) * people.scale[k] ** 2
-        s = np.append(s, people.angle[1, k] + 0.01)[: len(y)]
-        expected.append(np.sum(y * y / s + np.log(2 * np.pi * s)))
-    cost = sum(people.innovations(z, angle_var))[:, 0]
-    assert cost[1] - cost[0] == pytest.approx(expected[1] - expected[0])
-
-
 def test_a_post_does_not_cut_a_person_in_two():
     way = walk(100, 180, 3, 40)
     made = track([[p] for p in way], post=160.0)
@@ -175,20 +90,6 @@ def test_two_who_cross_in_one_blob_keep_who_they_are():
     assert both(made) > both(unsplit)
 
 
-def test_two_side_by_side_in_one_blob_are_two_when_their_size_is_known():
-    pair = [[(80 + 4 * k, 180, TALL), (98 + 4 * k, 181, TALL)] for k in range(30)]
-    made = track(pair)
-    assert [len(t.id) for t in made[3:]] == [2] * 27
-    assert len(ids(made)) == 2
-    assert all(mine(t, a) and mine(t, b) for t, (a, b) in zip(made[5:], pair[5:], strict=True))
-    assert len(ids(track(pair, people=()))) == 1  # nobody was ever seen alone: the blob is taken for one person
-
-
-def test_a_wide_sample_of_others_leaves_one_person_one():
-    """Seen at the pair's place alone: no second track out of thin air."""
-    assert len(ids(track([[(80 + 4 * k, 180, TALL)] for k in range(30)]))) == 1
-
-
 @pytest.mark.parametrize(("dark", "moved"), [(0.4, False), (1.0, True)])
 def test_shadows_move_the_centroid_only_where_they_are_foreground(dark, moved):
     """With `dark` at 1 whatever is darker than the ground is dark foreground: there is no class of shadows."""
@@ -197,31 +98,6 @@ def test_shadows_move_the_centroid_only_where_they_are_foreground(dark, moved):
     bank = seen[-1][:, 0]
     off = abs(bank[kalman.PLACE, 0] - way[-1][0]) / (TALL / 1.7)
     assert (off > 3 * np.sqrt(bank[kalman.VAR, 0])) == moved
-
-
-def test_a_track_that_lies_stands_up_where_templates_measure_it():
-    """Two in one blob, one of whom was taken for somebody lying."""
-    pair = [[(80 + 4 * k, 180, TALL), (98 + 4 * k, 181, TALL)] for k in range(30)]
-
-    def fell(tracker, tracks):
-        if tracks.index == 12:
-            tracker.people.angle[0, 0] = 0.0
-
-    made = track(pair, watch=fell)
-    assert made[12].box[0, 2] > made[12].box[0, 3]
-    for t, (a, b) in zip(made[18:], pair[18:], strict=True):
-        assert mine(t, a) == mine(made[11], pair[11][0])
-        assert mine(t, b) == mine(made[11], pair[11][1])
-
-
-def test_windows_follow_the_image_while_nobody_was_seen():
-    scales = []
-    for k in (1, 3):
-        sample = np.stack([painted.picture([], np.random.default_rng(0))] * 12).repeat(k, 1).repeat(k, 2)
-        tracker = painted.Blob()
-        tracker.reset(painted.Context(painted.FPS, float("nan"), background=sample), 0)
-        scales.append(tracker.people.context.px_per_m)
-    assert scales[1] == pytest.approx(3 * scales[0])
 
 
 def test_a_lost_frame_only_predicts():
@@ -245,23 +121,11 @@ def test_a_light_that_is_switched_starts_no_flood():
     assert known[-1] <= 4
 
 
-def test_empty_frames_and_nobody():
-    assert all(not len(t.id) for t in track([[]] * 10))
-
-
 def test_a_confirmed_person_who_stands_is_not_learned_as_background(monkeypatch):
     stands = [[(120.0, 180.0, TALL)]] * 60
     monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)
     made = track(stands, BlobConfig(background_time=2.0))
     assert mine(made[-1], stands[0][0])
-
-
-def test_same_pictures_same_bytes():
-    frames = [[(60 + 4 * k, 180, TALL), (200 - 3 * k, 175, TALL)] for k in range(25)]
-    first, again = track(frames), track(frames)
-    for a, b in zip(first, again, strict=True):
-        for name in ("id", "pos", "vel", "cov", "box", "score"):
-            assert getattr(a, name).tobytes() == getattr(b, name).tobytes()
 
 
 def test_a_moved_scene_moves_the_answer():

@@ -4,25 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import fields, replace
-from itertools import combinations
 
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
-from scipy.stats import chi2
 
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
-from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association import PointClaims, point_log_density, shares
-from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
-from tracking.papers.group_pda.merging import GroupMerging, merged
-from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
-from tracking.papers.group_pda.splitting import split
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.merging import merged
+from tracking.papers.group_pda.scaled_parameters import scale_parameters
 
 STATES = ["nothing", "null", "measured"]
 PLAIN = reference.Rules(
@@ -133,57 +127,6 @@ def test_four_hundred_random_cases() -> None:
     assert min(seen[k] for k in ("nothing", "null", "measured", "missed", "moved", "shared", "carried")) > 5, seen
 
 
-def test_whose_a_shared_point_is() -> None:
-    """By N_g N(y; xi_g, S_g), so that a large diffuse group has no claim on all that lies near a compact one."""
-    for seed in range(100):
-        _, case, region = random_case(seed)
-        points, weights, d2, own, hits, _, x, _, _, size, _ = case
-        claims = PointClaims(points, weights, np.zeros(len(points)), d2, own, hits)
-        log_density = point_log_density(size, region, claims, d2[:, :0])
-        may = np.isfinite(log_density) & (np.random.default_rng(seed).random(d2.shape) < 0.8)
-        found = shares(log_density, may)
-        np.testing.assert_allclose(found, reference.shares(points, x, region, size, own, may), rtol=1e-9, atol=1e-12)
-    region, d2 = np.array([4.0, 0.25])[:, None, None] * np.eye(2), np.array([[1.0], [1.2]])
-    claims = PointClaims(np.zeros((1, 2)), np.ones(1), np.zeros(1), d2, np.full(1, -1), np.full(1, 2))
-    log_density = point_log_density(np.full(2, 2.0), region, claims, d2[:, :0])
-    assert shares(log_density, d2 > 0)[1] > 0.9  # the nearer by d2 is the diffuse one
-    colours = point_log_density(np.full(2, 2.0), region, claims, np.array([[2.0], [-2.0]]))
-    assert shares(colours, d2 > 0)[0] > 0.7
-
-
-def test_search_regions() -> None:
-    for seed in range(50):
-        rules, (points, _, _, _, _, _, x, *_), region = random_case(seed)
-        found = kernels.search(points, x, region, rules.constraint.gate)
-        np.testing.assert_allclose(found, reference.search(points, x, region, rules.constraint.gate), rtol=1e-9)
-
-
-def test_covariances_stay_covariances() -> None:
-    for seed in range(200):
-        rules, case, region = random_case(seed)
-        *_, P, extent, size = kernel(case, rules, region)
-        assert np.array_equal(P, P.transpose(0, 2, 1))
-        assert (np.linalg.eigvalsh(P) > 0).all()
-        assert (np.linalg.eigvalsh(extent) > 0).all()
-        assert (size > 0).all()
-
-
-def test_groups_are_updated_each_by_itself() -> None:
-    """There is no mutual exclusion (4.1): the order of groups and of points does not matter."""
-    for seed in range(60):
-        rules, case, region = random_case(seed)
-        points, weights, d2, own, hits, age, *groups = case
-        r = np.random.default_rng(seed)
-        to, by = r.permutation(len(groups[0])), r.permutation(len(points))
-        names = np.where(own >= 0, np.argsort(to)[own], -1)
-        turned = points[by], weights[by], d2[np.ix_(to, by)], names[by], hits[by], age[by], *(a[to] for a in groups)
-        before, after = kernel(case, rules, region), kernel(turned, rules, region[to])
-        assert [before[0][k] for k in to] == after[0]
-        assert np.array_equal(before[1][np.ix_(to, by)], after[1])
-        for a, b in zip(before[2:], after[2:], strict=True):
-            np.testing.assert_allclose(b, a[to], rtol=1e-9, atol=1e-11)
-
-
 def kalman(x, P, F, Q):
     f = KalmanFilter(4, 2)
     f.x, f.P, f.F, f.Q, f.H = x[:, None].copy(), P.copy(), F, Q, reference.H
@@ -191,7 +134,7 @@ def kalman(x, P, F, Q):
 
 
 @pytest.mark.parametrize("redrawn", [False, True])
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_one_group_that_shares_nothing_is_a_kalman_filter(seed: int, redrawn: bool) -> None:
     """E1: x, P are filterpy's on the centroid, extent and size those of (2.4)."""
     r = np.random.default_rng(seed)
@@ -221,7 +164,7 @@ def test_one_group_that_shares_nothing_is_a_kalman_filter(seed: int, redrawn: bo
         x, P = x @ made.F.T, made.F @ P @ made.F.T + made.Q
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_masses_sum_to_one(seed: int) -> None:
     """E1: associations that are all alike, as what they share weighs nothing, are as one; so is the sum of masses."""
     r = np.random.default_rng(seed)
@@ -230,18 +173,9 @@ def test_masses_sum_to_one(seed: int) -> None:
     weights = np.where(np.arange(12) < 5, 1.0, 0.0)
     hold = np.zeros(1, bool)
     alone = (
-        y[:5],
-        weights[:5],
-        np.zeros((1, 5)),
-        np.full(5, -1),
-        np.ones(5, np.int64),
-        np.zeros(5),
-        x,
-        P,
-        extent,
-        size,
+        y[:5], weights[:5], np.zeros((1, 5)), np.full(5, -1), np.ones(5, np.int64), np.zeros(5), x, P, extent, size,
         hold,
-    )
+    )  # fmt: skip
     hits = np.where(np.arange(12) < 5, 1, 2)
     among = y, weights, np.arange(12.0)[None], np.full(12, -1), hits, np.zeros(12), x, P, extent, size, hold
     for a, b in zip(kernel(alone, PLAIN)[3:], kernel(among, PLAIN)[3:], strict=True):
@@ -298,30 +232,15 @@ def settled(gate, correct, frames=200, start=1.0, count=4_000):
 @pytest.mark.parametrize(
     ("gate", "correct", "extent", "inside"),
     [
-        (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2)),
-        (9.21, False, 0.943, 1 - np.exp(-0.943 * 9.21 / 2)),
-        (13.8, False, 0.993, 1.0),
-        (9.21, True, 1.0, 0.99),
-        (13.8, True, 1.0, 1.0),
+        (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2)), (9.21, False, 0.943, 1 - np.exp(-0.943 * 9.21 / 2)),
+        (13.8, False, 0.993, 1.0), (9.21, True, 1.0, 0.99), (13.8, True, 1.0, 1.0),
     ],
-)
+)  # fmt: skip
 def test_what_the_gate_cuts_off(gate: float, correct: bool, extent: float, inside: float, start: float) -> None:
     """E3: the fixed point of s = c(gate s), or of s = c(gate s) / c(gate), which is 1."""
     found = settled(gate, correct, start=start)
     assert found[0] == pytest.approx(extent, abs=0.02)
     assert found[1] == pytest.approx(inside, abs=0.01)
-
-
-def test_a_narrow_gate_collapses() -> None:
-    assert settled(3.0, False)[0] < 0.01
-
-
-def test_gate_factor() -> None:
-    for gate in (1.0, 3.0, 6.0, 9.21, 20.0):
-        assert gate_factor(gate) == pytest.approx(reference.truncation(gate), rel=1e-12)
-    points = gaussian(100_000)
-    inside = points[np.square(points).sum(1) < 6.0]
-    assert np.var(inside, axis=0) == pytest.approx(gate_factor(6.0), rel=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -347,55 +266,6 @@ def test_places_of_missed_members(seed: int) -> None:
         ]
     long = error.reshape(-1, 100, 2).sum(1)  # errors of sums tell what correlated errors amount to
     assert np.var(long) / 100 == pytest.approx(R / frames, rel=0.15)
-
-
-def noise_of(seen, extent, size, rules, cov=None):
-    own = np.full(3, np.nan) if cov is None else np.array([cov[0, 0], cov[0, 1], cov[1, 1]])
-    xx, xy, yy = centroid_noise(float(seen), float(seen), own, extent, float(size), rules.numbers)
-    return np.array([[xx, xy], [xy, yy]])
-
-
-@pytest.mark.parametrize("seen", [1, 2, 3, 5, 6])
-def test_centroid_of_some_members(seen: int) -> None:
-    """Six people who keep their places, of whom so many are seen: all ways to choose them, and draws with noise."""
-    r = np.random.default_rng(seen)
-    offset = r.normal(0, [1.0, 0.5], (6, 2))
-    extent = np.cov(offset.T, bias=True)
-    exact = noise_of(seen, extent, 6, replace(PLAIN, noise=0.0))
-    means = np.array([offset[list(c)].mean(axis=0) for c in combinations(range(6), seen)]) - offset.mean(axis=0)
-    np.testing.assert_allclose(exact, means.T @ means / len(means), rtol=1e-10, atol=1e-13)
-    draws = np.array([r.permutation(6)[:seen] for _ in range(20_000)])
-    noisy = (offset[draws] + r.normal(0, 0.3, (20_000, seen, 2))).mean(axis=1) - offset.mean(axis=0)
-    found = noise_of(seen, extent + 0.09 * np.eye(2), 6, replace(PLAIN, noise=0.3))
-    np.testing.assert_allclose(noisy.T @ noisy / len(noisy), found, atol=0.03 * np.trace(found))
-
-
-def test_centroid_of_members_drawn_anew() -> None:
-    """(2.1) read literally: as many, but new ones in each frame."""
-    r = np.random.default_rng(0)
-    extent = np.array([[0.5, 0.2], [0.2, 0.3]])  # of measured places
-    y = r.multivariate_normal([0, 0], extent, (20_000, 5))
-    found = noise_of(5, extent, 6, replace(PLAIN, noise=0.3, redrawn=True))
-    np.testing.assert_allclose(np.cov(y.mean(axis=1).T), found, atol=0.03 * np.trace(found))
-
-
-def test_unseen_members_are_there() -> None:
-    """Of n people measured with probability p, N = p n are on average: all of N seen is not all of n."""
-    extent, rules = np.eye(2), replace(PLAIN, noise=0.1, detect=0.75)
-    some = noise_of(6, extent, 6, rules)  # 6 of 8
-    np.testing.assert_allclose(some, noise_of(6, extent, 8, replace(rules, detect=1.0)))
-    assert some[0, 0] == pytest.approx(0.01 / 6 + (8 - 6) / 7 / 6 * 0.99)
-
-
-def test_centroid_with_strangers() -> None:
-    """Nine are seen, six of whom are the group: its centroid is that of any six of them."""
-    r = np.random.default_rng(0)
-    y = r.normal(0, [1.0, 0.5], (9, 2))
-    found = noise_of(9, np.eye(2), 6, replace(PLAIN, noise=0.0), np.cov(y.T, bias=True))
-    means = np.array([y[list(c)].mean(axis=0) for c in combinations(range(9), 6)]) - y.mean(axis=0)
-    np.testing.assert_allclose(found, means.T @ means / len(means), rtol=1e-10)
-    measured = noise_of(9, np.eye(2), 6, replace(PLAIN, noise=0.3), np.cov(y.T, bias=True))
-    np.testing.assert_allclose(measured, found + 0.09 / 6 * np.eye(2))
 
 
 def bank(**given):
@@ -425,7 +295,7 @@ def samples(r, count):
     return points, bank(x=x, P=P, extent=extent, size=size, first_seen=born, members=members)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_merging_pools_moments(seed: int) -> None:
     """E2: exactly those of the union, (3.1)."""
     points, groups = samples(np.random.default_rng(seed), 4)
@@ -438,70 +308,3 @@ def test_merging_pools_moments(seed: int) -> None:
     place, seen, _ = one.members[0]
     np.testing.assert_allclose(place + one.x[0, :2], union, atol=1e-12)
     assert np.array_equal(seen, np.repeat(np.arange(4.0), [len(y) for y in points]))
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_merging_in_any_order(seed: int) -> None:
-    r = np.random.default_rng(seed)
-    _, groups = samples(r, 4)
-    one, other = merged(groups, np.arange(4)), merged(groups, r.permutation(4))
-    step = merged(groups, np.array([0, 1]))
-    for k in (2, 3):
-        step.add(merged(groups, np.array([k])))
-        step = merged(step, np.array([0, 1]))
-    for again in (other, step):
-        for name in ("x", "P", "extent", "size"):
-            np.testing.assert_allclose(getattr(again, name), getattr(one, name), rtol=1e-12, atol=1e-12)
-        assert again.first_seen[0] == one.first_seen[0] == 0
-    assert other.id[0] == one.id[0]
-    assert groups.size[one.id[0]] == groups.size.max()
-
-
-def test_merged_groups_are_as_sure_as_they_say() -> None:
-    """E2: normalised squared errors over 500 merges average to 1; not so with the centroids' spread in P."""
-    r = np.random.default_rng(0)
-    errors, spread = [], []
-    for _ in range(500):
-        count = int(r.integers(2, 5))
-        P, size = np.array([positive(r, 4, 0.2) for _ in range(count)]), r.uniform(1, 9, count)
-        true = np.hstack([r.uniform(0, 6, (count, 2)), r.normal(0, 1, (count, 2))])
-        x = true + np.array([r.multivariate_normal(np.zeros(4), C) for C in P])
-        one = merged(bank(x=x, P=P, size=size), np.arange(count))
-        w = size / size.sum()
-        d, apart = one.x[0] - w @ true, x - one.x[0]
-        errors.append(d @ np.linalg.solve(one.P[0], d))
-        wide = np.einsum("k,kij->ij", w, P + apart[:, :, None] * apart[:, None, :])
-        spread.append(d @ np.linalg.solve(wide, d))
-    low, high = chi2.ppf([0.005, 0.995], 4 * 500) / (4 * 500)
-    assert low < np.mean(errors) / 4 < high
-    assert not low < np.mean(spread) / 4 < high
-
-
-@pytest.mark.parametrize("pixels", [False, True])
-def test_what_split_does_not_merge_in_the_same_frame(pixels: bool) -> None:
-    """E5: groups made of measurements cannot be merged back (3.3), even if merging needs no time at all."""
-    splits = 0
-    for seed in range(100):
-        r = np.random.default_rng(seed)
-        person = np.diag([0.05, 0.2]) if pixels else None
-        rules = scale_parameters(GroupPdaConfig(merge_time=0.0), 10.0, 1.0, person)
-        points = r.uniform(0, 9, (int(r.integers(2, 9)), 2))
-        if pixels:
-            points = np.concatenate([p + r.normal(0, [0.1, 0.3], (40, 2)) for p in points])
-        weights = np.full(len(points), 1 / 40 if pixels else 1.0)
-        one = newborn(points, weights, np.zeros(len(points), np.int64), rules, 1.0)
-        one.id[:], ids = 0, GroupIds()
-        found = split(one, 0, points, weights, rules, 1.0, ids)
-        splits += found is not None
-        assert found is None or len(one) == len(found.after) > 1
-        assert not list(GroupMerging().step(one, rules, 1.0)), seed
-    assert splits > 50
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_near_is_that_of_all_pairs(seed: int) -> None:
-    r = np.random.default_rng(seed)
-    place, points = (np.round(r.uniform(0, 5, (int(r.integers(0, 20)), 2)), 1) for _ in range(2))
-    reach = float(r.choice([0.05, 0.5, 2.0]))
-    squared = np.square(place[:, None] - points).sum(2) <= reach**2
-    np.testing.assert_array_equal(any_within(place, points, reach), squared.any(1))

@@ -61,11 +61,6 @@ def test_a_lost_group_takes_its_id_back(seed: int) -> None:
     assert [e[0] for e in events(fresh, "enter", "leave")] == ["enter", "leave", "enter"]
 
 
-@pytest.mark.parametrize("velocity", [(-1.0, 0.0), (1.0, -1.5)])
-def test_who_comes_with_another_velocity_is_somebody_else(velocity: tuple[float, float]) -> None:
-    assert ids(track(walk((1.0, 0.3), range(40, 60), after=np.array(velocity)))) == {1, 2}
-
-
 def test_a_leave_tells_where_and_when_it_was_seen_last() -> None:
     made = track([*walk((1.0, 0.3), range(40, 90))[:90]])
     (gone,) = [e for t in made for e in t.events if e.kind == "leave"]
@@ -73,15 +68,6 @@ def test_a_leave_tells_where_and_when_it_was_seen_last() -> None:
     assert gone.pos == pytest.approx((3.9, 1.17), abs=0.15)
     assert gone.emitted == 40 + 31  # the first frame more than recapture_time later
     assert not len(made[-1].id)
-
-
-def test_a_changed_config_holds_from_the_next_frame_on() -> None:
-    def forget(tracker: GroupPda, t: Tracks) -> None:
-        if t.index == 43:
-            tracker.config = replace(tracker.config, report_coast=0.0)
-
-    made = track(walk((1.0, 0.3), range(40, 50)), watch=forget)
-    assert [len(t.id) for t in made[40:51]] == [1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 1]
 
 
 def joining(seed: int, ranks: tuple[int, int]) -> list[Array]:
@@ -104,38 +90,6 @@ def test_equally_fast_groups_within_reach_merge_once(ranks: tuple[int, int], sta
         assert start == pytest.approx(31, abs=5)
         assert made[-1].id.tolist() == [stays]
         assert sizes(made[-1]) == pytest.approx([10], abs=0.5)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_group_that_has_just_merged_merges_with_a_third(seed: int) -> None:
-    """A second group comes to the first one's right until frame 21, and they are one before the third on its left,
-    there from frame 27 on, is known to stay. The union's centroid jumps, which makes the onset 0.3 s later."""
-    starts = []
-    for others in ((2.6,), (2.0, 2.6)):
-        r, frames = np.random.default_rng(seed), []
-        for k in range(90):
-            s = k / FPS
-            sides = [y * (1.6 + max(until - s, 0)) for y, until in zip((-1, 1), others[::-1], strict=False)]
-            frames.append(noisy([block(2, 2, (s, y)) for y in (0.0, *sides)], r))
-        found = changes(track(frames))
-        assert [kind for kind, *_ in found] == ["merge"] * len(others)
-        starts.append(found[-1][1])
-    assert 0 <= starts[1] - starts[0] <= 3
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("length", [2, 5, 8])
-def test_files_that_join_end_to_end_do_so_when_they_are_near(length: int, seed: int) -> None:
-    """The last of one and the first of the other are 1.2 m apart from frame 41 on, within 2 r, however far their
-    middles are."""
-    r, frames = np.random.default_rng(seed), []
-    for k in range(100):
-        s, file = k / FPS, np.column_stack([0.7 * np.arange(length), np.zeros(length)])
-        behind = file - [0.7 * (length - 1) + 1.2 + 0.9 * max(4.0 - s, 0), 0]
-        frames.append(noisy([file + np.array([s, 0]), behind + np.array([s, 0])], r))
-    ((kind, start, before, _),) = changes(track(frames, GroupPdaConfig(radius=0.75)))
-    assert (kind, before) == ("merge", (1, 2))
-    assert start == pytest.approx(41, abs=4)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -176,41 +130,6 @@ def test_a_group_that_falls_into_two_splits_once(seed: int, along: float, apart:
         assert sizes(made[-1])[0] == pytest.approx(3, abs=0.2)  # who stay are most, and keep the id
 
 
-@pytest.mark.parametrize("missed", range(5))
-@pytest.mark.parametrize("seed", range(3))
-def test_who_is_not_detected_when_his_group_splits_is_in_his_part_all_the_same(seed: int, missed: int) -> None:
-    """Five in a line, 0.8 m apart: without the second one they would fall into three."""
-    r, frames = np.random.default_rng(seed), []
-    for k in range(100):
-        x = 0.8 * np.arange(5)
-        x[3:] += 0.5 * max(k - 40, 0) / FPS
-        frames.append(noisy([np.column_stack([x, np.zeros(5)])], r))
-    (whole,) = [e for t in track(frames) for e in t.events if e.kind == "split"]
-    frames[whole.emitted - 1] = np.delete(frames[whole.emitted - 1], missed, axis=0)
-    made = track(frames)
-    (split,) = [e for t in made for e in t.events if e.kind != "enter" or e.emitted > 20]
-    assert (split.kind, split.before, split.emitted) == ("split", whole.before, whole.emitted)
-    assert len(split.after) == 2
-    assert sorted(sizes(made[-1])) == pytest.approx([2, 3], abs=0.2)
-
-
-@pytest.mark.parametrize("ranks", [2, 3])
-@pytest.mark.parametrize("seed", range(3))
-def test_one_who_walks_fast_out_of_the_region_is_split_off(ranks: int, seed: int) -> None:
-    """He is a newborn at the region's edge before the group is seen to be two."""
-    r, made = np.random.default_rng(seed), []
-    for k in range(80):
-        made.append(noisy([block(2, ranks), np.array([[0.9 + 1.6 * max(k - 40, 0) / FPS, 0.0]])], r))
-    spells: list[float] = []
-    told = track(made, watch=lambda t, _: spells.append(float(t.bank.null_time.max(initial=0))))
-    assert max(spells) < GroupPdaConfig().split_time
-    ((kind, start, before, after),) = changes(told)
-    assert (kind, before, after) == ("split", (1,), (1, 2))
-    assert start == pytest.approx(41 + 7.5, abs=FPS)  # 1.5 m from the nearest
-    assert told[-1].vel[1] == pytest.approx([1.6, 0], abs=0.3)
-    assert sizes(told[-1]) == pytest.approx([2 * ranks, 1], abs=0.2)
-
-
 def test_the_larger_part_keeps_the_id() -> None:
     frames, _ = parting(0, 1.0, 0.8, ranks=2, who=1)
     for turned, x in ((frames, -0.3), ([-p for p in frames], 0.3)):
@@ -218,16 +137,6 @@ def test_the_larger_part_keeps_the_id() -> None:
         assert last.id.tolist() == [1, 2]
         assert last.pos[0, 0] == pytest.approx(x, abs=0.1)
         assert sizes(last) == pytest.approx([6, 2], abs=0.3)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_children_have_their_parents_velocity(seed: int) -> None:
-    frames, _ = parting(seed, 1.0, 0.5)
-    for config, kept in ((GroupPdaConfig(), 1.0), (GroupPdaConfig(corrections=False), 0.0)):
-        made = track(frames, config)
-        (k,) = (k for k, t in enumerate(made) if any(e.kind == "split" for e in t.events))
-        assert made[k].vel == pytest.approx(np.repeat(kept * made[k - 1].vel, 2, 0), abs=1e-9)
-        assert np.hypot(*made[k - 1].vel[0]) > 0.8
 
 
 @pytest.mark.parametrize("gap", [2.0, 2.2])
@@ -295,10 +204,3 @@ def test_pixels_of_pairs_that_pass_each_other_keep_their_ids() -> None:
     assert not changes(made)
     assert sizes(made[-1]) == pytest.approx(sizes(made[10]), rel=0.2)
     assert np.sign(made[-1].vel[:, 0]).tolist() == np.sign(made[10].vel[:, 0]).tolist()
-
-
-def test_who_stands_for_long_does_not_become_background(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Unprotected he would be within two time constants."""
-    monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)
-    made = watched([[(80.0, 60.0)]] * 60, GroupPdaConfig(background_time=1.0))
-    assert all(t.id.tolist() == [1] for t in made[5:])

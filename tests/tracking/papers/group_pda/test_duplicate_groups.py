@@ -70,15 +70,3 @@ def test_the_order_of_groups_does_not_restart_the_clock() -> None:
                 two.add(turned)
                 two.own_people[:] = [0.0, 1.0]
     assert lost == [10, 10]
-
-
-def test_who_has_just_become_lost_makes_no_other_lost() -> None:
-    """Three in a row, the first two and the last two of which may be one: the middle one goes, the others stay."""
-    scaled, duplicates = scale_parameters(GroupPdaConfig(coast_time=1.0), FPS, 1.0), DuplicateGroups()
-    place = np.array([[0.0, 0, 0, 0], [1.2, 0, 0, 0], [2.4, 0, 0, 0]])
-    three = bank(size=np.ones(3), x=place, extent=np.tile(0.05 * np.eye(2), (3, 1, 1)))
-    three.own_people[:] = [0.5, 0.3, 0.1]
-    for k in range(11):
-        three.last_seen[:] = k / FPS
-        duplicates.step(three, scaled, k / FPS)
-    assert (three.last_seen < 1.0).tolist() == [False, True, False]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY
-from tracking.papers.group_pda.event_onsets import PairHistory, PairMoment, chords, split_onset
+from tracking.papers.group_pda.event_onsets import PairHistory, PairMoment, split_onset
 
 FPS, SLOWS, LASTS = 10.0, 2.0, 1.0
 """Frames per second; when the difference of the velocities begins to fall from 2 m/s to nothing, and for how long."""
@@ -34,20 +34,6 @@ def test_before_that_they_must_be_near() -> None:
     met = encounter(0.0, 0)
     far = [m._replace(gap=MERGE_DISTANCE + 0.1) if m.t < 4.2 else m for m in met.moments]
     assert PairHistory(4.4, far).merge_onset(MERGE_VELOCITY)[0] == pytest.approx(4.2)
-
-
-def test_whole_chords_are_as_sure_at_the_ends_as_elsewhere() -> None:
-    t, r = np.arange(30) / FPS, np.random.default_rng(0)
-    for half in (0.4, 5.0):  # the latter longer than all there is
-        speeds = [
-            chords(t, np.stack([1.0 + 0.9 * t, 0 * t], axis=1) + r.normal(0, 0.05, (30, 2)), half, full_length=True)
-            for _ in range(300)
-        ]
-        mean, sd = np.mean(speeds, axis=0), np.std(speeds, axis=0)
-        assert mean == pytest.approx(np.full(30, 0.9), abs=0.03)
-        assert sd == pytest.approx(np.full(30, sd[15]), rel=0.3)
-    for few in (1, 2):
-        assert len(chords(t[:few], np.zeros((few, 2)), 0.4, full_length=True)) == few
 
 
 def test_a_split_began_when_the_parts_were_apart_however_noisy_the_last_look() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,7 +78,6 @@ def ids(made: list[Tracks]) -> set[int]:
 
 
 def sizes(tracks: Tracks) -> Array:
-    assert tracks.groups is not None
     return tracks.groups.size
 
 
@@ -115,17 +113,6 @@ def same(a: list[Tracks], b: list[Tracks], matrix: Array | None = None, shift: A
             np.testing.assert_allclose(f.pos, A @ np.array(e.pos) + d, atol=1e-6)
 
 
-def bytes_of(made: list[Tracks]) -> list[tuple[bytes, ...]]:
-    """All that a user is told, as bytes."""
-    said = []
-    for t in made:
-        g = t.groups
-        assert g is not None
-        arrays = [t.id, t.pos, t.vel, t.cov, t.score, g.id, g.pos, g.vel, g.extent, g.size, *g.hull]
-        said.append((*(np.ascontiguousarray(a).tobytes() for a in arrays), repr(t.events).encode()))
-    return said
-
-
 @pytest.mark.parametrize("ranks", [(2, 2), (3, 2)])
 @pytest.mark.parametrize("turn", [np.pi, np.pi / 2])
 def test_groups_that_walk_through_each_other_keep_ids_and_sizes(ranks: tuple[int, int], turn: float) -> None:
@@ -136,16 +123,6 @@ def test_groups_that_walk_through_each_other_keep_ids_and_sizes(ranks: tuple[int
         assert not changes(made)
         assert after.vel == pytest.approx(before.vel, abs=0.5)
         assert sizes(after) == pytest.approx(sizes(before), rel=0.1)
-
-
-def test_all_points_in_the_region_make_each_group_both() -> None:
-    config = GroupPdaConfig(association="none", extent_time=0.05)
-    made = track(crossing(0), config)
-    meeting = slice(35, 40)
-    assert sizes(made[15]) == pytest.approx([4, 4])
-    assert np.array([sizes(t) for t in made[meeting]]) == pytest.approx(np.full((5, 2), 8.0), rel=0.05)
-    kept = track(crossing(0), replace(config, association="pda"))[meeting]
-    assert np.array([sizes(t) for t in kept]) == pytest.approx(np.full((5, 2), 4.0), rel=0.1)
 
 
 TURN = np.array([[0.8, -0.6], [0.6, 0.8]])
@@ -164,25 +141,6 @@ def test_in_the_image_it_is_the_same_at_any_scale(seed: int) -> None:
     frames, shift = busy(seed), np.array([500.0, 20.0])
     moved = [40 * p @ TURN.T + shift for p in frames]
     same(track(frames), track(moved, plane="image", context=Context(FPS, 40.0)), 40 * TURN, shift)
-
-
-def test_the_order_of_points_is_nothing() -> None:
-    frames, r = busy(0), np.random.default_rng(1)
-    same(track(frames), track([p[r.permutation(len(p))] for p in frames]))
-
-
-def test_somebody_far_away_is_nothing_to_the_others() -> None:
-    alone, among = track(busy(0)), track(busy(0, block(2, 2, (200, 200))))
-    far = 6
-    assert alone[40].id.tolist() == [i for i in among[40].id.tolist() if i != far]
-    for x, y in zip(alone, among, strict=True):
-        others = y.pos[:, 0] < 100
-        assert x.pos.tobytes() == y.pos[others].tobytes()
-        assert x.cov.tobytes() == y.cov[others].tobytes()
-    shifted = [
-        (kind, start, *(tuple(i - (i > far) for i in side) for side in sides)) for kind, start, *sides in changes(among)
-    ]
-    assert shifted == changes(alone)
 
 
 def missed(seed: int, speed: float, share: float = 0.8, frames: int = 120) -> tuple[list[Array], Array]:
@@ -230,8 +188,6 @@ def test_a_false_alarm_beside_a_group_is_no_member(angle: float, ranks: int, gap
     assert not changes(made)
     for k in range(at + 2, len(frames)):
         own, other = made[k].groups, plain[k].groups
-        assert own is not None
-        assert other is not None
         assert not holds(own.hull[0], middle[k] + away)  # nor does he walk along
         assert own.hull[0] - own.pos[0] == pytest.approx(other.hull[0] - other.pos[0], abs=0.1)
         assert abs(own.size[0] - other.size[0]) <= 1 / ranks**2
@@ -263,77 +219,8 @@ def test_a_lost_first_frame_does_not_decide_on_the_plane(plane: str) -> None:
         np.testing.assert_allclose(y.cov, x.cov, atol=1e-6)
 
 
-@pytest.mark.parametrize(("plane", "context"), [("ground", GROUND), ("image", Context(FPS, 40.0))])
-def test_nothing_at_all(plane: str, context: Context) -> None:
-    made = track([None] * 5, context=context) + track([np.zeros((0, 2))] * 5, plane=plane, context=context)
-    assert all(t.plane == plane and t.unit == "group" and not len(t.id) and not t.events for t in made)
-
-
 @pytest.mark.parametrize("first", [[], [None]])
 def test_the_image_needs_a_scale(first: list[Points]) -> None:
     with pytest.raises(InputError) as told:
         track([*first, block(2, 2)], plane="image")
     assert told.value.place == "context.px_per_m"
-
-
-def test_reset_is_a_fresh_start_and_the_input_stays_as_it_is() -> None:
-    frames = busy(0)
-    kept = [p.copy() for p in frames]
-    for p in frames:
-        p.flags.writeable = False
-    tracker = GroupPda()
-    first = bytes_of(track(frames, tracker=tracker))
-    track(busy(5)[:45], tracker=tracker)
-    assert bytes_of(track(frames, tracker=tracker)) == first
-    assert bytes_of(track(kept)) == first
-    assert all(p.tobytes() == q.tobytes() for p, q in zip(frames, kept, strict=True))
-
-
-def test_what_was_told_stays_as_it_was() -> None:
-    told: list[tuple[bytes, ...]] = []
-    made = track(busy(0), watch=lambda _, t: told.extend(bytes_of([t])))
-    assert bytes_of(made) == told
-
-
-def test_no_id_is_used_twice_and_events_speak_of_known_ones() -> None:
-    """A group comes again and again where none was; between them groups join and part."""
-    r, frames = np.random.default_rng(0), busy(0, frames=240)
-    frames = [
-        np.vstack([p, *([noisy([block(2, 1, (80, 0))], r)] if k % 60 < 20 else [])]) for k, p in enumerate(frames)
-    ]
-    known: set[int] = set()
-    gone: set[int] = set()
-    for t in track(frames):
-        for e in t.events:
-            assert e.before == tuple(sorted(set(e.before)))
-            assert e.after == tuple(sorted(set(e.after)))
-            assert set(e.before) <= known - gone
-            assert not set(e.after) & gone
-            assert 1 <= e.start <= e.end == e.emitted == t.index
-            assert e.members == ()
-            known |= set(e.after)
-            gone |= set(e.before) - set(e.after)
-        assert set(t.id.tolist()) <= known - gone
-    assert len(gone) >= 4
-
-
-def clouds(seed: int, speed: float, count: int = 40) -> list[Array]:
-    """Two clouds of points that fly through each other; speed: the difference of their velocities, m/s."""
-    r = np.random.default_rng(seed)
-    a, b = r.normal(0, 0.36, (2, count, 2))
-    way = np.array([1.0, 0.0])
-    return [noisy([a + s * way, b - s * way], r) for s in np.arange(-3, 3, speed / FPS) / 2]
-
-
-def test_clouds_that_fly_through_each_other_need_the_masses() -> None:
-    """Each point is in both regions for seconds: neither nearness nor the group constraint tells them apart."""
-    kept = dict.fromkeys(("pda", "nearest", "all", "none"), 0)
-    for seed in range(4):
-        for association in kept:
-            made = track(clouds(seed, 1.6), GroupPdaConfig(association=association))
-            before, after = made[12], made[-1]
-            same_ids = before.id.tolist() == after.id.tolist() == [1, 2]
-            kept[association] += same_ids and (np.sign(after.vel[:, 0]) == np.sign(before.vel[:, 0])).all()
-    assert kept["pda"] == 4
-    assert max(kept["nearest"], kept["all"]) <= 2
-    assert kept["none"] == 0

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sim.truth.identity import Identities
 from tests.reference_joint import all_partitions, label_of, validity
 from tracking.papers.joint import division_kernels
 from tracking.papers.joint import group_events_kernels as events
 from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.reported_events import ReportedEvents
 
 SCALES = np.array([0.5, 2.0])
 BIAS = -1
@@ -62,16 +64,6 @@ def test_the_rate_of_events_does_not_depend_on_the_frame_rate():
     assert quiet[0] == pytest.approx(quiet[1])
 
 
-def test_over_a_lag_the_probabilities_are_the_classifiers():
-    features, table = np.array([2.0, 0.3, 0.5, 1.5, 0.2, 0.6]), JointConfig().classifier
-    scores = np.append(table[:, :6] @ features + table[:, 6], 0.0)
-    expected = np.exp(scores) / np.exp(scores).sum()
-    assert events.event_probabilities(features, 2.0, 1.0, table, rules(ratio=1.0)) == pytest.approx(expected[:2])
-    no_merge = np.exp(scores[1]) / np.exp(scores[1:]).sum()
-    assert events.event_probabilities(features, 2.0, 0.0, table, rules(ratio=1.0)) == pytest.approx((0.0, no_merge))
-    assert events.event_probabilities(features, 1.0, 0.0, table, rules(ratio=1.0)) == (0.0, 0.0)
-
-
 def test_the_size_prior_acts_on_merges_or_on_all_events():
     features, table = np.zeros(8), weights(0.0, 0.0)
 
@@ -108,11 +100,6 @@ def test_of_a_large_group_the_cut_between_two_clumps_is_found():
     drawn = proposed(pos[order], np.ones(9), weights(split=100.0), rules(ratio=1.0, sharpness=50.0), count=500)
     true = label_of([np.flatnonzero(order < 5).tolist(), np.flatnonzero(order >= 5).tolist()])
     assert share(drawn, true) > 0.9
-
-
-def test_parts_of_one_person_are_alone():
-    drawn = proposed([[0, 0], [1, 0]], [1, 1], weights(split=100.0), rules(ratio=1.0), count=20)
-    assert not drawn.any()
 
 
 def test_a_group_takes_part_in_one_event_of_a_frame():
@@ -170,20 +157,6 @@ def test_a_newcomer_joins_the_nearest_person_by_the_validity(away):
     assert (expected > 0.5) == (away < 1.5) or away == 1.5
 
 
-def test_a_newcomer_joins_a_whole_group_and_nobody_else_changes():
-    drawn = placed([[0, 0], [0.7, 0], [9, 9], [0.9, 1.0]], [1, 1, 0, 0])
-    assert {tuple(d) for d in drawn.tolist()} == {(1, 1, 0, 0), (1, 1, 0, 1)}
-    assert share(drawn, [1, 1, 0, 1]) > 0.5
-    assert not placed([[1, 1]], [0]).any()
-
-
-def test_a_newcomer_who_was_joined_by_another_stays():
-    """The second of two newcomers is in a group already where the first one has joined; it leaves nobody behind."""
-    label = [1, 1, 0, 4, 4]
-    drawn = placed([[0, 0], [0.7, 0], [9, 9], [0.2, 0.8], [0.5, 0.5]], label, count=200)
-    assert (drawn == label).all()
-
-
 def placed_slowly(points, label, uniforms):
     """New people, the last ones, join the nearest cluster, one after the other; all clusters are looked at. Changes
     label (K,)."""
@@ -218,3 +191,60 @@ def test_many_newcomers_join_as_with_a_look_at_all_clusters():
     assert np.array_equal(labels, expected)
     assert (labels[..., 15:] > 15).any()
     assert ((labels[..., 15:] > 0) & (labels[..., 15:] <= 15)).any()
+
+
+FPS = 10.0
+
+
+def reported(pos, partitions):
+    """The events of a sequence; pos (T, P, 2), nan where absent; partitions: frame (from 0) to groups, from then on."""
+    report, identities, parts, out = ReportedEvents(FPS), Identities(), [], []
+    for t, place in enumerate(pos):
+        there = np.flatnonzero(np.isfinite(place[:, 0]))
+        parts = partitions.get(t, parts)
+        old = identities.groups
+        changes = identities.step(t + 1, frozenset((there + 11).tolist()), [frozenset(p) for p in parts])
+        report.add(there + 11, place[there])
+        out += report.events(changes, old, identities.groups, 2.0)
+    return out
+
+
+def two(gap):
+    """Two people (11, 12) side by side, `gap` (T,) apart."""
+    pos = np.zeros((len(gap), 2, 2))
+    pos[:, 1, 1] = gap
+    return pos
+
+
+def test_merges_and_splits_begin_when_the_rules_of_the_truth_come_true():
+    gap = np.concatenate([np.linspace(6, 1, 50), np.ones(40), np.linspace(1, 6, 50)])
+    form, dissolve = reported(two(gap), {70: [(11, 12)], 130: []})
+    assert (form.kind, form.emitted, form.members, form.before, form.after) == ("form", 71, (11, 12), (-1, -1), (1,))
+    assert 50 <= form.start <= 54, "near since frame 46, and alike in velocity since frame 51"
+    assert (dissolve.kind, dissolve.emitted) == ("dissolve", 131)
+    assert 90 < dissolve.start < 110
+    assert form.pos[0] == 0
+    assert 1.0 <= form.pos[1] <= 2 * 1.5
+
+
+def test_people_who_arrive_together_have_no_merge():
+    assert not reported(two(np.ones(60)), {20: [(11, 12)]})
+    late = two(np.ones(60))
+    late[:30] = np.nan
+    assert not reported(late, {45: [(11, 12)]})
+
+
+def test_members_of_an_event_are_those_of_its_parts():
+    pos = np.zeros((120, 4, 2))
+    pos[:, :, 1] = [0, 0.8, 10, 10.8]
+    pos[:, 2:, 1] -= np.clip(np.arange(120) - 20, 0, 80)[:, None] * 0.1
+    found = reported(pos, {0: [(11, 12), (13, 14)], 115: [(11, 12, 13, 14)]})
+    (merge,) = [e for e in found if e.kind == "merge"]
+    assert (merge.before, merge.after, merge.members) == ((1, 2), (1,), (11, 12, 13, 14))
+    assert 85 < merge.start < 105
+
+
+def test_what_is_more_than_the_searched_time_ago_is_forgotten():
+    gap = np.concatenate([np.linspace(6, 1, 50), np.ones(400)])
+    (form,) = reported(two(gap), {440: [(11, 12)]})
+    assert form.start > 441 - 21 * FPS

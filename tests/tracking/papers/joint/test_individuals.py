@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, label_of, log_group_dynamics
-from tracking.papers.joint.individuals import Proposal, log_density, moved, precision_of, process_noise
+from tracking.papers.joint.individuals import Proposal, moved, precision_of, process_noise
 from tracking.papers.joint.individuals_kernels import group_dynamics, own_dynamics
 
 DT, NOISE = 0.1, 0.1
@@ -38,14 +38,6 @@ def test_the_proposals_density_is_that_of_its_draws(alpha, informed):
     assert np.exp(log_w).mean() == pytest.approx(exact, rel=0.03)
 
 
-@pytest.mark.parametrize("informed", [True, False])
-def test_alpha_one_has_no_density_of_the_detection(informed):
-    z = np.array([1.15, 1.9])
-    _, new, log_w = drawn(1.0, informed, z, count=100)
-    away = ((z - new[:, 0, :2]) ** 2).sum(axis=1)
-    np.testing.assert_allclose(log_w[:, 0], -away / (2 * NOISE**2) - np.log(2 * np.pi * NOISE**2))
-
-
 def test_the_informed_proposal_is_the_posterior_of_the_step():
     z = np.array([1.15, 1.9])
     state, new, log_w = drawn(0.0, True, z)
@@ -57,29 +49,11 @@ def test_the_informed_proposal_is_the_posterior_of_the_step():
     assert np.ptp(log_w) < 1e-9
 
 
-def test_with_wide_dynamics_the_mean_goes_to_the_detection():
-    wide = process_noise(20.0, 0.8, DT)
-    _, new, log_w = drawn(0.0, True, np.array([1.4, 2.2]), sigma=wide)
-    weights = np.exp(log_w - log_w.max())
-    mean = (weights[..., None] * new).sum(axis=0)[0] / weights.sum()
-    np.testing.assert_allclose(mean[:2], [1.4, 2.2], atol=0.01)
-
-
 def test_a_person_who_is_not_measured_follows_the_dynamics():
     state, new, log_w = drawn(0.0, True, np.full(2, np.nan))
     assert not log_w.any()
     np.testing.assert_allclose(new[:, 0].mean(axis=0), moved(state[0, 0], DT), atol=0.01)
     np.testing.assert_allclose(np.cov(new[:, 0].T), covariance(SIGMA), atol=3e-3)
-
-
-def test_the_density_is_the_normal_one():
-    rng = np.random.default_rng(1)
-    x, mean = rng.normal(0, 0.2, (2, 5, 3, 4))
-    P = covariance(SIGMA)
-    expected = [
-        [-(d @ np.linalg.solve(P, d)) / 2 - np.log(np.linalg.det(2 * np.pi * P)) / 2 for d in row] for row in x - mean
-    ]
-    np.testing.assert_allclose(log_density(x, mean, SIGMA), expected)
 
 
 def dynamics(new, old, label, share=1.0):
@@ -102,13 +76,6 @@ def test_eq_5_is_that_of_all_partitions():
             np.testing.assert_allclose(out[i], expected)
 
 
-def test_without_the_group_s_share_eq_5_is_eq_3():
-    rng = np.random.default_rng(5)
-    old, new = rng.normal(0, 0.5, (2, 3, 4, 4))
-    out, own = dynamics(new, old, np.ones((3, 1, 4), np.int64), share=0.0)
-    np.testing.assert_allclose(out[:, 0], own.sum(axis=1))
-
-
 def test_eq_5_of_people_alone_is_eq_3_to_the_last_bit():
     """E4."""
     rng = np.random.default_rng(3)
@@ -118,17 +85,3 @@ def test_eq_5_of_people_alone_is_eq_3_to_the_last_bit():
     for k in range(5):
         total += own[:, k]
     assert np.array_equal(out, np.repeat(total[:, None], 2, axis=1))
-
-
-def test_a_group_of_all_moves_with_its_mean_velocity():
-    """The most probable new state has places moved by the mean velocity, and old velocities (E4)."""
-    rng = np.random.default_rng(4)
-    old = rng.normal(0, 1, (1, 4, 4))
-    label = np.ones((1, 1, 4), np.int64)
-    best = old.copy()
-    best[..., :2] += DT * old[..., 2:].mean(axis=1, keepdims=True)
-    top = dynamics(best, old, label)[0]
-    for _ in range(50):
-        assert dynamics(best + rng.normal(0, 0.05, best.shape), old, label)[0] < top
-    apart, _ = dynamics(best, old, np.zeros((1, 1, 4), np.int64))
-    assert apart < top

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, binder_gain, label_of, validity
-from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint import partition_kernels
-from tracking.papers.joint.config import JointConfig
-from tracking.papers.joint.distributions import FrameModel, stam_cumulated
-from tracking.papers.joint.estimate import binder_partition, groups_of, histogram_partition
+from tracking.papers.joint.distributions import stam_cumulated
+from tracking.papers.joint.estimate import binder_partition, histogram_partition
 
 SCALES = np.array([0.5, 2.0])
 PAIRS = np.array([[0, 0], [0.7, 0], [10, 0], [10.7, 0]])
@@ -71,37 +69,6 @@ def test_the_true_partition_is_the_best_of_all(points):
     assert found[ranked[1]] > 1.3 * found[ranked[0]]
 
 
-def test_the_example_of_two_pairs():
-    labels = [label_of(p) for p in ([[0, 1], [2, 3]], [[0, 2], [1, 3]], [[0], [1], [2], [3]], [[0, 1, 2, 3]])]
-    assert validities(PAIRS, labels)[[0, 2, 3]] == pytest.approx([0.2, 0.71, 2.05], abs=0.01)
-
-
-def test_the_data_of_the_validity_are_the_states():
-    """Eq. 4: d_cl(Z, X) with X in m and m/s, so that people who pass each other are no cluster."""
-    config = JointConfig(belief_rate=0.0, validity_rate=3.0)
-    model = FrameModel(
-        config, 0.1, 0.1, np.full((4, 2), np.nan), np.zeros((4, 4)), PersonStreams(0), np.zeros(4, np.uint64)
-    )
-    state = np.array([[0, 0, 1, 0], [0, 0.7, 1, 0], [5, 0, 1, 0], [5, 0.7, -1, 0]])
-    parts = list(all_partitions(4))
-    found = model.energy(state[None], np.array([[label_of(p) for p in parts]]))[0]
-    np.testing.assert_allclose(found, [-0.3 * validity(state, p, *SCALES) for p in parts])
-    assert sorted(map(sorted, parts[int(found.argmax())])) == [[0, 1], [2], [3]]
-
-
-def test_a_pair_is_better_together_below_a_distance():
-    for d, together in ((1.49, True), (1.51, False)):
-        alone, pair = validities([[0, 0], [d, 0]], [[0, 0], [1, 1]])
-        assert (pair < alone) == together
-
-
-def test_scaling_all_lengths_changes_no_validity():
-    rng = np.random.default_rng(2)
-    points, parts = rng.normal(0, 2, (4, 2)), [label_of(p) for p in all_partitions(4)]
-    scaled = validities(7 * points, parts, 7 * SCALES)
-    np.testing.assert_allclose(validities(points, parts), scaled)
-
-
 def uniform(people, count):
     label = np.empty((1, count, people), np.int64)
     uniforms = np.random.default_rng(3).random((1, count, people + 1))
@@ -116,13 +83,6 @@ def test_partitions_are_drawn_uniformly():
     counts = [int((drawn == label_of(p)).all(axis=1).sum()) for p in all_partitions(4)]
     assert sum(counts) == len(drawn)
     assert sum((n - expected) ** 2 / expected for n in counts) < 36.1
-
-
-def test_the_mean_number_of_clusters_of_ten_people():
-    """E7: Bell(11) / Bell(10) - 1."""
-    drawn = uniform(10, 40_000)
-    heads = (drawn == 0) | (drawn == np.arange(1, 11))
-    assert heads.sum(axis=1).mean() == pytest.approx(678570 / 115975 - 1, abs=0.02)
 
 
 def sampled(rng, people, count):
@@ -161,7 +121,3 @@ def test_the_histogram_takes_each_persons_label_of_most_weight():
     label = np.array([[[1, 1, 0], [1, 1, 1], [0, 0, 0]]])
     assert [r.tolist() for r in histogram_partition(label, np.array([[0.5, 0.2, 0.3]]))] == [[0, 1]]
     assert [r.tolist() for r in histogram_partition(label, np.array([[0.1, 0.8, 0.1]]))] == [[0, 1, 2]]
-
-
-def test_groups_have_two_people():
-    assert [r.tolist() for r in groups_of(np.array([3, 1, 3, 2]))] == [[0, 2]]

@@ -5,16 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.loading.resolve import load
-from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
 from tracking.papers.joint.config import LARGEST_DISTANCE, JointConfig
 from tracking.papers.joint.individuals import process_noise
-from tracking.papers.joint.partition_kernels import canonical, pair_sums
-from tracking.papers.joint.people import People
 from tracking.papers.joint.tracker import Joint
-from tracking.running.prepare import prepare
-from tracking.running.run import track
 from tracking.stats import paired
 
 FPS = 10.0
@@ -74,15 +68,9 @@ def test_people_alone_have_the_kalman_filter(algorithm, error):
     """Z all alone, no validity, exact association; ours: locally optimal proposal (E2); paper: all three people are
     drawn from the transition and weighted together, so that few of 1000 particles count."""
     config = JointConfig(
-        particles=1000,
-        partitions=1,
-        place_noise=0.15,
-        algorithm=algorithm,
-        alpha=0.0,
-        validity_rate=0.0,
-        newcomers="alone",
-        **QUIET,
-    )
+        particles=1000, partitions=1, place_noise=0.15, algorithm=algorithm, alpha=0.0, validity_rate=0.0,
+        newcomers="alone", **QUIET,
+    )  # fmt: skip
     points = walk([[0, 0], [20, 0], [40, 5]], [1.2, 0.3], 25, noise=0.08)
     runs = [stepped(Joint(config), points, seed) for seed in range(6)]
     for person in range(3):
@@ -101,23 +89,6 @@ def test_individuals_who_are_measured_are_the_same_in_all_particles():
     np.testing.assert_allclose(tracks[-1].pos, points[-1], atol=1e-9)
     np.testing.assert_allclose(tracks[-1].vel, [[1, 0]] * 3, atol=1e-6)
     assert tracks[-1].group[0] == tracks[-1].group[1] >= 0 > tracks[-1].group[2]
-
-
-@pytest.mark.parametrize("variant", ["full", "VAR1", "VAR1-standstill", "VAR2", "VAR3"])
-def test_variants_track_and_keep_labels_in_their_form(variant):
-    """Equal partitions have equal labels, however groups came about, so that no result depends on names (E5)."""
-    scene = simulate(load("merge", ["camera.fps=5", "duration=10"]), 40_003, 0, ())
-    ready = prepare("joint", scene, detections="file", params={"variant": variant, "particles": 15, "partitions": 15})
-    ready.reset(0)
-    groups = 0
-    for frame in ready.frames():
-        groups += (ready.step(frame).group >= 0).sum()
-        z = ready.tracker.nested.z
-        for label in z.reshape(z.shape[0] * z.shape[1], -1):
-            named = label.copy()
-            canonical(named)
-            assert np.array_equal(named, label)
-    assert groups > 20 or variant in ("VAR2", "VAR3")
 
 
 def found_pairs(variant, seed):
@@ -141,17 +112,6 @@ def test_groups_are_found_the_better_the_more_of_the_model_is_used():
     for better, worse in ((full, var2), (var2, var3)):
         _, low, _ = paired(worse, better)
         assert low > 0
-
-
-def test_groups_move_individuals_in_the_full_model_only():
-    """Two people side by side: eq. 5 is evaluated with the partitions, and VAR1 has no use for them."""
-    points = walk([[0, 0], [0, 0.7]], [1.0, 0.0], 20, noise=0.05)
-    plain = {"validity_rate": 0.0, "belief_rate": 0.0}
-    full = stepped(Joint(JointConfig(**plain)), points)
-    var1 = stepped(Joint(JointConfig(**plain, variant="VAR1")), points)
-    alone = stepped(Joint(JointConfig(**plain, variant="VAR1", newcomers="alone", **QUIET)), points)
-    assert not np.array_equal(full[-1].pos, var1[-1].pos)
-    assert np.array_equal(var1[-1].pos, alone[-1].pos)
 
 
 def test_a_pair_that_walks_together_is_a_group_and_crossing_strangers_are_none():
@@ -193,32 +153,6 @@ def test_a_member_who_is_missed_stays_in_the_group():
     assert [len(t.id) for t in tracks[24:36]] == [3] * 12
 
 
-def test_with_a_memory_people_join_and_part_later():
-    """Two people come near each other, stand, and walk apart slowly."""
-    gap = np.concatenate([np.linspace(4, 0.7, 40), np.full(60, 0.7), np.linspace(0.7, 6, 60)])
-    together = []
-    for memory in (0.0, 0.4):
-        tracks = stepped(Joint(JointConfig(belief_memory=memory)), [np.array([[0, 0], [0, g]]) for g in gap])
-        together.append([t.index for t in tracks if (t.group >= 0).any()])
-    assert together[0][0] < together[1][0] <= 100
-    assert together[0][-1] < together[1][-1] < 160
-
-
-def test_pairs_of_a_group_count_with_their_belief():
-    label = np.array([[[1, 1, 0, 4, 4], [1, 1, 1, 1, 1], [0, 0, 0, 0, 0]]])
-    worth = np.random.default_rng(0).normal(0, 1, (5, 5))
-    worth, out = worth + worth.T, np.empty((1, 3))
-    pair_sums(worth, label, out)
-    np.testing.assert_allclose(out[0], [worth[0, 1] + worth[3, 4], np.tril(worth, -1).sum(), 0])
-
-
-def test_the_absence_of_a_group_adds_up():
-    """Of a group of whom nobody is measured, people are removed the sooner the more they are."""
-    people = People(missed=np.array([0.2, 0.4, 0.3, 0.0, 0.5, 0.1]))
-    found = people.absence(np.array([4, 4, 7, 7, -1, -1]))
-    np.testing.assert_allclose(found, [0.6, 0.6, 0.3, 0.0, 0.5, 0.1])
-
-
 def test_a_lost_image_removes_nobody():
     tracks = stepped(Joint(), [*walk([[0, 0]], [1.0, 0.0], 20), *[None] * 25])
     assert tracks[-1].id.tolist() == tracks[19].id.tolist() == [1]
@@ -226,24 +160,6 @@ def test_a_lost_image_removes_nobody():
 
 def test_a_false_alarm_of_one_frame_is_no_person():
     assert not any(len(t.id) for t in stepped(Joint(), [[[3, 3]], [], [], [], []]))
-
-
-def test_the_run_tells_what_the_particles_are_worth():
-    scene = simulate(load("merge", ["camera.fps=5", "duration=8"]), 40_003, 0, ())
-    info = track("joint", scene, detections="file").info["diagnostics"]
-    assert 0.02 <= info["distinct_ancestors"] <= 1
-    assert 0.02 <= info["effective_particles"] <= 1
-    assert 0.02 <= info["effective_particles_of_a_person"] <= 1
-    assert Joint().config == JointConfig()
-
-
-def test_people_have_arrived_when_they_were_first_seen():
-    """The belief knows the step of the first sight, which is before the confirmation: 0 for those there at first."""
-    tracker = Joint(JointConfig(**QUIET))
-    frames = [row[:2] if t < 20 else row for t, row in enumerate(walk([(0, 0), (0, 0.8), (0, 5)], (1, 0), 40))]
-    stepped(tracker, frames)
-    assert len(tracker.people.id) == 3
-    assert tracker.belief.first.tolist() == [0, 0, 20 / tracker.belief.size]
 
 
 def test_a_new_person_goes_on_in_frames_without_a_detector():

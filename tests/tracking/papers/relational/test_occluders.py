@@ -22,16 +22,6 @@ def test_behind_beside_and_in_front(scene):
     assert found.tolist() == [1.0, 0.0, 0.0, float(scene.pillar_height > 3.0 - 2.15 * 0.2)]
 
 
-def test_low_occluders_hide_nobody_beyond_them():
-    low = PILLAR.replace(pillar_height=1.0)
-    assert hidden_share(np.array([[[0.0, 2.0]]]), np.ones((1, 1)), CAMERA, low).tolist() == [0.0]
-
-
-def test_a_share_of_the_particles():
-    pos = np.array([[[0.0, 2.0]], [[5.0, 2.0]]])
-    assert hidden_share(pos, np.array([[0.3], [0.7]]), CAMERA, PILLAR).tolist() == pytest.approx([0.3])
-
-
 @pytest.mark.parametrize(("camera", "scene"), [(None, PILLAR), (CAMERA, None), (CAMERA, Scene(np.ones(2)))])
 def test_without_knowledge_nobody_is_hidden(camera, scene):
     assert hidden_share(np.array([[[0.0, 2.0]]]), np.ones((1, 1)), camera, scene).tolist() == [0.0]

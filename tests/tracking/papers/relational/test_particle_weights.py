@@ -11,6 +11,7 @@ from tracking.papers.relational import sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
+from tracking.papers.relational.relations import Relational
 from tracking.papers.relational.tracker import Particle
 
 
@@ -63,17 +64,6 @@ def test_people_get_weights_of_their_own_only_after_resampling():
     assert not particles.one_weight
 
 
-def test_with_one_weight_particles_are_resampled_as_a_whole():
-    particles = three()
-    particles.share_weights(True)
-    relate(particles, 0, 1, np.random.default_rng(3).random(400) < 0.5)
-    particles.weigh(np.random.default_rng(4).normal(0, 1, (400, 1)))
-    old = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related.T, strict=True)}
-    particles.resample(0.9, 0.0, drawn(particles, np.random.default_rng(0)))
-    new = {(*pos.ravel(), *rel.ravel()) for pos, rel in zip(particles.pos, particles.related.T, strict=True)}
-    assert new < old
-
-
 def test_a_person_is_resampled_alone_and_takes_the_own_relations():
     """The others stay in their particles, and the relations stay symmetric."""
     particles, few = three(), np.arange(400) < 40
@@ -88,25 +78,6 @@ def test_a_person_is_resampled_alone_and_takes_the_own_relations():
     assert particles.pairs.tolist() == [[0, 1], [1, 2]]
     assert particles.related[0].all()
     assert np.array_equal(particles.related[1], ~few)
-
-
-def test_a_new_person_has_the_one_weight_of_the_particles():
-    particles = three()
-    particles.share_weights(True)
-    particles.weigh(np.random.default_rng(5).normal(0, 1, (400, 1)))
-    particles.add(np.zeros((400, 1, 2)), np.zeros((400, 1, 2)), 0.5)
-    assert np.array_equal(particles.weights[:, 3], particles.weights[:, 0])
-
-
-def test_weights_of_people_far_from_each_other_multiply_to_the_joint_weight():
-    points, joint, apart = np.array([[0.2, 0.05], [8.1, 0.0]]), three(), three()
-    for made in (joint, apart):
-        made.keep(np.array([True, False, True]))
-    sensor.weigh(joint, points, sight([0.9] * 2), 0.08, ParticleConfig(weights="joint"))
-    sensor.weigh(apart, points, sight([0.9] * 2), 0.08, ParticleConfig())
-    product = apart.weights.prod(axis=1)
-    np.testing.assert_allclose(joint.weights[:, 0], product / product.sum(), rtol=1e-9)
-    np.testing.assert_allclose(joint.exist, apart.exist, rtol=1e-12)
 
 
 def test_weights_of_a_person_are_those_of_the_joint_filter_with_the_others_averaged():
@@ -171,16 +142,6 @@ def test_existence_by_bayes():
     np.testing.assert_allclose(particles.exist[:, 0], 1.0, atol=1e-6)
 
 
-def test_moments_are_weighted_by_existence():
-    particles = three()
-    particles.exist[:200, 0] = 0.0
-    mean, cov, exist = particles.estimates()
-    kept = np.concatenate([particles.pos[200:, 0], particles.vel[200:, 0]], axis=1)
-    np.testing.assert_allclose(mean[0], kept.mean(axis=0), rtol=1e-9)
-    np.testing.assert_allclose(cov[0], np.cov(kept.T, bias=True), rtol=1e-9)
-    assert exist[0] == pytest.approx(0.45)
-
-
 def candidates(seed):
     """Densities of 9 pairs of 6 people and 5 points in 20 particles, existence and detection; people 0 to 2 and 3 to 5
     share points."""
@@ -234,23 +195,6 @@ def reference_sum(W, miss):
     return exact_sum(W, miss, np.ones(W.shape[1]), found), found
 
 
-def test_a_displaced_point_is_the_persons_only_if_points_may_be_displaced():
-    displaced, found = np.array([[0.7, 0.0]]), []
-    for share in (0.0, 0.1):
-        particles = placed_alone(np.zeros(2))
-        config = ParticleConfig(outlier_share=share, outlier_noise=0.4)
-        said = sensor.weigh(particles, displaced, sight([0.9]), 0.08, config)
-        found.append(float(said.nobody[0]))
-    assert found[0] > 0.999
-    assert found[1] < 0.5
-
-
-def placed_alone(place):
-    particles = ParticleSet.empty(200)
-    particles.add(np.tile(place, (200, 1))[:, None], np.zeros((200, 1, 2)), 1.0)
-    return particles
-
-
 @pytest.mark.parametrize("weights", ["factorised", "joint"])
 def test_a_miss_leaves_weights_if_everybody_who_exists_is_detected(weights):
     particles = three()
@@ -263,14 +207,6 @@ def test_a_miss_leaves_weights_if_everybody_who_exists_is_detected(weights):
     np.testing.assert_allclose(particles.existence, 1.0, rtol=1e-6)  # who certainly exists is hidden
 
 
-def test_products_of_weights_that_are_0_everywhere_become_equal():
-    particles = three()
-    particles.weights[:] = 0.0
-    particles.weights[:200, 0] = particles.weights[200:, 1] = particles.weights[:200, 2] = 1 / 200
-    particles.share_weights(True)
-    np.testing.assert_allclose(particles.weights, 1 / 400, rtol=1e-12)
-
-
 def test_a_detection_that_is_certainly_nobodys_starts_a_person_at_the_largest_doubt(monkeypatch):
     monkeypatch.setattr("tracking.papers.relational.tracker.BIRTH_DOUBT", 1.0)
     tracker = Particle(ParticleConfig())
@@ -279,3 +215,21 @@ def test_a_detection_that_is_certainly_nobodys_starts_a_person_at_the_largest_do
         found = Detections(k + 1, k / 10, "ground", np.zeros((1, 2)), None, None, np.ones(1))
         tracks = tracker.step(Frame(k + 1, k / 10), found)
     assert len(tracks.id) == 1
+
+
+def test_probabilities_of_pairs_are_those_of_the_reported_people():
+    """Two people side by side, and a third far away; the matrix is symmetric with ones on the diagonal."""
+    tracker = Relational()
+    tracker.reset(Context(10.0, float("nan")), 0)
+    assert tracker.walking_together()[1].shape == (0, 0)
+    for k in range(40):
+        pos = np.array([[0.12 * k, 0.0], [0.12 * k, 0.6], [0.12 * k, 9.0]])
+        tracks = tracker.step(Frame(k + 1, k / 10), Detections(k + 1, k / 10, "ground", pos, score=np.ones(3)))
+    id, together = tracker.walking_together()
+    assert id.tolist() == tracks.id.tolist()
+    assert np.array_equal(together, together.T)
+    order = np.argsort(tracks.pos[:, 1])
+    together = together[np.ix_(order, order)]
+    assert together[0, 1] > 0.5
+    assert together[0, 2] == together[1, 2] == 0.0
+    assert together.diagonal().tolist() == [1, 1, 1]

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
 from tests.reference_relational import drawn, relate, relations
 from tracking.filters.person_streams import birth_keys
-from tracking.grouping.belief import UNSEEN, default_belief
-from tracking.grouping.pair_evidence import frames_per_step
-from tracking.grouping.pair_probabilities import pair_probabilities
-from tracking.papers.relational import association_sums_kernels, sensor, sensor_kernels, transition_kernels
+from tracking.grouping.belief import UNSEEN
+from tracking.papers.relational import sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.relations import Relational
@@ -141,18 +137,6 @@ def test_without_relations_it_is_the_baseline_to_the_last_bit():
     same_tracks(*runs)
 
 
-def test_one_person_has_no_relations():
-    walk = [[(0.1 * k, 0.0)] for k in range(20)]
-    same_tracks(stepped(Particle(), 10.0, *walk), stepped(Relational(), 10.0, *walk))
-
-
-def test_relations_change_the_motion():
-    """Two people side by side: the test of equality can fail."""
-    walk = [[(0.1 * k, 0.0), (0.1 * k, 0.7)] for k in range(20)]
-    alone, related = stepped(Particle(), 10.0, *walk), stepped(Relational(), 10.0, *walk)
-    assert not np.array_equal(alone[-1].pos, related[-1].pos)
-
-
 # E5
 
 
@@ -166,10 +150,6 @@ def riccati(r, steps=400):
         K = P[:, 0] / (P[0, 0] + r * r)
         P = P - np.outer(K, P[0])
     return P[2, 2]
-
-
-def test_the_exact_filter_of_a_hidden_partner_has_the_closed_form():
-    assert riccati(1e-5) == pytest.approx(5**0.5 - 1, abs=1e-4)
 
 
 def hidden_variance(related, seen, steps, count=20_000, r=0.4):
@@ -196,10 +176,6 @@ def test_a_hidden_partner_has_a_bounded_velocity_variance():
     found = hidden_variance(True, True, 60)[15:]
     assert found.mean() == pytest.approx(riccati(0.4), rel=0.03)
     assert found.mean() < 4 / 3 * 0.97
-
-
-def test_a_hidden_free_walker_diffuses():
-    np.testing.assert_allclose(hidden_variance(False, False, 8), np.arange(1, 9), rtol=0.05)
 
 
 # E6
@@ -260,27 +236,6 @@ def test_a_newcomer_in_an_empty_scene_is_alone_and_beside_a_group_in_it_by_half(
 # E7
 
 
-def test_new_relations_depend_on_new_attributes_alone(monkeypatch):
-    """Given the attributes at t and the relations at t - 1, attributes at t - 1 have no effect (eq. 7)."""
-    rng = np.random.default_rng(2)
-    new_pos, new_vel = rng.normal(0, 1, (300, 4, 2)), rng.normal(0, 0.3, (300, 4, 2))
-
-    def to_new(pos, vel, *_):
-        pos[:], vel[:] = new_pos, new_vel
-
-    monkeypatch.setattr(transition_kernels, "move", to_new)
-    found = []
-    for seed in (0, 1):
-        tracker = Relational(RelationalConfig(relation_evidence="state", particles=300))
-        tracker.reset(Context(10.0, float("nan")), 7)
-        seat(tracker, placed(300, np.random.default_rng(seed).normal(0, 3, (4, 2))))
-        relate(tracker.particles, 0, 1)
-        tracker._forecast()
-        found.append(relations(tracker.particles))
-    assert np.array_equal(*found)
-    assert 0 < found[0].mean() < 1
-
-
 def reconsidered(particles, rules, rng):
     particles.hold(transition_kernels.near_pairs(particles.pos, rules))
     uniforms = rng.random((particles.count, particles.people, 2))
@@ -298,33 +253,6 @@ def test_a_pairs_relation_approaches_its_equilibrium_at_its_rate():
         assert relations(particles)[:, 0, 1].mean() == pytest.approx(g * (1 - np.exp(-0.05 * step)), abs=0.012)
 
 
-def test_a_person_leaves_a_group_at_once():
-    """Relations of one person end together far more often than by themselves; none ends of people far from it."""
-    rules, rng = np.array([0.05, 3.0, 1.0, 0.0]), np.random.default_rng(1)
-    particles = placed(40_000, [[0, 0], [0.4, 0], [0, 0.4], [0.4, 0.4]])
-    for i, j in itertools.combinations(range(4), 2):
-        relate(particles, i, j)
-    reconsidered(particles, rules, rng)
-    ends = ~relations(particles)[:, 0, 1:]
-    assert ends[:, 0].mean() == pytest.approx(0.05 * 0.069, abs=0.001)
-    assert ends.all(axis=1).mean() > 0.3 * ends[:, 0].mean()
-
-
-def test_pairs_that_are_far_in_all_particles_and_not_related_are_left_out():
-    rules, particles = np.array([0.1, 5.0, 3.0, 3.0]), placed(10, [[0, 0], [1, 0], [50, 0]])
-    particles.pos[0, 2] = [49.0, 0.0]
-
-    def pairs():
-        particles.hold(transition_kernels.near_pairs(particles.pos, rules))
-        return particles.pairs.tolist()
-
-    assert pairs() == [[0, 1]]
-    relate(particles, 0, 2, np.arange(particles.count) == 3)
-    assert pairs() == [[0, 1], [0, 2]]
-    particles.pos[5, 2] = [3.0, 0.0]
-    assert pairs() == [[0, 1], [0, 2], [1, 2]]
-
-
 # E8
 
 
@@ -337,11 +265,6 @@ def test_the_papers_sensor_breaks_down_and_goes_on():
     assert any(np.abs(tracks[-1].pos - [60.9, 0]).max(axis=1) < 0.2), "the person is found again"
     stepped(ours, 10.0, *walk)
     assert ours.vanished == 0
-
-
-def test_a_sensor_without_false_alarms_misses_nobody():
-    with pytest.raises(InputError, match="clutter_density"):
-        ParticleConfig(clutter_density=0.0, detect_prob=0.9)
 
 
 # E9
@@ -378,20 +301,6 @@ def test_velocities_of_partners_approach_each_other_with_the_time_constant():
         assert alone.tolist() == [1, 1]
 
 
-def test_partners_have_a_share_of_the_noise_in_common():
-    """The variance of each person's noise is that of a person alone; the correlation of partners is common_noise."""
-    count, rng = 40_000, np.random.default_rng(4)
-    particles = placed(count, [[0, 0], [0, 1], [1, 0], [9, 9]])
-    for i, j in itertools.combinations(range(3), 2):
-        relate(particles, i, j)
-    noise, shared = rng.standard_normal((2, count, 4, 2))
-    move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), np.array([0.5, 0.7]), 1.0, shared)
-    expected = np.eye(4)
-    expected[:3, :3] += 0.7 * (1 - np.eye(3))
-    np.testing.assert_allclose(np.cov(particles.vel[..., 0].T), expected, atol=0.03)
-    assert np.array_equal(particles.vel[:, 3], noise[:, 3])
-
-
 def test_partners_count_by_how_alike_they_are():
     """A partner 1 m away with a velocity difference of 1 m/s has the weight w = 1 / (1 + e^2) in the mean, and the
     noises of both have the correlation 2 c w / (1 + w^2), c = common_noise w."""
@@ -410,51 +319,6 @@ def test_partners_count_by_how_alike_they_are():
     np.testing.assert_allclose(np.cov(particles.vel[..., 0].T), [[1, common], [common, 1]], atol=0.02)
 
 
-def test_what_uncertainty_adds_to_the_squares_is_taken_off():
-    """Two people 1 m apart, with a velocity difference of 1 m/s, whose squares are lowered by 0.36."""
-    alike, w = np.array([0.0, 3.0, 2.0, 3.0]), 1 / (1 + np.exp(5 * 0.8 - 3))
-    particles = placed(1, [[0, 0], [0, 1]], [[2, 0], [1, 0]])
-    relate(particles, 0, 1)
-    table = ParticleConfig(**flat_table(0.0)).speed_table(1.0)
-    move(particles, np.zeros((1, 2, 2)), table, AT_ONCE, 1.0, None, alike, 0.36)
-    np.testing.assert_allclose(particles.vel[0, :, 0], [(2 + w) / (1 + w), (1 + 2 * w) / (1 + w)], rtol=1e-12)
-
-
-def test_the_spread_of_a_pair_is_twice_its_variance():
-    """That of the particles' differences: what partners have in common does not count."""
-    rng = np.random.default_rng(6)
-    pos, vel = rng.normal(0, 1, (2, 500, 4, 2)) + rng.normal(0, 3, (2, 500, 1, 2))
-    pairs = np.array([[0, 1], [1, 3]])
-    found = transition_kernels.pair_spread(pos, vel, pairs)
-    for row, (i, j) in zip(found, pairs.tolist(), strict=True):
-        expected = [2 * np.var(x[:, i] - x[:, j], axis=0).sum() for x in (pos, vel)]
-        np.testing.assert_allclose(row, expected, rtol=1e-9)
-
-
-def test_the_squares_of_partners_who_move_alike_are_those_of_their_errors():
-    """Estimates with errors of the filter's variance, and particles about them with the same: |v_i - v_j|^2 of two
-    people of equal velocity is `pair_spread` on average."""
-    rng, squares, spreads = np.random.default_rng(7), [], []
-    for _ in range(400):
-        vel = rng.normal(0, 0.5, (1, 2, 2)) + rng.normal(0, 0.5, (300, 2, 2))
-        squares.append(np.square(vel[:, 0] - vel[:, 1]).sum(axis=1).mean())
-        spreads.append(transition_kernels.pair_spread(vel, vel, np.array([[0, 1]]))[0, 1])
-    assert np.mean(squares) == pytest.approx(np.mean(spreads), rel=0.1)
-
-
-@pytest.mark.parametrize("name", ["paper", "caviar-25fps"])
-def test_presets_couple_velocities_as_the_paper(name):
-    tracker = Relational(RelationalConfig.preset(name))
-    tracker.reset(Context(25.0, float("nan")), 0)
-    seat(tracker, placed(50, np.random.default_rng(0).normal(0, 3, (4, 2))))
-    relate(tracker.particles, 0, 1, np.arange(tracker.particles.count) < 25)
-    _, coupling, alike, spread = tracker._coupling()
-    assert coupling.tolist() == AT_ONCE.tolist()
-    assert transition_kernels.belonging(50.0, 9.0, alike) == 1
-    assert tracker.particles.pairs.tolist() == [[0, 1]]
-    assert not spread.any()
-
-
 def test_the_equilibrium_of_a_pair_is_the_belief():
     """Whatever the particles say; pairs without a belief, 4 m and more apart, do not walk together."""
     tracker = Relational(RelationalConfig(particles=20_000, relation_rate=2.0))
@@ -463,7 +327,6 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
     seat(tracker, placed(20_000, place, np.array([[0, 0], [1, 0], [0, 0], [0, 0]])))
     relate(tracker.particles, 0, 3)
     tracker._follow(np.concatenate([place, np.zeros((4, 2))], axis=1))
-    assert tracker.belief is not None
     assert (tracker.belief.log_odds[3, :3] == UNSEEN).all()
     tracker.belief.log_odds[:3, :3] = odds = np.array([[0, 1.0, -2.0], [1.0, 0, 0.5], [-2.0, 0.5, 0]])
     for _ in range(60):
@@ -482,24 +345,6 @@ def test_the_equilibrium_of_a_pair_is_the_belief():
         tracker.streams.frame += 1
         tracker._relate()
     assert np.array_equal(relations(tracker.particles)[:, 1], before)  # who is not seen stays with the partners
-
-
-def test_the_probabilities_are_those_of_the_belief_over_the_reported_tracks():
-    scene = simulate(load("cross", ["camera.fps=5", "duration=8"]), 40_004, 0, ())
-    ready = prepare("relational", scene, detections="file", params={"particles": 200})
-    ready.reset(3)
-    tracks, said = [], {}
-    for frame in ready.frames():
-        tracks.append(ready.step(frame))
-        ids, together = ready.tracker.walking_together()
-        for i, a in enumerate(ids):
-            said |= {(frame.index, int(a), int(b)): together[i, j] for j, b in enumerate(ids) if a < b}
-    found = pair_probabilities(tracks, scene.fps, scene.px_per_m, default_belief())
-    rows = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), found.probability.tolist(), strict=True)
-    expected = {(f, a, b): p for f, a, b, p in rows}
-    known = [key for key in expected if (key[0] - 1) % frames_per_step(scene.fps) == 0]
-    assert len(known) > 100
-    np.testing.assert_allclose([said[key] for key in known], [expected[key] for key in known], atol=1e-9)
 
 
 def walked(evidence, apart, frames):
@@ -527,58 +372,3 @@ def test_the_belief_tells_who_passes_from_who_walks_along():
         stays, comes = np.log(both) - np.log1p(-np.array(both))
         assert stays > 2
         assert (stays - comes > 2) == (evidence == "belief"), (evidence, stays, comes)
-
-
-def test_the_belief_has_the_rows_of_the_people():
-    """People come, are missed and go: each row of the belief stays that of the same person."""
-    tracker = Relational(RelationalConfig(particles=100, time_window=0.5))
-    tracker.reset(Context(10.0, float("nan")), 1)
-    for k in range(40):
-        there = [(0.1 * k, y) for y, first, last in ((0, 0, 40), (3, 2, 15), (6, 8, 40)) if first <= k < last]
-        tracker.step(Frame(k + 1, k / 10), detections(k + 1, *there))
-        assert tracker.belief is not None
-        assert len(tracker.belief.count) == tracker.particles.people
-    assert tracker.particles.people == 2
-    np.testing.assert_allclose(tracker.belief.past[-1][:, 1], [0, 6], atol=0.3)
-
-
-def test_newcomers_of_a_frame_join_as_if_one_came_after_the_other():
-    rules, count, draws = np.array([0.05, 5.9, 3.3, 5.9]), 500, np.random.default_rng(3)
-    old, new = draws.uniform(0, 6, (5, 2)), draws.uniform(0, 6, (7, 2))
-    uniforms = draws.random((len(new), count))
-
-    def joined(portions):
-        particles, begin = placed(count, old), 0
-        relate(particles, 0, 1)
-        for points in np.split(new, portions):
-            label = np.empty((count, particles.people + len(points)), np.int64)
-            label[:, : particles.people] = particles.labels()
-            places = np.tile(points, (count, 1, 1))
-            particles.add(places, np.zeros_like(places), 0.7)
-            u = uniforms[begin : begin + len(points)]
-            joined_by(particles, label, points, u, rules)
-            assert np.array_equal(label, particles.labels())
-            begin += len(points)
-        return relations(particles)
-
-    together = joined([])
-    assert np.array_equal(together, joined([1, 2, 3, 4, 5, 6]))
-    assert np.array_equal(together, together.transpose(0, 2, 1))
-    assert together[:, -2:, :-2].any()
-
-
-def test_free_detections_of_many_linked_people_are_those_of_one_sum_for_each():
-    """More than 12 people and detections in one component: messages of one propagation stand for many sums."""
-    draws = np.random.default_rng(1)
-    people, found = 20, 18
-    W, miss = (
-        draws.uniform(0, 3, (people, found)) * (draws.random((people, found)) < 0.25),
-        draws.uniform(0.05, 1, people),
-    )
-    free = sensor_kernels.free_detections(W, miss)
-    for k in range(people):
-        others, marginals = W.copy(), np.empty_like(W)
-        others[k] = 0.0
-        association_sums_kernels.sparse_sum(others, miss, np.ones(found), marginals)
-        mine = W[k] > 0
-        np.testing.assert_allclose(free[k, mine], 1 - marginals.sum(axis=0)[mine], atol=0.05)

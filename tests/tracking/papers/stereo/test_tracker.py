@@ -7,20 +7,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.stereo.density import ABOVE, BELOW, in_image
 from scenarios.errors import InputError
-from sim.types import Context, Detections, Frame
+from sim.geometry.polygons import contains
+from sim.scene.camera import project
+from sim.types import Context, Frame, Groups, Tracks
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.filters.ellipsoid_overlap import separation
-from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo.association import associated
 from tracking.papers.stereo.births_and_losses import sphere_groups
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.measurement import POS, VEL, PairMeasurement, PlaceMeasurement
+from tracking.papers.stereo.measurement import VEL, PairMeasurement, PlaceMeasurement
 from tracking.papers.stereo.merging import merge, overlap, pooled
 from tracking.papers.stereo.picture_points import stereo_camera
 from tracking.papers.stereo.space_group import SpaceGroup, motion_model, newborn
-from tracking.papers.stereo.splitting import split
 from tracking.papers.stereo.tracker import Stereo
 
 FPS = 30.0
@@ -176,29 +177,6 @@ def test_a_group_that_has_just_come_enters_with_the_other_one(before: float, eve
     assert [g.id for g in groups] == [2 if event == "merge" else 1]
 
 
-def test_a_group_that_split_merges_again() -> None:
-    groups = people((1, 12, 1.0, 0.0), (2, 30, 1.0, 4.9))
-    groups[1].parent = 1
-    (found,) = merge(groups, StereoConfig(), 5.0)
-    assert found.kind == "merge"
-
-
-def test_children_of_merged_groups_are_children_of_the_union() -> None:
-    """A tentative child of group 1 here, whose parent merges into group 2, and one that merges with a newborn group."""
-    tentative = (NO_ID, 8, 9.0, 4.0), (NO_ID, 8, 17.0, 4.0), (NO_ID, 20, 17.0, 5.0)
-    groups = people((1, 12, 1.0, 0.0), (2, 30, 1.0, 0.0), *tentative)
-    groups[2].parent = groups[3].parent = 1
-    merge(groups, StereoConfig(), 5.0)
-    assert [(g.id, g.parent) for g in groups] == [(2, NO_ID), (NO_ID, 2), (NO_ID, 2)]
-
-
-def test_tentative_groups_merge_without_an_event() -> None:
-    """One joins a confirmed group with fewer points, whose id stays; two become one."""
-    groups = people((7, 10, 1.0, 5.0), (NO_ID, 30, 1.0, 5.0), (NO_ID, 10, 9.0, 5.0), (NO_ID, 20, 9.0, 5.0))
-    assert merge(groups, StereoConfig(), 5.0) == []
-    assert [(g.id, g.count) for g in groups] == [(7, 40), (NO_ID, 30)]
-
-
 @pytest.mark.parametrize("distance", [0.0, 0.1, 0.5, 1.0, 2.0, 4.0])
 @pytest.mark.parametrize("direction", [0.0, 0.8, 1.6])
 def test_regions_of_opposite_groups_overlap_at_no_distance(distance: float, direction: float) -> None:
@@ -278,49 +256,6 @@ def test_parts_that_would_merge_at_once_do_not_split(gap: float, parts: int, mon
         assert tracker.groups[0].apart_since == pytest.approx(1.0, abs=0.1), "the clock runs on"
 
 
-def test_the_clock_of_a_split_stops_while_a_group_is_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    count_single_features(monkeypatch)
-    steps = beside(1.8, 90)
-    config = StereoConfig(radius=0.75)
-    steps = steps[: round(FPS) + 18]
-    lost = [None if FPS + 2 < k < FPS + 17 else points for k, points in enumerate(steps)]
-    seen, after = scripted(steps, config)[0], scripted(lost, config)[0]
-    assert [g.parent for g in seen.groups] == [NO_ID, 1]
-    assert [g.parent for g in after.groups] == [NO_ID]
-
-
-def test_a_child_has_the_velocity_of_its_parent_and_its_covariance() -> None:
-    (step,) = together(walkers(0, 12, [0, 5, 1], [1, 0, 0], 1), walkers(1, 8, [4, 5, 1], [0, 1, 0], 1, first=100))
-    config = StereoConfig()
-    motion = motion_model(config, 1 / FPS)
-    group = newborn(step, PLACE, motion, 0.0)
-    group.apart_since = 0.0
-    before = group.ekf
-    (child,) = split(group, step, sphere_groups(step.pos, config.radius, 1), PLACE, motion, config.split_time)
-    assert child.count == 8
-    assert np.array_equal(child.ekf.x[VEL], before.x[VEL])
-    assert np.array_equal(child.ekf.P[np.ix_(VEL, VEL)], before.P[np.ix_(VEL, VEL)])
-
-
-def test_points_that_appear_far_from_their_group_enter() -> None:
-    """They are no part that splits, as the group has not moved apart."""
-    seen = together(walkers(0, 20, [0, 5, 1], [0, 0, 0], 30))
-    far = together(walkers(0, 10, [0, 5, 1], [0, 0, 0], 30), walkers(1, 10, [5, 5, 1], [0, 0, 0], 30, first=11))
-    _, tracks = scripted([*seen, *far])
-    assert kinds(tracks) == ["enter", "enter"]
-
-
-def test_a_frame_without_detections_ends_the_links_of_points() -> None:
-    """Their places would else be one frame apart, and their velocities too high."""
-    tracker = Stereo()
-    tracker.reset(Context(FPS, 30.0), 0)
-    for k in range(30):
-        found = Detections(k + 1, k / FPS, "ground", np.array([[1.3 * k / FPS, 5.0]]))
-        tracker.step(Frame(k + 1, k / FPS, None, None), found if k < 28 else None)
-    points = tracker.links.step(np.array([[1.3 * 30 / FPS, 5.0, 0.0]]), tracker.config)
-    assert not points.vel.any()
-
-
 def test_a_group_that_is_gone_is_deleted() -> None:
     steps = together(walkers(0, 12, [1, 5, 1], [1, 0, 0], 30))
     tracker, tracks = scripted([*steps, *[SpacePoints.none()] * 60])
@@ -328,14 +263,30 @@ def test_a_group_that_is_gone_is_deleted() -> None:
     assert tracker.groups == []
 
 
-def test_the_tilt_of_the_camera_changes_nothing_but_the_noise() -> None:
-    steps = together(walkers(3, 20, [1, 6, 1], [1, 0.5, 0], 60))
-    found = [scripted(steps, camera=rig(tilt, focal=1000.0, baseline=0.5))[0].groups[0] for tilt in (20.0, 60.0)]
-    off = (found[0].ekf.x - found[1].ekf.x)[POS, 0]
-    assert np.abs(off).max() < 0.02
-
-
 @pytest.mark.parametrize("camera", [None, rig(40.0, baseline=0.0), rig(40.0).replace(radial=0.1)])
 def test_a_camera_that_is_no_pair_is_refused(camera) -> None:
     with pytest.raises(InputError, match="baseline"):
         stereo_camera(camera)
+
+
+def test_a_hull_in_the_image_covers_bodies_from_their_feet_to_their_heads() -> None:
+    camera, square = rig(30.0), np.array([[0.5, 5.5], [1.5, 5.5], [1.5, 6.5], [0.5, 6.5]])
+    pos, one = np.array([[1.0, 6.0, 1.4]]), np.array([7])
+    groups = Groups(one, (np.zeros(0, int),), pos, 0 * pos, np.eye(2)[None], np.array([np.nan]), (square,))
+    made = in_image(
+        Tracks(1, 0.0, "space", "group", one, one, pos, 0 * pos, np.eye(6)[None], None, np.ones(1), groups, ()), camera
+    )
+    assert made.plane == "image"
+    (hull,) = made.groups.hull
+    for height, inside in (
+        (1.4 - BELOW, True),
+        (1.4 + ABOVE, True),
+        (1.4 - BELOW - 0.8, False),
+        (1.4 + ABOVE + 0.8, False),
+    ):
+        uv = project(camera, np.array([[1.0, 6.0, height]]))[0]
+        assert contains(hull, uv).tolist() == [inside], height
+    corners = np.column_stack([square, np.full(4, 1.4)])
+    assert contains(hull, project(camera, corners)[0], 0.01).all()
+    assert made.pos[0] == pytest.approx(hull.mean(0))
+    assert made.groups.id.tolist() == [7]
