@@ -13,10 +13,9 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, shortened
 from scenarios.limits import DEPTH, NESTING
 from scenarios.loading.toml_files import Table, did_you_mean
-from scenarios.printable import shortened
 from scenarios.reading import parse_toml
 
 KeyPath = tuple[str | int, ...]

@@ -8,14 +8,16 @@ from typing import Annotated
 
 from pydantic import Field
 
-from scenarios.schema.values import Distribution, Model, NonNegative, Positive, Share, Value
+from scenarios.schema.values import Distribution, Model, NonNegative, Positive, Share, Value, within
+
+Pixels = Annotated[float, within(0.0, 100.0, " px")]
 
 
 class LightSwitch(Model):
     """A sudden change of brightness, as of a lamp or a cloud; those of several switches multiply."""
 
     at: Value = Field(description="time of the change, s")
-    gain: Value = Field(description="factor of the brightness from then on; above 0")
+    gain: Annotated[Value, within(1e-3, 1000.0)] = Field(description="factor of the brightness from then on; above 0")
     ramp: NonNegative = Field(0.2, description="duration of the change, s")
 
 
@@ -29,17 +31,17 @@ class Light(Model):
     shadow: Share = Field(
         0.3, description="share of the brightness that the ground loses in a cast shadow; 0 = no shadows"
     )
-    penumbra: NonNegative = Field(0.05, description="width of a shadow's soft edge, m")
+    penumbra: Annotated[float, within(0.0, 100.0, " m")] = Field(0.05, description="width of a shadow's soft edge, m")
     drift: NonNegative = Field(0.0, description="standard deviation of slow changes of brightness, relative")
     drift_time: Positive = Field(20.0, description="time constant of slow changes, s")
     flicker: NonNegative = Field(
         0.0, description="standard deviation of changes of brightness from frame to frame, relative"
     )
-    cloud: Value = Field(
+    cloud: Annotated[Value, within(0.0, 10.0)] = Field(
         0.0, description="standard deviation of the brightness of soft patches that move over the ground, relative"
     )
     cloud_size: Positive = Field(8.0, description="size of the patches: distance at which their correlation is 0.6, m")
-    cloud_speed: NonNegative = Field(1.0, description="speed of the patches, m/s")
+    cloud_speed: Annotated[float, within(0.0, 1000.0, " m/s")] = Field(1.0, description="speed of the patches, m/s")
     switch: tuple[LightSwitch, ...] = Field((), description="sudden changes of brightness")
 
 
@@ -54,24 +56,26 @@ class Picture(Model):
     samples: Annotated[int, Field(ge=1, le=4)] = Field(
         1, description="rays along each axis of a pixel of the empty scene, averaged; with more, patterns are finer"
     )
-    noise: NonNegative = Field(
+    noise: Annotated[float, within(0.0, 255.0, " grey levels")] = Field(
         3.0,
         description="standard deviation of the noise of each pixel and colour channel at grey level 128, grey levels",
     )
     shot: Share = Field(0.5, description="share of that noise's variance that is proportional to the brightness")
-    blur_px: NonNegative = Field(0.6, description="standard deviation of the blur, px")
+    blur_px: Pixels = Field(0.6, description="standard deviation of the blur, px")
     jpeg: Annotated[int, Field(ge=0, le=100)] = Field(
         0, description="quality of JPEG compression, which adds artefacts; 0 = no compression"
     )
-    foliage: Value = Field(
+    foliage: Annotated[Value, within(0.0, 1.0)] = Field(
         0.0, description="share of the image that is covered by plants moving in the wind; on the ground only"
     )
-    sway_px: NonNegative = Field(1.5, description="standard deviation of the plants' movement along each axis, px")
+    sway_px: Pixels = Field(1.5, description="standard deviation of the plants' movement along each axis, px")
     sway_time: Positive = Field(0.4, description="time after which the correlation of that movement is 0.6, s")
-    right_gain: Positive = Field(1.0, description="factor of the right picture's brightness, which is not calibrated")
-    right_roll_deg: float = Field(
+    right_gain: Annotated[float, within(1e-3, 1000.0)] = Field(
+        1.0, description="factor of the right picture's brightness, which is not calibrated"
+    )
+    right_roll_deg: Annotated[float, within(-10.0, 10.0, " degrees")] = Field(
         0.0, description="angle by which the right picture's content is turned clockwise, which is not calibrated"
     )
-    right_down_px: float = Field(
+    right_down_px: Annotated[float, within(-100.0, 100.0, " px")] = Field(
         0.0, description="distance by which the right picture's content lies too low, px, which is not calibrated"
     )

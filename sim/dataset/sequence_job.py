@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import FlockscopeError, InputError, WorkError
+from scenarios.errors import FlockscopeError, InputError, WorkError, shortened
 from scenarios.loading.resolve import Entry
 from scenarios.loading.toml_files import Table
-from scenarios.printable import shortened
 from sim.io.files.output_paths import output_path, output_paths
 from sim.io.files.own_files import is_side_file
 from sim.io.store import sequence_folder

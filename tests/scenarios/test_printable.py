@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.errors import InputError
-from scenarios.printable import printable, shortened
+from scenarios.errors import InputError, printable, shortened
 
 TEXT = st.text(alphabet=st.characters(exclude_categories=()), max_size=60)
 

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scenarios.printable import counted
+from scenarios.errors import counted
 from sim.io.files.atomic import write_file
 from sim.versions import installed
 from tracking.config import Config

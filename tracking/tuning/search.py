@@ -17,8 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenarios.errors import InputError, OrderError, WorkError
-from scenarios.printable import counted
+from scenarios.errors import InputError, OrderError, WorkError, counted
 from sim.dataset.generate import LEFT_OUT
 from sim.io.files.own_files import refuse_foreign_file
 from sim.io.files.tables import TABLE, TEXT, Rules, list_of

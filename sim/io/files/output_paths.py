@@ -12,8 +12,7 @@ import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
 
-from scenarios.errors import InputError
-from scenarios.printable import is_control
+from scenarios.errors import InputError, is_control
 
 LONGEST = 200  # bytes of a file name made from a label: 255 less temporary prefixes and our suffixes
 FORBIDDEN = frozenset('/\\:*?"<>|')  # by Windows, or on network drives

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
-from scenarios.printable import printable
+from scenarios.errors import InputError, printable
 from sim import hashing
 from sim.io.files import atomic, tables
 from sim.io.files.own_files import is_side_file

@@ -170,7 +170,7 @@ def test_an_id_with_a_dot_can_be_set(path: Path) -> None:
         ("duration='20'", "", "'20'", "number", ""),
         ("duration=nan", "", "nan", "finite", ""),
         ("duration=2020-01-01", "", "2020-01-01", "number", ""),
-        ("camera.fps=-1", "", "-1", "greater than 0", ""),
+        ("camera.fps=-1", "", "-1", "from 0.01 to 1000", ""),
         ("event.m1.type=mrge", "", "'mrge'", "'merge'", ""),
         ("event.m1.goal=mete", "", "'mete'", "'meet'", ""),
         ("event.m1.when={time=1, after='x'}", "", "after", "exactly one of time", ""),

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from scenarios.loading.resolve import load, names, resolve, suite_names
-from scenarios.loading.suites import about, find_suite
+from scenarios.loading.resolve import find_suite, load, names, read_suite, resolve, suite_names
 from tracking.app.commands.scenarios import list_keys
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
@@ -29,7 +28,7 @@ def test_catalogue() -> None:
 def test_suites() -> None:
     rows = re.findall(r"^\| suite `(.+)` \| (\d+) \| (.+) \|$", DOC, re.MULTILINE)
     suites = [(name, find_suite(name)) for name in suite_names()]
-    assert rows == [(name, str(len(resolve(f"suite:{name}"))), about(file)) for name, file in suites]
+    assert rows == [(name, str(len(resolve(f"suite:{name}"))), read_suite(file).about) for name, file in suites]
 
 
 def test_keys() -> None:

@@ -10,8 +10,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import InputError
-from scenarios.printable import counted, printable
+from scenarios.errors import InputError, counted, printable
 from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
