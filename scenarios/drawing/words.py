@@ -146,3 +146,8 @@ def text(scenario: Scenario) -> str:
     for k, event in enumerate(scenario.event):
         lines += [f"  {k + 1} {event.id}  {order(event)}", f"      {trigger(event.when)}"]
     return "\n".join([*lines, "", "Sensor", *("  " + line for line in sensor(scenario)), ""])
+
+
+def cut(words: str, length: int) -> str:
+    """Returns the words, cut to a length at their end."""
+    return words if len(words) <= length else words[: length - 1] + "…"

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.drawing.plan_svg import COLOURS, _colours, svg
-from scenarios.drawing.routes import group_routes, middle, order_marks, spread
+from scenarios.drawing.plan import COLOURS, _colours, middle, order_marks, spread, svg
 from scenarios.drawing.words import number, order, text, trigger
 from scenarios.loading.resolve import load, names
 from scenarios.schema.geometry import queue_places
@@ -89,12 +88,11 @@ def test_marks_follow_the_script(path: Path) -> None:
     scenario = load(path)
     merge, split, queue = order_marks(scenario)
     assert (merge.before, merge.after) == (("a", "b"), ("ab",))
-    assert merge.arrows[0].points[-1] == (8, 6)
-    assert [arrow.points[-1] for arrow in split.arrows] == [(14, 5), (8, 8)]
+    assert merge.ways["ab"][-1] == (8, 6)
+    assert [way[-1] for way in split.ways.values()] == [(14, 5), (8, 8)]
     assert queue.before == ("w-1", "w-2", "w-3", "c")
     assert len(queue.slots) == 4  # those inside the world
     assert queue_places(scenario.event[2], 2)[1] == pytest.approx((12, 7.8))  # type: ignore[arg-type]
-    assert [c.repeat for c in group_routes(scenario)] == [1, 1, 3]
 
 
 @pytest.mark.parametrize(
@@ -128,5 +126,5 @@ def test_each_of_twelve_groups_has_the_next_of_ten_colours(tmp_path: Path) -> No
     rows = "".join(f'[[group]]\nid = "g{k}"\nstart = [1, {k + 1}]\ngoal = [9, {k + 1}]\n' for k in range(12))
     (tmp_path / "many.toml").write_text(f"schema = 1\nduration = 5\nworld.size = [20, 20]\n{rows}")
     scenario = load(tmp_path / "many.toml")
-    colour = _colours(group_routes(scenario), order_marks(scenario))
+    colour = _colours(scenario, order_marks(scenario))
     assert [colour[f"g{k}"] for k in range(12)] == [*COLOURS, COLOURS[0], COLOURS[1]]

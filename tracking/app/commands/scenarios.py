@@ -60,7 +60,7 @@ def _is_suite(name: str) -> bool:
 
 
 def _explain_scenario(scenario: Scenario, drawing: Path | None) -> CommandResult:
-    from scenarios.drawing.plan_svg import svg
+    from scenarios.drawing.plan import svg
     from scenarios.drawing.words import text
 
     words = text(scenario)
