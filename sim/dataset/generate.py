@@ -23,7 +23,7 @@ from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
 from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
 from sim.io.files.output_paths import output_path, output_paths
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import MANIFEST
+from sim.io.store.seal import MANIFEST
 from sim.io.store.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.start import WorkerOptions, start_workers

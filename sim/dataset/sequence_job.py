@@ -19,7 +19,7 @@ from scenarios.loading.toml_files import Table
 from sim.io.files.output_paths import output_path, output_paths
 from sim.io.files.own_files import is_side_file
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import MANIFEST, check_manifest, damaged_files, identity, is_own_sequence, read_manifest
+from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
 
 MOST = 3  # differences that are named; the others are counted
 LONGEST = 40  # characters of a value
@@ -101,7 +101,7 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
     if not path.exists():
         return None
     try:
-        manifest = check_manifest(path, read_manifest(job.folder))
+        manifest = read_manifest(job.folder)
     except InputError as error:
         # An invalid manifest does not tell what the folder holds.
         remedy = "delete that folder, or choose another --out"
@@ -141,7 +141,7 @@ def _word(value: Any) -> str:
 def is_stored(job: SequenceJob) -> bool:
     """Returns True if the folder holds the job's sequence, and every file has the hash of its manifest."""
     manifest = stored_manifest(job)
-    return manifest is not None and next(damaged_files(job.folder, manifest), None) is None
+    return manifest is not None and next(damaged_files(job.folder, manifest["files"]), None) is None
 
 
 def simulate_and_store(job: SequenceJob) -> None:

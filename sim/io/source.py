@@ -21,7 +21,7 @@ from sim.io.formats.box_columns import BoxScale, parse_box_scale
 from sim.io.formats.calibration import read_calibration
 from sim.io.pictures.background_sample import BackgroundChoice, parse_choice
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import is_sequence
+from sim.io.store.seal import is_sequence
 from sim.types import Camera, Sequence
 
 KINDS = "a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video"

@@ -24,7 +24,7 @@ from sim.io.files.output_paths import output_paths
 from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
-from sim.io.store.manifest import read_whole_manifest
+from sim.io.store.seal import read_whole_manifest
 from sim.io.store.streams import file_name
 from sim.types import Array, Ints, Sequence, Truth
 

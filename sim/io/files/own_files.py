@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Mapping
 from html.parser import HTMLParser
 from pathlib import Path, PurePath
 
 from scenarios.errors import InputError
 from sim.io.files import tables
-from sim.io.files.tables import Rules
 
 NAMES = frozenset({"__macosx", ".ds_store", "thumbs.db", "ehthumbs.db", "desktop.ini", "@eadir", "icon\r"})
 APPLE_DOUBLE = "._"  # beginning of the files in which macOS keeps attributes on disks that cannot store them
@@ -48,24 +48,28 @@ def marked_png(picture: bytes) -> bytes:
     return picture[:IHDR_END] + SOFTWARE + picture[IHDR_END:]
 
 
-def is_ours(path: Path, marks: Rules | None = None) -> bool | None:
+# types of the values of keys that a .json file of ours always has, and no other program writes, by key
+Marks = Mapping[str, type]
+
+
+def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
     """Returns True if flockscope wrote the file, False if not, None if it is missing or cannot be parsed.
 
-    marks: of a .json file, rules for keys that such a file of ours always has and no other program writes.
+    marks: of a .json file.
     """
     if not path.is_file():
         return None
     try:
         if path.suffix == ".json" and marks:
             found = tables.read_json(path)
-            return all(key in found and rule.accepts(found[key]) for key, rule in marks.items())
+            return all(isinstance(found.get(key), kind) for key, kind in marks.items())
         kinds = {".parquet": tables.is_own_table, ".html": _page, ".png": _picture, ".mp4": _video}
         return path.suffix in kinds and kinds[path.suffix](path)
     except (InputError, OSError, ValueError):
         return None
 
 
-def refuse_foreign_file(path: Path, marks: Rules | None = None) -> None:
+def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
     """Raises InputError if there is a file at `path` that is not ours: only our own files are replaced unasked."""
     if path.exists() and not is_ours(path, marks):
         raise InputError(

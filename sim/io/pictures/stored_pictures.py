@@ -26,8 +26,7 @@ from sim.io.pictures import video_decoding
 from sim.io.pictures.picture_folder import require_size
 from sim.io.pictures.video_encoding import VideoWriter, write_video
 from sim.io.store import streams
-from sim.io.store.manifest import REDO
-from sim.io.store.seal import file_facts
+from sim.io.store.seal import REDO, file_facts
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95

@@ -20,20 +20,10 @@ from sim.io.files import atomic, tables
 from sim.io.files.own_files import is_side_file
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.stored_pictures import NO_PICTURES, StoredPictures, WrittenPictures, write_pictures
-from sim.io.store import truth_files
+from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.group_files import read_script
-from sim.io.store.manifest import (
-    MANIFEST,
-    REDO,
-    check_manifest,
-    damaged_files,
-    identity,
-    is_own_sequence,
-    read_manifest,
-    with_hash,
-)
-from sim.io.store.seal import file_facts
+from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
 from sim.io.store.streams import check_streams, file_name
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
 from sim.versions import versions
@@ -117,8 +107,8 @@ def sequence_files(
         files |= truth_files.detection_files(found, sequence.fps, sequence.scene)
     files = dict(sorted(files.items()))
     manifest = _manifest(sequence, found, len(frames), scenario, seed, repeat, pictures)
-    listed = dict(sorted((file_facts(files) | pictures.files).items()))
-    return {**files, MANIFEST: tables.json_document(with_hash({**manifest, "files": listed}))}
+    listed = dict(sorted((seal.file_facts(files) | pictures.files).items()))
+    return {**files, MANIFEST: tables.json_document(seal.with_hash({**manifest, "files": listed}))}
 
 
 def _manifest(
@@ -132,7 +122,7 @@ def _manifest(
 ) -> dict[str, Any]:
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
     return {
-        **identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
+        **seal.identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
         **{key: sequence.source[key] for key in ("origin", "stride") if key in sequence.source},
         "pixels": pictures.pixels,
         "truth_hash": truth,
@@ -169,8 +159,8 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     background: frames for background models, in place of the stored empty ones. Pictures are checked when they are
     read.
     """
-    manifest = check_manifest(folder / MANIFEST, read_manifest(folder))
-    for error in damaged_files(folder, manifest, pictures=False):
+    manifest = read_manifest(folder)
+    for error in seal.damaged_files(folder, manifest["files"], size_only=seal.pictures_of(manifest)):
         raise error
     about, has, pictures = manifest["sequence"], manifest["files"].keys(), StoredPictures(folder, manifest)
     size, length, fps = about["image_size"], about["length"], about["fps"]

@@ -15,7 +15,7 @@ from sim.hashing import file_hash
 from sim.io.files.atomic import lock_folder
 from sim.io.source import open_source
 from sim.io.store import seal
-from sim.io.store.run_seal import read_run
+from sim.io.store.seal import read_run
 from sim.io.store.validate import validate
 from tests.refusals import refused
 from tests.sealing import seal_again
@@ -232,7 +232,7 @@ def test_a_sealed_fault_is_named_with_its_frame(made, tracks, tmp_path, capsys, 
     info = json.loads((folder / "run.json").read_text())
     wrong = [t.replace(pos=t.pos * (np.nan if t.index == 7 else 1.0)) for t in read_tracks(folder)]
     with monkeypatch.context() as patch:
-        patch.setattr("sim.io.store.track_tables.RunRows.reject_faults", lambda *_: None)
+        patch.setattr("sim.io.store.track_files.RunRows.reject_faults", lambda *_: None)
         write_tracks(folder, wrong, fps=5.0, info=info)
     seal_again(folder)
     assert "tracks.parquet: frame 7, id " in refused(capsys, "score", made / "data", tracks)

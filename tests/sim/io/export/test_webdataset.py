@@ -20,7 +20,7 @@ from sim.io.export.webdataset import read_item, size_of, webdataset
 from sim.io.files import atomic, tables
 from sim.io.source import open_source, sequence_folders
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import read_manifest, with_hash
+from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
 
 Sample = dict[str, bytes]

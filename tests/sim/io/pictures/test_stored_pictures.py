@@ -12,7 +12,7 @@ from sim.io.files import atomic
 from sim.io.files.tables import read_table
 from sim.io.source import open_source
 from sim.io.store import sequence_folder, streams
-from sim.io.store.manifest import with_hash
+from sim.io.store.seal import with_hash
 from sim.io.store.validate import validate
 from sim.types import PixelTruth
 

@@ -8,8 +8,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.files.tables import json_document
-from sim.io.store.run_seal import read_run
-from sim.io.store.seal import with_hash
+from sim.io.store.seal import read_run, with_hash
 from sim.io.store.track_files import tracks_files, write_tracks
 from tracking.app.stored_tracks import find_tracks
 
