@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, is_number
+from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
 from sim.io.files.numeric_text import read_number, read_text
-from sim.io.files.own_files import is_hidden
 from sim.io.formats import mot_text
 from sim.io.formats.box_columns import BoxScale, size_doubt
 from sim.io.formats.calibration import scaled_to_image
@@ -74,47 +73,16 @@ def read_seqinfo(path: Path) -> SeqInfo:
     )
 
 
-def frame_rate(given: float | None, found: float | None, path: Path | None = None) -> float:
+def frame_rate(given: float | None, found: float | None) -> float:
     """Returns the frames per second: `given` (--fps), else `found` in the recording, else 25 with a warning."""
     if given is not None:
-        low, high = FRAME_RATES
-        if not is_number(given, low, high):
-            expected = f"a number from {low:g} to {high:g}"
-            raise InputError(place="fps", got=given, expected=expected, remedy="correct --fps")
         return given
     if found is None:
-        video = None if path is None else _video_beside(path)
         # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
-        # A video beside the text tells which rate is right.
-        if video is not None and video[1] != DEFAULT_FPS:
-            text = f"{path}: without a frame rate; taken at {DEFAULT_FPS:g} fps, but {video[0].name} beside it has "
-            text += f"{video[1]:g}: give --fps {video[1]:g}"
         warnings.warn(text, stacklevel=3)
         return DEFAULT_FPS
     return found
-
-
-def _is_video(path: Path) -> bool:
-    from sim.io.formats import video
-
-    return path.suffix.lower() in video.SUFFIXES and not is_hidden(path) and path.is_file()
-
-
-def _video_beside(path: Path) -> tuple[Path, float] | None:
-    from sim.io.formats import video
-
-    around = [path.parent, path] if path.is_dir() else [path.parent]
-    found = [p for folder in around for p in sorted(folder.iterdir()) if _is_video(p)]
-    own = [p for p in found if p.stem == path.stem or p.parent == path] or (found if not path.is_dir() else [])
-    if len(own) != 1:
-        return None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return own[0], float(f"{video.open_video(own[0]).fps:.5g}")
-    except InputError:
-        return None
 
 
 def open_folder(
@@ -135,7 +103,7 @@ def open_folder(
     """
     ini = path / "seqinfo.ini"
     info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
-    rate = frame_rate(fps, info.fps, path)
+    rate = frame_rate(fps, info.fps)
     scale = float("nan") if px_per_m is None else px_per_m
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found = mot_text.read_detections(det, info.length, person_class, box_scale) if is_present(det) else None
@@ -238,7 +206,7 @@ def open_text(
 
     Options as of `open_source`. The camera is not scaled.
     """
-    rate = frame_rate(fps, None, path)
+    rate = frame_rate(fps, None)
     scale = float("nan") if px_per_m is None else px_per_m
     table = read_table(path, boxless=True)
     if not len(table.frame):

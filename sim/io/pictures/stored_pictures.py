@@ -72,7 +72,7 @@ class StreamWriter:
             return
         name = streams.file_name(self.stream, self.images, self.pixels.count)
         body = encoded(picture, streams.suffix(self.stream, self.images))
-        atomic.write_unsynced(self.folder / name, body)
+        atomic.write_inside(self.folder / name, body)
         self.files |= file_facts({name: body})
 
     def __enter__(self) -> StreamWriter:
@@ -119,7 +119,7 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
     files = {name: facts for output in outputs.values() for name, facts in output.files.items()}
     if known and sequence.truth is not None:
         body = pixel_table(sequence.truth, known)
-        atomic.write_unsynced(folder / TABLE, body)
+        atomic.write_inside(folder / TABLE, body)
         files |= file_facts({TABLE: body})
     pixels = {name: output.pixels.hex() for name, output in outputs.items()}
     return WrittenPictures(wanted, streams.coding(wanted, images), pixels, files)

@@ -66,7 +66,7 @@ def write_sequence(
         pictures = write_pictures(partial, sequence, wanted, images)
         files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
         for name, body in files.items():
-            atomic.write_unsynced(partial / name, body)
+            atomic.write_inside(partial / name, body)
         names |= {*files, *pictures.files}
     return folder
 

@@ -46,20 +46,20 @@ from sim.workers.start import WorkerOptions
 if __name__ == "__main__":
     out, workers, kill_after = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     count = 0
-    fsync = os.fsync
+    write = atomic.write_inside
 
-    def die(descriptor):
+    def die(path, body):
         global count
         count += 1
         if count == kill_after:
             os.kill(os.getpid(), signal.SIGKILL)
-        fsync(descriptor)
+        write(path, body)
 
     def parent_dies(done, total, name):
         if kill_after == -1:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    atomic.os.fsync = die
+    atomic.write_inside = die
     scenario = Scenario.model_validate({"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}]})
     entries = [Entry("x", scenario, 0), Entry("y-1", scenario, 1)]
     generate(entries, range(3), out, workers=WorkerOptions(workers), progress=parent_dies, streams=())
@@ -215,7 +215,7 @@ def test_a_disk_that_takes_no_more_ends_all_at_once(tmp_path, simulate, monkeypa
     """The first sequence fits, the second in part; nobody tries the third. With room again, all is as ever."""
     generate([Entry("x", scenario())], range(3), tmp_path / "right")
     room = 1.5 * sum(len(body) for name, body in content(tmp_path / "right").items() if "x-s00000" in name)
-    write = atomic.write_unsynced
+    write = atomic.write_inside
     simulate.asked.clear()
 
     def write_while_there_is_room(path, body):
@@ -226,7 +226,7 @@ def test_a_disk_that_takes_no_more_ends_all_at_once(tmp_path, simulate, monkeypa
             raise OSError(number, os.strerror(number))
         write(path, body)
 
-    monkeypatch.setattr(atomic, "write_unsynced", write_while_there_is_room)
+    monkeypatch.setattr(atomic, "write_inside", write_while_there_is_room)
     with pytest.raises(InputError if number == errno.EACCES else WorkError) as caught:
         generate([Entry("x", scenario())], range(3), tmp_path / "out")
     assert os.strerror(number) in str(caught.value)

@@ -66,7 +66,7 @@ def test_of_two_who_make_it_at_once_the_first_counts(
     job: SequenceJob, made: FakeSimulator, monkeypatch: pytest.MonkeyPatch, late: bool
 ) -> None:
     """A worker that was thought dead ends first: before ours looks, or between looking and renaming."""
-    real, name = (os.rename, "rename") if late else (atomic._sync_tree, "_sync_tree")
+    real, name = (os.rename, "rename") if late else (atomic.write_inside, "write_inside")
 
     def first_the_other(*args: Any) -> None:
         monkeypatch.setattr(os if late else atomic, name, real)
@@ -80,7 +80,7 @@ def test_of_two_who_make_it_at_once_the_first_counts(
     assert made.made == [1, 1]
     whole = {k: v for k, v in others.items() if not k.startswith(atomic.PARTIAL)}
     assert content(job) == whole
-    assert len(others) == 2 * len(whole)
+    assert len(others) == (1 + late) * len(whole)
 
 
 def test_who_does_not_see_the_mark_writes_nothing(
@@ -103,7 +103,7 @@ def test_a_machine_that_cannot_write_is_named(
     def refuse(path: Path, body: bytes) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(atomic, "write_unsynced", refuse)
+    monkeypatch.setattr(atomic, "write_inside", refuse)
     monkeypatch.setattr(jobs.socket, "gethostname", lambda: "node7")
     (tmp_path / "mark").write_text("")
     outcome = run_job(SequenceJob(job.folder, job.entry, job.seed, marker=tmp_path / "mark"))

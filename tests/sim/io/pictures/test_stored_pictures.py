@@ -233,7 +233,7 @@ def test_a_renderer_that_fails_leaves_nothing(tmp_path, make_pictured, images):
 
 
 def test_a_full_disk_in_the_middle_of_the_pictures(tmp_path, make_pictured, monkeypatch):
-    put, count = atomic.write_unsynced, 0
+    put, count = atomic.write_inside, 0
 
     def full(path, body):
         nonlocal count
@@ -242,7 +242,7 @@ def test_a_full_disk_in_the_middle_of_the_pictures(tmp_path, make_pictured, monk
             raise OSError(28, "No space left on device")
         put(path, body)
 
-    monkeypatch.setattr(atomic, "write_unsynced", full)
+    monkeypatch.setattr(atomic, "write_inside", full)
     with pytest.raises(WorkError, match="No space left"):
         stored(tmp_path / "a", make_pictured(3, ALL))
     assert list(tmp_path.iterdir()) == []
