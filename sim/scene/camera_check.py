@@ -5,6 +5,8 @@ Calibrations of users, stored cameras and cameras of scenarios pass through the 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from scenarios.errors import InputError
@@ -31,72 +33,38 @@ def require_camera(camera: Camera, file: object = "", place: str = "") -> Camera
     return camera
 
 
-def _facts(camera: Camera) -> list[tuple[str, bool, str, str]]:
-    found: list[tuple[str, bool, str, str]] = []
-    for check in (_image, _lens, _rotation, _position, _scale, _ground):
-        fact = check(camera)
-        found.append(fact)
-        if not fact[1]:
-            break
-    return found
-
-
-def _image(camera: Camera) -> tuple[str, bool, str, str]:
-    w, h = camera.image
-    return "image", fits_picture(w, h), f"{w}×{h} px", PICTURE_SIZES
-
-
-def _lens(camera: Camera) -> tuple[str, bool, str, str]:
-    if camera.kind == "top":
-        return "focal_px", True, "", ""
-    size, focal, centre = np.array(camera.image), np.array(camera.focal_px), np.array(camera.centre_px)
-    got = (
-        f"focal_px {list(camera.focal_px)}, centre_px {list(camera.centre_px)} for {camera.image[0]}×{camera.image[1]}"
-    )
-    low, high = FOCAL[0] * size.max(), FOCAL[1] * size.max()
-    if not ((focal >= low) & (focal <= high)).all() or focal.max() > ASPECT * focal.min():
-        return "focal_px", False, got, f"two like focal lengths from {low:g} to {high:g} px"
-    if not ((centre >= -CENTRE * size) & (centre <= (1 + CENTRE) * size)).all():
-        return "centre_px", False, got, "an image centre near the image"
-    corner = np.square(np.maximum(np.abs(centre), np.abs(size - centre)) / focal)
-    bend = camera.radial * float(corner.sum())
-    expected = f"from {FOLD:.2f} to {BULGE:g} at the corner"
-    return "radial", FOLD < bend <= BULGE, f"a lens with radial r² = {bend:.3g} at the image's corner", expected
-
-
-def _rotation(camera: Camera) -> tuple[str, bool, str, str]:
-    r = camera.rotation
+def _facts(camera: Camera) -> Iterator[tuple[str, bool, str, str]]:
+    """Yields (field, whether it is right, what was found, what was expected); each supposes that those before hold."""
+    (w, h), p, r = camera.image, camera.position, camera.rotation
+    yield "image", fits_picture(w, h), f"{w}×{h} px", PICTURE_SIZES
+    if camera.kind == "pinhole":
+        yield from _lens(camera)
     with np.errstate(over="ignore", invalid="ignore"):
         off = float(np.abs(product(r, r.T) - np.eye(3)).max())
-        turn = float(dot(r[0], np.cross(r[1], r[2]))) if off <= ROTATION_TOLERANCE else np.nan
-    if not off <= ROTATION_TOLERANCE:
-        got = f"rows that are no unit vectors at right angles (off by {off:.2g})"
-        return "rotation", False, got, "a rotation matrix, world to camera"
-    return "rotation", turn > 0, "a mirrored rotation (determinant -1)", "determinant +1: x right, y down, z forward"
-
-
-def _position(camera: Camera) -> tuple[str, bool, str, str]:
-    p = camera.position
-    if not (np.abs(p) <= COORDINATE).all():
-        return "position", False, str(p.tolist()), f"coordinates within {COORDINATE:g} m"
-    return "position", p[2] > 0, f"a camera at height {p[2]:g} m", "above the ground, z = 0 (in m)"
-
-
-def _scale(camera: Camera) -> tuple[str, bool, str, str]:
-    if camera.kind == "top" and not camera.rotation[2, 2] <= -DOWN:
-        return "rotation", False, "a camera of kind top that does not look down", "one that looks straight down"
+    got = f"rows that are no unit vectors at right angles (off by {off:.2g})"
+    yield "rotation", off <= ROTATION_TOLERANCE, got, "a rotation matrix, world to camera"
+    turn, expected = float(dot(r[0], np.cross(r[1], r[2]))), "determinant +1: x right, y down, z forward"
+    yield "rotation", turn > 0, "a mirrored rotation (determinant -1)", expected
+    yield "position", bool((np.abs(p) <= COORDINATE).all()), str(p.tolist()), f"coordinates within {COORDINATE:g} m"
+    yield "position", bool(p[2] > 0), f"a camera at height {p[2]:g} m", "above the ground, z = 0 (in m)"
+    down = camera.kind == "pinhole" or bool(r[2, 2] <= -DOWN)
+    yield "rotation", down, "a camera of kind top that does not look down", "one that looks straight down"
     scale = px_per_m_at_centre(camera)
-    good = is_number(scale, *SCALES) or (camera.kind == "pinhole" and np.isnan(scale))
-    return "px_per_m", bool(good), f"{scale:g} px per m in the image centre", f"from {SCALES[0]:g} to {SCALES[1]:g}"
-
-
-def _ground(camera: Camera) -> tuple[str, bool, str, str]:
-    w, h = camera.image
+    good = is_number(scale, *SCALES) or (camera.kind == "pinhole" and bool(np.isnan(scale)))
+    yield "px_per_m", good, f"{scale:g} px per m in the image centre", f"from {SCALES[0]:g} to {SCALES[1]:g}"
     u, v = (a.ravel() for a in np.meshgrid([0.0, w / 2, w], np.linspace(h / 2, h, 5)))
-    ground = to_ground(camera, np.concatenate([np.c_[u, v], [camera.centre_px]]))
-    return (
-        "rotation",
-        bool(shows_ground(camera, ground).any()),
-        "an image without ground in its lower half",
-        "a camera that sees the ground",
-    )
+    seen = shows_ground(camera, to_ground(camera, np.concatenate([np.c_[u, v], [camera.centre_px]])))
+    yield "rotation", bool(seen.any()), "an image without ground in its lower half", "a camera that sees the ground"
+
+
+def _lens(camera: Camera) -> Iterator[tuple[str, bool, str, str]]:
+    size, focal, centre = np.array(camera.image), np.array(camera.focal_px), np.array(camera.centre_px)
+    (w, h), low, high = camera.image, FOCAL[0] * size.max(), FOCAL[1] * size.max()
+    got = f"focal_px {list(camera.focal_px)}, centre_px {list(camera.centre_px)} for {w}×{h}"
+    alike = ((focal >= low) & (focal <= high)).all() and focal.max() <= ASPECT * focal.min()
+    yield "focal_px", bool(alike), got, f"two like focal lengths from {low:g} to {high:g} px"
+    near = ((centre >= -CENTRE * size) & (centre <= (1 + CENTRE) * size)).all()
+    yield "centre_px", bool(near), got, "an image centre near the image"
+    bend = camera.radial * float(np.square(np.maximum(np.abs(centre), np.abs(size - centre)) / focal).sum())
+    got, expected = f"a lens with radial r² = {bend:.3g} at the image's corner", f"from {FOLD:.2f} to {BULGE:g} there"
+    yield "radial", FOLD < bend <= BULGE, got, expected
