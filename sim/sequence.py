@@ -12,26 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.clock import check_stride, every_nth
-from sim.io.store.streams import check_streams
 from sim.render.renderer import RenderedFrame, Renderer, make_renderer
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
+from sim.streams import check_streams
 from sim.truth.label import bodies, label
 from sim.truth.order_fulfilment import check_orders
-from sim.types import (
-    BACKGROUNDS,
-    OWN_BACKGROUND,
-    Camera,
-    Detections,
-    Frame,
-    Image,
-    Motion,
-    Order,
-    PixelTruth,
-    Scene,
-    Sequence,
-    Truth,
-)
+from sim.types import BACKGROUNDS, OWN_BACKGROUND, Camera, Detections, Frame, Image, Motion, PixelTruth, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import ObservationSpec, Scenario
@@ -91,6 +78,7 @@ def observe(
         if people is not None:
             return people
         from scenarios.schema import scenario as schema
+        from sim.crowd.population import named_people
 
         assert isinstance(scenario, schema.Scenario), "only a scenario names groups: give people"
         return named_people(scenario, motion.scene, motion.seed, motion.repeat, motion.orders)
@@ -155,23 +143,3 @@ def _renderer(
     if not streams.isdisjoint({"right", "disparity"}):
         made.check_pair()
     return made
-
-
-def named_people(
-    scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
-) -> dict[str, tuple[int, ...]]:
-    """Returns the person ids of each group that the script names, also those that its orders made."""
-    from sim.crowd.population import draw_population
-
-    parties = draw_population(scenario, scene, seed, repeat)
-    names = {party.name: tuple(m.column + 1 for m in party.members) for party in parties}
-    after = {order.id: order.after for order in orders if order.fired is not None}
-    for event in scenario.event:
-        made = after.get(event.id)
-        if made is None:
-            continue
-        if event.type == "merge":
-            names[event.into] = made[0]
-        elif event.type == "split":
-            names |= {part.id: ids for part, ids in zip(event.parts, made, strict=True)}
-    return names

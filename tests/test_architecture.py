@@ -138,7 +138,7 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
 
 
 def test_one_function_makes_paths_of_names():
-    """Names of sequences are labels; `sim.io.files.output_paths` alone turns one into a part of a path."""
+    """Names of sequences are labels; `sim.io.files.own_files` alone turns one into a part of a path."""
     paths_of_paths = {"sim.io.files.atomic", "sim.io.store.validate"}  # target.name, split.name: of a Path
     found = [
         f"{name}, line {node.lineno}: {ast.unparse(node)}"

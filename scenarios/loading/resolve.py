@@ -23,7 +23,7 @@ from pydantic import Field
 
 from scenarios.errors import InputError
 from scenarios.limits import REPEATS
-from scenarios.loading import overrides, toml_files
+from scenarios.loading import toml_files
 from scenarios.loading.checks import check
 from scenarios.loading.toml_files import SUITES, Table, did_you_mean, dump, names, parse, suite_names, toml_value
 from scenarios.loading.validation import validate
@@ -114,7 +114,7 @@ def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) ->
             file=path, got="no such file", expected="a TOML file with [camera]", remedy="check --camera"
         )  # fmt: skip
     file = Path(path) if path is not None else ""
-    table, places = overrides.apply_settings({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
+    table, places = toml_files.apply_settings({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
     return validate(table, file, places, model=ObservationSpec)
 
 
@@ -204,7 +204,7 @@ def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
 
 
 def _build(path: Path, settings: tuple[str, ...]) -> Scenario:
-    table, places = overrides.apply_settings(toml_files.read(path), settings, path)
+    table, places = toml_files.apply_settings(toml_files.read(path), settings, path)
     scenario = validate(table, path, places, model=Scenario)
     check(scenario, path)
     return scenario

@@ -12,8 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, is_number
-from scenarios.loading.overrides import KeyPath, place_of
-from scenarios.loading.toml_files import Table, did_you_mean
+from scenarios.loading.toml_files import KeyPath, Table, did_you_mean, place_of
 
 # words for what pydantic expects, by its kind of error
 EXPECTED = {

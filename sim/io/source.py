@@ -17,8 +17,8 @@ from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
 from sim.io.files.own_files import is_hidden
 from sim.io.formats import biwi, caviar, mot_folder, video
-from sim.io.formats.box_columns import BoxScale, parse_box_scale
 from sim.io.formats.calibration import read_calibration
+from sim.io.formats.mot_table import BoxScale, parse_box_scale
 from sim.io.pictures.background_sample import BackgroundChoice, parse_choice
 from sim.io.store import sequence_folder
 from sim.io.store.seal import is_sequence

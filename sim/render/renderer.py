@@ -1,6 +1,6 @@
 """Images and pixel truth of a Motion; each a pure function of the frame's index, drawn when asked for.
 
-A frame starts from the empty scene (`sim.render.background`). Wind moves its plants, shadows darken it, and people are
+A frame starts from the empty scene (`sim.render.camera_view`). Wind moves its plants, shadows darken it, and people are
 drawn over it by depth. The result is blurred, multiplied by the brightness of the moment, given noise and, if the
 scenario wants it, compressed as JPEG. The people of up to 16 consecutive frames are computed at once, which is faster.
 """
@@ -17,15 +17,24 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim.render.camera_view import NODE_STEP, CameraView, blur_weights, noise_offsets, noise_pool
 from sim.render.canvas import UNIT, FrameCanvas
-from sim.render.people import DrawnPeople, ProjectedPeople, clothing_atlas, people_of_frames, project_people, take_rows
+from sim.render.people import (
+    DrawnPeople,
+    PeopleShadows,
+    ProjectedPeople,
+    clothing_atlas,
+    people_of_frames,
+    people_shadows,
+    project_people,
+    sunlit_shares,
+    take_rows,
+)
 from sim.render.pixel_truth import empty_scene_disparities, frame_disparities, pixel_truth
-from sim.render.shadows import PeopleShadows, people_shadows, sunlit_shares
 from sim.render.weather import Foliage, Illumination, draw_illumination, grow_plants
 from sim.scene import camera as cameras
 from sim.types import BACKGROUNDS, Array, Camera, Image, Motion, PixelTruth
 
 if TYPE_CHECKING:
-    from scenarios.schema.picture import Light, Picture
+    from scenarios.schema.scenario import Light, Picture
 
 
 FRAMES = 16  # frames of a batch
@@ -283,6 +292,6 @@ def make_renderer(
     Raises:
         InputError: The lens distorts.
     """
-    from scenarios.schema.picture import Light, Picture
+    from scenarios.schema.scenario import Light, Picture
 
     return Renderer(motion, camera, light or Light(), picture or Picture())

@@ -2,7 +2,7 @@
 
 The scheduler is given bytes only, so it needs none of our code. A worker refuses an item unless it has the same
 versions and sources as this process, because its results could differ in their bytes otherwise
-(sim.versions.runtime). If a worker dies, the scheduler gives its item to another worker.
+(sim.hashing.runtime). If a worker dies, the scheduler gives its item to another worker.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from itertools import islice
 from typing import Any
 
 from scenarios.errors import InputError, WorkError
-from sim.versions import runtime
+from sim.hashing import runtime
 from sim.workers.pool import THREAD_VARIABLES, R, RunItems, T, WorkResult, run_pickled, worker_loss
 
 ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]+/?"

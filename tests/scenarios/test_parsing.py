@@ -3,8 +3,7 @@
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading.overrides import parse_setting, parse_value
-from scenarios.loading.toml_files import parse
+from scenarios.loading.toml_files import parse, parse_setting, parse_value
 from sim.io.files.tables import read_json
 from tracking.papers.blob.config import BlobConfig
 

@@ -64,7 +64,7 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
     from scenarios.loading.resolve import SensorFile
     from scenarios.loading.validation import input_error
     from sim.detector.sense import sense
-    from sim.scene.boxes import with_visibility
+    from sim.scene.visibility import with_visibility
 
     table = {"sensor": _PERFECT_SENSOR | _SEES_ALL | _nested(sensor)}
     try:

@@ -28,7 +28,7 @@ from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
 from sim.io.store.seal import MANIFEST, read_manifest, read_whole_manifest
 from sim.io.store.sequence_folder import open_sequence
-from sim.io.store.streams import file_name
+from sim.streams import file_name
 from sim.types import Array, Detections, FrameTruth, Groups
 
 # streams with one picture per frame; a frame's sample holds those of them that are stored

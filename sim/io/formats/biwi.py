@@ -20,7 +20,7 @@ from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, crowded, read_number, read_numbers, read_text
-from sim.io.formats.group_labels import labelled_truth_fields, require_size
+from sim.io.formats.labels import labelled_truth_fields, require_size
 from sim.types import Frame, Ints, Sequence, Truth
 
 FPS = 2.5

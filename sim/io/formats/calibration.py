@@ -26,7 +26,7 @@ from scenarios.limits import COORDINATE, XML_BYTES
 from scenarios.reading import require_regular
 from sim.io.files.numeric_text import read_number, read_text
 from sim.io.store.camera_files import read_camera
-from sim.scene.camera_check import require_camera
+from sim.scene.camera import require_camera
 from sim.types import Array, Camera
 
 MM = 1000.0  # per m

@@ -23,9 +23,8 @@ from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
 from scenarios.reading import read_regular
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import read_number, whole_number
-from sim.io.formats.group_labels import labelled_truth_fields, require_size
-from sim.io.formats.velocity import differentiate
-from sim.scene.boxes import scale_of_all_boxes, scale_of_first_boxes
+from sim.io.formats.labels import differentiate, labelled_truth_fields, require_size
+from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Frame, Ints, Sequence, Truth
 

@@ -18,9 +18,8 @@ from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
 from sim.io.files.numeric_text import read_number, read_text
 from sim.io.formats import mot_text
-from sim.io.formats.box_columns import BoxScale, size_doubt
 from sim.io.formats.calibration import scaled_to_image
-from sim.io.formats.mot_table import read_table
+from sim.io.formats.mot_table import BoxScale, read_table, size_doubt
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
 from sim.types import Camera, Frame, Image, Ints, Sequence, Truth

@@ -15,7 +15,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.calibration import scaled_to_image
-from sim.io.pictures import video_decoding
+from sim.io.pictures import video_files
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import fill_gaps, require_size, size_of
 from sim.types import Array, Bools, Camera, Frame, Image, Sequence
@@ -43,19 +43,19 @@ def open_video(
 
     A frame that cannot be decoded has no picture, with a warning. Times are those of the file if the rate varies.
     """
-    index = video_decoding.index_packets(path)
+    index = video_files.index_packets(path)
     length = len(index.stamps)
-    first = next((picture for _, picture in video_decoding.decode_frames(path, index)), None)
+    first = next((picture for _, picture in video_files.decode_frames(path, index)), None)
     if first is None:
         got = f"{length} frames, none of which can be decoded" if length else "no frame"
-        raise InputError(file=path, got=got, expected="a video with pictures", remedy=video_decoding.REMEDY)
+        raise InputError(file=path, got=got, expected="a video with pictures", remedy=video_files.REMEDY)
     for words in missing(index):
         warnings.warn(f"{path.name}: {words}", stacklevel=2)
     if index.aspect != 1:
         words = f"pixels of shape {index.aspect.numerator}:{index.aspect.denominator} are made square"
         warnings.warn(f"{path.name}: {words}: pictures of {size_of(first)[0]}×{size_of(first)[1]} px", stacklevel=2)
     # Some packets of VP8 are not shown, so the length is unknown.
-    size, known = size_of(first), None if index.codec in video_decoding.HIDDEN else length
+    size, known = size_of(first), None if index.codec in video_files.HIDDEN else length
     rate, words = frame_rate(path.name, fps, index)
     choice = background.of(length, path, size)
     times = None if fps is not None or index.ranks() is None or is_steady(index.times()) else index.times()
@@ -77,7 +77,7 @@ def open_video(
     )  # fmt: skip
 
 
-def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
+def missing(index: video_files.PacketIndex) -> Iterator[str]:
     """Yields a text for each part of a video that is missing: its end, or a gap in time."""
     times, length = index.times(), len(index.stamps)
     step = np.diff(times)
@@ -95,7 +95,7 @@ def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
         yield f"nothing for {step[gaps[0] - 1]:.1f} s after frame {gaps[0]}{more}; frames are numbered without the gap"
 
 
-def frame_rate(name: str, given: float | None, index: video_decoding.PacketIndex) -> tuple[float, str]:
+def frame_rate(name: str, given: float | None, index: video_files.PacketIndex) -> tuple[float, str]:
     """Returns (frames per second, text that says where they come from), with a warning if they are a guess."""
     if given is not None:
         return given, f"{given:g}, as given"
@@ -130,7 +130,7 @@ def is_steady(times: Array) -> bool:
     return bool(np.abs(off).max() <= (times[-1] - times[0]) / (len(times) - 1) / 2)
 
 
-def stamped_rate(index: video_decoding.PacketIndex) -> float:
+def stamped_rate(index: video_files.PacketIndex) -> float:
     """Returns the frames per second by the packets' time stamps, without gaps; 0 with fewer than two stamps."""
     step = np.diff(index.times())
     step = step[~_is_gap(step)]
@@ -138,9 +138,9 @@ def stamped_rate(index: video_decoding.PacketIndex) -> float:
 
 
 def _pictures(
-    path: Path, index: video_decoding.PacketIndex, size: tuple[int, int], wanted: list[int] | None = None
+    path: Path, index: video_files.PacketIndex, size: tuple[int, int], wanted: list[int] | None = None
 ) -> Iterator[tuple[int, Image]]:
     return (
         (k, require_size(picture, size, path, f"frame {k}"))
-        for k, picture in video_decoding.decode_frames(path, index, wanted)
+        for k, picture in video_files.decode_frames(path, index, wanted)
     )

@@ -19,13 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
-from sim import hashing
+from sim import hashing, streams
 from sim.io.files import atomic
 from sim.io.files.tables import Column, StoredTable, read_table, table_bytes
-from sim.io.pictures import video_decoding
+from sim.io.pictures import video_files
 from sim.io.pictures.picture_folder import require_size
-from sim.io.pictures.video_encoding import VideoWriter, write_video
-from sim.io.store import streams
+from sim.io.pictures.video_files import VideoWriter, write_video
 from sim.io.store.seal import REDO, file_facts
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
@@ -243,7 +242,7 @@ class StoredPictures:
         self.body(name)
         path, found = self.folder / name, 0
         for found, (_, picture) in enumerate(
-            video_decoding.decode_frames(path, video_decoding.index_packets(path), wanted), 1
+            video_files.decode_frames(path, video_files.index_packets(path), wanted), 1
         ):
             yield require_size(picture, self.size, path, f"frame {found}")
         if found != (count if wanted is None else len(wanted)):

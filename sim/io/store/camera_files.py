@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from scenarios.errors import InputError
 from sim.io.files import tables
 from sim.io.files.tables import Number, Pair, Triple, validated
-from sim.scene.camera_check import require_camera
+from sim.scene.camera import require_camera
 from sim.types import Camera, Scene, Stairs
 
 Pixels = Annotated[float, Field(strict=True, multiple_of=1)]

@@ -124,7 +124,7 @@ class _Order(BaseModel):
 
 
 class _Orders(BaseModel):
-    orders: list[_Order] = []
+    orders: tuple[_Order, ...] = ()
 
 
 def read_script(path: Path) -> tuple[Order, ...]:

@@ -20,7 +20,7 @@ from sim import hashing
 from sim.io.files import tables
 from sim.io.files.own_files import Marks, is_ours
 from sim.io.files.tables import Count, FrameNumber, Id, Rate, Scale, validated
-from sim.io.store.streams import IMAGES, STREAMS, check_streams, coding, file_name, is_picture
+from sim.streams import IMAGES, STREAMS, check_streams, coding, file_name, is_picture
 from sim.types import BACKGROUNDS, Sequence
 
 MANIFEST, RUN = "manifest.json", "run.json"
@@ -85,7 +85,7 @@ class _Manifest(_Sealed):
     truth_hash: str
     content_hash: str
     scenario_hash: str
-    streams: list[Literal[STREAMS]] = []  # type: ignore[valid-type]
+    streams: tuple[Literal[STREAMS], ...] = ()  # type: ignore[valid-type]
     images: Literal[IMAGES] | None = None  # type: ignore[valid-type]
     stride: FrameNumber = 1
 

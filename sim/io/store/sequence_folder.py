@@ -16,6 +16,7 @@ import numpy as np
 
 from scenarios.errors import InputError, printable
 from sim import hashing
+from sim.hashing import versions
 from sim.io.files import atomic, tables
 from sim.io.files.own_files import is_side_file
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
@@ -24,9 +25,8 @@ from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.group_files import read_script
 from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
-from sim.io.store.streams import check_streams, file_name
+from sim.streams import check_streams, file_name
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
-from sim.versions import versions
 
 
 def write_sequence(
@@ -235,7 +235,7 @@ def _background(
 def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:
     # Computed again from the stored scenario, scene and script.
     from scenarios import load
-    from sim.sequence import named_people
+    from sim.crowd.population import named_people
 
     scene, orders = read_scene(folder / "scene.json"), read_script(folder / "gt" / "script.json")
     return named_people(load(folder / "scenario.toml"), scene, manifest["seed"], manifest["repeat"], orders)

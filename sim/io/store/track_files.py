@@ -24,11 +24,16 @@ from sim.arrays import repeated_ids
 from sim.io.files import tables
 from sim.io.files.atomic import hold_lock, replace_sealed
 from sim.io.files.tables import Column, Count, Rate, table_bytes
-from sim.io.formats.box_columns import BoxScale, require_pixels
-from sim.io.formats.mot_people import ground_positions, of_class, require_metres
-from sim.io.formats.mot_table import MotTable, read_table
-from sim.io.formats.mot_text import ground_cells, reject_duplicate_ids, unit_scores
-from sim.io.formats.velocity import chords
+from sim.io.formats.labels import chords
+from sim.io.formats.mot_table import BoxScale, MotTable, read_table, require_pixels
+from sim.io.formats.mot_text import (
+    ground_cells,
+    ground_positions,
+    of_class,
+    reject_duplicate_ids,
+    require_metres,
+    unit_scores,
+)
 from sim.io.store import group_files
 from sim.io.store.group_files import AXES
 from sim.io.store.seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run

@@ -18,8 +18,8 @@ from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
 from sim.io.store import seal, truth_files
 from sim.io.store.seal import is_run, read_run, run_problems
-from sim.io.store.streams import suffix
 from sim.io.store.track_files import read_tracks
+from sim.streams import suffix
 from sim.types import BACKGROUNDS
 
 

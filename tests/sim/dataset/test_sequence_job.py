@@ -12,7 +12,7 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
 from sim.dataset import sequence_job as jobs
-from sim.dataset.sequence_job import (
+from sim.dataset.generate import (
     JobOutcome,
     SequenceJob,
     is_stored,

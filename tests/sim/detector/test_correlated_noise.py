@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from scenarios.schema.sensor import Memory
-from sim.detector.correlated_noise import correlated_normals
+from sim.detector.draws import correlated_normals
 
 
 def drawn(memory: list[Memory], frames: int = 4000, first: int = 1, id: int = 1) -> np.ndarray:

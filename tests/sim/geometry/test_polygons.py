@@ -1,12 +1,14 @@
 import numpy as np
 import pytest
 
-from sim.geometry.footprints import FOOTPRINT, footprint_hull, footprint_hulls
 from sim.geometry.polygons import (
+    FOOTPRINT,
     area,
     contains,
     convex_hull,
     edge_distance_pairs,
+    footprint_hull,
+    footprint_hulls,
     gap_pairs,
     intersection_pairs,
     iou_matrix,

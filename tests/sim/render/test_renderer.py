@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.schema.picture import Light, LightSwitch, Picture
+from scenarios.schema.scenario import Light, LightSwitch, Picture
 from sim.hashing import canonical_hash
 from sim.render.pixel_truth import amodal_mask, modal_mask
 from sim.render.renderer import BACKGROUNDS, make_renderer

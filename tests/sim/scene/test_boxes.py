@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.scene.boxes import BOXES, image_size_of_boxes, scale_of_first_boxes, with_visibility
+from sim.scene.visibility import BOXES, image_size_of_boxes, scale_of_first_boxes, with_visibility
 from sim.truth.label import bodies
 from sim.types import Truth
 from tests.reference_sense import crowd, pinhole

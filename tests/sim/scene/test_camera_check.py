@@ -9,8 +9,7 @@ from scenarios import load
 from scenarios.errors import InputError
 from scenarios.limits import SCALES, is_number
 from sim.io.formats.calibration import read_calibration
-from sim.scene.camera import camera_rotation, px_per_m_at_centre
-from sim.scene.camera_check import require_camera
+from sim.scene.camera import camera_rotation, px_per_m_at_centre, require_camera
 from sim.sequence import simulate
 
 DOWN = camera_rotation(0.6, 0.4).tolist()

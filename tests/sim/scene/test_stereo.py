@@ -5,8 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.scene.camera import camera_rotation, disparity, project, to_ground
-from sim.scene.stereo import back_project, pair_jacobian, point_covariances, project_pair
+from sim.scene.camera import (
+    back_project,
+    camera_rotation,
+    disparity,
+    pair_jacobian,
+    point_covariances,
+    project,
+    project_pair,
+    to_ground,
+)
 from sim.types import Camera
 
 

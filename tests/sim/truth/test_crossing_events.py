@@ -2,8 +2,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.geometry.footprints import footprint_hull
-from sim.geometry.polygons import polygon_gap
+from sim.geometry.polygons import footprint_hull, polygon_gap
 from sim.truth.crossing_events import encounters, members_by_frame, net_crossings
 
 

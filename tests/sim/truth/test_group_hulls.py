@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.geometry.footprints import footprint_hull
+from sim.geometry.polygons import footprint_hull
 from sim.truth.group_hulls import box_groups, frame_groups, groups_over_time
 
 

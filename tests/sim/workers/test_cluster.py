@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from sim import versions
+from sim import hashing as versions
 from sim.workers import cluster
 from sim.workers.start import start_workers
 from tests.errands import complain, fall, process, profiled, refuse, root_of, tell_and_wait

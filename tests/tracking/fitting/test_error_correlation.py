@@ -6,7 +6,7 @@ from scipy.special import ndtr
 from scipy.stats import multivariate_normal
 
 from scenarios.schema.sensor import Memory
-from sim.detector.correlated_noise import correlated_normals
+from sim.detector.draws import correlated_normals
 from sim.types import Truth
 from tracking.fitting.error_correlation import (
     Correlations,

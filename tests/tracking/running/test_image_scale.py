@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
-from sim.scene.boxes import scale_of_all_boxes
 from sim.scene.camera import px_per_m_at_centre
+from sim.scene.visibility import scale_of_all_boxes
 from sim.sequence import simulate
 from sim.types import Groups, Sequence, Tracks
 from tracking.running import image_scale

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from scenarios.errors import printable
-from sim.io.files.output_paths import output_path
+from sim.io.files.own_files import output_path
 from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult

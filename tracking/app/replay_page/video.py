@@ -15,7 +15,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.files.atomic import staged_path
 from sim.io.files.own_files import GENERATOR, refuse_foreign_file
-from sim.io.pictures.video_encoding import rate_of, write_video
+from sim.io.pictures.video_files import rate_of, write_video
 from sim.types import Image, Sequence
 
 VideoPlacement = Literal["auto", "inside", "beside", "none"]

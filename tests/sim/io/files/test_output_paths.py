@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from scenarios.errors import InputError
 from sim.io.files.atomic import PARTIAL
-from sim.io.files.output_paths import file_name, output_path, output_paths
+from sim.io.files.own_files import file_name, output_path, output_paths
 
 EVIL = (
     "../../x", "/etc/passwd", "..", ".", "", "a\0b", "a/b", "a\\b", "C:x", "con", "NUL.txt", "\u202egnp.exe", "x" * 300,

@@ -8,7 +8,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.files.own_files import GENERATOR, is_ours, marked_png, refuse_foreign_file
 from sim.io.files.tables import Column, table_bytes
-from sim.io.pictures.video_encoding import write_video
+from sim.io.pictures.video_files import write_video
 
 META = '<meta name="generator" content="flockscope">'
 PAGE = f"<!doctype html><head>{META}</head>".encode()

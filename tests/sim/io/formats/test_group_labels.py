@@ -5,7 +5,7 @@ import types
 import numpy as np
 import pytest
 
-from sim.io.formats.group_labels import labelled_truth_fields, rows_to_grid
+from sim.io.formats.labels import labelled_truth_fields, rows_to_grid
 from sim.types import GroupEvent, Near
 
 FRAME = np.array([1, 1, 1, 3, 3], np.int64)

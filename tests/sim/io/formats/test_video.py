@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.pictures import video_decoding
+from sim.io.pictures import video_files as video_decoding
 from sim.io.source import open_source
 from sim.types import Camera
 from tests.small_videos import SIZE, cut, damage, disc, picture, write_jpegs, write_video
