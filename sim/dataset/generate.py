@@ -11,13 +11,15 @@ import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
-from typing import Any, TypedDict, Unpack, cast
+from typing import Any, cast
 from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, shortened
-from scenarios.loading.resolve import Entry
-from scenarios.loading.toml_files import Table, dump
+from scenarios.loading.resolve import Entry, resolve
+from scenarios.loading.toml_files import Table, dump, parse
+from scenarios.reading import parse_toml
 from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
@@ -88,16 +90,8 @@ class JobOutcome:
     fatal: bool = False  # True if every other job would fail in the same way, as with a full disk
 
 
-def plan_jobs(entries: list[Entry], seeds: range, folder: Path) -> list[SequenceJob]:
-    """Returns one job per entry and seed, without pictures, all seeds of the first entry first."""
-    output_paths(folder, [e.name for e in entries], source="entries")
-    return [SequenceJob(output_path(folder, e.name, f"-s{seed:05d}"), e, seed) for e in entries for seed in seeds]
-
-
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
     """Returns the manifest in the job's folder, None without one; raises InputError if it is another sequence's."""
-    from scenarios.loading.resolve import dump
-
     if not job.folder.exists():
         return None
     inside = job.folder.is_dir() and any(not is_side_file(path.name) for path in job.folder.iterdir())
@@ -113,8 +107,7 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
         manifest = read_manifest(job.folder)
     except InputError as error:
         # An invalid manifest does not tell what the folder holds.
-        remedy = "delete that folder, or choose another --out"
-        raise InputError(**{**error.as_dict(), "remedy": remedy}) from None
+        raise error.replaced(remedy="delete that folder, or choose another --out") from None
     scenario = dump(job.entry.scenario)
     wanted = {**identity(scenario, job.seed, job.entry.repeat, job.streams, job.images), "stride": job.stride}
     manifest = {"stride": 1, **manifest}
@@ -129,9 +122,6 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
 
 
 def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str, Any]) -> str:
-    from scenarios.loading.toml_files import dump, parse
-    from scenarios.reading import parse_toml
-
     settings = ""
     if "scenario_hash" in different:
         with suppress(InputError):
@@ -153,23 +143,27 @@ def is_stored(job: SequenceJob) -> bool:
     return manifest is not None and next(damaged_files(job.folder, manifest["files"]), None) is None
 
 
+def store(job: SequenceJob, sequence: Sequence) -> None:
+    """Writes the job's folder, unless it holds the sequence undamaged."""
+    if not is_stored(job):
+        sequence_folder.write_sequence(
+            job.folder, replace(sequence, name=job.name), scenario=dump(job.entry.scenario), seed=job.seed,
+            repeat=job.entry.repeat, streams=job.streams, images=job.images, keep=lambda: is_stored(job),
+        )  # fmt: skip
+
+
 def simulate_and_store(job: SequenceJob) -> None:
     """Simulates the job's scenario and writes its folder, replacing a damaged one."""
-    from scenarios.loading.resolve import dump
     from sim.sequence import simulate
 
     entry = job.entry
     try:
-        sequence = replace(simulate(entry.scenario, job.seed, entry.repeat, job.streams, job.stride), name=job.name)
-        sequence_folder.write_sequence(
-            job.folder, sequence, scenario=dump(entry.scenario), seed=job.seed, repeat=entry.repeat,
-            streams=job.streams, images=job.images, keep=lambda: is_stored(job),
-        )  # fmt: skip
+        store(job, simulate(entry.scenario, job.seed, entry.repeat, job.streams, job.stride))
     except FlockscopeError as error:
         # A full disk: it would hit every other job, too.
         if isinstance(error.__cause__, OSError):
             raise
-        raise type(error)(**{**error.as_dict(), "file": entry.file or error.file or job.name}) from error
+        raise error.replaced(file=entry.file or error.file or job.name) from error
     except Exception as error:
         raise WorkError(
             file=job.name, got=f"{type(error).__name__}: {error}", expected="a sequence",
@@ -187,14 +181,14 @@ def run_job(job: SequenceJob) -> JobOutcome:
     except FlockscopeError as error:
         fatal = isinstance(error.__cause__, OSError)
         if fatal and job.marker is not None:
-            error = type(error)(**{**error.as_dict(), "place": f"on {socket.gethostname()}"})
+            error = error.replaced(place=f"on {socket.gethostname()}")
         return JobOutcome(error, fatal)
     return JobOutcome()
 
 
 def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
     """Returns the outcome of a job that killed too many workers."""
-    return JobOutcome(WorkError(**{**error.as_dict(), "file": job.name}))
+    return JobOutcome(error.replaced(file=job.name))
 
 
 def _wait_for_marker(marker: Path) -> None:
@@ -214,15 +208,6 @@ ONE_WORKER = WorkerOptions()
 Progress = Callable[[int, int, str], None]  # called as progress(sequences done, sequences in all, name of the last one)
 
 
-class Stored(TypedDict, total=False):
-    """What is stored of each sequence: pictures ("left", "right", "disparity", "ids"), file type, every N-th frame."""
-
-    streams: Iterable[str]  # pictures ("left", "right", "disparity", "ids", "background"; () for none)
-    images: str  # their file type, "jpg", "png" or "mp4"
-    # N stores every N-th frame of the camera only: 1, 1 + N, …, as they are without it, and numbered from 1
-    stride: int
-
-
 class Folders(list[Path]):
     """The folders of the sequences made; `left_out` has the error of each whose script did not come true, by name."""
 
@@ -239,7 +224,9 @@ def generate(
     set: Iterable[str] = (),
     workers: WorkerOptions = ONE_WORKER,
     progress: Progress | None = None,
-    **stored: Unpack[Stored],
+    streams: Iterable[str] = ("left",),
+    images: str = "jpg",
+    stride: int = 1,
 ) -> Folders:
     """Simulates every entry with every seed, and stores each sequence as OUT/flockscope-<split>/<name>-s<seed>/.
 
@@ -253,7 +240,9 @@ def generate(
         set: "key=value" settings for entries given by name.
         workers: By default this process. Those of a cluster must share the folder `out` under the same path.
         progress: Called as progress(sequences done, sequences in all, name of the last one) after each.
-        **stored: Streams, images, stride (`Stored`); left jpg pictures of all frames by default.
+        streams: Pictures to store: "left", "right", "disparity", "ids", "background"; () for none.
+        images: Their file type, "jpg", "png" or "mp4".
+        stride: N stores every N-th frame of the camera only: 1, 1 + N, …, numbered from 1.
 
     Returns:
         The folders, in the order of entries, all seeds of an entry together. `left_out` has the errors of those whose
@@ -267,13 +256,22 @@ def generate(
         raise InputError(place="workers", got=workers.count, expected="1 or more", remedy="correct --workers")
     split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
     folder = root / f"flockscope-{split}"
-    jobs = _storing(plan_jobs(_resolved(entries, set), seeds, folder), **stored)
+    settings, pictures = tuple(set), check_streams(streams, images)
+    found = [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
+    output_paths(folder, [entry.name for entry in found], source="entries")
+    for entry in found:
+        check_stride(stride, entry.scenario.camera.fps)
+    jobs = [
+        SequenceJob(output_path(folder, entry.name, f"-s{seed:05d}"), entry, seed, pictures, images, stride)
+        for entry in found
+        for seed in seeds
+    ]
     with lock_folder(root):
         remove_partials(root, folder, root / "seqmaps")
         for job in jobs:
             stored_manifest(job)
         try:
-            errors = _run_jobs(jobs, workers, _counter(progress, len(jobs)))
+            errors = _run_jobs(jobs, workers, progress)
         finally:
             remove_partials(root, folder)
         try:
@@ -286,67 +284,34 @@ def generate(
     else:
         unfulfilled = {}
     made = [job for job in jobs if job.name not in unfulfilled]
-    errors = errors or {job.name: _not_visible(job) for job in made if job.name not in complete}
+    for job in made if not errors else ():
+        if job.name not in complete:
+            errors[job.name] = WorkError(
+                file=job.folder, got="nothing, though a worker has made it",
+                expected="a folder that all machines share", remedy="run again, or choose another --out",
+            )  # fmt: skip
     if errors:
         raise _summary(errors, len(jobs))
     return Folders((job.folder for job in made), unfulfilled)
 
 
-def _storing(
-    jobs: list[SequenceJob], streams: Iterable[str] = ("left",), images: str = "jpg", stride: int = 1
-) -> list[SequenceJob]:
-    pictures = check_streams(streams, images)
-    for job in jobs:
-        check_stride(stride, job.entry.scenario.camera.fps)
-    return [replace(job, streams=pictures, images=images, stride=stride) for job in jobs]
-
-
-def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]:
-    from scenarios.loading.resolve import resolve
-
-    settings = tuple(set)
-    return [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
-
-
-def _run_jobs(
-    jobs: list[SequenceJob], workers: WorkerOptions, done: Callable[[SequenceJob], None]
-) -> dict[str, FlockscopeError]:
+def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progress | None) -> dict[str, FlockscopeError]:
     errors: dict[str, FlockscopeError] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
-        marked = _with_marker(jobs) if jobs and workers.cluster is not None else jobs
-        for job, outcome in run(run_job, marked, ahead=QUEUED_JOBS, on_loss=lost_job):
+        if jobs and workers.cluster is not None:
+            # A worker starts a job only if it sees this file: else it would write to another file system.
+            marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
+            write_file(marker, b"")
+            jobs = [replace(job, marker=marker) for job in jobs]
+        done = run(run_job, jobs, ahead=QUEUED_JOBS, on_loss=lost_job)
+        for count, (job, outcome) in enumerate(done, 1):
             if outcome.error is not None:
                 errors[job.name] = outcome.error
             if outcome.fatal:
                 break
-            done(job)
+            if progress is not None:
+                progress(count, len(jobs), job.name)
     return {job.name: errors[job.name] for job in jobs if job.name in errors}
-
-
-def _with_marker(jobs: list[SequenceJob]) -> list[SequenceJob]:
-    # A worker starts a job only if it sees this file: else it would write to another file system.
-    marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
-    write_file(marker, b"")
-    return [replace(job, marker=marker) for job in jobs]
-
-
-def _counter(progress: Progress | None, total: int) -> Callable[[SequenceJob], None]:
-    count = 0
-
-    def done(job: SequenceJob) -> None:
-        nonlocal count
-        count += 1
-        if progress is not None:
-            progress(count, total, job.name)
-
-    return done
-
-
-def _not_visible(job: SequenceJob) -> WorkError:
-    return WorkError(
-        file=job.folder, got="nothing, though a worker has made it", expected="a folder that all machines share",
-        remedy="run again, or choose another --out",
-    )  # fmt: skip
 
 
 def write_seqmap(root: Path, split: str) -> set[str]:
@@ -394,42 +359,28 @@ def store_replays(
     on.
     """
     recordings, split, root = list(sources), split_of(seeds), Path(out)
-    folder = root / f"flockscope-{split}"
-    _check(recordings, folder, options.cut, seeds, split)
-    options = replace(options, streams=tuple(check_streams(options.streams, options.images)))
-    made: list[Path] = []
-    with lock_folder(root):
-        remove_partials(root, folder, root / "seqmaps")
-        try:
-            for recording in recordings:
-                for seed in seeds:
-                    made.append(_store(recording, options, seed, folder))
-                    if progress is not None:
-                        progress(len(made), len(recordings) * len(seeds), made[-1].name)
-        finally:
-            remove_partials(root, folder)
-            write_seqmap(root, split)
-    return made
-
-
-def _check(recordings: list[Sequence], folder: Path, cut: Cut, seeds: range, split: str) -> None:
+    folder, cut = root / f"flockscope-{split}", options.cut
     output_paths(folder, [replay_name(recording.name, cut) for recording in recordings], source="recordings")
     if split in TUNING_SPLITS and any(is_real(recording) for recording in recordings):
         raise InputError(
             place="--seeds", got=f"{seeds.start} ({split})", expected="seeds from 20000 (test) on, for real motion",
             remedy="choose other seeds: nothing is tuned on recordings",
         )  # fmt: skip
-
-
-def _store(recording: Sequence, options: ReplayOptions, seed: int, folder: Path) -> Path:
-    sequence, form = resolve_replay(
-        recording, options.view, seed, cut=options.cut, calibration=options.calibration, streams=options.streams
-    )  # fmt: skip
-    entry = Entry(form.name, cast(Any, form))
-    job = SequenceJob(output_path(folder, form.name, f"-s{seed:05d}"), entry, seed, options.streams, options.images)
-    if not is_stored(job):
-        sequence_folder.write_sequence(
-            job.folder, replace(sequence, name=job.name), scenario=dump(form), seed=seed, streams=options.streams,
-            images=options.images, keep=lambda: is_stored(job),
-        )  # fmt: skip
-    return job.folder
+    streams = check_streams(options.streams, options.images)
+    made: list[Path] = []
+    with lock_folder(root):
+        remove_partials(root, folder, root / "seqmaps")
+        try:
+            for recording, seed in product(recordings, seeds):
+                sequence, form = resolve_replay(
+                    recording, options.view, seed, cut=cut, calibration=options.calibration, streams=streams
+                )
+                entry, path = Entry(form.name, cast(Any, form)), output_path(folder, form.name, f"-s{seed:05d}")
+                store(SequenceJob(path, entry, seed, streams, options.images), sequence)
+                made.append(path)
+                if progress is not None:
+                    progress(len(made), len(recordings) * len(seeds), path.name)
+        finally:
+            remove_partials(root, folder)
+            write_seqmap(root, split)
+    return made
