@@ -9,7 +9,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim.io.files.own_files import is_hidden, output_paths
-from sim.io.formats.mot_table import BoxScale
+from sim.io.formats.options import BoxScale
 from sim.io.store.seal import AGAIN, RUN, WHOLE, check_run, is_run, is_sequence, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence

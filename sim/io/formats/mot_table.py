@@ -20,11 +20,10 @@ from typing import NoReturn
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, DETECTIONS, FRAMES, PICTURE_SIDE
+from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from sim.io.files.numeric_text import NumericTable, crowded, is_number_text, read_numbers, read_text
+from sim.io.formats.options import BoxScale
 from sim.types import Array, Bools, Ints
-
-BoxScale = tuple[float, float]  # factors of x and y that make the boxes of a text pixels of the pictures
 
 ENOUGH = 10  # rows that are needed to judge by how their columns vary
 
@@ -111,18 +110,6 @@ def size_doubt(box: Array, size: tuple[int, int]) -> str:
     if len(box) >= MANY and right <= PART * size[0] and bottom <= PART * size[1]:
         return f"all {len(box)} boxes lie in the upper left {right:.0f} × {bottom:.0f} px of the {words}"
     return ""
-
-
-def parse_box_scale(text: str) -> BoxScale:
-    """Returns the factors of x and y that a text such as "2" or "1920,1080" names."""
-    cells = text.split(",")
-    factors = [float(cell) if is_number_text(cell) else float("nan") for cell in cells]
-    if len(cells) > 2 or not all(0 < f <= PICTURE_SIDE for f in factors):
-        raise InputError(
-            place="--box-scale", got=repr(text), expected=f"X or X,Y, above 0, at most {PICTURE_SIDE}",
-            remedy="give pixels of the picture per unit of the boxes",
-        )  # fmt: skip
-    return factors[0], factors[-1]
 
 
 Column = np.ndarray[tuple[int], np.dtype[np.float64]]

@@ -27,7 +27,8 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.labels import differentiate
-from sim.io.formats.mot_table import GROUND_COLUMNS, BoxScale, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.options import BoxScale
 from sim.scene.visibility import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
 

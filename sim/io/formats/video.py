@@ -15,10 +15,11 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.calibration import scaled_to_image
+from sim.io.formats.options import RecordingOptions
 from sim.io.pictures import video_files
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import fill_gaps, require_size, size_of
-from sim.types import Array, Bools, Camera, Frame, Image, Sequence
+from sim.types import Array, Bools, Frame, Image, Sequence
 
 SUFFIXES = (
     ".mp4", ".m4v", ".mov", ".3gp", ".mkv", ".webm", ".avi", ".wmv", ".flv", ".ogv", ".mpg", ".mpeg",
@@ -28,18 +29,10 @@ RATES = (0.1, 300.0)  # plausible frames/s
 AGREE = 0.02  # relative difference allowed between the container's rate and that of the time stamps
 GAP, GAPS = 1.0, 5.0  # a gap without frames is reported if longer than 1 s and than 5 usual steps
 DEFAULT_FPS = 25.0
-ANY = BackgroundChoice()
 
 
-def open_video(
-    path: Path,
-    *,
-    fps: float | None = None,
-    px_per_m: float | None = None,
-    camera: Camera | None = None,
-    background: BackgroundChoice = ANY,
-) -> Sequence:
-    """Returns a video file as Sequence whose pictures are decoded while iterating. Options as of `open_source`.
+def open_video(path: Path, options: RecordingOptions) -> Sequence:
+    """Returns a video file as Sequence whose pictures are decoded while iterating.
 
     A frame that cannot be decoded has no picture, with a warning. Times are those of the file if the rate varies.
     """
@@ -56,9 +49,9 @@ def open_video(
         warnings.warn(f"{path.name}: {words}: pictures of {size_of(first)[0]}×{size_of(first)[1]} px", stacklevel=2)
     # Some packets of VP8 are not shown, so the length is unknown.
     size, known = size_of(first), None if index.codec in video_files.HIDDEN else length
-    rate, words = frame_rate(path.name, fps, index)
-    choice = background.of(length, path, size)
-    times = None if fps is not None or index.ranks() is None or is_steady(index.times()) else index.times()
+    rate, words = frame_rate(path.name, options.fps, index)
+    choice = (options.background or BackgroundChoice()).of(length, path, size)
+    times = None if options.fps is not None or index.ranks() is None or is_steady(index.times()) else index.times()
 
     def bare(k: int) -> Frame:
         return Frame(k, (k - 1) / rate if times is None else float(times[k - 1] - times[0]))
@@ -69,8 +62,8 @@ def open_video(
 
     return Sequence(
         name=path.stem, fps=rate, length=known, frames=frames,
-        image_size=size, camera=None if camera is None else scaled_to_image(camera, size, path, index.aspect),
-        px_per_m=float("nan") if px_per_m is None else px_per_m, has_images=True,
+        image_size=size, has_images=True,
+        camera=options.camera and scaled_to_image(options.camera, size, path, index.aspect), px_per_m=options.scale,
         load_background=BackgroundSample(choice, length, path, lambda wanted: _pictures(path, index, size, wanted)),
         source={"kind": "video", "path": str(path), "fps": words, "background": str(choice)},
         bare=None if known is None else lambda: map(bare, range(1, known + 1)),

@@ -25,7 +25,7 @@ from sim.io.files import tables
 from sim.io.files.atomic import hold_lock, replace_sealed
 from sim.io.files.tables import Column, Count, Rate, table_bytes
 from sim.io.formats.labels import chords
-from sim.io.formats.mot_table import BoxScale, MotTable, read_table, require_pixels
+from sim.io.formats.mot_table import MotTable, read_table, require_pixels
 from sim.io.formats.mot_text import (
     ground_cells,
     ground_positions,
@@ -34,6 +34,7 @@ from sim.io.formats.mot_text import (
     require_metres,
     unit_scores,
 )
+from sim.io.formats.options import BoxScale
 from sim.io.store import group_files
 from sim.io.store.group_files import AXES
 from sim.io.store.seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
