@@ -21,7 +21,7 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, crowded, read_number, read_numbers, read_text
 from sim.io.formats.labels import labelled_truth_fields, require_size
-from sim.io.formats.options import RecordingOptions
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Frame, Ints, Sequence, Truth
 
 FPS = 2.5
@@ -133,7 +133,7 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
     return truth.replace(group=label, **labelled_truth_fields(frame, id, label, pos, vel, fps=fps, length=length))
 
 
-def open_folder(folder: Path, options: RecordingOptions) -> Sequence:
+def open_folder(folder: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns the recording in `folder` as Sequence, without pictures and detections, by default at 2.5 fps."""
     rate = options.fps or FPS
     length = int(_table(folder)[1].max(initial=0))

@@ -24,7 +24,7 @@ from scenarios.reading import read_regular
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import read_number, whole_number
 from sim.io.formats.labels import differentiate, labelled_truth_fields, require_size
-from sim.io.formats.options import RecordingOptions
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Frame, Ints, Sequence, Truth
@@ -203,7 +203,7 @@ def _measured(found: CaviarRecording, vel: Array, fps: float, px_per_m: float) -
     return {"events": tuple(events), "near": near, "labelled": np.isin(np.arange(1, found.length + 1), listed)}
 
 
-def open_file(path: Path, options: RecordingOptions) -> Sequence:
+def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns the CAVIAR file `path` as Sequence, without pictures and detections.
 
     px_per_m: None: the median of the longer sides of the first 100 boxes / 1.7 m; `source["px_per_m_frames"]` is then

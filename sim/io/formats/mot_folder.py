@@ -20,7 +20,7 @@ from sim.io.files.numeric_text import read_number, read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.mot_table import read_table, size_doubt
-from sim.io.formats.options import RecordingOptions
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
 from sim.types import Frame, Image, Ints, Sequence, Truth
@@ -85,7 +85,7 @@ def frame_rate(given: float | None, found: float | None) -> float:
     return found
 
 
-def open_folder(path: Path, options: RecordingOptions) -> Sequence:
+def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a MOTChallenge folder (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
     img1_right/ holds the pictures of the right camera of a rectified pair. The length is that of seqinfo.ini, else the
@@ -181,7 +181,7 @@ def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, in
     return stated or seen
 
 
-def open_text(path: Path, options: RecordingOptions) -> Sequence:
+def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a MOT text as Sequence without pictures: detections if every id is -1, else truth.
 
     The camera is not scaled.

@@ -40,6 +40,9 @@ class RecordingOptions:
             raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
 
 
+NO_OPTIONS = RecordingOptions()
+
+
 def parse_box_scale(text: str) -> BoxScale:
     """Returns the factors of x and y that a text such as "2" or "1920,1080" names."""
     cells = text.split(",")

@@ -15,7 +15,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.calibration import scaled_to_image
-from sim.io.formats.options import RecordingOptions
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.io.pictures import video_files
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import fill_gaps, require_size, size_of
@@ -31,7 +31,7 @@ GAP, GAPS = 1.0, 5.0  # a gap without frames is reported if longer than 1 s and 
 DEFAULT_FPS = 25.0
 
 
-def open_video(path: Path, options: RecordingOptions) -> Sequence:
+def open_video(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a video file as Sequence whose pictures are decoded while iterating.
 
     A frame that cannot be decoded has no picture, with a warning. Times are those of the file if the rate varies.

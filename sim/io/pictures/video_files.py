@@ -7,14 +7,11 @@ as one.
 Writes H.264 videos that browsers can play and seek: mp4, yuv420p, a key frame each second, the index in front.
 
 One thread is used and no date is written, so the same pictures give the same bytes. libav ignores a write that fails
-or takes only a part, as on a full disk. So the file that it writes to keeps account, and the pictures of the finished
-video are counted.
+or takes only a part, as on a full disk, so the pictures of the finished video are counted.
 """
 
 from __future__ import annotations
 
-import errno
-import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -241,15 +238,13 @@ def write_video(
             place="--images mp4", got="pictures of {}×{} px".format(*size), expected="an even width and height",
             remedy="take --images jpg or png, or another camera.image",
         )  # fmt: skip
-    # We open the file because libav leaves its own open if a video cannot be finished. It is unbuffered, since Ctrl-C
-    # would be lost inside a Python callback from libav.
-    with path.open("wb", buffering=0) as file:
-        made = VideoWriter(WholeFile(file), size, fps, quality, comment)
-        try:
-            yield made
-            made.end()
-        finally:
-            made.close()
+    path.write_bytes(b"")  # libav makes no file without pictures
+    made = VideoWriter(path, size, fps, quality, comment)
+    try:
+        yield made
+        made.end()
+    finally:
+        made.close()
     written = _pictures_in(path) if made.count else 0
     if written != made.count:
         raise WorkError(
@@ -268,48 +263,17 @@ def _pictures_in(path: Path) -> int:
         return 0
 
 
-class WholeFile:
-    """The file that libav writes to: every byte is written, or the first exception is kept and writing ends.
-
-    State: the exception, None as long as all is written. Each caller of libav then calls `raise_error`.
-    """
-
-    def __init__(self, file: Any):
-        self._file, self.name = file, file.name  # libav opens the name again to move the index
-        self.seek, self.tell = file.seek, file.tell
-        self._error: BaseException | None = None
-
-    def write(self, data: Any) -> int:
-        """Writes all bytes; returns their number, also after a failure."""
-        rest = memoryview(data)
-        try:
-            while rest and self._error is None:
-                count = self._file.write(rest)
-                if not count:
-                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-                rest = rest[count:]
-        # libav goes on after an exception, also after Ctrl-C.
-        except BaseException as error:
-            self._error = error
-        return len(data)
-
-    def raise_error(self) -> None:
-        """Raises the exception that ended the writing."""
-        if self._error is not None:
-            raise self._error
-
-
 class VideoWriter:
     """A video that is being written; made by `write_video`, which also ends and closes it.
 
     State: libav's open container and stream, and `count`, the number of pictures added.
     """
 
-    def __init__(self, file: WholeFile, size: tuple[int, int], fps: float, quality: int, comment: str):
+    def __init__(self, path: Path, size: tuple[int, int], fps: float, quality: int, comment: str):
         import av
 
-        self._file, self.count = file, 0
-        self._container: Any = av.open(file, "w", format="mp4", options={"movflags": "faststart"})
+        self._path, self.count = path, 0
+        self._container: Any = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
         if comment:
             self._container.metadata["comment"] = comment
         group = str(max(1, round(fps)))
@@ -333,7 +297,7 @@ class VideoWriter:
         width, height = self._stream.width, self._stream.height
         if picture.shape[:2] != (height, width):
             raise InputError(
-                file=self._file.name, place=f"picture {self.count + 1}",
+                file=self._path, place=f"picture {self.count + 1}",
                 got="{1}×{0} px".format(*picture.shape), expected=f"{width}×{height} px, the size of the video",
                 remedy="give pictures of one size",
             )  # fmt: skip
@@ -341,17 +305,12 @@ class VideoWriter:
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
         frame.color_range, frame.colorspace = WRITTEN_RANGE, WRITTEN_COLOURS
         self._container.mux(self._stream.encode(frame))
-        self._file.raise_error()
         self.count += 1
 
     def end(self) -> None:
         """Writes the frames that the encoder still holds."""
         self._container.mux(self._stream.encode(None))
-        self._file.raise_error()
 
     def close(self) -> None:
         """Writes the index of the file and closes the container."""
-        try:
-            self._container.close()
-        finally:
-            self._file.raise_error()
+        self._container.close()

@@ -11,7 +11,7 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
-from sim.dataset import sequence_job as jobs
+from sim.dataset import generate as jobs
 from sim.dataset.generate import (
     JobOutcome,
     SequenceJob,
