@@ -28,11 +28,14 @@ import os.path
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from scenarios.errors import InputError, shortened
 from scenarios.limits import DEPTH, NESTING, TOML_BYTES
 from scenarios.reading import parse_toml, read_regular
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
 CATALOGUE = Path(__file__).parents[1]
 SUITES = CATALOGUE / "suites"
@@ -72,15 +75,13 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
         path = CATALOGUE / f"{text}.toml"
         if text in names():
             return path
-        raise InputError(
-            got=repr(text), expected="the name of a scenario or a *.toml file", remedy=did_you_mean(text, names())
-        )
+        expected = "the name of a scenario or a *.toml file"
+        raise InputError(got=repr(text), expected=expected, remedy=did_you_mean(text, names()))
     for folder in (beside or Path(), CATALOGUE):
         if os.path.exists(folder / text):
             return folder / text
-    raise InputError(
-        file=text, got="no such file", expected="a scenario file", remedy="check the path, or name a scenario"
-    )
+    remedy = "check the path, or name a scenario"
+    raise InputError(file=text, got="no such file", expected="a scenario file", remedy=remedy)
 
 
 def parse(path: Path) -> Table:
@@ -89,13 +90,8 @@ def parse(path: Path) -> Table:
     try:
         return parse_toml(body.decode(), path)
     except UnicodeDecodeError as error:
-        raise InputError(
-            file=path,
-            place=f"byte {error.start}",
-            got="bytes that are not UTF-8",
-            expected="TOML",
-            remedy="save the file as UTF-8",
-        ) from None
+        place, got = f"byte {error.start}", "bytes that are not UTF-8"
+        raise InputError(file=path, place=place, got=got, expected="TOML", remedy="save the file as UTF-8") from None
 
 
 def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
@@ -106,29 +102,19 @@ def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
     if base is None:
         return {**table, "name": table.get("name", path.stem)}
     if not isinstance(base, str):
-        raise InputError(
-            file=path, place="extends", got=repr(base), expected="a file's name", remedy="put the name in quotes"
-        )
-    base_path = _base(path, base)
-    if base_path.resolve() in chain:
-        circle = " → ".join(p.name for p in (*chain, base_path))
-        raise InputError(
-            file=path,
-            place="extends",
-            got=circle,
-            expected="files that do not extend each other in a circle",
-            remedy="remove one `extends`",
-        )
-    return {**merge(read(base_path, chain), table), "name": table.get("name", path.stem)}
-
-
-def _base(path: Path, base: str) -> Path:
+        remedy = "put the name in quotes"
+        raise InputError(file=path, place="extends", got=repr(base), expected="a file's name", remedy=remedy)
     try:
-        return find(base, beside=path.parent)
+        base_path = find(base, beside=path.parent)
     except InputError as error:
-        raise InputError(
-            file=path, place="extends", got=repr(base), expected=error.expected, remedy=error.remedy
-        ) from None
+        raise error.replaced(file=path, place="extends", got=repr(base)) from None
+    if base_path.resolve() in chain:
+        got, expected = (
+            " → ".join(p.name for p in (*chain, base_path)),
+            "files that do not extend each other in a circle",
+        )
+        raise InputError(file=path, place="extends", got=got, expected=expected, remedy="remove one `extends`")
+    return {**merge(read(base_path, chain), table), "name": table.get("name", path.stem)}
 
 
 def merge(below: Table, above: Table) -> Table:
@@ -166,31 +152,19 @@ def _merge_by_id(below: list[Table], above: list[Table]) -> list[Table]:
     return rows
 
 
-class _Dumps(Protocol):
-    """A pydantic model, as far as `dump` needs it: this module must not import pydantic."""
-
-    def model_dump(self, *, mode: str, by_alias: bool, exclude_none: bool) -> dict[str, Any]: ...
-
-
-def dump(scenario: _Dumps) -> str:
+def dump(scenario: BaseModel) -> str:
     """Returns a scenario, or another model of tables, as TOML with all defaults; equal models give equal bytes."""
     table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True)
-    flat = [(k, v) for k, v in table.items() if not _is_table(v) and not _is_rows(v)]
-    blocks = [_lines(dict(flat))]
+    flat: Table = {}
+    blocks = []
     for key, value in table.items():
-        if _is_table(value):
+        if isinstance(value, dict):
             blocks.append(f"[{key}]\n" + _lines(value))
-        elif _is_rows(value):
+        elif isinstance(value, tuple) and value and isinstance(value[0], dict):
             blocks += [f"[[{key}]]\n" + _lines(row) for row in value]
-    return "\n".join(blocks)
-
-
-def _is_table(value: Any) -> bool:
-    return isinstance(value, dict)
-
-
-def _is_rows(value: Any) -> bool:
-    return isinstance(value, tuple) and bool(value) and isinstance(value[0], dict)
+        else:
+            flat[key] = value
+    return "\n".join([_lines(flat), *blocks])
 
 
 def _lines(table: dict[str, Any]) -> str:
@@ -280,13 +254,9 @@ def _put(table: Table, steps: list[str], value: Any, text: str, file: object) ->
                 return tuple(path)
             here = here[index]
         else:
-            raise InputError(
-                file=file,
-                place=place_of(text),
-                got=f"{'.'.join(map(str, path))} = {here!r}, which has no {steps[0]!r}",
-                expected="a key that exists",
-                remedy=f"set {'.'.join(map(str, path))} itself",
-            )
+            key = ".".join(map(str, path))
+            got, remedy = f"{key} = {here!r}, which has no {steps[0]!r}", f"set {key} itself"
+            raise InputError(file=file, place=place_of(text), got=got, expected="a key that exists", remedy=remedy)
 
 
 def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: object) -> tuple[int, list[str]]:
@@ -302,13 +272,12 @@ def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: objec
     if isinstance(value, dict) and len(steps) == 1 and ids and not re.fullmatch("[0-9]+", steps[0]):
         value.setdefault("id", steps[0])
         return len(rows), []
-    raise InputError(
-        file=file,
-        place=place_of(text),
-        got=f"{steps[0]!r} in an array of {len(rows)}",
-        expected="an index from 0 or an id" if ids else "an index from 0",
-        remedy=did_you_mean(steps[0], list(ids) or [str(k) for k in range(len(rows))]),
+    expected, known = (
+        "an index from 0 or an id" if ids else "an index from 0",
+        list(ids) or [*map(str, range(len(rows)))],
     )
+    got, remedy = f"{steps[0]!r} in an array of {len(rows)}", did_you_mean(steps[0], known)
+    raise InputError(file=file, place=place_of(text), got=got, expected=expected, remedy=remedy)
 
 
 def _position(step: str, length: int) -> int | None:
