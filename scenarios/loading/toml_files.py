@@ -109,10 +109,8 @@ def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
     except InputError as error:
         raise error.replaced(file=path, place="extends", got=repr(base)) from None
     if base_path.resolve() in chain:
-        got, expected = (
-            " → ".join(p.name for p in (*chain, base_path)),
-            "files that do not extend each other in a circle",
-        )
+        got = " → ".join(p.name for p in (*chain, base_path))
+        expected = "files that do not extend each other in a circle"
         raise InputError(file=path, place="extends", got=got, expected=expected, remedy="remove one `extends`")
     return {**merge(read(base_path, chain), table), "name": table.get("name", path.stem)}
 
@@ -272,10 +270,8 @@ def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: objec
     if isinstance(value, dict) and len(steps) == 1 and ids and not re.fullmatch("[0-9]+", steps[0]):
         value.setdefault("id", steps[0])
         return len(rows), []
-    expected, known = (
-        "an index from 0 or an id" if ids else "an index from 0",
-        list(ids) or [*map(str, range(len(rows)))],
-    )
+    expected = "an index from 0 or an id" if ids else "an index from 0"
+    known = list(ids) or [str(k) for k in range(len(rows))]
     got, remedy = f"{steps[0]!r} in an array of {len(rows)}", did_you_mean(steps[0], known)
     raise InputError(file=file, place=place_of(text), got=got, expected=expected, remedy=remedy)
 
