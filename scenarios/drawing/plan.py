@@ -51,8 +51,8 @@ def middle(value: Value) -> float:
         return float(value)
     if value.normal is not None:
         mean = value.normal[0]
-    elif value.uniform is not None or value.choice is not None:
-        mean = float(np.mean(value.uniform or value.choice))
+    elif values := value.uniform or value.choice:
+        mean = float(np.mean(values))
     else:
         mean = value.exponential or value.poisson or 0.0
     low, high = bounds(value)
@@ -130,7 +130,7 @@ def svg(scenario: Scenario) -> str:
             (0.5, describe.cut(scenario.about, 140), {"color": GREY}),
             (script - 0.05, "Script", {"weight": "bold"}),
         ):
-            figure.text(0.03, 1 - y / height, text, **style)  # type: ignore[arg-type]
+            figure.text(0.03, 1 - y / height, text, **style)
         plan = axes(0.7, 0.7 + tall, (WIDTH - tall * width / depth) / 2)
         _draw_world(plan, scenario)
         _draw_orders(plan, scenario, orders, colour)

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypedDict, Unpack, cast
 from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, shortened
@@ -216,6 +216,14 @@ class Folders(list[Path]):
         self.left_out = left_out
 
 
+class Stored(TypedDict, total=False):
+    """What `generate` stores of each sequence."""
+
+    streams: Iterable[str]  # pictures: some of "left", "right", "disparity", "ids", "background"; () for none
+    images: str  # their file type, "jpg", "png" or "mp4"
+    stride: int  # N stores every N-th frame of the camera only: 1, 1 + N, …, numbered from 1
+
+
 def generate(
     entries: Iterable[Entry | str],
     seeds: range,
@@ -224,9 +232,7 @@ def generate(
     set: Iterable[str] = (),
     workers: WorkerOptions = ONE_WORKER,
     progress: Progress | None = None,
-    streams: Iterable[str] = ("left",),
-    images: str = "jpg",
-    stride: int = 1,
+    **stored: Unpack[Stored],
 ) -> Folders:
     """Simulates every entry with every seed, and stores each sequence as OUT/flockscope-<split>/<name>-s<seed>/.
 
@@ -240,9 +246,7 @@ def generate(
         set: "key=value" settings for entries given by name.
         workers: By default this process. Those of a cluster must share the folder `out` under the same path.
         progress: Called as progress(sequences done, sequences in all, name of the last one) after each.
-        streams: Pictures to store: "left", "right", "disparity", "ids", "background"; () for none.
-        images: Their file type, "jpg", "png" or "mp4".
-        stride: N stores every N-th frame of the camera only: 1, 1 + N, …, numbered from 1.
+        **stored: Streams, images, stride (`Stored`); left jpg pictures of all frames by default.
 
     Returns:
         The folders, in the order of entries, all seeds of an entry together. `left_out` has the errors of those whose
@@ -256,13 +260,14 @@ def generate(
         raise InputError(place="workers", got=workers.count, expected="1 or more", remedy="correct --workers")
     split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
     folder = root / f"flockscope-{split}"
-    settings, pictures = tuple(set), check_streams(streams, images)
+    settings, stride, images = tuple(set), stored.get("stride", 1), stored.get("images", "jpg")
+    streams = check_streams(stored.get("streams", ("left",)), images)
     found = [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
     output_paths(folder, [entry.name for entry in found], source="entries")
     for entry in found:
         check_stride(stride, entry.scenario.camera.fps)
     jobs = [
-        SequenceJob(output_path(folder, entry.name, f"-s{seed:05d}"), entry, seed, pictures, images, stride)
+        SequenceJob(output_path(folder, entry.name, f"-s{seed:05d}"), entry, seed, streams, images, stride)
         for entry in found
         for seed in seeds
     ]

@@ -36,6 +36,7 @@ PARTS = {
     "Extrinsic": ("tx", "ty", "tz", "rx", "ry", "rz"),
 }
 LARGEST = 1e9  # mm or px: absolute value of a number
+YAML_BYTES = 16_384  # OpenCV's parser overflows the stack where some ten thousand brackets are nested
 POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
 
 
@@ -128,22 +129,23 @@ def _opencv_numbers(path: Path) -> dict[str, Array]:
     """Returns the numbers (N,) under each of KEYS that the file has."""
     import cv2
 
+    text = read_text(path, YAML_BYTES)
+    found = {}
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
-        storage = cv2.FileStorage(read_text(path), cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+        for key in KEYS:
+            node = storage.getNode(key)
+            # The numbers of a matrix are read without its stated size, which may be as large as the memory.
+            items = node.getNode("data") if node.isMap() else node
+            numbers = [items.at(k) for k in range(items.size())] if items.isSeq() else [items]
+            if not node.empty():
+                found[key] = np.array([number.real() for number in numbers])
     except (cv2.error, SystemError):
         expected = "a file of cv2.FileStorage, which begins with %YAML"
         raise InputError(file=path, got="no OpenCV YAML", expected=expected, remedy="check --camera") from None
     finally:
         cv2.utils.logging.setLogLevel(level)
-    found = {}
-    for key in KEYS:
-        node = storage.getNode(key)
-        # The numbers of a matrix are read without its stated size, which may be as large as the memory.
-        items = node.getNode("data") if node.isMap() else node
-        numbers = [items.at(k) for k in range(items.size())] if items.isSeq() else [items]
-        if not node.empty():
-            found[key] = np.array([number.real() for number in numbers])
     return found
 
 

@@ -107,7 +107,7 @@ def sequence_files(
         files |= truth_files.detection_files(found, sequence.fps, sequence.scene)
     files = dict(sorted(files.items()))
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
-    manifest = {
+    manifest: dict[str, Any] = {
         **seal.identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
         **{key: sequence.source[key] for key in ("origin", "stride") if key in sequence.source},
         "pixels": pictures.pixels, "truth_hash": truth,
