@@ -22,7 +22,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, XML_BYTES
+from scenarios.limits import COORDINATE, XML_BYTES, YAML_BYTES
 from scenarios.reading import require_regular
 from sim.io.files.numeric_text import read_number, read_text
 from sim.io.store.camera_files import read_camera
@@ -36,7 +36,6 @@ PARTS = {
     "Extrinsic": ("tx", "ty", "tz", "rx", "ry", "rz"),
 }
 LARGEST = 1e9  # mm or px: absolute value of a number
-YAML_BYTES = 16_384  # OpenCV's parser overflows the stack where some ten thousand brackets are nested
 POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
 
 
