@@ -59,7 +59,7 @@ def read_xml(path: Path) -> CaviarRecording:
     rows: list[tuple[float, ...]] = []
     listed, labelled, hypotheses = set[int](), False, root.find("frame/objectlist/object/hypothesislist") is not None
     for element in root.iterfind("frame"):
-        index = _whole(path, "frame", element, "number", FRAMES - 1) + 1
+        index = int(_number(path, "frame", element, "number", FRAMES - 1)) + 1
         listed.add(index)
         labelled = labelled or element.find("grouplist") is not None
         label = _labels(path, index, element)
@@ -104,30 +104,18 @@ def _root(path: Path) -> ET.Element:
     return root
 
 
-def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
-    text = element.get(key)
+def _number(path: Path, place: str, element: ET.Element, key: str, largest: int = 0) -> float:
+    """Returns the attribute `key`, a whole number from 0 to `largest` if that is given."""
+    text = element.get(key) or ""
     try:
-        value = read_number(text or "")
+        value = whole_number(text) if largest else read_number(text)
     except ValueError:
         value = float("nan")
-    if not abs(value) <= COORDINATE:
+    if not (0 if largest else -COORDINATE) <= value <= (largest or COORDINATE):
         raise InputError(
-            file=path, place=f"{place}: {element.tag} {key}", got=repr(text),
-            expected=f"a number within {COORDINATE:g}", remedy="correct it",
-        )  # fmt: skip
-    return value
-
-
-def _whole(path: Path, place: str, element: ET.Element, key: str, limit: int = LAST_ID) -> int:
-    text = element.get(key)
-    try:
-        value = whole_number(text or "")
-    except ValueError:
-        value = -1
-    if not 0 <= value <= limit:
-        raise InputError(
-            file=path, place=f"{place}: {element.tag} {key}", got=repr(text),
-            expected=f"a whole number from 0 to {limit}", remedy="correct it",
+            file=path, place=f"{place}: {element.tag} {key}", got=repr(element.get(key)),
+            expected=f"a whole number from 0 to {largest}" if largest else f"a number within {COORDINATE:g}",
+            remedy="correct it",
         )  # fmt: skip
     return value
 
@@ -147,7 +135,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
             continue
         if members & label.keys():
             warnings.warn(f"{path}: frame {index - 1}: a person in two groups; the first holds", stacklevel=3)
-        number = _whole(path, f"frame {index - 1}", group, "id")
+        number = int(_number(path, f"frame {index - 1}", group, "id", LAST_ID))
         label.update({m: number for m in sorted(members) if m not in label})
     return label
 
@@ -155,7 +143,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
 def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
     """Returns (frame, id, label, centre x, centre y, width, height), px; label -1 for alone."""
     place = f"frame {index - 1}"
-    id, box = _whole(path, place, person, "id"), person.find("box")
+    id, box = int(_number(path, place, person, "id", LAST_ID)), person.find("box")
     if box is None:
         raise InputError(file=path, place=place, got="an object without box", expected="a box", remedy="add it")
     x, y, w, h = (_number(path, place, box, key) for key in ("xc", "yc", "w", "h"))

@@ -17,7 +17,6 @@ people; other programs write categories, occlusion flags, zeros or pixels there.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -348,13 +347,6 @@ def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
     if ground is None or np.isnan(ground).any():
         table.rows.reject(boxless, "a box, or x, y, z in every line", "give each line a box or a ground position")
     return boxless
-
-
-def ground_cells(xyz: Sequence[float]) -> str:
-    """Returns the last three cells "x,y,z" of a MOT line for a position in m."""
-    # z = -1 would mean unknown.
-    x, y, z = (f"{v:.3f}" for v in xyz)
-    return f"{x},{y},{z if z != '-1.000' else '-1.001'}"
 
 
 def read_truth(

@@ -27,7 +27,6 @@ from sim.io.files.tables import Column, Count, Rate, table_bytes
 from sim.io.formats.labels import chords
 from sim.io.formats.mot_table import MotTable, read_table, require_pixels
 from sim.io.formats.mot_text import (
-    ground_cells,
     ground_positions,
     of_class,
     reject_duplicate_ids,
@@ -38,9 +37,9 @@ from sim.io.formats.options import BoxScale
 from sim.io.store import group_files
 from sim.io.store.group_files import AXES
 from sim.io.store.seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
-from sim.io.store.truth_files import BOX, scores_or_ones, with_ground_height
+from sim.io.store.truth_files import BOX, mot_text, score_and_place, scores_or_ones, with_ground_height
 from sim.scene.body import PERSON_HEIGHT
-from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Plane, Scene, Tracks
+from sim.types import Array, Camera, GroupEvent, Groups, Ints, Plane, Scene, Tracks
 
 WIDTH = 0.50  # m, diameter of the upright cylinder
 
@@ -362,8 +361,8 @@ def tracks_files(
         text_box = upright_boxes(camera, place)
     files = {
         EXACT: track_table(rows, every, fps),
-        "tracks.txt": _text(rows, text_box, place, full=True),
-        "tracks.mot.txt": _text(rows, text_box, place, full=False),
+        "tracks.txt": mot_text(rows.frame, rows.id, text_box, score_and_place(rows.score, place)),
+        "tracks.mot.txt": mot_text(rows.frame, rows.id, text_box, (f"{score:.4f}" for score in rows.score.tolist())),
     }
     first = every[0].index if every else 1
     groups = [t.groups for t in every]
@@ -375,21 +374,6 @@ def tracks_files(
     events = [{**group_files.event_dict(e), "frame": t.index} for t in every for e in t.events]
     files["events.json"] = tables.json_list("events", events)
     return {**files, RUN: sealed_run({**(info or {}), "boxes": boxes}, files)}
-
-
-def _text(rows: RunRows, box: Array, place: Array | None, *, full: bool) -> bytes:
-    boxed: Bools = np.asarray(np.isfinite(box).all(axis=1) & (box[:, 2:] > 0).all(axis=1))
-    places = [[np.nan] * 3] * len(rows.id) if place is None else place.tolist()
-    placed: Bools = np.asarray(np.isfinite(np.reshape(places, (-1, 3))).all(axis=1))
-    lines = []
-    for k, (frame, id, score) in enumerate(
-        zip(rows.frame.tolist(), rows.id.tolist(), rows.score.tolist(), strict=True)
-    ):
-        left, top, width, height = box[k].tolist()
-        corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed[k] else "-1,-1,-1,-1"
-        where = ground_cells(places[k]) if placed[k] else "-1,-1,-1"
-        lines.append(f"{frame},{id},{corner},{score:.4f}" + (f",{where}\n" if full else "\n"))
-    return "".join(lines).encode()
 
 
 def read_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:

@@ -6,9 +6,10 @@ is written only for a truth with boxes.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import BaseModel
@@ -17,10 +18,9 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.io.files import tables
 from sim.io.files.tables import REDO, Column, Count, FrameNumber, Rate, Scale, StoredTable, read_table, table_bytes
-from sim.io.formats.mot_text import ground_cells
 from sim.io.store import group_files
 from sim.scene.terrain import height_at
-from sim.types import Array, Bools, Detections, Groups, Scene, Truth
+from sim.types import Array, Bools, Detections, Groups, Ints, Scene, Truth
 
 BOX = ("box_left", "box_top", "box_width", "box_height")
 VISIBLE = ("visible_left", "visible_top", "visible_width", "visible_height")
@@ -31,7 +31,9 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
     """Returns the files under gt/ of a truth, content by name: those for which it has values."""
     files = {"gt/truth.parquet": _table(truth), "gt/script.json": group_files.script_bytes(truth.orders)}
     if truth.box is not None:
-        files["gt/gt.txt"] = _mot_text(truth, truth.box)
+        seen = has_box(truth.box)
+        visibility = [f"1,1,{v:.3f}" for v in truth.visibility[seen].tolist()]
+        files["gt/gt.txt"] = mot_text(truth.frame[seen], truth.id[seen], truth.box[seen], visibility)
     if truth.groups is not None:
         files["gt/groups.parquet"] = group_files.groups_bytes(truth.groups, 1, "m")
     if truth.groups_px is not None:
@@ -79,14 +81,32 @@ def _flags(table: StoredTable, spans: list[tuple[int, int]], length: int) -> Boo
     return flags
 
 
-def _mot_text(truth: Truth, box: Array) -> bytes:
+def has_box(box: Array) -> Bools:
+    """Returns which of the boxes (R, 4) are known and not empty, (R,)."""
+    return np.asarray(np.isfinite(box).all(axis=1) & (box[:, 2:] > 0).all(axis=1))
+
+
+def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
+    """Returns MOTChallenge text: frame, id, box, and the cells `rest` of each row; an unknown box is four times -1."""
     lines = []
-    rows = zip(truth.frame.tolist(), truth.id.tolist(), box.tolist(), truth.visibility.tolist(), strict=True)
-    for frame, id, (left, top, width, height), visibility in rows:
-        if np.isfinite([left, top, width, height]).all() and width > 0 and height > 0:
-            size = f"{max(width, 0.01):.2f},{max(height, 0.01):.2f}"
-            lines.append(f"{frame},{id},{left:.2f},{top:.2f},{size},1,1,{visibility:.3f}\n")
+    rows = zip(frame.tolist(), id.tolist(), box.tolist(), has_box(box).tolist(), rest, strict=True)
+    for f, i, (left, top, width, height), boxed, end in rows:
+        corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed else "-1,-1,-1,-1"
+        lines.append(f"{f},{i},{corner},{end}\n")
     return "".join(lines).encode()
+
+
+def score_and_place(score: Array, place: Array | None) -> list[str]:
+    """Returns the cells conf, x, y, z of MOT lines; place: (R, 3) m, with nan or None for unknown."""
+    places = np.full((len(score), 3), np.nan) if place is None else place
+    return [f"{s:.4f},{_cells(xyz)}" for s, xyz in zip(score.tolist(), places.tolist(), strict=True)]
+
+
+def _cells(xyz: list[float]) -> str:
+    if not np.isfinite(xyz).all():
+        return "-1,-1,-1"
+    x, y, z = (f"{v:.3f}" for v in xyz)
+    return f"{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown
 
 
 class _TruthFacts(BaseModel):
@@ -153,11 +173,9 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     counts = [len(d.pos) for d in detections]
     pos = np.concatenate([np.zeros((0, len(axes))), *(d.pos for d in detections)])
     score = np.concatenate([np.zeros(0), *(scores_or_ones(d.score, len(d.pos)) for d in detections)])
-    columns = [
-        Column("frame", np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), counts)),
-        *(Column(a, pos[:, k], unit) for k, a in enumerate(axes)),
-        Column("score", score),
-    ]
+    frame = np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), counts)
+    places = (Column(a, pos[:, k], unit) for k, a in enumerate(axes))
+    columns = [Column("frame", frame), *places, Column("score", score)]
     if moving:
         vel = np.concatenate([d.vel for d in detections if d.vel is not None])
         columns += [Column(f"v{a}", vel[:, k], f"{unit}/s") for k, a in enumerate(axes)]
@@ -165,7 +183,10 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     if box is not None:
         columns += [Column(name, box[:, k], "px") for k, name in enumerate(BOX)]
     facts = {"plane": plane, "frames": len(detections), "fps": fps}
-    text = _det_text(columns[0].values, box, score, None if plane == "image" else with_ground_height(pos, scene))
+    rest = score_and_place(score, None if plane == "image" else with_ground_height(pos, scene))
+    # An alarm at the picture's edge may be a box without width.
+    shown = np.full((len(score), 4), np.nan) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
+    text = mot_text(frame, np.full(len(frame), -1), shown, rest)
     return {"det/det.parquet": table_bytes(columns, facts), "det/det.txt": text}
 
 
@@ -186,16 +207,6 @@ def with_ground_height(pos: Array, scene: Scene | None) -> Array:
         return pos
     z = np.zeros(len(pos)) if scene is None else height_at(scene, pos)
     return np.concatenate([pos, z[:, None]], axis=1)
-
-
-def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None) -> bytes:
-    boxes = np.full((len(score), 4), -1.0) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
-    lines = []
-    for k, f in enumerate(frame):
-        corner = "-1,-1,-1,-1" if box is None else ",".join(f"{v:.2f}" for v in boxes[k])
-        place = "-1,-1,-1" if ground is None else ground_cells(ground[k])
-        lines.append(f"{f},-1,{corner},{score[k]:.4f},{place}\n")
-    return "".join(lines).encode()
 
 
 class _DetectionFacts(BaseModel):
