@@ -34,7 +34,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.support.options import new_parser
-from sim.versions import versions
+from sim.hashing import versions
 from sim.workers.pool import THREAD_VARIABLES
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -30,7 +30,7 @@ import numpy as np
 
 from benchmarks.support.options import CAMPUS, HOTEL, PETS, WALK_TOGETHER, add_data, new_parser
 from scenarios import sensor_settings
-from scenarios.loading.suites import read_entries
+from scenarios.loading.resolve import read_suite
 from sim.io.files.atomic import write_file
 from sim.io.source import open_source
 from sim.types import Sequence, Tracks
@@ -109,7 +109,7 @@ def search(given: argparse.Namespace) -> None:
 def half_with_sensor(suite: Path, sensor: Path, out: Path) -> Path:
     """Writes and returns the suite with this detector in every second scene, beginning with the first."""
     rows = []
-    for k, line in enumerate(read_entries(suite)):
+    for k, line in enumerate(read_suite(suite).entry):
         settings = (*line.settings, *(sensor_settings(sensor) if k % 2 == 0 else ()))
         name, scenario, more = map(json.dumps, (line.name, line.scenario, settings))
         rows.append(f"  {{ name = {name}, scenario = {scenario}, set = {more} }},")

@@ -1,13 +1,13 @@
 """The errors that users see: InputError (wrong input, exit code 2) and WorkError (failed work or check, exit code 1).
 
-Each message is one line: file, place in it, what was found, what was expected, and what the user can do.
+Each message is one line: file, place in it, what was found, what was expected, and what the user can do. Text from
+files, names and command lines is made safe to print: no control characters, and no endless lines.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
-
-from scenarios.printable import printable, shortened
+import unicodedata
+from typing import ClassVar, Self
 
 # the parts of an error, and how many characters of each its line shows at most
 PARTS = {"file": 400, "place": 200, "got": 200, "expected": 400, "remedy": 400}
@@ -42,6 +42,10 @@ class FlockscopeError(Exception):
         where = "".join(f"{part}: " for part in (file, place) if part)
         return f"{where}got {got}; expected {expected}; {remedy}"
 
+    def replaced(self, **parts: object) -> Self:
+        """Returns the same error with other parts, as with the file that a check of values did not know."""
+        return type(self)(**{**self.as_dict(), **parts})  # type: ignore[arg-type]
+
     def as_dict(self) -> dict[str, str]:
         """Returns the parts of the error by name, as `--json` prints them."""
         return {name: getattr(self, name) for name in PARTS}
@@ -66,3 +70,37 @@ class OrderError(WorkError):
 
 def _rebuild(kind: type[FlockscopeError], parts: dict[str, str]) -> FlockscopeError:
     return kind(**parts)
+
+
+# unicode categories that are never printed: control (as ESC), format (as right-to-left marks), surrogates, and
+# separators of lines and paragraphs
+CONTROL = ("Cc", "Cf", "Cs", "Zl", "Zp")
+
+
+def printable(text: str, keep: str = "") -> str:
+    """Returns the text with each control character, but those of `keep`, as an escape that a terminal shows."""
+    if text.isprintable():
+        return text
+    return "".join([c if c.isprintable() or c in keep or not is_control(c) else _escape(c) for c in text])
+
+
+def is_control(character: str) -> bool:
+    """Returns True for a character that is never printed."""
+    return unicodedata.category(character) in CONTROL
+
+
+def _escape(character: str) -> str:
+    return character.encode("unicode_escape").decode("ascii")
+
+
+def counted(number: int, noun: str) -> str:
+    """Returns a number with its noun: "1 frame", "2 frames"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def shortened(text: str, longest: int) -> str:
+    """Returns the text if it has at most `longest` characters, else its beginning and end around a "…"."""
+    if len(text) <= longest:
+        return text
+    end = longest // 3
+    return f"{text[: longest - 1 - end]}…{text[-end:]}"

@@ -14,6 +14,7 @@ TEXT_BYTES = 128 * 2**20  # bytes of a text file of rows
 JSON_BYTES = 64 * 2**20  # bytes of a JSON file
 TOML_BYTES = 2 * 2**20  # bytes of a TOML file
 XML_BYTES = 64 * 2**20  # bytes of an XML file
+YAML_BYTES = 16_384  # OpenCV's parser overflows the stack where some ten thousand brackets are nested
 DEPTH = 32  # tables and lists inside each other in a TOML or JSON file
 NESTING = f"at most {DEPTH} tables and lists inside each other"  # words for what DEPTH allows
 REPEATS = 10_000  # entries that one row of a suite stands for

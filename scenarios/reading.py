@@ -111,24 +111,19 @@ def require_regular(path: Path, remedy: str = "check the path") -> int:
 
 def refuse_irregular(path: Path) -> None:
     """Raises InputError as `require_regular` does, but not for a missing file or a link to one."""
-    if os.path.lexists(path) and (os.path.exists(path) or not _dangles(path)):
-        require_regular(path)
+    try:
+        os.stat(path)
+    except FileNotFoundError:
+        return
+    except OSError:
+        pass
+    require_regular(path)
 
 
 def is_present(path: Path) -> bool:
     """Returns True if the regular file exists; raises InputError for something else, as a FIFO."""
     refuse_irregular(path)
     return os.path.isfile(path)
-
-
-def _dangles(path: Path) -> bool:
-    try:
-        os.stat(path)
-    except FileNotFoundError:
-        return True
-    except OSError:
-        return False
-    return False
 
 
 def read_regular(path: Path, limit: int, remedy: str = "check the path") -> bytes:

@@ -17,25 +17,12 @@ from sim.types import Array, Ints
 if TYPE_CHECKING:
     from scenarios.schema.values import Distribution, Value
 
-# Every stored hash depends on these numbers: add at the end, never change one.
-ROLE = {
-    "layout": 0,
-    "group": 1,
-    "person": 2,
-    "event": 3,
-    "service": 4,
-    "gait": 5,
-    "detect": 6,
-    "clutter": 7,
-    "texture": 8,
-    "light": 9,
-    "noise": 10,
-    "tracker": 11,
-    "camera": 12,
-    "wind": 13,
-    "label": 14,
-    "delivery": 15,
-}
+# Every stored hash depends on their numbers: add at the end, never change one.
+ROLES = (
+    "layout", "group", "person", "event", "service", "gait", "detect", "clutter", "texture", "light", "noise",
+    "tracker", "camera", "wind", "label", "delivery",
+)  # fmt: skip
+ROLE = {name: number for number, name in enumerate(ROLES)}
 
 
 def rng(seed: int, role: str, *keys: int, repeat: int = 0) -> np.random.Generator:

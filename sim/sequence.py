@@ -6,37 +6,22 @@ Its pictures, detections and truth are computed when they are first used, not wh
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.errors import InputError
 from sim.clock import check_stride, every_nth
 from sim.render.renderer import RenderedFrame, Renderer, make_renderer
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
+from sim.streams import check_streams
 from sim.truth.label import bodies, label
 from sim.truth.order_fulfilment import check_orders
-from sim.types import (
-    BACKGROUNDS,
-    OWN_BACKGROUND,
-    Camera,
-    Detections,
-    Frame,
-    Image,
-    Motion,
-    Order,
-    PixelTruth,
-    Scene,
-    Sequence,
-    Truth,
-)
+from sim.types import BACKGROUNDS, OWN_BACKGROUND, Camera, Detections, Frame, Image, Motion, PixelTruth, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import ObservationSpec, Scenario
-
-STREAMS = frozenset({"left", "right", "disparity", "ids", "background"})
 
 
 def simulate(
@@ -82,7 +67,10 @@ def observe(
     """
     check_stride(stride, motion.fps)
     camera = place_camera(scenario.camera, motion)
-    drawn = _pictures(streams, scenario, motion, camera, stride)
+    wanted = frozenset(check_streams(streams, "png"))
+    renderer = _renderer(wanted, scenario, motion, camera)
+    left, right, disparity = ("left" in wanted, "right" in wanted, "disparity" in wanted)
+    labels = left and not wanted.isdisjoint({"ids", "disparity"})
     kept = every_nth(motion, stride)
 
     @cache
@@ -90,6 +78,7 @@ def observe(
         if people is not None:
             return people
         from scenarios.schema import scenario as schema
+        from sim.crowd.population import named_people
 
         assert isinstance(scenario, schema.Scenario), "only a scenario names groups: give people"
         return named_people(scenario, motion.scene, motion.seed, motion.repeat, motion.orders)
@@ -106,9 +95,26 @@ def observe(
     def bare() -> Iterator[Frame]:
         return (Frame(d.index, d.t, detections=d) for d in detections())
 
+    # A frame's pixels are usually read right after its pictures.
+    @lru_cache(maxsize=1)
+    def drawn(index: int) -> RenderedFrame:
+        shot = 1 + (index - 1) * stride
+        if renderer is None or not left:
+            return RenderedFrame(right=renderer.right(shot) if renderer is not None and right else None)
+        return renderer.draw(shot, right=right, pixels=labels, disparity=disparity)
+
+    def pixels(index: int) -> PixelTruth:
+        assert renderer is not None
+        known = drawn(index).pixels if labels else None
+        return renderer.pixels(1 + (index - 1) * stride, disparity=disparity) if known is None else known
+
+    def background() -> Image:
+        assert renderer is not None
+        return np.stack([renderer.background(k) for k in range(BACKGROUNDS)])
+
     def frames() -> Iterator[Frame]:
         for d in detections():
-            made = RenderedFrame() if drawn is None else drawn.draw(d.index)
+            made = drawn(d.index)
             yield Frame(d.index, d.t, made.image, made.right, d)
 
     def truth() -> Truth:
@@ -117,105 +123,23 @@ def observe(
             check_orders(kept, found)
         return found
 
+    source = {"kind": "simulated", "seed": motion.seed, "repeat": motion.repeat}
+    source |= {} if stride == 1 else {"stride": stride}
+    source |= {} if renderer is None else {"background": OWN_BACKGROUND}
     return Sequence(
-        name=motion.name,
-        fps=kept.fps,
-        length=len(kept.present),
-        frames=frames,
-        load_truth=truth,
-        image_size=camera.image,
-        camera=camera,
-        scene=motion.scene,
-        px_per_m=px_per_m_at_centre(camera),
-        has_detections=True,
-        load_people=named,
-        source={
-            "kind": "simulated",
-            "seed": motion.seed,
-            "repeat": motion.repeat,
-            **({} if stride == 1 else {"stride": stride}),
-            **({} if drawn is None else {"background": OWN_BACKGROUND}),
-        },
-        has_images=drawn is not None and drawn.has_image,
-        has_right=drawn is not None and drawn.has_right,
-        bare=bare,
-        load_background=None if drawn is None else drawn.background,
-        load_pixels=None if drawn is None else drawn.pixels,
-    )
+        name=motion.name, fps=kept.fps, length=len(kept.present), frames=frames, load_truth=truth,
+        image_size=camera.image, camera=camera, scene=motion.scene, px_per_m=px_per_m_at_centre(camera),
+        has_images=left, has_right=right, has_detections=True, load_people=named, source=source, bare=bare,
+        load_background=None if renderer is None else background, load_pixels=None if renderer is None else pixels,
+    )  # fmt: skip
 
 
-class _Pictures:
-    """Draws the requested streams of a simulated sequence.
-
-    State: index and exact pixels of the frame that was drawn last, because its pixels are usually read next.
-    """
-
-    def __init__(self, renderer: Renderer, streams: frozenset[str], stride: int) -> None:
-        self.renderer, self.streams, self.stride = renderer, streams, stride
-        self.has_image, self.has_right = "left" in streams, "right" in streams
-        self._last: tuple[int, PixelTruth | None] = (0, None)
-
-    def draw(self, index: int) -> RenderedFrame:
-        """Draws frame `index` (from 1): the left and right picture, each None unless requested."""
-        shot = self._shot(index)
-        if not self.has_image:
-            return RenderedFrame(right=self.renderer.right(shot) if self.has_right else None)
-        labels = not self.streams.isdisjoint({"ids", "disparity"})
-        made = self.renderer.draw(shot, right=self.has_right, pixels=labels, disparity="disparity" in self.streams)
-        self._last = index, made.pixels
-        return made
-
-    def pixels(self, index: int) -> PixelTruth:
-        """Returns the exact pixels of frame `index` (from 1); disparity is None unless the stream "disparity" was
-        requested.
-        """
-        last, known = self._last
-        if known is not None and last == index:
-            return known
-        return self.renderer.pixels(self._shot(index), disparity="disparity" in self.streams)
-
-    def _shot(self, index: int) -> int:
-        return 1 + (index - 1) * self.stride
-
-    def background(self) -> Image:
-        """Returns pictures of the empty scene before frame 1, (50, H, W, 3) BGR uint8, in the order of time, 1 / fps
-        apart.
-        """
-        return np.stack([self.renderer.background(k) for k in range(BACKGROUNDS)])
-
-
-def _pictures(
-    streams: Iterable[str], scenario: Scenario | ObservationSpec, motion: Motion, camera: Camera, stride: int
-) -> _Pictures | None:
-    wanted = frozenset(streams)
-    if not wanted <= STREAMS:
-        raise InputError(
-            place="streams", got=", ".join(sorted(wanted - STREAMS)), expected=f"some of {', '.join(sorted(STREAMS))}",
-            remedy="leave it out",
-        )  # fmt: skip
-    if not wanted:
+def _renderer(
+    streams: frozenset[str], scenario: Scenario | ObservationSpec, motion: Motion, camera: Camera
+) -> Renderer | None:
+    if not streams:
         return None
     made = make_renderer(motion, camera, scenario.light, scenario.picture)
-    if not wanted.isdisjoint({"right", "disparity"}):
+    if not streams.isdisjoint({"right", "disparity"}):
         made.check_pair()
-    return _Pictures(made, wanted, stride)
-
-
-def named_people(
-    scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
-) -> dict[str, tuple[int, ...]]:
-    """Returns the person ids of each group that the script names, also those that its orders made."""
-    from sim.crowd.population import draw_population
-
-    parties = draw_population(scenario, scene, seed, repeat)
-    names = {party.name: tuple(m.column + 1 for m in party.members) for party in parties}
-    after = {order.id: order.after for order in orders if order.fired is not None}
-    for event in scenario.event:
-        made = after.get(event.id)
-        if made is None:
-            continue
-        if event.type == "merge":
-            names[event.into] = made[0]
-        elif event.type == "split":
-            names |= {part.id: ids for part, ids in zip(event.parts, made, strict=True)}
-    return names
+    return made

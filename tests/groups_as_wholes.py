@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.geometry.footprints import footprint_hull
-from sim.geometry.polygons import convex_hull
+from sim.geometry.polygons import convex_hull, footprint_hull
 from sim.types import Array, FrameTruth, GroupEvent, Groups, Sequence, Tracks
 
 LATE = 4

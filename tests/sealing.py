@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.io.files import tables
-from sim.io.store.run_seal import NAMES, sealed_run
+from sim.io.store.seal import NAMES, sealed_run
 
 
 def seal_again(folder: Path, **changes: Any) -> None:

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import results
-from scenarios.loading.resolve import resolve
-from scenarios.loading.suites import read_entries
+from scenarios.loading.resolve import read_suite, resolve
 
 TABLES = results.tables()
 SHOWN = {(page, name): text for page in results.pages() for name, text in results.shown(page).items()}
@@ -47,12 +46,12 @@ SUITES = Path(__file__).resolve().parents[1] / "benchmarks" / "tuning_suites"
 
 @pytest.mark.parametrize("path", sorted(SUITES.glob("*.toml")), ids=lambda path: path.stem)
 def test_each_can_be_read(path: Path) -> None:
-    assert [entry.name for entry in resolve(str(path))] == [line.name for line in read_entries(path)]
+    assert [entry.name for entry in resolve(str(path))] == [line.name for line in read_suite(path).entry]
 
 
 def test_labelled_scenes_are_those_of_groups_seen_by_labellers() -> None:
     """Everybody is seen at 2.5 frames/s, and nothing else is changed."""
-    groups, labelled = read_entries(SUITES / "groups.toml"), read_entries(SUITES / "labelled.toml")
+    groups, labelled = (read_suite(SUITES / f"{name}.toml").entry for name in ("groups", "labelled"))
     for plain, seen, entry in zip(groups, labelled, resolve(str(SUITES / "labelled.toml")), strict=True):
         sensor = [setting for setting in seen.settings if setting.startswith("sensor.")]
         assert (seen.name, seen.scenario, seen.settings) == (plain.name, plain.scenario, (*plain.settings, *sensor))

@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.stereo.scenes import Variant, measured
 from benchmarks.stereo.stored_rows import Row
 from benchmarks.support.tables import signed, table
-from sim.scene.stereo import back_project, project_pair
+from sim.scene.camera import back_project, project_pair
 from sim.types import Array
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import measurement, merging, picture_points, space_group, tracker

@@ -52,12 +52,11 @@ def setting(scenario: Scenario) -> list[str]:
     turned += [] if scenario.lead == 0.0 else [f"{number(scenario.lead, 's')} further on than it says"]
     view = "from above" if camera.kind == "top" else f"looking down {camera.tilt_deg:g}°"
     solved = "" if camera.height is not None or camera.px_per_m is not None else ", placed to see everybody"
+    script = f"; the script is {', '.join(turned)}" if turned else ""
     return [
-        f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up; the script is {', '.join(turned)}"
-        if turned
-        else f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up",
+        f"{scenario.duration:g} s after {scenario.warmup:g} s of warm-up{script}",
         f"world {world.size[0]:g} × {world.size[1]:g} m"
-        + (": " + ", ".join(things_in_it) if things_in_it else ", empty"),
+        + (f": {', '.join(things_in_it)}" if things_in_it else ", empty"),
         f"camera {view}, {camera.image[0]} × {camera.image[1]} px, {camera.fps:g} frames/s{solved}",
     ]
 
@@ -132,17 +131,15 @@ def sensor(scenario: Scenario) -> list[str]:
 
 def text(scenario: Scenario) -> str:
     """Returns a description of a scenario for people, as lines of text: setting, people, orders, sensor."""
-    lines = [
-        scenario.name,
-        *([scenario.about] if scenario.about else []),
-        "",
-        *setting(scenario),
-        "",
-        "People",
-    ]
+    lines = [scenario.name, *([scenario.about] if scenario.about else []), "", *setting(scenario), "", "People"]
     wide = max(len(group.id) for group in scenario.group)
     lines += [f"  {group.id:<{wide}}  {people(group)}" for group in scenario.group]
     lines += ["", "Orders"] + ([] if scenario.event else ["  none"])
     for k, event in enumerate(scenario.event):
         lines += [f"  {k + 1} {event.id}  {order(event)}", f"      {trigger(event.when)}"]
     return "\n".join([*lines, "", "Sensor", *("  " + line for line in sensor(scenario)), ""])
+
+
+def cut(words: str, length: int) -> str:
+    """Returns the words, cut to a length at their end."""
+    return words if len(words) <= length else words[: length - 1] + "…"

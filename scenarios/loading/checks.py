@@ -1,8 +1,7 @@
-"""Checks a scenario before it is simulated: values, places inside the world and clear of walls, and the script.
+"""Checks a scenario before it is simulated: its size, places inside the world and clear of walls, and the script.
 
-A value that is a distribution must lie in its range in at least 999 of 1000 draws. Each order of the script must
-concern groups that exist at that point of it, in sizes that fit, within the duration. The first thing that cannot work
-raises InputError.
+The ranges of single values stand in scenarios.schema. Each order of the script must concern groups that exist at that
+point of it, in sizes that fit, within the duration. The first thing that cannot work raises InputError.
 """
 
 from __future__ import annotations
@@ -10,48 +9,35 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 from scenarios.errors import InputError
-from scenarios.limits import CELLS, DETECTIONS, FRAME_RATES, FRAMES, PEOPLE, PICTURE_SIZES, fits_picture
+from scenarios.limits import CELLS, FRAMES, PEOPLE
 from scenarios.loading.toml_files import did_you_mean
 from scenarios.schema.geometry import clearance, door_fits, queue_places
-from scenarios.schema.scenario import (
-    MergeOrder,
-    ObservationSpec,
-    QueueOrder,
-    Scenario,
-    ScriptOrder,
-    SplitOrder,
-    expand,
-    group_names,
-)
-from scenarios.schema.values import Distribution, Point, Value, bounds, fixed, share_within
+from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
+from scenarios.schema.values import SURE, Distribution, Point, Value, bounds, fixed
 
-SURE = 0.999  # least probability that a value lies in its range
-FASTEST = 10.0  # m/s: as fast as a sprinter
-TALLEST = 3.0  # m
+BODY = 0.2  # m: least distance from a person's middle to a wall or pillar (the radius of a body in the physics)
 
 
-class _Range(NamedTuple):
-    """A value at the key `place` of a scenario, and the least and greatest number allowed there, both included."""
+def check(scenario: Scenario, file: str | Path = "") -> None:
+    """Raises InputError, naming `file`, for the first thing in the scenario that cannot work."""
+    try:
+        _check_world(scenario)
+        _check_groups(scenario)
+        _check_amounts(scenario)
+        _check_sensor(scenario)
+        _check_points(scenario)
+        _check_script(scenario)
+    except InputError as error:
+        raise error.replaced(file=file) from None
 
-    place: str
-    value: Value
-    low: float
-    high: float
-    unit: str  # a text for messages, with a blank in front (" m"), "" for none
 
-
-def check_values(scenario: Scenario) -> None:
-    """Raises InputError, without a file, for the first value that is out of its range, or if it is all too much."""
-    _require(_crowd(scenario))
-    check_observation(scenario)
-    frames = scenario.duration * scenario.camera.fps
+def _check_amounts(scenario: Scenario) -> None:
+    frames, people = scenario.duration * scenario.camera.fps, most_people(scenario)
     if frames > FRAMES:
-        expected = f"at most {FRAMES:,}"
-        fail("duration", f"{frames:,.0f} frames", expected, "shorten it, or lower camera.fps")
-    people = most_people(scenario)
+        fail("duration", f"{frames:,.0f} frames", f"at most {FRAMES:,}", "shorten it, or lower camera.fps")
     if people > PEOPLE:
         fail("group", f"up to {people:,.0f} people", f"at most {PEOPLE:,}", "make groups smaller or fewer")
     if people * frames > CELLS:
@@ -64,71 +50,6 @@ def most_people(scenario: Scenario) -> float:
     return sum(group.repeat * _most(group.size) for group in scenario.group)
 
 
-def check_observation(spec: Scenario | ObservationSpec) -> None:
-    """Raises InputError, without a file, for the first value of camera, sensor, light or picture out of range."""
-    _require(_observation(spec))
-    if not fits_picture(*spec.camera.image):
-        fail("camera.image", "{}×{} px".format(*spec.camera.image), PICTURE_SIZES, "make the image smaller")
-
-
-def _require(ranges: Iterator[_Range]) -> None:
-    for place, value, low, high, unit in ranges:
-        share = share_within(value, low, high)
-        if share < SURE:
-            drawn = isinstance(value, Distribution)
-            got = f"a distribution with {share:.1%} of its draws in this range" if drawn else f"{value:g}{unit}"
-            remedy = f"correct it, or add clip = [{low:g}, {high:g}]" if drawn else "correct it"
-            fail(place, got, f"from {low:g} to {high:g}{unit}", remedy)
-
-
-def _crowd(scenario: Scenario) -> Iterator[_Range]:
-    crowd = scenario.crowd
-    yield _Range("crowd.free_speed", crowd.free_speed, 0.05, FASTEST, " m/s")
-    yield _Range("crowd.spacing", crowd.spacing, 0.1, 10.0, " m")
-    yield _Range("crowd.height", crowd.height, 0.3, TALLEST, " m")
-    yield _Range("crowd.slowdown_per_member", crowd.slowdown_per_member, 0.0, FASTEST, " m/s")
-    yield _Range("crowd.sway", crowd.sway, 0.0, 0.2, " m")
-    for k in range(2):
-        yield _Range(f"crowd.velocity_noise.{k}", crowd.velocity_noise[k], 0.0, 1.0, " m/s")
-        yield _Range(f"crowd.place_noise.{k}", crowd.place_noise[k], 0.0, 2.0, " m")
-    for axis, size in zip("xy", scenario.world.size, strict=True):
-        yield _Range(f"world.size.{'xy'.index(axis)}", size, 0.1, 10_000.0, " m")
-    for group in scenario.group:
-        yield _Range(f"group.{group.id}.size", group.size, 0.5, PEOPLE, " people")
-        yield _Range(f"group.{group.id}.scatter", group.scatter, 0.0, 10.0, " m")
-        for k, stop in enumerate(group.stops):
-            yield _Range(f"group.{group.id}.stops.{k}.stay", stop.stay, 0.0, 3600.0, " s")
-            if stop.members is not None:
-                yield _Range(f"group.{group.id}.stops.{k}.members", stop.members, -0.5, PEOPLE, " people")
-        if group.speed is not None:
-            yield _Range(f"group.{group.id}.speed", group.speed, 0.05, FASTEST, " m/s")
-    for order in scenario.event:
-        if isinstance(order, QueueOrder):
-            yield _Range(f"event.{order.id}.service", order.service, 0.0, 3600.0, " s")
-
-
-def _observation(spec: Scenario | ObservationSpec) -> Iterator[_Range]:
-    camera, sensor, light, picture = spec.camera, spec.sensor, spec.light, spec.picture
-    yield _Range("camera.fps", camera.fps, *FRAME_RATES, " frames/s")
-    yield _Range("camera.baseline", camera.baseline, 0.0, 100.0, " m")
-    yield _Range("sensor.clutter_rate", sensor.clutter_rate, 0.0, DETECTIONS / 5, " false alarms per frame")
-    yield _Range("sensor.box_noise.floor_px", sensor.box_noise.floor_px, 0.0, 1000.0, " px")
-    yield _Range("sensor.box_noise.scale", sensor.box_noise.scale, 0.0, 20.0, "")
-    yield _Range("sensor.noise_m", sensor.noise_m, 0.0, 1000.0, " m")
-    yield _Range("light.penumbra", light.penumbra, 0.0, 100.0, " m")
-    yield _Range("light.cloud", light.cloud, 0.0, 10.0, "")
-    yield _Range("light.cloud_speed", light.cloud_speed, 0.0, 1000.0, " m/s")
-    for k, switch in enumerate(light.switch):
-        yield _Range(f"light.switch.{k}.gain", switch.gain, 1e-3, 1000.0, "")
-    yield _Range("picture.noise", picture.noise, 0.0, 255.0, " grey levels")
-    yield _Range("picture.blur_px", picture.blur_px, 0.0, 100.0, " px")
-    yield _Range("picture.foliage", picture.foliage, 0.0, 1.0, "")
-    yield _Range("picture.sway_px", picture.sway_px, 0.0, 100.0, " px")
-    yield _Range("picture.right_gain", picture.right_gain, 1e-3, 1000.0, "")
-    yield _Range("picture.right_roll_deg", picture.right_roll_deg, -10.0, 10.0, " degrees")
-    yield _Range("picture.right_down_px", picture.right_down_px, -100.0, 100.0, " px")
-
-
 def _most(size: Value) -> float:
     if not isinstance(size, Distribution):
         return max(1.0, float(round(size)))
@@ -139,22 +60,6 @@ def _most(size: Value) -> float:
     return most
 
 
-BODY = 0.2  # m: least distance from a person's middle to a wall or pillar (the radius of a body in the physics)
-
-
-def check(scenario: Scenario, file: str | Path = "") -> None:
-    """Raises InputError, naming `file`, for the first thing in the scenario that cannot work."""
-    try:
-        _check_world(scenario)
-        _check_groups(scenario)
-        check_values(scenario)
-        _check_sensor(scenario)
-        _check_points(scenario)
-        check_script(scenario)
-    except InputError as error:
-        raise InputError(**{**error.as_dict(), "file": str(file)}) from None
-
-
 def _check_world(scenario: Scenario) -> None:
     world = scenario.world
     for k, wall in enumerate(world.walls):
@@ -163,9 +68,8 @@ def _check_world(scenario: Scenario) -> None:
     for k, door in enumerate(world.doors):
         if not any(door_fits(door, wall) for wall in world.walls):
             got = f"a door {door.width:g} m wide at {list(door.at)}, which lies on no wall"
-            fail(
-                f"world.doors.{k}", got, "an opening that lies on one wall", "move it onto a wall, or make it narrower"
-            )
+            remedy = "move it onto a wall, or make it narrower"
+            fail(f"world.doors.{k}", got, "an opening that lies on one wall", remedy)
     for k, stairs in enumerate(world.stairs):
         if stairs.foot == stairs.head:
             fail(f"world.stairs.{k}", "foot and head at one place", "two different places", "move one of them")
@@ -178,10 +82,6 @@ def _check_groups(scenario: Scenario) -> None:
             if name in seen:
                 fail(f"group.{group.id}", f"a second group named {name!r}", "unique ids", "rename one")
             seen.add(name)
-        low = bounds(group.size)[0]
-        if low < 0.5:
-            got = f"a size that can be {'any number' if math.isinf(low) else f'{low:g}'}"
-            fail(f"group.{group.id}.size", got, "at least 1 person", "raise it, or add clip = [1, 6]")
         earliest = bounds(group.enter)[0]
         got = f"{earliest:g} s at the earliest"
         if earliest >= scenario.duration:
@@ -192,12 +92,10 @@ def _check_groups(scenario: Scenario) -> None:
 
 
 def _check_sensor(scenario: Scenario) -> None:
-    known = [name for group in scenario.group for name in group_names(group)] + [
-        name
-        for event in scenario.event
-        for name in ((event.into,) if isinstance(event, MergeOrder) else ())
-        + (tuple(part.id for part in event.parts) if isinstance(event, SplitOrder) else ())
-    ]
+    known = [name for group in scenario.group for name in group_names(group)]
+    for event in scenario.event:
+        known += [event.into] if isinstance(event, MergeOrder) else []
+        known += [part.id for part in event.parts] if isinstance(event, SplitOrder) else []
     for k, hide in enumerate(scenario.sensor.hide):
         if hide.group is not None and hide.group not in known:
             fail(f"sensor.hide.{k}.group", repr(hide.group), "a group of the script", did_you_mean(hide.group, known))
@@ -248,7 +146,7 @@ def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
             yield f"{key}.goal", event.goal
 
 
-SizeRange = tuple[float, float]
+Sizes = dict[str, tuple[float, float]]  # least and greatest number of people of each existing group
 QUEUE_PEOPLE = 3  # least number of people in a queue; sim.truth.queue_detection has the same number
 
 
@@ -257,10 +155,12 @@ def fail(place: str, got: str, expected: str, remedy: str) -> NoReturn:
     raise InputError(place=place, got=got, expected=expected, remedy=remedy)
 
 
-def check_script(scenario: Scenario) -> None:
-    """Raises InputError, without a file, for the first order of the script that cannot work."""
+def _check_script(scenario: Scenario) -> None:
     # Each merge and split ends its groups and makes new ones, whose possible sizes follow.
-    alive = {name: _people(bounds(group.size)) for group in scenario.group for name in group_names(group)}
+    alive: Sizes = {}
+    for group in scenario.group:
+        low, high = bounds(group.size)
+        alive.update(dict.fromkeys(group_names(group), (max(1.0, float(round(low))), high)))
     gone: dict[str, str] = {}
     orders: list[str] = []
     for event in scenario.event:
@@ -268,26 +168,22 @@ def check_script(scenario: Scenario) -> None:
         if event.id in orders:
             fail(key, f"a second order named {event.id!r}", "unique ids", "rename one")
         _check_when(event, key, orders, alive, gone, scenario.duration)
-        _apply(event, key, alive, gone)
+        if isinstance(event, MergeOrder):
+            _merge(event, key, alive, gone)
+        elif isinstance(event, SplitOrder):
+            _split(event, key, alive, gone)
+        else:
+            _queue(event, key, alive, gone)
         orders.append(event.id)
 
 
-def _people(size: SizeRange) -> SizeRange:
-    """Returns the least and greatest number of people for the bounds of a group's `size`."""
-    return max(1.0, float(round(size[0]))), size[1]
-
-
 def _check_when(
-    event: ScriptOrder, key: str, orders: list[str], alive: dict[str, SizeRange], gone: dict[str, str], duration: float
+    event: ScriptOrder, key: str, orders: list[str], alive: Sizes, gone: dict[str, str], duration: float
 ) -> None:
     when = event.when
     if when.after is not None and when.after not in orders:
-        fail(
-            f"{key}.when.after",
-            repr(when.after),
-            "the id of an order before this one",
-            did_you_mean(when.after, orders),
-        )
+        remedy = did_you_mean(when.after, orders)
+        fail(f"{key}.when.after", repr(when.after), "the id of an order before this one", remedy)
     if when.reach is not None:
         _exists(when.reach.group, f"{key}.when.reach.group", alive, gone)
     delay = bounds(when.delay)[0]
@@ -298,7 +194,7 @@ def _check_when(
         fail(f"{key}.when", f"{first:g} s at the earliest", f"before the end, {duration:g} s", "fire it earlier")
 
 
-def _exists(name: str, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
+def _exists(name: str, place: str, alive: Sizes, gone: dict[str, str]) -> None:
     if name in gone:
         expected = "a group that still exists: " + ", ".join(alive)
         fail(place, f"{name!r}, which ended with {gone[name]!r}", expected, "name another group, or move the order up")
@@ -306,22 +202,13 @@ def _exists(name: str, place: str, alive: dict[str, SizeRange], gone: dict[str, 
         fail(place, repr(name), "a group that exists at this point of the script", did_you_mean(name, list(alive)))
 
 
-def _add_group(name: str, size: SizeRange, place: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
+def _add_group(name: str, size: tuple[float, float], place: str, alive: Sizes, gone: dict[str, str]) -> None:
     if name in alive or name in gone:
         fail(place, f"{name!r}, which is another group's name", "a new name", "rename it")
     alive[name] = size
 
 
-def _apply(event: ScriptOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
-    if isinstance(event, MergeOrder):
-        _merge(event, key, alive, gone)
-    elif isinstance(event, SplitOrder):
-        _split(event, key, alive, gone)
-    else:
-        _queue(event, key, alive, gone)
-
-
-def _merge(event: MergeOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
+def _merge(event: MergeOrder, key: str, alive: Sizes, gone: dict[str, str]) -> None:
     for k, name in enumerate(event.groups):
         _exists(name, f"{key}.groups.{k}", alive, gone)
         if name in event.groups[:k]:
@@ -331,7 +218,7 @@ def _merge(event: MergeOrder, key: str, alive: dict[str, SizeRange], gone: dict[
     _add_group(event.into, (sum(low for low, _ in sizes), sum(high for _, high in sizes)), f"{key}.into", alive, gone)
 
 
-def _split(event: SplitOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
+def _split(event: SplitOrder, key: str, alive: Sizes, gone: dict[str, str]) -> None:
     _exists(event.group, f"{key}.group", alive, gone)
     low, high = alive.pop(event.group)
     gone[event.group] = event.id
@@ -348,19 +235,14 @@ def _split(event: SplitOrder, key: str, alive: dict[str, SizeRange], gone: dict[
         _add_group(part.id, size, f"{key}.parts.{part.id}", alive, gone)
 
 
-def _queue(event: QueueOrder, key: str, alive: dict[str, SizeRange], gone: dict[str, str]) -> None:
+def _queue(event: QueueOrder, key: str, alive: Sizes, gone: dict[str, str]) -> None:
     queued: list[str] = []
     for k, pattern in enumerate(event.groups):
-        found = expand(pattern, list(alive))
+        found, place = expand(pattern, list(alive)), f"{key}.groups.{k}"
         if not found:
-            fail(
-                f"{key}.groups.{k}",
-                repr(pattern),
-                "a name or pattern of an existing group",
-                "groups: " + ", ".join(alive),
-            )
+            fail(place, repr(pattern), "a name or pattern of an existing group", "groups: " + ", ".join(alive))
         for name in found:
-            _exists(name, f"{key}.groups.{k}", alive, gone)
+            _exists(name, place, alive, gone)
         queued += [name for name in found if name not in queued]
     people = sum(alive[name][1] for name in queued)
     if people < QUEUE_PEOPLE:

@@ -1,28 +1,35 @@
 """Loads scenarios: `load` returns the checked scenario of a catalogue name or a TOML file.
 
-`resolve` returns the entries of a scenario or a suite (a list of scenarios); each entry is one sequence to make for
-every seed. The profile of a detector, made by `flockscope fit sensor`, is a file with a [sensor] table alone;
+`resolve` returns the entries of a scenario or a suite; each entry is one sequence to make for every seed. A suite,
+suites/*.toml, is an ordered list of scenarios with settings:
+
+    about = "what this suite is for"
+    entry = [ { name = "cross-dense", scenario = "cross", set = ["group.a.size=5"], repeat = 3 }, … ]
+
+The profile of a detector, made by `flockscope fit sensor`, is a file with a [sensor] table alone;
 `sensor_settings(path)` returns its keys as settings, for every function that takes settings of a scenario.
 """
 
 from __future__ import annotations
 
 import os.path
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from scenarios.errors import InputError
-from scenarios.loading import overrides, suites, toml_files
-from scenarios.loading.checks import check, check_observation
-from scenarios.loading.toml_files import Table, dump, names, parse, suite_names, toml_value
+from scenarios.limits import REPEATS
+from scenarios.loading import toml_files
+from scenarios.loading.checks import check
+from scenarios.loading.toml_files import SUITES, Table, did_you_mean, dump, names, parse, suite_names, toml_value
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from scenarios.schema.sensor import Sensor
-from scenarios.schema.values import Model
+from scenarios.schema.values import Model, Name
 
 
 class SensorFile(Model):
@@ -97,8 +104,7 @@ def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
         InputError: Everything that can be found wrong without simulating: an unknown name, an unreadable file, a wrong
             key or value, a place in a wall, an order for a group that does not exist.
     """
-    path = toml_files.find(name_or_path)
-    return _build(path, tuple(set))
+    return _build(toml_files.find(name_or_path), tuple(set))
 
 
 def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
@@ -108,13 +114,52 @@ def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) ->
             file=path, got="no such file", expected="a TOML file with [camera]", remedy="check --camera"
         )  # fmt: skip
     file = Path(path) if path is not None else ""
-    table, places = overrides.apply_settings({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
-    spec = validate(table, file, places, model=ObservationSpec)
-    try:
-        check_observation(spec)
-    except InputError as error:
-        raise InputError(**{**error.as_dict(), "file": str(file)}) from None
-    return spec
+    table, places = toml_files.apply_settings({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
+    return validate(table, file, places, model=ObservationSpec)
+
+
+class SuiteEntry(Model):
+    """One entry of a suite whose scenario is not loaded yet."""
+
+    name: Name = ""  # of the sequence, unique; absent: the scenario's name
+    scenario: str  # catalogue name or *.toml file
+    settings: tuple[str, ...] = Field((), alias="set")  # `key=value` texts
+    # n makes the entries name-1 … name-n, whose numbers are one more key of their random streams; 0: one without number
+    repeat: Annotated[int, Field(ge=1, le=REPEATS)] = 0
+
+    def expanded(self) -> list[SuiteEntry]:
+        """Returns the entries that this row of a file stands for."""
+        name = self.name or Path(self.scenario).stem
+        copies = [(f"{name}-{k}", k) for k in range(1, self.repeat + 1)] or [(name, 0)]
+        return [self.model_copy(update={"name": each, "repeat": k}) for each, k in copies]
+
+
+class Suite(Model):
+    """The content of a suite file."""
+
+    about: str = ""  # what it is for
+    entry: Annotated[tuple[SuiteEntry, ...], Field(min_length=1)]
+
+
+def find_suite(name: str) -> Path:
+    """Returns the file of a suite, by name in the catalogue or path."""
+    if name.endswith(".toml") and os.path.exists(name):
+        return Path(name)
+    if name in suite_names():
+        return SUITES / f"{name}.toml"
+    raise InputError(got=repr(name), expected="a suite's name or file", remedy=did_you_mean(name, suite_names()))
+
+
+def read_suite(path: Path) -> Suite:
+    """Returns the content of a suite file, with an entry of `repeat = n` expanded to name-1 … name-n."""
+    suite = validate(parse(path), path, model=Suite)
+    entries = tuple(each for entry in suite.entry for each in entry.expanded())
+    counts = Counter(entry.name for entry in entries)
+    twice = next((name for name, count in counts.items() if count > 1), None)
+    if twice is not None:
+        got, expected = f"two entries named {twice!r}", "unique names"
+        raise InputError(file=path, place="entry", got=got, expected=expected, remedy="rename one")
+    return suite.model_copy(update={"entry": entries})
 
 
 def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
@@ -124,17 +169,17 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
     """
     settings = tuple(set)
     if name.startswith("suite:"):
-        return _entries(suites.find_suite(name.removeprefix("suite:")), settings)
+        return _entries(find_suite(name.removeprefix("suite:")), settings)
     if name.endswith(".toml"):
         path = toml_files.find(name)
         if "entry" in toml_files.parse(path):
             return _entries(path, settings)
     elif name not in names():
         if name in suite_names():
-            return _entries(suites.find_suite(name), settings)
+            return _entries(find_suite(name), settings)
         known = names() + suite_names()
         raise InputError(
-            got=repr(name), expected="a scenario, a suite or a *.toml file", remedy=toml_files.did_you_mean(name, known)
+            got=repr(name), expected="a scenario, a suite or a *.toml file", remedy=did_you_mean(name, known)
         )
     scenario = load(name, settings)
     return [Entry(scenario.name, scenario, file=str(toml_files.find(name)))]
@@ -143,26 +188,23 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
 def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
     loaded: dict[tuple[str, tuple[str, ...]], Scenario] = {}
     entries = []
-    for entry in suites.read_entries(path):
+    for entry in read_suite(path).entry:
         key = (entry.scenario, entry.settings)
         # Copies of an entry are loaded once.
         if key not in loaded:
-            loaded[key] = _load_entry(entry, path, settings)
+            try:
+                file = toml_files.find(entry.scenario, beside=path.parent)
+                loaded[key] = _build(file, entry.settings + settings)
+            except InputError as error:
+                where = f"{path}: entry {entry.name}" + (f": {error.file}" if error.file else "")
+                raise error.replaced(file=where) from None
         scenario = loaded[key].model_copy(update={"name": entry.name})
         entries.append(Entry(entry.name, scenario, entry.repeat, f"{path}: entry {entry.name}"))
     return entries
 
 
-def _load_entry(entry: suites.SuiteEntry, path: Path, settings: tuple[str, ...]) -> Scenario:
-    try:
-        return _build(toml_files.find(entry.scenario, beside=path.parent), entry.settings + settings)
-    except InputError as error:
-        where = f"{path}: entry {entry.name}" + (f": {error.file}" if error.file else "")
-        raise InputError(**{**error.as_dict(), "file": where}) from None
-
-
 def _build(path: Path, settings: tuple[str, ...]) -> Scenario:
-    table, places = overrides.apply_settings(toml_files.read(path), settings, path)
+    table, places = toml_files.apply_settings(toml_files.read(path), settings, path)
     scenario = validate(table, path, places, model=Scenario)
     check(scenario, path)
     return scenario

@@ -9,21 +9,33 @@ A file with `extends = "base.toml"` (relative to itself, else in the catalogue) 
 - any other value replaces the value of the base;
 - `name` is not inherited: without one, a scenario has the name of its own file.
 
-`--set key=value` (scenarios.loading.overrides) differs: it replaces the value of the key, also where that is a table.
+`--set key=value` (scenarios.loading.toml_files) differs: it replaces the value of the key, also where that is a table.
+
+Applies `--set key=value` to a scenario's table: `camera.fps=25`, `group.a.size=3`, `group.0.size`,
+`world.size.0=20`.
+
+A step into an array is an index from 0 or an `id`. Values are TOML (`3`, `[8, 5]`, `{ uniform = [0, 5] }`, `"top"`); a
+word without quotes is a string. The value replaces that of the key, also where it is a table; a table that replaces a
+row of an array keeps the row's id. A table set on a new id (`group.x={ size = 2, … }`) is appended to the array.
 """
 
 from __future__ import annotations
 
+import copy
 import difflib
 import json
 import os.path
+import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from scenarios.errors import InputError
-from scenarios.limits import TOML_BYTES
+from scenarios.errors import InputError, shortened
+from scenarios.limits import DEPTH, NESTING, TOML_BYTES
 from scenarios.reading import parse_toml, read_regular
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
 CATALOGUE = Path(__file__).parents[1]
 SUITES = CATALOGUE / "suites"
@@ -63,15 +75,13 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
         path = CATALOGUE / f"{text}.toml"
         if text in names():
             return path
-        raise InputError(
-            got=repr(text), expected="the name of a scenario or a *.toml file", remedy=did_you_mean(text, names())
-        )
+        expected = "the name of a scenario or a *.toml file"
+        raise InputError(got=repr(text), expected=expected, remedy=did_you_mean(text, names()))
     for folder in (beside or Path(), CATALOGUE):
         if os.path.exists(folder / text):
             return folder / text
-    raise InputError(
-        file=text, got="no such file", expected="a scenario file", remedy="check the path, or name a scenario"
-    )
+    remedy = "check the path, or name a scenario"
+    raise InputError(file=text, got="no such file", expected="a scenario file", remedy=remedy)
 
 
 def parse(path: Path) -> Table:
@@ -80,13 +90,8 @@ def parse(path: Path) -> Table:
     try:
         return parse_toml(body.decode(), path)
     except UnicodeDecodeError as error:
-        raise InputError(
-            file=path,
-            place=f"byte {error.start}",
-            got="bytes that are not UTF-8",
-            expected="TOML",
-            remedy="save the file as UTF-8",
-        ) from None
+        place, got = f"byte {error.start}", "bytes that are not UTF-8"
+        raise InputError(file=path, place=place, got=got, expected="TOML", remedy="save the file as UTF-8") from None
 
 
 def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
@@ -97,29 +102,17 @@ def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
     if base is None:
         return {**table, "name": table.get("name", path.stem)}
     if not isinstance(base, str):
-        raise InputError(
-            file=path, place="extends", got=repr(base), expected="a file's name", remedy="put the name in quotes"
-        )
-    base_path = _base(path, base)
-    if base_path.resolve() in chain:
-        circle = " → ".join(p.name for p in (*chain, base_path))
-        raise InputError(
-            file=path,
-            place="extends",
-            got=circle,
-            expected="files that do not extend each other in a circle",
-            remedy="remove one `extends`",
-        )
-    return {**merge(read(base_path, chain), table), "name": table.get("name", path.stem)}
-
-
-def _base(path: Path, base: str) -> Path:
+        remedy = "put the name in quotes"
+        raise InputError(file=path, place="extends", got=repr(base), expected="a file's name", remedy=remedy)
     try:
-        return find(base, beside=path.parent)
+        base_path = find(base, beside=path.parent)
     except InputError as error:
-        raise InputError(
-            file=path, place="extends", got=repr(base), expected=error.expected, remedy=error.remedy
-        ) from None
+        raise error.replaced(file=path, place="extends", got=repr(base)) from None
+    if base_path.resolve() in chain:
+        got = " → ".join(p.name for p in (*chain, base_path))
+        expected = "files that do not extend each other in a circle"
+        raise InputError(file=path, place="extends", got=got, expected=expected, remedy="remove one `extends`")
+    return {**merge(read(base_path, chain), table), "name": table.get("name", path.stem)}
 
 
 def merge(below: Table, above: Table) -> Table:
@@ -157,31 +150,19 @@ def _merge_by_id(below: list[Table], above: list[Table]) -> list[Table]:
     return rows
 
 
-class _Dumps(Protocol):
-    """A pydantic model, as far as `dump` needs it: this module must not import pydantic."""
-
-    def model_dump(self, *, mode: str, by_alias: bool, exclude_none: bool) -> dict[str, Any]: ...
-
-
-def dump(scenario: _Dumps) -> str:
+def dump(scenario: BaseModel) -> str:
     """Returns a scenario, or another model of tables, as TOML with all defaults; equal models give equal bytes."""
     table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True)
-    flat = [(k, v) for k, v in table.items() if not _is_table(v) and not _is_rows(v)]
-    blocks = [_lines(dict(flat))]
+    flat: Table = {}
+    blocks = []
     for key, value in table.items():
-        if _is_table(value):
+        if isinstance(value, dict):
             blocks.append(f"[{key}]\n" + _lines(value))
-        elif _is_rows(value):
+        elif isinstance(value, tuple) and value and isinstance(value[0], dict):
             blocks += [f"[[{key}]]\n" + _lines(row) for row in value]
-    return "\n".join(blocks)
-
-
-def _is_table(value: Any) -> bool:
-    return isinstance(value, dict)
-
-
-def _is_rows(value: Any) -> bool:
-    return isinstance(value, tuple) and bool(value) and isinstance(value[0], dict)
+        else:
+            flat[key] = value
+    return "\n".join([_lines(flat), *blocks])
 
 
 def _lines(table: dict[str, Any]) -> str:
@@ -199,3 +180,107 @@ def toml_value(v: Any) -> str:
     if isinstance(v, tuple | list):
         return "[" + ", ".join(map(toml_value, v)) + "]"
     return repr(v)
+
+
+KeyPath = tuple[str | int, ...]
+SHOWN = 120  # characters of a setting that messages show
+
+
+def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[KeyPath, str]]:
+    """Returns a copy of the table with each `key=value` applied, and the text of each by path of its key.
+
+    A misspelt key is found by `validate`. file: for messages.
+    """
+    table = copy.deepcopy(table)
+    places: dict[KeyPath, str] = {}
+    for text in settings:
+        key, value = parse_setting(text)
+        places[_put(table, key, value, text, file)] = text
+    return table, places
+
+
+def place_of(text: str) -> str:
+    """Returns the place of a setting for messages."""
+    return f"--set {shortened(text, SHOWN)}"
+
+
+def parse_setting(text: str) -> tuple[list[str], Any]:
+    """Returns the steps of the key and the TOML value of a setting `a.b=value`."""
+    key, equals, value = text.partition("=")
+    steps = key.strip().split(".")
+    if not equals or not all(steps):
+        raise InputError(
+            place=place_of(text), got=repr(text), expected="key=value", remedy="write for example --set group.a.size=3"
+        )
+    if len(steps) > DEPTH:
+        raise InputError(place=place_of(text), got=f"{len(steps)} steps", expected=NESTING, remedy="shorten the key")
+    return steps, parse_value(value.strip(), text)
+
+
+def parse_value(value: str, text: str) -> Any:
+    """Returns the value of a TOML text, or of a word without quotes; `text` is the whole setting, for messages."""
+    try:
+        table = parse_toml(f"value = {value}")
+    except InputError:
+        if re.fullmatch(r"[A-Za-z][\w.*:-]*", value):
+            return value
+        table = {}
+    if list(table) != ["value"]:
+        raise InputError(
+            place=place_of(text), got=repr(value), expected="a TOML value", remedy="quote strings, put lists in [ ]"
+        )
+    return table["value"]
+
+
+def _put(table: Table, steps: list[str], value: Any, text: str, file: object) -> KeyPath:
+    """Sets the value in the table; returns the path of its key, with ids replaced by indices."""
+    here: Any = table
+    path: list[str | int] = []
+    while True:
+        if isinstance(here, dict):
+            step, steps = steps[0], steps[1:]
+            path.append(step)
+            if not steps:
+                here[step] = value
+                return tuple(path)
+            here = here.setdefault(step, {})
+        elif isinstance(here, list):
+            index, steps = _index(here, steps, value, text, file)
+            path.append(index)
+            if not steps:
+                here[index : index + 1] = [_with_id(here, index, value)]
+                return tuple(path)
+            here = here[index]
+        else:
+            key = ".".join(map(str, path))
+            got, remedy = f"{key} = {here!r}, which has no {steps[0]!r}", f"set {key} itself"
+            raise InputError(file=file, place=place_of(text), got=got, expected="a key that exists", remedy=remedy)
+
+
+def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: object) -> tuple[int, list[str]]:
+    """Returns the index in the array that the first steps name, by index or id, and the steps after them."""
+    if (index := _position(steps[0], len(rows))) is not None:
+        return index, steps[1:]
+    ids = {str(row["id"]): k for k, row in reversed(list(enumerate(rows))) if isinstance(row, dict) and "id" in row}
+    # Ids may have dots; the longest wins, and an existing index wins over an id.
+    for n in range(len(steps), 0, -1):
+        name = ".".join(steps[:n])
+        if name in ids:
+            return ids[name], steps[n:]
+    if isinstance(value, dict) and len(steps) == 1 and ids and not re.fullmatch("[0-9]+", steps[0]):
+        value.setdefault("id", steps[0])
+        return len(rows), []
+    expected = "an index from 0 or an id" if ids else "an index from 0"
+    known = list(ids) or [str(k) for k in range(len(rows))]
+    got, remedy = f"{steps[0]!r} in an array of {len(rows)}", did_you_mean(steps[0], known)
+    raise InputError(file=file, place=place_of(text), got=got, expected=expected, remedy=remedy)
+
+
+def _position(step: str, length: int) -> int | None:
+    return int(step) if re.fullmatch("[0-9]{1,9}", step) and int(step) < length else None
+
+
+def _with_id(rows: list[Any], index: int, value: Any) -> Any:
+    if index < len(rows) and isinstance(value, dict) and isinstance(rows[index], dict) and "id" in rows[index]:
+        return {"id": rows[index]["id"], **value}
+    return value

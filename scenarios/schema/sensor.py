@@ -12,7 +12,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.schema.values import Model, Name, NonNegative, Positive, Share
+from scenarios.limits import DETECTIONS
+from scenarios.schema.values import Model, Name, NonNegative, Positive, Share, within
 
 Curve = Annotated[tuple[Share, ...], Field(min_length=2)]
 MeanAndSd = tuple[float, NonNegative]
@@ -74,8 +75,10 @@ class BoxNoise(Model):
         (0.0, 0.06), description="error of the upper edge, downwards: mean, standard deviation; box heights"
     )
     width: MeanAndSd = Field((0.0, 0.18), description="error of the logarithm of the width: mean, standard deviation")
-    floor_px: NonNegative = Field(0.3, description="least standard deviation of middle, lower and upper edge, px")
-    scale: NonNegative = Field(1.0, description="factor of all these errors; 0 = exact boxes")
+    floor_px: Annotated[float, within(0.0, 1000.0, " px")] = Field(
+        0.3, description="least standard deviation of middle, lower and upper edge, px"
+    )
+    scale: Annotated[float, within(0.0, 20.0)] = Field(1.0, description="factor of all these errors; 0 = exact boxes")
     occluded: NonNegative = Field(
         0.0, description="each standard deviation is multiplied by 1 + this times the hidden share of the box"
     )
@@ -170,9 +173,13 @@ class Sensor(Model):
     """
 
     detect_prob: Share = Field(0.95, description="probability that a fully visible person of usual size is detected")
-    clutter_rate: NonNegative = Field(0.3, description="mean number of false alarms per frame (Poisson)")
+    clutter_rate: Annotated[float, within(0.0, DETECTIONS / 5, " false alarms per frame")] = Field(
+        0.3, description="mean number of false alarms per frame (Poisson)"
+    )
     box_noise: BoxNoise = Field(BoxNoise(), description="errors of boxes, in box heights")
-    noise_m: NonNegative = Field(0.05, description="standard deviation of points on the ground along each axis, m")
+    noise_m: Annotated[float, within(0.0, 1000.0, " m")] = Field(
+        0.05, description="standard deviation of points on the ground along each axis, m"
+    )
     box: Literal["visible", "amodal"] = Field(
         "visible",
         description="visible: boxes of the visible parts, so that occlusion moves foot points; amodal: boxes "

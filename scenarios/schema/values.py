@@ -9,9 +9,10 @@ bounds, both included. `sim.rng.draw` draws.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
 
 from scenarios.limits import PICTURE_SIDE
 
@@ -34,11 +35,18 @@ class Model(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, table: Any) -> Any:
+        known = {name: f.alias or name for name, f in cls.model_fields.items()}
+        for key in table if isinstance(table, dict) else ():
+            if key not in known and key not in known.values():
+                raise PydanticCustomError("unknown_key", "unknown", {"key": key, "known": list(known.values())})
+        return table
 
-class Distribution(BaseModel):
+
+class Distribution(Model):
     """One of five distributions of a number: exactly one of the keys besides `clip` is given."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     normal: tuple[float, Annotated[float, Field(ge=0)]] | None = None
     uniform: tuple[float, float] | None = None
@@ -51,9 +59,7 @@ class Distribution(BaseModel):
     def _one_kind(self) -> Self:
         kinds = [name for name in ("normal", "uniform", "exponential", "poisson", "choice") if getattr(self, name)]
         if len(kinds) != 1:
-            raise ValueError(
-                f"a distribution has exactly one of normal, uniform, exponential, poisson, choice, not {kinds}"
-            )
+            raise problem(str(kinds), "exactly one of normal, uniform, exponential, poisson, choice", "keep one")
         if self.clip is not None and self.clip[0] > self.clip[1]:
             raise ValueError("clip = [low, high] with low <= high")
         if self.uniform is not None and self.uniform[0] > self.uniform[1]:
@@ -92,8 +98,34 @@ class Distribution(BaseModel):
         return max(0.0, above - (0.0 if math.isinf(low) else self._below(low, strictly=True)))
 
 
-Value = float | Distribution
+# Discriminators, so that pydantic reports the errors of one kind of value alone.
+Value = Annotated[
+    Annotated[float, Tag("number")] | Annotated[Distribution, Tag("distribution")],
+    Discriminator(lambda value: "distribution" if isinstance(value, dict | Distribution) else "number"),
+]
 Point = tuple[Value, Value]
+
+
+def problem(got: str, expected: str, remedy: str = "correct it") -> PydanticCustomError:
+    """Returns the error that a validator raises for a wrong value, with the words of an InputError."""
+    return PydanticCustomError("problem", "problem", {"got": got, "expected": expected, "remedy": remedy})
+
+
+SURE = 0.999  # least probability that a value lies in its range
+
+
+def within(low: float, high: float, unit: str = "") -> AfterValidator:
+    """Returns the validator of values of which nearly all draws lie from `low` to `high`."""
+
+    def check(value: Value) -> Value:
+        drawn, share = isinstance(value, Distribution), share_within(value, low, high)
+        if share < SURE:
+            got = f"a distribution with {share:.1%} of its draws in this range" if drawn else f"{value:g}{unit}"
+            remedy = f"correct it, or add clip = [{low:g}, {high:g}]" if drawn else "correct it"
+            raise problem(got, f"from {low:g} to {high:g}{unit}", remedy)
+        return value
+
+    return AfterValidator(check)
 
 
 def poisson_share(mean: float, k: int) -> float:

@@ -61,73 +61,36 @@ FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, WIDTH, SLOWDOWN = range(7)
 
 # slots of Steering.array(), in the order of the fields of Steering
 (
-    RELAXATION,
-    COHESION_TIME,
-    ALIGNMENT,
-    SEPARATION,
-    SEPARATION_RANGE,
-    HASTE,
-    TURN_TIME,
-    SLOW_TIME,
-    AVOID_PERSON,
-    AVOID_GROUP,
-    AVOID_TIME,
-    PERSON_RADIUS,
-    PERSON_RANGE,
-    GROUP_RANGE,
-    AVOID_MAX,
-    SHOVE,
-    WALL,
-    WALL_RANGE,
-    GATHER_RADIUS,
-    PASS_RADIUS,
-    MAX_ACCELERATION,
-) = range(21)
+    RELAXATION, COHESION_TIME, ALIGNMENT, SEPARATION, SEPARATION_RANGE, HASTE, TURN_TIME, SLOW_TIME, AVOID_PERSON,
+    AVOID_GROUP, AVOID_TIME, PERSON_RADIUS, PERSON_RANGE, GROUP_RANGE, AVOID_MAX, SHOVE, WALL, WALL_RANGE,
+    GATHER_RADIUS, PASS_RADIUS, MAX_ACCELERATION,
+) = range(21)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class Steering:
     """Parameters of the forces on people, in the order of the slots of the kernels' array (21,)."""
 
-    # s, to take up the wanted velocity
     relaxation: float = 0.5  # s: time in which a person takes up the wanted velocity
-    # s, to return to one's place in the formation
     cohesion_time: float = 1.6  # s: time in which a member returns to its place in the formation
-    # rate of taking up the group's mean velocity, 1/s
     alignment: float = 0.25  # 1/s: rate at which a member takes up the group's mean velocity
-    # repulsion of two members at distance zero, m/s², falling to 0 at separation_range, m
     separation: float = 2.5  # m/s²: repulsion between two members at distance zero
     separation_range: float = 0.6  # m: distance at which that repulsion ends
-    # share of the group's speed that a member may add
     haste: float = 0.15  # share of the group's speed that a member may add to keep its place
-    # s, in which a group's heading follows its way
     turn_time: float = 0.7  # s: time in which a group's heading follows its way
-    # s, how early a group slows down before a goal where it stands
     slow_time: float = 0.9  # s: how early a group slows down before a goal where it stands
-    # avoid_person, avoid_group: strengths, m², of the power law of the time to collision, between strangers and between
-    # whole groups
     avoid_person: float = 1.3  # strength of the power law between strangers
     avoid_group: float = 1.6  # strength of the power law between whole groups
-    # its time constant, s; collisions beyond four times that are ignored
     avoid_time: float = 2.5  # s: time constant of the power law; collisions beyond four times this are ignored
-    # half the distance that strangers keep, m
     person_radius: float = 0.29  # m: half the distance that strangers keep
-    # person_range, group_range: strangers, and groups, further apart ignore each other, m
     person_range: float = 3.5  # m: strangers further apart ignore each other
     group_range: float = 8.0  # m: groups further apart ignore each other
-    # cap of one avoidance force, m/s²
     avoid_max: float = 2.0  # m/s²: cap of each avoidance force
-    # repulsion of strangers at distance zero, m/s², falling to 0 at twice person_radius
     shove: float = 3.0  # m/s²: repulsion between strangers at distance zero
-    # repulsion of a wall or pillar at contact (0.2 m from its line or edge), m/s²; it falls to 37 % over wall_range, m
     wall: float = 4.0  # m/s²: repulsion of a wall or pillar at contact
     wall_range: float = 0.25  # m: distance over which that repulsion falls to 37 %
-    # a group has gathered when all members are this close to their places, m
     gather_radius: float = 0.9  # m: a group has gathered when all members are this close to their places
-    # distance of the group's middle at which a waypoint counts as passed, m; 0.3 × the group's radius is added except
-    # at the end
     pass_radius: float = 0.8  # m: a waypoint counts as passed at this distance
-    # cap of the sum of all forces, m/s²
     max_acceleration: float = 2.2  # m/s²: cap of the sum of all forces
 
     def array(self) -> Array:

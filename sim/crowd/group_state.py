@@ -9,22 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.crowd.forces import (
-    END,
-    GATHER,
-    GROUP,
-    IN_GROUP,
-    LEAVE,
-    MODE,
-    NARROW,
-    PASS,
-    QUEUE,
-    STAND,
-    TO_TARGET,
-    WAYPOINT,
-    GroupArrays,
-    PeopleArrays,
-)
+from sim.crowd import forces
+from sim.crowd.forces import END, GATHER, LEAVE, NARROW, PASS, STAND, GroupArrays, PeopleArrays
 from sim.crowd.formation import assign, standing, to_world, walking
 from sim.crowd.navigation import Navigator
 from sim.crowd.population import EnteringGroup, walking_speed
@@ -173,7 +159,7 @@ class GroupState:
         people.place[:] = self.places[columns]
         people.target[:] = self.targets[columns]
         people.pace[:] = np.minimum(self.arrays.speed[self.group_of[columns]], MAX_QUEUE_SPEED)
-        people.tag[:, GROUP] = self.group_of[columns]
-        people.tag[:, MODE] = np.where((queue >= 0) | self.held[columns], TO_TARGET, IN_GROUP)
-        people.tag[:, QUEUE] = queue
-        people.tag[:, WAYPOINT] = self.waypoint[columns]
+        people.tag[:, forces.GROUP] = self.group_of[columns]
+        people.tag[:, forces.MODE] = np.where((queue >= 0) | self.held[columns], forces.TO_TARGET, forces.IN_GROUP)
+        people.tag[:, forces.QUEUE] = queue
+        people.tag[:, forces.WAYPOINT] = self.waypoint[columns]

@@ -6,7 +6,7 @@ drawn again, for this group alone, until the group has room there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +17,7 @@ from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
 from sim.elementary import dot, exp, length, unit
 from sim.rng import autoregression, draw, normals, rng, uniforms
-from sim.types import Array, Scene
+from sim.types import Array, Order, Scene
 
 
 @dataclass(frozen=True)
@@ -265,3 +265,21 @@ def fluctuations(crowd: CrowdSpec, people: Sequence[Person], frames: int, fps: f
         out[:, p] = normals(uniforms(rng(seed, "gait", *person.key, repeat=repeat), (frames, 4)))
     scale = np.array([*crowd.velocity_noise, *crowd.place_noise])
     return scale * autoregression(out, keep)
+
+
+def named_people(
+    scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
+) -> dict[str, tuple[int, ...]]:
+    """Returns the person ids of each group that the script names, also those that its orders made."""
+    parties = draw_population(scenario, scene, seed, repeat)
+    names = {party.name: tuple(m.column + 1 for m in party.members) for party in parties}
+    after = {order.id: order.after for order in orders if order.fired is not None}
+    for event in scenario.event:
+        made = after.get(event.id)
+        if made is None:
+            continue
+        if event.type == "merge":
+            names[event.into] = made[0]
+        elif event.type == "split":
+            names |= {part.id: ids for part, ids in zip(event.parts, made, strict=True)}
+    return names

@@ -6,41 +6,206 @@ The stored bytes depend on scenario, seed and versions only, not on the workers.
 
 from __future__ import annotations
 
+import socket
+import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, TypedDict, Unpack, cast
 from uuid import uuid4
 
-from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
-from scenarios.loading.resolve import Entry
-from scenarios.loading.toml_files import dump
+from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, shortened
+from scenarios.loading.resolve import Entry, resolve
+from scenarios.loading.toml_files import Table, dump, parse
+from scenarios.reading import parse_toml
 from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
-from sim.dataset.sequence_job import SequenceJob, is_stored, lost_job, plan_jobs, run_job, stored_manifest
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
 from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
-from sim.io.files.output_paths import output_path, output_paths
+from sim.io.files.own_files import is_side_file, output_path, output_paths
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import MANIFEST
-from sim.io.store.streams import check_streams
+from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
+from sim.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.start import WorkerOptions, start_workers
+
+MOST = 3  # differences that are named; the others are counted
+LONGEST = 40  # characters of a value
+
+
+def setting_differences(stored: Table, wanted: Table) -> str:
+    """Returns the settings that differ between two scenarios, as "camera.fps 10 → 5, duration 20 → 30"."""
+    before, after = (dict(_flat("", table)) for table in (stored, wanted))
+    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
+    words = [f"{key} {_value(before, key)} → {_value(after, key)}" for key in keys[:MOST]]
+    return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
+
+
+def _flat(prefix: str, value: Any) -> list[tuple[str, Any]]:
+    if isinstance(value, dict):
+        dot = "." if prefix else ""
+        return [pair for key, inner in value.items() for pair in _flat(f"{prefix}{dot}{key}", inner)]
+    if isinstance(value, list) and any(isinstance(inner, dict) for inner in value):
+        return [pair for k, inner in enumerate(value) for pair in _flat(f"{prefix}[{k}]", inner)]
+    return [(prefix, value)]
+
+
+def _value(settings: Table, key: str) -> str:
+    value = settings.get(key, "none")
+    return shortened(str(value).removesuffix(".0") if isinstance(value, float) else str(value), LONGEST)
+
+
+MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
+
+
+@dataclass(frozen=True)
+class SequenceJob:
+    """One sequence to make."""
+
+    folder: Path  # where it is stored; its last part is the sequence's name
+    entry: Entry  # the scenario to simulate
+    seed: int  # the random seed
+    # pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none
+    streams: tuple[str, ...] = ()
+    images: str = "jpg"  # their file type, "jpg", "png" or "mp4"
+    stride: int = 1  # N stores every N-th frame of the camera
+    # a file that a worker must see before it starts, because it would otherwise write to another file system; None for
+    # local workers
+    marker: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """The sequence's name, the last part of `folder`: <entry>-s<seed, 5 digits>."""
+        return self.folder.name
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """How a job ended."""
+
+    error: FlockscopeError | None = None  # the error, None if the sequence is stored
+    fatal: bool = False  # True if every other job would fail in the same way, as with a full disk
+
+
+def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
+    """Returns the manifest in the job's folder, None without one; raises InputError if it is another sequence's."""
+    if not job.folder.exists():
+        return None
+    inside = job.folder.is_dir() and any(not is_side_file(path.name) for path in job.folder.iterdir())
+    if not job.folder.is_dir() or (inside and not is_own_sequence(job.folder)):
+        raise InputError(
+            file=job.folder, got="something that flockscope did not write", expected="a stored sequence, or nothing",
+            remedy="choose another --out, or move it away",
+        )  # fmt: skip
+    path = job.folder / MANIFEST
+    if not path.exists():
+        return None
+    try:
+        manifest = read_manifest(job.folder)
+    except InputError as error:
+        # An invalid manifest does not tell what the folder holds.
+        raise error.replaced(remedy="delete that folder, or choose another --out") from None
+    scenario = dump(job.entry.scenario)
+    wanted = {**identity(scenario, job.seed, job.entry.repeat, job.streams, job.images), "stride": job.stride}
+    manifest = {"stride": 1, **manifest}
+    different = {key: value for key, value in wanted.items() if manifest.get(key) != value}
+    if different:
+        expected = "the same scenario, version, streams and images, or an empty place"
+        raise InputError(
+            file=job.folder, got=f"another sequence (stored → asked for: {_differences(job, manifest, different)})",
+            expected=expected, remedy="choose another --out, or delete that folder",
+        )  # fmt: skip
+    return manifest
+
+
+def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str, Any]) -> str:
+    settings = ""
+    if "scenario_hash" in different:
+        with suppress(InputError):
+            settings = setting_differences(parse(job.folder / "scenario.toml"), parse_toml(dump(job.entry.scenario)))
+    fields = {key: value for key, value in different.items() if key != "scenario_hash" or not settings}
+    return ", ".join(
+        [settings] * bool(settings) + [f"{k} {_word(manifest.get(k))} → {_word(v)}" for k, v in fields.items()]
+    )
+
+
+def _word(value: Any) -> str:
+    text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
+    return "none" if value is None or not text else text
+
+
+def is_stored(job: SequenceJob) -> bool:
+    """Returns True if the folder holds the job's sequence, and every file has the hash of its manifest."""
+    manifest = stored_manifest(job)
+    return manifest is not None and next(damaged_files(job.folder, manifest["files"]), None) is None
+
+
+def store(job: SequenceJob, sequence: Sequence) -> None:
+    """Writes the job's folder, unless it holds the sequence undamaged."""
+    if not is_stored(job):
+        sequence_folder.write_sequence(
+            job.folder, replace(sequence, name=job.name), scenario=dump(job.entry.scenario), seed=job.seed,
+            repeat=job.entry.repeat, streams=job.streams, images=job.images, keep=lambda: is_stored(job),
+        )  # fmt: skip
+
+
+def simulate_and_store(job: SequenceJob) -> None:
+    """Simulates the job's scenario and writes its folder, replacing a damaged one."""
+    from sim.sequence import simulate
+
+    entry = job.entry
+    try:
+        store(job, simulate(entry.scenario, job.seed, entry.repeat, job.streams, job.stride))
+    except FlockscopeError as error:
+        # A full disk: it would hit every other job, too.
+        if isinstance(error.__cause__, OSError):
+            raise
+        raise error.replaced(file=entry.file or error.file or job.name) from error
+    except Exception as error:
+        raise WorkError(
+            file=job.name, got=f"{type(error).__name__}: {error}", expected="a sequence",
+            remedy="report it with the scenario and seed",
+        ) from error  # fmt: skip
+
+
+def run_job(job: SequenceJob) -> JobOutcome:
+    """Makes the job's sequence unless it is stored undamaged; errors are in the outcome, not raised."""
+    try:
+        if job.marker is not None:
+            _wait_for_marker(job.marker)
+        if not is_stored(job):
+            simulate_and_store(job)
+    except FlockscopeError as error:
+        fatal = isinstance(error.__cause__, OSError)
+        if fatal and job.marker is not None:
+            error = error.replaced(place=f"on {socket.gethostname()}")
+        return JobOutcome(error, fatal)
+    return JobOutcome()
+
+
+def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
+    """Returns the outcome of a job that killed too many workers."""
+    return JobOutcome(error.replaced(file=job.name))
+
+
+def _wait_for_marker(marker: Path) -> None:
+    end = time.monotonic() + MARKER_TIMEOUT
+    while not marker.exists():
+        if time.monotonic() > end:
+            raise InputError(
+                file=marker.parent, got="another folder, or none", expected="the one that the command writes to",
+                remedy="choose an --out that all machines share under the same path",
+            ) from FileNotFoundError(marker)  # fmt: skip
+        time.sleep(MARKER_TIMEOUT / 20)
+
 
 LEFT_OUT = 0.05  # greatest share of sequences that may be left out because an order of their script did not come true
 QUEUED_JOBS = 100  # jobs that wait at a cluster's scheduler, beside one for each worker
 ONE_WORKER = WorkerOptions()
 Progress = Callable[[int, int, str], None]  # called as progress(sequences done, sequences in all, name of the last one)
-
-
-class Stored(TypedDict, total=False):
-    """What is stored of each sequence: pictures ("left", "right", "disparity", "ids"), file type, every N-th frame."""
-
-    streams: Iterable[str]  # pictures ("left", "right", "disparity", "ids", "background"; () for none)
-    images: str  # their file type, "jpg", "png" or "mp4"
-    # N stores every N-th frame of the camera only: 1, 1 + N, …, as they are without it, and numbered from 1
-    stride: int
 
 
 class Folders(list[Path]):
@@ -49,6 +214,14 @@ class Folders(list[Path]):
     def __init__(self, folders: Iterable[Path], left_out: dict[str, OrderError]) -> None:
         super().__init__(folders)
         self.left_out = left_out
+
+
+class Stored(TypedDict, total=False):
+    """What `generate` stores of each sequence."""
+
+    streams: Iterable[str]  # pictures: some of "left", "right", "disparity", "ids", "background"; () for none
+    images: str  # their file type, "jpg", "png" or "mp4"
+    stride: int  # N stores every N-th frame of the camera only: 1, 1 + N, …, numbered from 1
 
 
 def generate(
@@ -87,13 +260,23 @@ def generate(
         raise InputError(place="workers", got=workers.count, expected="1 or more", remedy="correct --workers")
     split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
     folder = root / f"flockscope-{split}"
-    jobs = _storing(plan_jobs(_resolved(entries, set), seeds, folder), **stored)
+    settings, stride, images = tuple(set), stored.get("stride", 1), stored.get("images", "jpg")
+    streams = check_streams(stored.get("streams", ("left",)), images)
+    found = [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
+    output_paths(folder, [entry.name for entry in found], source="entries")
+    for entry in found:
+        check_stride(stride, entry.scenario.camera.fps)
+    jobs = [
+        SequenceJob(output_path(folder, entry.name, f"-s{seed:05d}"), entry, seed, streams, images, stride)
+        for entry in found
+        for seed in seeds
+    ]
     with lock_folder(root):
         remove_partials(root, folder, root / "seqmaps")
         for job in jobs:
             stored_manifest(job)
         try:
-            errors = _run_jobs(jobs, workers, _counter(progress, len(jobs)))
+            errors = _run_jobs(jobs, workers, progress)
         finally:
             remove_partials(root, folder)
         try:
@@ -106,67 +289,34 @@ def generate(
     else:
         unfulfilled = {}
     made = [job for job in jobs if job.name not in unfulfilled]
-    errors = errors or {job.name: _not_visible(job) for job in made if job.name not in complete}
+    for job in made if not errors else ():
+        if job.name not in complete:
+            errors[job.name] = WorkError(
+                file=job.folder, got="nothing, though a worker has made it",
+                expected="a folder that all machines share", remedy="run again, or choose another --out",
+            )  # fmt: skip
     if errors:
         raise _summary(errors, len(jobs))
     return Folders((job.folder for job in made), unfulfilled)
 
 
-def _storing(
-    jobs: list[SequenceJob], streams: Iterable[str] = ("left",), images: str = "jpg", stride: int = 1
-) -> list[SequenceJob]:
-    pictures = check_streams(streams, images)
-    for job in jobs:
-        check_stride(stride, job.entry.scenario.camera.fps)
-    return [replace(job, streams=pictures, images=images, stride=stride) for job in jobs]
-
-
-def _resolved(entries: Iterable[Entry | str], set: Iterable[str]) -> list[Entry]:
-    from scenarios.loading.resolve import resolve
-
-    settings = tuple(set)
-    return [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
-
-
-def _run_jobs(
-    jobs: list[SequenceJob], workers: WorkerOptions, done: Callable[[SequenceJob], None]
-) -> dict[str, FlockscopeError]:
+def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progress | None) -> dict[str, FlockscopeError]:
     errors: dict[str, FlockscopeError] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
-        marked = _with_marker(jobs) if jobs and workers.cluster is not None else jobs
-        for job, outcome in run(run_job, marked, ahead=QUEUED_JOBS, on_loss=lost_job):
+        if jobs and workers.cluster is not None:
+            # A worker starts a job only if it sees this file: else it would write to another file system.
+            marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
+            write_file(marker, b"")
+            jobs = [replace(job, marker=marker) for job in jobs]
+        done = run(run_job, jobs, ahead=QUEUED_JOBS, on_loss=lost_job)
+        for count, (job, outcome) in enumerate(done, 1):
             if outcome.error is not None:
                 errors[job.name] = outcome.error
             if outcome.fatal:
                 break
-            done(job)
+            if progress is not None:
+                progress(count, len(jobs), job.name)
     return {job.name: errors[job.name] for job in jobs if job.name in errors}
-
-
-def _with_marker(jobs: list[SequenceJob]) -> list[SequenceJob]:
-    # A worker starts a job only if it sees this file: else it would write to another file system.
-    marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
-    write_file(marker, b"")
-    return [replace(job, marker=marker) for job in jobs]
-
-
-def _counter(progress: Progress | None, total: int) -> Callable[[SequenceJob], None]:
-    count = 0
-
-    def done(job: SequenceJob) -> None:
-        nonlocal count
-        count += 1
-        if progress is not None:
-            progress(count, total, job.name)
-
-    return done
-
-
-def _not_visible(job: SequenceJob) -> WorkError:
-    return WorkError(
-        file=job.folder, got="nothing, though a worker has made it", expected="a folder that all machines share",
-        remedy="run again, or choose another --out",
-    )  # fmt: skip
 
 
 def write_seqmap(root: Path, split: str) -> set[str]:
@@ -214,42 +364,28 @@ def store_replays(
     on.
     """
     recordings, split, root = list(sources), split_of(seeds), Path(out)
-    folder = root / f"flockscope-{split}"
-    _check(recordings, folder, options.cut, seeds, split)
-    options = replace(options, streams=tuple(check_streams(options.streams, options.images)))
-    made: list[Path] = []
-    with lock_folder(root):
-        remove_partials(root, folder, root / "seqmaps")
-        try:
-            for recording in recordings:
-                for seed in seeds:
-                    made.append(_store(recording, options, seed, folder))
-                    if progress is not None:
-                        progress(len(made), len(recordings) * len(seeds), made[-1].name)
-        finally:
-            remove_partials(root, folder)
-            write_seqmap(root, split)
-    return made
-
-
-def _check(recordings: list[Sequence], folder: Path, cut: Cut, seeds: range, split: str) -> None:
+    folder, cut = root / f"flockscope-{split}", options.cut
     output_paths(folder, [replay_name(recording.name, cut) for recording in recordings], source="recordings")
     if split in TUNING_SPLITS and any(is_real(recording) for recording in recordings):
         raise InputError(
             place="--seeds", got=f"{seeds.start} ({split})", expected="seeds from 20000 (test) on, for real motion",
             remedy="choose other seeds: nothing is tuned on recordings",
         )  # fmt: skip
-
-
-def _store(recording: Sequence, options: ReplayOptions, seed: int, folder: Path) -> Path:
-    sequence, form = resolve_replay(
-        recording, options.view, seed, cut=options.cut, calibration=options.calibration, streams=options.streams
-    )  # fmt: skip
-    entry = Entry(form.name, cast(Any, form))
-    job = SequenceJob(output_path(folder, form.name, f"-s{seed:05d}"), entry, seed, options.streams, options.images)
-    if not is_stored(job):
-        sequence_folder.write_sequence(
-            job.folder, replace(sequence, name=job.name), scenario=dump(form), seed=seed, streams=options.streams,
-            images=options.images, keep=lambda: is_stored(job),
-        )  # fmt: skip
-    return job.folder
+    streams = check_streams(options.streams, options.images)
+    made: list[Path] = []
+    with lock_folder(root):
+        remove_partials(root, folder, root / "seqmaps")
+        try:
+            for recording, seed in product(recordings, seeds):
+                sequence, form = resolve_replay(
+                    recording, options.view, seed, cut=cut, calibration=options.calibration, streams=streams
+                )
+                entry, path = Entry(form.name, cast(Any, form)), output_path(folder, form.name, f"-s{seed:05d}")
+                store(SequenceJob(path, entry, seed, streams, options.images), sequence)
+                made.append(path)
+                if progress is not None:
+                    progress(len(made), len(recordings) * len(seeds), path.name)
+        finally:
+            remove_partials(root, folder)
+            write_seqmap(root, split)
+    return made

@@ -2,19 +2,32 @@
 
 Everything is drawn as uniforms; all other numbers are quantiles at them. A changed setting therefore leaves all draws
 as they were.
+
+Normal draws that stay correlated over time: sums of stationary AR(1) processes and of white noise.
+
+A part has a share s of the variance and a time constant tau in s. It is a process in time, not in frames: it runs on a
+clock of CLOCK ticks per s, and a frame takes the nearest tick. At tick k it adds sqrt(s) x_k, where x_k = rho x_(k-1) +
+sqrt(1 - rho²) e_k, e_k is a new standard normal, and rho = exp(-1 / (CLOCK tau)). The sum of all parts is N(0, 1); its
+autocorrelation at a lag in s is the sum of s exp(-lag / tau). The rest of the variance is white, that is independent in
+each frame. Every process begins in frame 1, so that the draws of a frame do not depend on when a person enters.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.rng import uniforms
-from sim.types import Array
+from sim.elementary import exp
+from sim.rng import autoregression, normals, rng, uniforms
+from sim.types import Array, Detections, Ints, Plane, Truth
 
 if TYPE_CHECKING:
-    from scenarios.schema.sensor import Sensor
+    from scenarios.schema.sensor import Memory, Sensor
+
 
 HIGHEST_FALSE_SCORE = 0.7  # of a false alarm whose detector has no measured scores; the mean is a third of it
 
@@ -68,3 +81,76 @@ def false_scores(u: Array, sensor: Sensor) -> Array:
     """
     curve = sensor.false_scores
     return HIGHEST_FALSE_SCORE * u * u if curve is None else interpolated_quantiles(curve, u)
+
+
+@dataclass(frozen=True)
+class Readings:
+    """R detections of a whole sequence, true ones or false alarms; rows need not be sorted by frame.
+
+    frame (R,)    frame number, from 1 on
+    pos (R, 2)    x, y in m on the ground; the box's centre in px where the truth has no positions
+    box (R, 4)    left, top, width, height in px; None without boxes
+    score (R,)    in [0, 1]
+    order (R,)    random, above 0 and at most 1: the detections of a frame are listed in ascending order of it, so that
+                  a place in the list tells nothing
+    """
+
+    frame: Ints
+    pos: Array
+    box: Array | None
+    score: Array
+    order: Array
+
+
+def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[Detections]:
+    """Returns a list of truth.length Detections, for frames 1 on: true detections and false alarms mixed, in random
+    order.
+
+    A frame without any has empty Detections. The plane is "ground" (positions in m) if the truth has positions, else
+    "image" (px). Boxes are None unless `true` and `false` both have boxes. Velocities are None. Readings outside frames
+    1 to truth.length are dropped.
+    """
+    frame = np.concatenate([true.frame, false.frame])
+    order = np.lexsort((np.concatenate([true.order, false.order]), frame))
+    pos = np.concatenate([true.pos, false.pos])[order]
+    score = np.concatenate([true.score, false.score])[order]
+    box = None if true.box is None or false.box is None else np.concatenate([true.box, false.box])[order]
+    plane: Plane = "image" if truth.pos is None else "ground"
+    cuts = np.searchsorted(frame[order], np.arange(1, truth.length + 2))
+    found = []
+    for k, (a, b) in enumerate(pairwise(cuts)):
+        here = None if box is None else box[a:b]
+        found.append(Detections(k + 1, k / truth.fps, plane, pos[a:b], None, here, score[a:b]))
+    return found
+
+
+CLOCK = 50.0  # Hz, of what lasts in the simulated detector: errors, misses, false alarms
+
+
+def correlated_normals(
+    fresh: Array, memory: Sequence[Memory], first: int, fps: float, seed: int, *keys: int, repeat: int = 0
+) -> Array:
+    """Returns standard normals (F, D), correlated over time, of frames `first` to `first` + F - 1 (frames from 1 on).
+
+    fresh (F, D): standard normals, used as the white part, which has the variance that no part of the memory takes.
+    memory: share of the variance and time constant (s) of each AR(1) part; the shares must not add up to more than 1,
+    which is not checked. fps: frames per second. The D columns are independent. The random stream of a part is named by
+    the seed, `keys`, the part's number from 0 on, and repeat (number of the suite entry's copy, 0 without copies). It
+    begins in frame 1, whatever `first` is. If memory is empty, `fresh` itself is returned; otherwise it is not changed.
+
+    Raises ValueError for a negative seed or key.
+    """
+    if not memory:
+        return fresh
+    white = max(0.0, 1.0 - sum(part.share for part in memory))
+    out = np.sqrt(white) * fresh
+    tick = ticks(np.arange(first, first + len(fresh)), fps)
+    for k, part in enumerate(memory):
+        e = normals(uniforms(rng(seed, "detect", *keys, k, repeat=repeat), (int(tick[-1]) + 1, fresh.shape[1])))
+        out += np.sqrt(part.share) * autoregression(e, exp(-1.0 / (CLOCK * part.time)))[tick]
+    return np.asarray(out)
+
+
+def ticks(frame: Ints, fps: float) -> Ints:
+    """Returns the ticks (F,) of the detector's clock, from 0 on, that are nearest to the times of frames (F,)."""
+    return np.asarray(np.floor((frame - 1) / fps * CLOCK + 0.5), np.int64)

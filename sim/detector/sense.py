@@ -9,7 +9,7 @@ paired. Everything is drawn as uniforms (`sim.detector.draws`).
 
 Errors of boxes are proportional to the box (`sim.detector.box_noise`). A measured profile (`flockscope fit sensor`)
 replaces visibility^occlusion_power by a curve, and makes misses and errors correlated over time
-(`sim.detector.correlated_noise`).
+(`sim.detector.draws`).
 """
 
 from __future__ import annotations
@@ -22,9 +22,16 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.detector.box_noise import perturb_boxes, seen_shift
 from sim.detector.clutter import false_alarms
-from sim.detector.correlated_noise import CLOCK, correlated_normals, ticks
-from sim.detector.draws import frame_uniforms, interpolated_quantiles, true_scores
-from sim.detector.readings import Readings, detections_by_frame
+from sim.detector.draws import (
+    CLOCK,
+    Readings,
+    correlated_normals,
+    detections_by_frame,
+    frame_uniforms,
+    interpolated_quantiles,
+    ticks,
+    true_scores,
+)
 from sim.elementary import normal_quantile, power
 from sim.rng import normals, rng, uniforms
 from sim.scene.body import SHOULDER_SHARE

@@ -9,7 +9,7 @@ import os
 import os.path
 import warnings
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from scenarios.errors import InputError
@@ -17,11 +17,11 @@ from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
 from sim.io.files.own_files import is_hidden
 from sim.io.formats import biwi, caviar, mot_folder, video
-from sim.io.formats.box_columns import BoxScale, parse_box_scale
 from sim.io.formats.calibration import read_calibration
-from sim.io.pictures.background_sample import BackgroundChoice, parse_choice
+from sim.io.formats.options import RecordingOptions, parse_box_scale
+from sim.io.pictures.background_sample import parse_choice
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import is_sequence
+from sim.io.store.seal import is_sequence
 from sim.types import Camera, Sequence
 
 KINDS = "a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video"
@@ -124,47 +124,20 @@ def split_and_name(folder: Path) -> str:
     return "/".join(Path(os.path.abspath(folder)).parts[-2:])
 
 
-@dataclass(frozen=True)
-class RecordingOptions:
-    """The user's options for a recording; None: not given."""
-
-    fps: float | None  # frames per second
-    px_per_m: float | None  # image scale
-    camera: Camera | None  # its calibration
-    images: bool  # False leaves out the pictures of MOTChallenge folders, True is the default
-    background: BackgroundChoice | None  # which frames are the sample for background models
-    person_class: int | None = None  # the class of people in MOTChallenge texts
-    box_scale: BoxScale | None = None  # factors of x and y of the boxes of these
-
-    def reject(self, path: Path, kind: str, why: str, names: str) -> None:
-        """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect."""
-        found = [name for name in names.split() if getattr(self, name) is not None]
-        given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
-        if given:
-            remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
-            raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
-
-
 def _open_file(path: Path, options: RecordingOptions) -> Sequence:
-    suffix, o = path.suffix.lower(), options
+    suffix = path.suffix.lower()
     if suffix == ".xml":
-        o.reject(
-            path, "a CAVIAR recording", "its truth is in the image, without pictures",
-            "camera background person_class box_scale",
-        )  # fmt: skip
-        return caviar.open_file(path, fps=o.fps, px_per_m=o.px_per_m)
+        no = "camera background person_class box_scale"
+        options.reject(path, "a CAVIAR recording", "its truth is in the image, without pictures", no)
+        return caviar.open_file(path, options)
     if path.name == "obsmat.txt":
-        return _open_folder(path.parent, o)
+        return _open_folder(path.parent, options)
     if suffix in video.SUFFIXES:
-        o.reject(path, "a video", "it has no text", "person_class box_scale")
-        return video.open_video(
-            path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, background=o.background or video.ANY
-        )
+        options.reject(path, "a video", "it has no text", "person_class box_scale")
+        return video.open_video(path, options)
     if suffix in (".txt", ".csv"):
-        o.reject(path, "a text", "it has no pictures", "background")
-        return mot_folder.open_text(
-            path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, person_class=o.person_class, box_scale=o.box_scale
-        )
+        options.reject(path, "a text", "it has no pictures", "background")
+        return mot_folder.open_text(path, options)
     raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy="check the path")
 
 
@@ -193,20 +166,16 @@ def _is_recording(path: Path) -> bool:
 
 
 def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
-    o = options
     if path.is_file():
-        return _open_file(path, o)
+        return _open_file(path, options)
     match _kind(path):
         case "generated":
             no = "fps px_per_m camera person_class box_scale"
-            o.reject(path, "a generated sequence", "it knows its own", no)
-            return sequence_folder.open_sequence(path, background=o.background)
+            options.reject(path, "a generated sequence", "it knows its own", no)
+            return sequence_folder.open_sequence(path, background=options.background)
         case "biwi":
             no = "px_per_m camera background person_class box_scale"
-            o.reject(path, "a BIWI recording", "it is in metres, without pictures", no)
-            return biwi.open_folder(path, fps=o.fps)
+            options.reject(path, "a BIWI recording", "it is in metres, without pictures", no)
+            return biwi.open_folder(path, options)
         case _:
-            return mot_folder.open_folder(
-                path, fps=o.fps, px_per_m=o.px_per_m, camera=o.camera, images=o.images, background=o.background,
-                person_class=o.person_class, box_scale=o.box_scale,
-            )  # fmt: skip
+            return mot_folder.open_folder(path, options)

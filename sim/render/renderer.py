@@ -1,6 +1,6 @@
 """Images and pixel truth of a Motion; each a pure function of the frame's index, drawn when asked for.
 
-A frame starts from the empty scene (`sim.render.background`). Wind moves its plants, shadows darken it, and people are
+A frame starts from the empty scene (`sim.render.camera_view`). Wind moves its plants, shadows darken it, and people are
 drawn over it by depth. The result is blurred, multiplied by the brightness of the moment, given noise and, if the
 scenario wants it, compressed as JPEG. The people of up to 16 consecutive frames are computed at once, which is faster.
 """
@@ -17,23 +17,24 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim.render.camera_view import NODE_STEP, CameraView, blur_weights, noise_offsets, noise_pool
 from sim.render.canvas import UNIT, FrameCanvas
-from sim.render.people import DrawnPeople, ProjectedPeople, clothing_atlas, people_of_frames, project_people, take_rows
+from sim.render.people import (
+    DrawnPeople,
+    PeopleShadows,
+    ProjectedPeople,
+    clothing_atlas,
+    people_of_frames,
+    people_shadows,
+    project_people,
+    sunlit_shares,
+    take_rows,
+)
 from sim.render.pixel_truth import empty_scene_disparities, frame_disparities, pixel_truth
-from sim.render.shadows import PeopleShadows, people_shadows, sunlit_shares
 from sim.render.weather import Foliage, Illumination, draw_illumination, grow_plants
 from sim.scene import camera as cameras
-from sim.types import BACKGROUNDS, Array, Camera, Frame, Image, Motion, PixelTruth
+from sim.types import BACKGROUNDS, Array, Camera, Image, Motion, PixelTruth
 
 if TYPE_CHECKING:
-    from scenarios.schema.picture import Light, Picture
-
-
-def compressed(image: Image, quality: int) -> Image:
-    """Returns the image (H, W, 3) uint8, BGR, after JPEG compression with this quality, 1 (worst) to 100."""
-    import cv2
-
-    code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
-    return np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
+    from scenarios.schema.scenario import Light, Picture
 
 
 FRAMES = 16  # frames of a batch
@@ -221,60 +222,38 @@ class Renderer:
     def _draw(
         self, index: int, side: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
+        from sim.render.people_kernels import draw_people
+        from sim.render.weather_kernels import draw_shadows
+
         view, batch = self._shown_right_view if side else self.left_view, self._batch(index)
         number = MISALIGNED if side and view is not self.right_view else side
         people, seen = batch.people(index), batch.in_view(view, number, index)
         canvas = self._moved_canvas(view, index) if shade else view.take_canvas()
-        if shade:
-            self._draw_shadows(view, canvas, people, seen)
+        light, here, fall = self.illumination, seen.projected, seen.shadows
+        if shade and fall is not None:
+            draw_shadows(
+                view.geometry.place, view.empty_scene.direct, fall.outlines.bounds, view.level, fall.outlines.middle,
+                fall.outlines.inverse, people.shapes.centre, fall.shape, light.sun, fall.softness,
+                canvas.shaded, canvas.colour, canvas.dirty, self._margin,
+            )  # fmt: skip
         ids = view.empty_ids() if label else np.zeros((0, 0), np.int64)
         amodal = np.zeros(len(people.id), np.int64)
-        self._draw_people(canvas, people, seen, ids, amodal, shade=shade, label=label)
-        image = self._finish(view, canvas, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
-        truth = None
-        if label:
-            found = None
-            if disparity:
-                other = batch.in_view(self.right_view, RIGHT, index).projected
-                found = frame_disparities(
-                    self._empty_disparities, self.right_view, canvas, ids, people, seen.projected, other
-                )
-            truth = pixel_truth(ids, seen.projected.outlines.bounds, people.id, amodal, found)
-        view.return_canvas(canvas)
-        return image, truth
-
-    def _draw_shadows(self, view: CameraView, canvas: FrameCanvas, people: DrawnPeople, seen: PeopleInView) -> None:
-        from sim.render.weather_kernels import draw_shadows
-
-        fall = seen.shadows
-        if fall is None:
-            return
-        draw_shadows(
-            view.geometry.place, view.empty_scene.direct, fall.outlines.bounds, view.level, fall.outlines.middle,
-            fall.outlines.inverse, people.shapes.centre, fall.shape, self.illumination.sun, fall.softness,
-            canvas.shaded, canvas.colour, canvas.dirty, self._margin,
-        )  # fmt: skip
-
-    def _draw_people(
-        self,
-        canvas: FrameCanvas,
-        people: DrawnPeople,
-        seen: PeopleInView,
-        ids: NDArray[np.int64],
-        amodal: NDArray[np.int64],
-        *,
-        shade: bool,
-        label: bool,
-    ) -> None:
-        from sim.render.people_kernels import draw_people
-
-        here, light = seen.projected, self.illumination
         draw_people(
             np.argsort(here.nearest_depth[:, 0], kind="stable"), here.start, here.step, people.half,
             here.outlines.middle, here.outlines.inverse, here.outlines.bounds, people.id, people.turn @ light.sun,
             light.shadow, seen.sunlit, people.id - 1, self._atlas, shade, label, canvas.depth, ids, canvas.colour,
             canvas.dirty, self._margin, amodal,
         )  # fmt: skip
+        image = self._finish(view, canvas, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
+        truth = None
+        if label:
+            found = None
+            if disparity:
+                other = batch.in_view(self.right_view, RIGHT, index).projected
+                found = frame_disparities(self._empty_disparities, self.right_view, canvas, ids, people, here, other)
+            truth = pixel_truth(ids, here.outlines.bounds, people.id, amodal, found)
+        view.return_canvas(canvas)
+        return image, truth
 
     def _finish(self, view: CameraView, canvas: FrameCanvas, index: int, side: int) -> Image:
         from sim.render.blur_noise_kernels import finish_image
@@ -288,7 +267,12 @@ class Renderer:
             canvas.colour.reshape(flat), view.blurred_canvas.reshape(flat), canvas.dirty, self._weights, bright,
             NODE_STEP, self._noise, np.float32(self.picture.shot), offsets, image.reshape(flat),
         )  # fmt: skip
-        return compressed(image, self.picture.jpeg) if self.picture.jpeg else image
+        if self.picture.jpeg:
+            import cv2
+
+            code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, self.picture.jpeg])[1]
+            image = np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
+        return image
 
 
 def make_renderer(
@@ -308,14 +292,6 @@ def make_renderer(
     Raises:
         InputError: The lens distorts.
     """
-    from scenarios.schema.picture import Light, Picture
+    from scenarios.schema.scenario import Light, Picture
 
     return Renderer(motion, camera, light or Light(), picture or Picture())
-
-
-def render(
-    motion: Motion, camera: Camera, index: int, light: Light | None = None, picture: Picture | None = None
-) -> Frame:
-    """Returns frame `index` (from 1) with the left image alone; `make_renderer` is faster for many."""
-    image = make_renderer(motion, camera, light, picture).frame(index)
-    return Frame(index, (index - 1) / motion.fps, image)

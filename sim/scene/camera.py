@@ -8,13 +8,25 @@ The lens of a pinhole camera may distort (`radial` = k, of calibrated recordings
 from the image centre, it shows at the distorted point x, |x| = r, what an ideal lens shows at y = x (1 + k r²). Given
 |y| = q, the distorted radius r is the root of r + k r³ = q that continues r = 0: r = 2/√(3k) sinh(asinh(3/2 q √(3k))/3)
 for k > 0. For k < 0 sin and asin with √(-3k) replace sinh and asinh; points with q > 2/(3 √(-3k)) are not shown at all.
+
+A rectified stereo pair as a sensor of points: (u, v, d) of a world point, its Jacobian, and the way back.
+
+u, v: pixel in the left image; d = u_left - u_right: disparity, px. With x_c = R (X - C) = (x right, y down, z forward),
+R the rotation and C the position of the left camera, f its focal lengths, b the baseline:
+    u = u0 + fx x_c / z_c,   v = v0 + fy y_c / z_c,   d = b fx / z_c                 (Hoshikawa et al. 2011, eq. 6)
+    d(u, v, d)/dX = J R,   J = [[fx/z, 0, -fx x/z^2], [0, fy/z, -fy y/z^2], [0, 0, -b fx/z^2]]
+Eq. 6 is printed with y in place of x, and with world coordinates in place of camera coordinates.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from sim.elementary import PI, atan2, dot, exp, length, log, product, sin, turned, unit
+from scenarios.errors import InputError
+from scenarios.limits import COORDINATE, PICTURE_SIZES, SCALES, fits_picture, is_number
+from sim.elementary import PI, atan2, dot, exp, inverse_3x3, length, log, product, sin, turned, unit
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera
 
@@ -187,3 +199,91 @@ def _low_ground(camera: Camera) -> Array:
         ahead = camera.rotation[2, :2] / max(float(length(camera.rotation[2, :2])), 1e-12)
         return np.asarray(camera.position[:2] + 10.0 * ahead)
     return np.asarray(ground[(seen[0] + len(v) - 1) // 2])
+
+
+ROTATION_TOLERANCE = 0.01  # difference of R Rᵀ from the identity: rotations are often written with three decimals
+FOCAL = (0.1, 100.0)  # focal length in widths of the image: a fisheye has some 0.3, a telescope 50
+ASPECT = 2.0  # greatest ratio of the two focal lengths
+CENTRE = 1.0  # by how many image sizes the image centre may lie outside the image
+FOLD = -1 / 3  # least radial r² at the image's corner: below it the lens would show two points at one place
+BULGE = 10.0  # greatest radial r² there
+DOWN = 0.99  # least downward part of the forward axis of a camera of kind "top"
+
+
+def require_camera(camera: Camera, file: object = "", place: str = "") -> Camera:
+    """Returns the camera unchanged if it can be used; raises InputError otherwise."""
+    for key, good, got, expected in _facts(camera):
+        if not good:
+            where = f"{place}: {key}" if place else key
+            raise InputError(file=file, place=where, got=got, expected=expected, remedy="correct the camera")
+    return camera
+
+
+def _facts(camera: Camera) -> Iterator[tuple[str, bool, str, str]]:
+    """Yields (field, whether it is right, what was found, what was expected); each supposes that those before hold."""
+    (w, h), p, r = camera.image, camera.position, camera.rotation
+    yield "image", fits_picture(w, h), f"{w}×{h} px", PICTURE_SIZES
+    if camera.kind == "pinhole":
+        yield from _lens(camera)
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = float(np.abs(product(r, r.T) - np.eye(3)).max())
+    got = f"rows that are no unit vectors at right angles (off by {off:.2g})"
+    yield "rotation", off <= ROTATION_TOLERANCE, got, "a rotation matrix, world to camera"
+    turn, expected = float(dot(r[0], np.cross(r[1], r[2]))), "determinant +1: x right, y down, z forward"
+    yield "rotation", turn > 0, "a mirrored rotation (determinant -1)", expected
+    yield "position", bool((np.abs(p) <= COORDINATE).all()), str(p.tolist()), f"coordinates within {COORDINATE:g} m"
+    yield "position", bool(p[2] > 0), f"a camera at height {p[2]:g} m", "above the ground, z = 0 (in m)"
+    down = camera.kind == "pinhole" or bool(r[2, 2] <= -DOWN)
+    yield "rotation", down, "a camera of kind top that does not look down", "one that looks straight down"
+    scale = px_per_m_at_centre(camera)
+    good = is_number(scale, *SCALES) or (camera.kind == "pinhole" and bool(np.isnan(scale)))
+    yield "px_per_m", good, f"{scale:g} px per m in the image centre", f"from {SCALES[0]:g} to {SCALES[1]:g}"
+    u, v = (a.ravel() for a in np.meshgrid([0.0, w / 2, w], np.linspace(h / 2, h, 5)))
+    seen = shows_ground(camera, to_ground(camera, np.concatenate([np.c_[u, v], [camera.centre_px]])))
+    yield "rotation", bool(seen.any()), "an image without ground in its lower half", "a camera that sees the ground"
+
+
+def _lens(camera: Camera) -> Iterator[tuple[str, bool, str, str]]:
+    size, focal, centre = np.array(camera.image), np.array(camera.focal_px), np.array(camera.centre_px)
+    (w, h), low, high = camera.image, FOCAL[0] * size.max(), FOCAL[1] * size.max()
+    got = f"focal_px {list(camera.focal_px)}, centre_px {list(camera.centre_px)} for {w}×{h}"
+    alike = ((focal >= low) & (focal <= high)).all() and focal.max() <= ASPECT * focal.min()
+    yield "focal_px", bool(alike), got, f"two like focal lengths from {low:g} to {high:g} px"
+    near = ((centre >= -CENTRE * size) & (centre <= (1 + CENTRE) * size)).all()
+    yield "centre_px", bool(near), got, "an image centre near the image"
+    bend = camera.radial * float(np.square(np.maximum(np.abs(centre), np.abs(size - centre)) / focal).sum())
+    got, expected = f"a lens with radial r² = {bend:.3g} at the image's corner", f"from {FOLD:.2f} to {BULGE:g} there"
+    yield "radial", FOLD < bend <= BULGE, got, expected
+
+
+def project_pair(camera: Camera, xyz: Array) -> Array:
+    """Returns u, v, d (N, 3) px of world points xyz (N, 3) m before the camera (eq. 6, with its pose)."""
+    x = turned(camera.rotation, xyz - camera.position)
+    (fx, fy), (u0, v0) = camera.focal_px, camera.centre_px
+    z = x[:, 2]
+    return np.column_stack([u0 + fx * x[:, 0] / z, v0 + fy * x[:, 1] / z, camera.baseline * fx / z])
+
+
+def back_project(camera: Camera, uvd: Array) -> Array:
+    """Returns the world points (N, 3) m that are measured as uvd (N, 3) px, d above 0."""
+    (fx, fy), (u0, v0) = camera.focal_px, camera.centre_px
+    z = camera.baseline * fx / uvd[:, 2]
+    x = np.column_stack([(uvd[:, 0] - u0) / fx * z, (uvd[:, 1] - v0) / fy * z, z])
+    return np.asarray(turned(camera.rotation.T, x) + camera.position)
+
+
+def pair_jacobian(camera: Camera, xyz: Array) -> Array:
+    """Returns d(u, v, d)/d(x, y, z) of `project_pair` at xyz (N, 3): (N, 3, 3) px/m."""
+    x = turned(camera.rotation, xyz - camera.position)
+    (fx, fy), z = camera.focal_px, x[:, 2]
+    J = np.zeros((len(x), 3, 3))
+    J[:, 0, 0], J[:, 0, 2] = fx / z, -fx * x[:, 0] / (z * z)
+    J[:, 1, 1], J[:, 1, 2] = fy / z, -fy * x[:, 1] / (z * z)
+    J[:, 2, 2] = -camera.baseline * fx / (z * z)
+    return product(J, camera.rotation)
+
+
+def point_covariances(camera: Camera, xyz: Array, variances: Array) -> Array:
+    """Returns the covariances J⁻¹ R J⁻ᵀ (N, 3, 3) m² of measured points xyz (N, 3); variances (3,) px²: of u, v, d."""
+    inverse = inverse_3x3(pair_jacobian(camera, xyz))
+    return product(inverse * variances, np.swapaxes(inverse, 1, 2))

@@ -17,8 +17,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.elementary import dot, product, turned
 from sim.scene.body import PERSON_HEIGHT, Ellipsoids, RecordedBodies, ellipsoids, recorded_bodies
-from sim.scene.camera import camera_rotation
-from sim.scene.camera_check import require_camera
+from sim.scene.camera import camera_rotation, require_camera
 from sim.types import Array, Bools, Camera, Motion
 
 if TYPE_CHECKING:
@@ -44,7 +43,7 @@ def place_camera(spec: CameraSpec, motion: Motion) -> Camera:
 
     Raises InputError, naming the first person out of view, if `spec.crop` is false and a body is not wholly in the
     image. That can happen where position, height or scale are given, or where the tilt allows no place. Also raises
-    InputError for a camera that cannot be used, as one that sees no ground (sim.scene.camera_check).
+    InputError for a camera that cannot be used, as one that sees no ground (sim.scene.camera).
     """
     everybody = recorded_bodies(motion)
     aimed = _bodies_to_fit(everybody, motion, spec.crop)

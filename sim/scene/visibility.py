@@ -5,6 +5,17 @@ meets three conditions: it lies in the image; no nearer silhouette covers it; it
 step first. `sim.scene.body.occlusion_distance` orders people from near to far. A wall hides people beyond its line. A
 pillar hides people further away than the tangent to it. Stairs hide if the ray meets a step before the upright plane
 through the person that faces the camera. Seen from above, walls, pillars and stairs hide nobody.
+
+What the boxes of people tell where neither a camera nor the user does: the scale of the image, and who is visible.
+
+There are two rules of the scale on purpose. A tracker gets the scale of the first boxes (`scale_of_first_boxes`), so
+that it needs no later frame. The truth, which is read as a whole, takes that of all labelled boxes
+(`scale_of_all_boxes`). On PETS09-S2L1, TUD-Campus and TownCentre the scale of the first 100 boxes is within 11 % of
+that of all boxes, on CAVIAR's mwt1gt within 12 %.
+
+For visibility each box is taken for an upright person of `sim.scene.body` whose body and head fill it. Of two people,
+the one whose box ends lower in the image is the nearer (flat ground, a level camera). Only labelled people hide people
+here: walls and other objects are unknown.
 """
 
 from __future__ import annotations
@@ -13,9 +24,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.scene.body import Ellipsoids, occlusion_distance, outline_boxes, outlines, packed_inverse
+from sim.scene import body
+from sim.scene.body import (
+    PERSON_HEIGHT,
+    Ellipsoids,
+    Outlines,
+    occlusion_distance,
+    outline_boxes,
+    outlines,
+    packed_inverse,
+)
 from sim.scene.raycast import only_flights, solids_of, unprojection
-from sim.types import Array, Camera, Ints, Scene
+from sim.types import Array, Camera, Ints, Scene, Truth
 
 
 @dataclass(frozen=True)
@@ -57,3 +77,68 @@ def measure_visibility(
 def frame_starts(frame: Ints) -> Ints:
     """Returns the first row of each frame in sorted frame numbers (R,), then R: (F + 1,)."""
     return np.concatenate([[0], np.flatnonzero(np.diff(frame)) + 1, [len(frame)]]).astype(np.int64)
+
+
+BOXES = 100  # boxes that the first frames must hold together
+
+
+def scale_of_first_boxes(frame: Ints, height: Array) -> tuple[float, int]:
+    """Returns the image scale, px per m, by the first 100 boxes, and the last frame that it was taken from.
+
+    frame, height (R,): of each box, in any order; height px.
+    """
+    known = np.isfinite(height)
+    frame, height = frame[known], height[known]
+    if not len(frame):
+        return float("nan"), 0
+    last = int(np.sort(frame)[min(BOXES, len(frame)) - 1])
+    return float(np.median(height[frame <= last])) / PERSON_HEIGHT, last
+
+
+def scale_of_all_boxes(height: Array) -> float:
+    """Returns the image scale, px per m, by the heights (R,) px of all labelled boxes."""
+    return float(np.median(height)) / PERSON_HEIGHT if len(height) else float("nan")
+
+
+def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
+    """Returns the truth with visibility, truncation and visible boxes estimated from its boxes.
+
+    image_size: (width, height) px; None: the image ends with the boxes. Visibilities that the labels state are kept.
+    """
+    if truth.box is None or truth.visible_box is not None or not len(truth.box):
+        return truth
+    from sim.scene.visibility_kernels import COLUMNS, ROWS, sample_visibility
+
+    size = np.array(image_size if image_size is not None else image_size_of_boxes(truth.box), dtype=float)
+    ellipses = inscribed_outlines(truth.box)
+    nothing = only_flights(np.zeros((0, 9)))
+    seen, truncation, visible_box = sample_visibility(
+        frame_starts(truth.frame), np.array(truth.box), np.ascontiguousarray(ellipses.centre),
+        packed_inverse(ellipses.shape), -(truth.box[:, 1] + truth.box[:, 3]), np.zeros((len(truth.box), 2)), size,
+        False, np.zeros(3), np.eye(3), nothing, np.zeros((0, ROWS, COLUMNS), bool),
+    )  # fmt: skip
+    labelled = bool((truth.visibility < 1).any())
+    return truth.replace(
+        visibility=truth.visibility if labelled else seen, truncation=truncation, visible_box=visible_box
+    )
+
+
+def inscribed_outlines(box: Array) -> Outlines:
+    """Returns body and head of N people that fill the boxes (N, 4) px."""
+    left, top, width, height = box.T
+    middle = left + width / 2
+    centre, shape = np.empty((len(box), 2, 2)), np.zeros((len(box), 2, 2, 2))
+    for k, part, half_width in (
+        (body.BODY_PART, body.BODY, 0.5),
+        (body.HEAD_PART, body.HEAD, body.HEAD.across / body.SHOULDER_SHARE),
+    ):
+        centre[:, k] = np.stack([middle, top + (1.0 - part.centre) * height], axis=1)
+        shape[:, k, 0, 0], shape[:, k, 1, 1] = np.square(half_width * width), np.square(part.up * height)
+    return Outlines(centre, shape)
+
+
+def image_size_of_boxes(*boxes: Array) -> tuple[int, int]:
+    """Returns the (width, height) px of the smallest image from (0, 0) that holds all boxes (N, 4)."""
+    far = np.concatenate([box[:, :2] + box[:, 2:] for box in boxes]) if boxes else np.zeros((0, 2))
+    width, height = np.ceil(far.max(axis=0, initial=1.0)) if len(far) else (1.0, 1.0)
+    return int(width), int(height)

@@ -15,10 +15,16 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from sim.elementary import atan2, cos, dot, length
-from sim.geometry.footprints import FOOTPRINT_RADIUS, FOOTPRINT_SIDES, footprint_hulls, position_hulls
-from sim.geometry.polygons import edge_distance_pairs, gap_pairs, pack
-from sim.truth.merge_split_rules import frames_of, mean_of_present
-from sim.truth.proximity import close_pairs, runs, stretches
+from sim.geometry.polygons import (
+    FOOTPRINT_RADIUS,
+    FOOTPRINT_SIDES,
+    edge_distance_pairs,
+    footprint_hulls,
+    gap_pairs,
+    pack,
+    position_hulls,
+)
+from sim.truth.merge_split_rules import close_pairs, frames_of, mean_of_present, runs, stretches
 from sim.types import Array, Bools, GroupEvent, Ints
 
 CROSS_GAP = 1.0  # m between hulls

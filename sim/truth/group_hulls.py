@@ -12,8 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.geometry.footprints import footprint_hulls
-from sim.geometry.polygons import convex_hull
+from sim.geometry.polygons import convex_hull, footprint_hulls
 from sim.types import Array, Groups, Ints
 
 __all__ = ["box_groups", "frame_groups", "groups_over_time"]

@@ -19,8 +19,7 @@ from typing import Literal
 import numpy as np
 
 from sim.truth.identity import GroupChange, Identities, PersonSet
-from sim.truth.merge_split_rules import HOLD_TIME, frames_of, holds_for, mean_of_present, separation
-from sim.truth.proximity import strangers
+from sim.truth.merge_split_rules import HOLD_TIME, frames_of, holds_for, mean_of_present, separation, strangers
 from sim.types import Array, Bools, GroupEvent, Ints, Near
 
 Rule = Literal["merge", "split"]

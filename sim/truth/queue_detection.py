@@ -19,8 +19,7 @@ from itertools import groupby
 import numpy as np
 
 from sim.elementary import atan2, length, unit
-from sim.truth.merge_split_rules import frames_of
-from sim.truth.proximity import close_pairs, stretches
+from sim.truth.merge_split_rules import close_pairs, frames_of, stretches
 from sim.types import Array, Bools, GroupEvent, Ints
 
 MIN_SPACING, MAX_SPACING = 0.4, 1.5  # m along the line

@@ -2,7 +2,7 @@
 
 The scheduler is given bytes only, so it needs none of our code. A worker refuses an item unless it has the same
 versions and sources as this process, because its results could differ in their bytes otherwise
-(sim.versions.runtime). If a worker dies, the scheduler gives its item to another worker.
+(sim.hashing.runtime). If a worker dies, the scheduler gives its item to another worker.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from itertools import islice
 from typing import Any
 
 from scenarios.errors import InputError, WorkError
-from sim.versions import runtime
-from sim.workers.pool import THREAD_VARIABLES, R, RunItems, T, WorkResult, run_pickled, worker_loss
+from sim.hashing import runtime
+from sim.workers.pool import THREAD_VARIABLES, OnLoss, R, RunItems, T, WorkResult, run_pickled, worker_loss
 
 ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]+/?"
 SAME = "install the same on all (pip install -c constraints.txt) and restart the workers"
@@ -34,11 +34,8 @@ CONNECT_TIMEOUT = 10.0  # s to reach a scheduler
 COUNT_INTERVAL = 1.0  # s between two counts of the cluster's workers
 NO_WORKERS_WARNING = 20.0  # s without any worker before a warning
 REMEDY = "run the same command again: what is complete is kept"
-PROFILE_SAFE = (
-    3,
-    11,
-    9,
-)  # earlier Pythons may deadlock in sys._current_frames, which dask's profiler calls (gh-106883)
+# earlier Pythons may deadlock in sys._current_frames, which dask's profiler calls (gh-106883)
+PROFILE_SAFE = (3, 11, 9)
 
 
 @contextmanager
@@ -50,11 +47,7 @@ def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
     client = _connect(address)
 
     def run(
-        function: Callable[[T], R],
-        items: Iterable[T],
-        *,
-        ahead: int = 0,
-        on_loss: Callable[[T, WorkError], R] | None = None,
+        function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: OnLoss[T, R] = None
     ) -> Iterator[tuple[T, R]]:
         capacity = _ClusterCapacity(client, address, workers)
         waiting, finished = iter(items), queue.SimpleQueue[str]()
@@ -208,7 +201,7 @@ def _fetchers(client: Any, futures: list[Any]) -> list[Callable[[], bytes]]:
     return [future.result for future in futures]
 
 
-def _result(fetch: Callable[[], bytes], item: T, address: str, on_loss: Callable[[T, WorkError], R] | None) -> R:
+def _result(fetch: Callable[[], bytes], item: T, address: str, on_loss: OnLoss[T, R]) -> R:
     from distributed import CancelledError, KilledWorker
 
     try:

@@ -21,18 +21,14 @@ from typing import Any, Generic, Protocol, TypeVar
 from scenarios.errors import WorkError
 
 # environment variables that are set to 1 in every worker: a worker computes in one thread
-THREAD_VARIABLES = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "OPENCV_FOR_THREADS_NUM",
-)
+THREAD_VARIABLES = tuple(f"{name}_NUM_THREADS" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA"))
+THREAD_VARIABLES += ("OPENCV_FOR_THREADS_NUM",)
 
 MAX_LOSSES = 3  # workers of the local pool that one item may kill before it counts as failed
 
 T = TypeVar("T")
 R = TypeVar("R")
+OnLoss = Callable[[T, WorkError], R] | None  # gives the result of an item that killed too many workers
 
 
 class RunItems(Protocol):
@@ -42,12 +38,7 @@ class RunItems(Protocol):
     """
 
     def __call__(
-        self,
-        function: Callable[[T], R],
-        items: Iterable[T],
-        *,
-        ahead: int = 0,
-        on_loss: Callable[[T, WorkError], R] | None = None,
+        self, function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: OnLoss[T, R] = None
     ) -> Iterator[tuple[T, R]]:
         """Yields (item, function(item)) for every item, in the order in which the results arrive.
 
@@ -61,11 +52,9 @@ class RunItems(Protocol):
 
 def worker_loss(losses: int, cause: str) -> WorkError:
     """Returns the error for an item that killed `losses` workers, the last by `cause` ("exit code 3")."""
-    return WorkError(
-        got=f"an item that killed {losses} workers, the last by {cause}",
-        expected="workers that finish",
-        remedy="run again, with fewer workers if memory is short",
-    )
+    got = f"an item that killed {losses} workers, the last by {cause}"
+    remedy = "run again, with fewer workers if memory is short"
+    return WorkError(got=got, expected="workers that finish", remedy=remedy)
 
 
 EXIT_TIMEOUT = 5.0  # s that a terminated process has to exit before it is killed
@@ -201,11 +190,7 @@ def process_pool(workers: int) -> Iterator[RunItems]:
     processes = [WorkerProcess() for _ in range(workers)]
 
     def run(
-        function: Callable[[T], R],
-        items: Iterable[T],
-        *,
-        ahead: int = 0,
-        on_loss: Callable[[T, WorkError], R] | None = None,
+        function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: OnLoss[T, R] = None
     ) -> Iterator[tuple[T, R]]:
         return _run_items(processes, function, items, on_loss)
 
@@ -229,10 +214,7 @@ class _PendingItem(Generic[T]):
 
 
 def _run_items(
-    processes: list[WorkerProcess],
-    function: Callable[[T], R],
-    items: Iterable[T],
-    on_loss: Callable[[T, WorkError], R] | None,
+    processes: list[WorkerProcess], function: Callable[[T], R], items: Iterable[T], on_loss: OnLoss[T, R]
 ) -> Iterator[tuple[T, R]]:
     from multiprocessing.connection import wait
 

@@ -9,10 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.errors import InputError
-from scenarios.loading.overrides import parse_setting, parse_value
-from scenarios.loading.toml_files import parse
-from scenarios.printable import printable, shortened
+from scenarios.errors import InputError, printable, shortened
+from scenarios.loading.toml_files import parse, parse_setting, parse_value
 from sim.io.files.tables import read_json
 from tracking.papers.blob.config import BlobConfig
 

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import FlockscopeError, InputError, WorkError
-from scenarios.printable import is_control, printable
+from scenarios.errors import FlockscopeError, InputError, WorkError, is_control, printable
 
 STATUS = {0: "ok", 1: "failed", 2: "refused", 130: "interrupted"}
 """The "status" of the JSON object, by exit code."""

@@ -13,8 +13,7 @@ from typing import Any
 
 import typer
 
-from scenarios.errors import FlockscopeError, InputError, WorkError
-from scenarios.printable import printable, shortened
+from scenarios.errors import FlockscopeError, InputError, WorkError, printable, shortened
 from tracking.app.command_result import (
     DEBUG,
     INTERRUPTED,

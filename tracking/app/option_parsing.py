@@ -84,7 +84,7 @@ def sensor_settings(file: Path | None) -> tuple[str, ...]:
 
 def pictures(streams: str, images: str | None) -> tuple[tuple[str, ...], str]:
     """Returns (names of the streams, picture format) from the texts of `--streams` and `--images`."""
-    from sim.io.store.streams import coding
+    from sim.streams import coding
 
     words = () if streams.strip() == "none" else tuple(word.strip() for word in streams.split(",") if word.strip())
     if images is not None and coding(words, images) is None:
@@ -95,7 +95,7 @@ def pictures(streams: str, images: str | None) -> tuple[tuple[str, ...], str]:
 
 def toml_values(texts: Iterable[str]) -> dict[str, Any]:
     """Returns texts "key=value" as a dictionary from key to value; of equal keys the last counts."""
-    from scenarios.loading.overrides import parse_setting
+    from scenarios.loading.toml_files import parse_setting
 
     return {".".join(steps): value for steps, value in map(parse_setting, texts)}
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from scenarios.printable import printable
+from scenarios.errors import printable
 from tracking.running.interrupts import raise_if_interrupted
 
 if TYPE_CHECKING:

@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from sim.io.files.output_paths import output_paths
-from sim.io.files.own_files import is_hidden
-from sim.io.formats.box_columns import BoxScale
-from sim.io.store.manifest import is_sequence
-from sim.io.store.run_seal import AGAIN, RUN, WHOLE, check_run, is_run, read_run, run_folder, tracked_hash
+from sim.io.files.own_files import is_hidden, output_paths
+from sim.io.formats.options import BoxScale
+from sim.io.store.seal import AGAIN, RUN, WHOLE, check_run, is_run, is_sequence, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.running.run import TrackingRun

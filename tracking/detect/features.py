@@ -6,7 +6,7 @@ backwards; it ends where it does not come back to its place, and where it leaves
 world points of the last frames. Its velocity is the slope of the line of least squares through those of the time
 window. Features that have not lived through the time window are not used (Fig. 3).
 
-Each point has a covariance of its own, C = J^-1 R J^-T with the Jacobian J of the pair (sim.scene.stereo) and R of
+Each point has a covariance of its own, C = J^-1 R J^-T with the Jacobian J of the pair (sim.scene.camera) and R of
 (u, v, d): along the line of sight it grows with the squared depth. Of n measurements at times t_k the slope has the
 covariance C / sum (t_k - mean t)^2.
 """
@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from sim.arrays import no_ids
-from sim.scene.stereo import back_project, point_covariances
+from sim.scene.camera import back_project, point_covariances
 from sim.types import Array, Bools, Camera, Image, Ints
 from tracking.detect.subtraction_stereo import Disparities, sampled
 

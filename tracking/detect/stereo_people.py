@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.scene.stereo import back_project, point_covariances
+from sim.scene.camera import back_project, point_covariances
 from sim.types import Array, Bools, Camera
 from tracking.detect.blobs import Blobs
 from tracking.detect.subtraction_stereo import Disparities

@@ -17,10 +17,10 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors, perturb_boxes
-from sim.io.formats.mot_people import DISTRACTORS
 from sim.io.formats.mot_table import read_table
+from sim.io.formats.mot_text import DISTRACTORS
 from sim.io.store.truth_files import scores_or_ones
-from sim.scene.boxes import image_size_of_boxes, with_visibility
+from sim.scene.visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth
 from tracking.filters.assignment import optimal
 from tracking.scoring.annotated_frames import annotated_frames

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.truth.merge_split_rules import frames_of
-from sim.truth.proximity import runs, stretches
+from sim.truth.merge_split_rules import frames_of, runs, stretches
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import UNSEEN, Belief, pair_beliefs
 from tracking.grouping.link_rule import Links

@@ -15,8 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from sim.truth.identity import GroupChange, Identities, Members, PersonSet
-from sim.truth.merge_split_rules import frames_of
-from sim.truth.proximity import stretches
+from sim.truth.merge_split_rules import frames_of, stretches
 from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.link_rule import LinkRule, Links

@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.io.formats.velocity import chords
+from sim.io.formats.labels import chords
 from sim.truth.crossing_events import SAME_BEFORE, crossings
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of

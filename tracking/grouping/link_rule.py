@@ -13,8 +13,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, frames_of
-from sim.truth.proximity import close_pairs
+from sim.truth.merge_split_rules import (
+    HOLD_TIME,
+    MERGE_DISTANCE,
+    MERGE_VELOCITY,
+    SPLIT_DISTANCE,
+    close_pairs,
+    frames_of,
+)
 from sim.types import Array, Bools, Ints
 from tracking.config import Config, param
 

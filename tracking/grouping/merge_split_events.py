@@ -14,8 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from sim.truth.identity import GroupChange, PersonSet, lineage
-from sim.truth.merge_split_rules import HOLD_TIME, frames_of, separation
-from sim.truth.proximity import stretches
+from sim.truth.merge_split_rules import HOLD_TIME, frames_of, separation, stretches
 from sim.types import Array, Bools, GroupEvent, Ints
 
 ABSENT = -2

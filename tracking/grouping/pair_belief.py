@@ -10,7 +10,7 @@ from collections import deque
 
 import numpy as np
 
-from sim.truth.proximity import close_pairs
+from sim.truth.merge_split_rules import close_pairs
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import UNSEEN, default_belief
 from tracking.grouping.pair_evidence import (

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_VELOCITY
-from sim.truth.proximity import close_pairs
+from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_VELOCITY, close_pairs
 from sim.types import Array, Ints
 
 STEP = 0.4

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.truth.proximity import runs
+from sim.truth.merge_split_rules import runs
 from sim.types import Array, Ints, Tracks
 from tracking.grouping.belief import Belief, beliefs_of_tracks
 from tracking.grouping.pair_evidence import frames_per_step

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sim.io.formats.velocity import WINDOW, chords
+from sim.io.formats.labels import WINDOW, chords
 from sim.types import Tracks
 from tracking.grouping.grouping_choice import Grouping, default_grouping
 from tracking.grouping.link_rule import LinkRule

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.velocity import WINDOW, chords
+from sim.io.formats.labels import WINDOW, chords
 from sim.types import Array, Bools, Ints, Tracks
 
 

@@ -2,7 +2,7 @@
 
 Lengths in configs are metres. A tracker that works in the image plane multiplies them by this scale once, in `reset`.
 Rules (docs/reference/formats.md): the camera's scale at the image centre, else the scale that the recording states,
-else the median height of the given boxes of the first frames divided by 1.7 m (sim.scene.boxes).
+else the median height of the given boxes of the first frames divided by 1.7 m (sim.scene.visibility).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
-from sim.scene.boxes import scale_of_first_boxes
+from sim.scene.visibility import scale_of_first_boxes
 from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
 
 
@@ -40,7 +40,7 @@ def required(px_per_m: float) -> float:
 
 
 def from_boxes(frames: Iterable[Detections | Tracks | None]) -> ImageScale:
-    """Returns the image scale by the heights of the boxes of the first frames (sim.scene.boxes); nan without a box."""
+    """Returns the image scale by the heights of the boxes of the first frames ; nan without a box."""
     boxed = [(d.index, d.box[:, 3]) for d in frames if d is not None and d.box is not None]
     index = np.repeat(np.array([k for k, _ in boxed], np.int64), [len(h) for _, h in boxed])
     return ImageScale(*scale_of_first_boxes(index, np.concatenate([np.zeros(0), *(h for _, h in boxed)])))

@@ -59,9 +59,8 @@ class TrackingRun(SequenceOf[Tracks]):
 
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
         """Stores the tracks in the folder as `flockscope track` does, and return the folder."""
-        from sim.io.store.run_seal import tracked_hash
-        from sim.io.store.track_files import write_tracks
-        from sim.io.store.track_tables import pair_table
+        from sim.io.store.seal import tracked_hash
+        from sim.io.store.track_files import pair_table, write_tracks
 
         info = {**self.info, "truth_hash": tracked_hash(sequence)}
         table = None if pairs is None else pair_table(pairs.frame, pairs.a, pairs.b, pairs.probability)

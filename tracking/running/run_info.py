@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from sim.hashing import installed
 from sim.types import Sequence, Tracks
-from sim.versions import installed
 from tracking.running.detection_mode import input_kind
 from tracking.running.image_scale import ImageScale
 from tracking.running.prepare import PreparedTracker

@@ -64,13 +64,13 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
     from scenarios.loading.resolve import SensorFile
     from scenarios.loading.validation import input_error
     from sim.detector.sense import sense
-    from sim.scene.boxes import with_visibility
+    from sim.scene.visibility import with_visibility
 
     table = {"sensor": _PERFECT_SENSOR | _SEES_ALL | _nested(sensor)}
     try:
         spec = SensorFile.model_validate(table).sensor
     except ValidationError as error:
-        raise input_error(error, table, "", {}, SensorFile) from None
+        raise input_error(error, table, "", {}) from None
     if spec.box == "visible" or spec.by_visibility or spec.occlusion_power or spec.min_visibility:
         truth = with_visibility(truth, sequence.image_size)
     hides_groups, load_people = any(hide.group is not None for hide in spec.hide), sequence.load_people

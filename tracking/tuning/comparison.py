@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.printable import counted
+from scenarios.errors import counted
 from tracking.config import Config
 from tracking.environment.episodes import Episode
 from tracking.stats import paired

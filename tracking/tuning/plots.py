@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from scenarios.printable import counted
+from scenarios.errors import counted
 from tracking.config import Config
 from tracking.tuning.comparison import Candidate, TrialRecord
 from tracking.tuning.search_plan import SearchPlan

@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scenarios.printable import counted
+from scenarios.errors import counted
+from sim.hashing import installed
 from sim.io.files.atomic import write_file
-from sim.versions import installed
 from tracking.config import Config
 from tracking.tuning.comparison import Candidate, Comparison, TrialRecord
 from tracking.tuning.plots import history_plot, importance_plot, pareto_plot

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scenarios.errors import InputError
-from scenarios.loading import suites, toml_files
+from scenarios.loading import resolve, toml_files
 from sim.dataset.splits import SPLITS, split_of
 from tracking.environment.episodes import Source, sources
 from tracking.tuning.options import Scenes
@@ -87,8 +87,10 @@ def shared_scenarios(names: Sequence[str], others: Sequence[str]) -> list[str]:
 def _files(name: str) -> list[str]:
     bare = name.removeprefix("suite:")
     if bare != name or (bare in toml_files.suite_names() and bare not in toml_files.names()) or _is_suite(bare):
-        path = suites.find_suite(bare)
-        return [str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in suites.read_entries(path)]
+        path = resolve.find_suite(bare)
+        return [
+            str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in resolve.read_suite(path).entry
+        ]
     return [str(toml_files.find(bare).resolve())]
 
 

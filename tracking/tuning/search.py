@@ -17,11 +17,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenarios.errors import InputError, OrderError, WorkError
-from scenarios.printable import counted
+from scenarios.errors import InputError, OrderError, WorkError, counted
 from sim.dataset.generate import LEFT_OUT
-from sim.io.files.own_files import refuse_foreign_file
-from sim.io.files.tables import TABLE, TEXT, Rules, list_of
+from sim.io.files.own_files import Marks, refuse_foreign_file
 from sim.types import Tracker
 from tracking.environment.episodes import Episode, Source
 from tracking.keyword_options import documented, from_keywords
@@ -41,7 +39,7 @@ UNFULFILLED = "unfulfilled"
 JOURNAL = ".journal"
 """Suffix of the journal beside `--out`."""
 
-RESULT_MARKS: Rules = {"settings": TABLE, "counts": TABLE, "taken_back": list_of(TEXT)}
+RESULT_MARKS: Marks = {"settings": dict, "counts": dict, "taken_back": list}
 """What every .json file of a search has."""
 
 

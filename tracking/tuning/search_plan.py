@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from sim.hashing import runtime
 from sim.types import DetectionMode
-from sim.versions import runtime
 from tracking.config import Config, Param, Value
 from tracking.environment.episodes import Source
 from tracking.tuning.goals import FAST_KEYS, SPEED, Goal, goals_of

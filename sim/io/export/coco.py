@@ -20,12 +20,12 @@ from scenarios.limits import is_number
 from sim import hashing
 from sim.dataset.splits import split_of
 from sim.io.files.atomic import write_file
-from sim.io.files.output_paths import output_paths
+from sim.io.files.own_files import output_paths
 from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
-from sim.io.store.manifest import read_whole_manifest
-from sim.io.store.streams import file_name
+from sim.io.store.seal import read_whole_manifest
+from sim.streams import file_name
 from sim.types import Array, Ints, Sequence, Truth
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}

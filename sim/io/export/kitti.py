@@ -24,7 +24,7 @@ from sim.io.files.atomic import write_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
 from sim.io.store.camera_files import read_camera
-from sim.io.store.manifest import read_whole_manifest
+from sim.io.store.seal import read_whole_manifest
 from sim.types import Camera
 
 FOLDERS = {"left": "image_2", "right": "image_3", "disparity": "disp_noc_0"}

@@ -23,13 +23,12 @@ from scenarios.errors import InputError
 from sim import hashing
 from sim.io.files import tables
 from sim.io.files.atomic import lock_folder, new_file, remove_partials, write_file
-from sim.io.files.own_files import refuse_foreign_file
-from sim.io.files.tables import TABLE, TEXT, Rules, list_of
+from sim.io.files.own_files import Marks, refuse_foreign_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
-from sim.io.store.manifest import MANIFEST, read_manifest, read_whole_manifest
+from sim.io.store.seal import MANIFEST, read_manifest, read_whole_manifest
 from sim.io.store.sequence_folder import open_sequence
-from sim.io.store.streams import file_name
+from sim.streams import file_name
 from sim.types import Array, Detections, FrameTruth, Groups
 
 # streams with one picture per frame; a frame's sample holds those of them that are stored
@@ -152,8 +151,8 @@ SAMPLES = ("sequence", "frame")
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
 RECORD = tarfile.RECORDSIZE
 INDEX = "index.json"
-INDEX_MARKS: Rules = {"content_hash": TEXT, "shards": list_of(TABLE)}
-SHARD_MARKS: Rules = {"manifests": TEXT, "sequences": TABLE}  # what every index.json, and every .json of a shard, has
+INDEX_MARKS: Marks = {"content_hash": str, "shards": list}
+SHARD_MARKS: Marks = {"manifests": str, "sequences": dict}  # what every index.json, and every .json of a shard, has
 
 Progress = Callable[[int, int, str], None]
 

@@ -1,9 +1,9 @@
 """Safe writing: a file or folder appears complete or not at all, and two commands never write to one folder at a time.
 
-What is written gets a temporary name, is synced to disk, then renamed to its target. An OSError becomes a WorkError if
-the disk is full, else an InputError. Killed runs leave files with names .partial-…-<12 hex digits>, which
-`remove_partials` deletes. A lock on an output folder makes a second command fail at once. On systems and file systems
-without such locks, nothing is locked.
+What is written gets a temporary name, then the name of its target. An OSError becomes a WorkError if the disk is full,
+else an InputError. Killed runs leave files with names .partial-…-<12 hex digits>, which `remove_partials` deletes. A
+power failure may damage files; their hashes in the seals tell. A lock on an output folder makes a second command fail
+at once. On systems and file systems without such locks, nothing is locked.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from pathlib import Path
@@ -90,8 +89,8 @@ def _is_folder(descriptor: int, root: Path) -> bool:
 
 
 PARTIAL = ".partial-"  # beginning of temporary names
-OURS = re.compile(re.escape(PARTIAL) + r"(.*-[0-9a-f]{12}|[0-9a-f]{32})", re.DOTALL)  # all of a temporary name
-SYNC_THREADS = 8  # files synced at a time
+# all of a temporary name: with the name of the target, or the marker of a cluster's run
+OURS = re.compile(re.escape(PARTIAL) + r"(?:(.*)-[0-9a-f]{12}|[0-9a-f]{32})", re.DOTALL)
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -129,7 +128,7 @@ def write_file(target: Path, content: bytes) -> None:
     """Writes `content` to the file `target`, which appears complete or not at all; an existing file is replaced."""
     with staged_path(target) as partial:
         partial.write_bytes(content)
-        move_synced(partial, target)
+        os.replace(partial, target)
 
 
 @contextmanager
@@ -137,15 +136,7 @@ def new_file(target: Path) -> Iterator[Path]:
     """Yields a temporary path for the block to write a file to; the file replaces the target when the block ends."""
     with staged_path(target) as partial:
         yield partial
-        move_synced(partial, target)
-
-
-def move_synced(partial: Path, target: Path) -> None:
-    """Renames the file `partial` to `target`, in the same folder, after its content has reached the disk."""
-    # Some file systems report only now that the disk is full.
-    _sync_file(partial)
-    os.replace(partial, target)
-    _sync_folder(target.parent)
+        os.replace(partial, target)
 
 
 @contextmanager
@@ -154,7 +145,6 @@ def new_folder(target: Path, keep: Callable[[], bool]) -> Iterator[Path]:
     with staged_path(target) as partial:
         partial.mkdir()
         yield partial
-        _sync_tree(partial)
         if target.exists():
             # Two writers may make the same sequence: the first one wins. `keep` raises for a folder that must stay.
             if keep():
@@ -165,11 +155,10 @@ def new_folder(target: Path, keep: Callable[[], bool]) -> Iterator[Path]:
         except OSError:
             if not keep():
                 raise
-        _sync_folder(target.parent)
 
 
-def write_unsynced(path: Path, content: bytes) -> None:
-    """Writes a file into a folder that is still temporary, without syncing it to disk."""
+def write_inside(path: Path, content: bytes) -> None:
+    """Writes a file into a folder that is still temporary, and makes the folders between."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content)
 
@@ -182,67 +171,26 @@ def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: I
     """
     # The first file appears first, so that it marks even a folder that never had a seal.
     first, *others = (name for name in files if name != seal)
-    for path in _leftovers(target):
-        _remove(path)
+    remove_partials(target.parent, of=target.name)
     with staged_path(target) as partial:
-        _write_synced_files(partial, files)
+        for name, content in files.items():
+            write_inside(partial / name, content)
         target.mkdir(exist_ok=True)
         (target / seal).unlink(missing_ok=True)
-        _sync_folder(target)
         os.replace(partial / first, target / first)
-        _sync_folder(target)
         for name in names:
             if name not in files:
                 (target / name).unlink(missing_ok=True)
-        for name in others:
+        for name in (*others, seal):
             os.replace(partial / name, target / name)
-        _sync_folder(target)
-        os.replace(partial / seal, target / seal)
-        _sync_folder(target)
 
 
-def _leftovers(target: Path) -> list[Path]:
-    if not target.parent.is_dir():
-        return []
-    form = re.compile(re.escape(f"{PARTIAL}{target.name}-") + "[0-9a-f]{12}")
-    return [path for path in target.parent.iterdir() if form.fullmatch(path.name)]
-
-
-def remove_partials(*folders: Path) -> None:
-    """Deletes what killed runs left directly in the given folders: files and folders with temporary names."""
-    for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*") if OURS.fullmatch(p.name)]:
-        _remove(path)
-
-
-def _write_synced_files(folder: Path, files: Mapping[str, bytes]) -> None:
-    folder.mkdir()
-    for name, content in files.items():
-        write_unsynced(folder / name, content)
-    _sync_tree(folder)
-
-
-def _sync_tree(folder: Path) -> None:
-    within = sorted(folder.rglob("*"))
-    with ThreadPoolExecutor(SYNC_THREADS) as pool:
-        # Threads, because a sync waits for the disk.
-        list(pool.map(_sync_file, [path for path in within if not path.is_dir()]))
-    for path in [*(path for path in within if path.is_dir()), folder]:
-        _sync_folder(path)
-
-
-def _sync_file(path: Path) -> None:
-    with path.open("rb+") as file:
-        os.fsync(file.fileno())
-
-
-def _sync_folder(path: Path) -> None:
-    with suppress(OSError):
-        # Some systems cannot sync a folder's list of entries; then nothing happens.
-        descriptor = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+def remove_partials(*folders: Path, of: str = "") -> None:
+    """Deletes the files and folders with temporary names, if given those of one target, directly in the folders."""
+    for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*")]:
+        found = OURS.fullmatch(path.name)
+        if found and of in ("", found[1]):
+            _remove(path)
 
 
 def _remove(path: Path) -> None:

@@ -2,18 +2,25 @@
 
 JSON files of ours have keys that only we write, Parquet tables our metadata. Pages, PNG pictures and MP4 videos name
 the program that made them. Side files are ignored by readers of folders.
+
+Output paths: the only place where a name becomes a part of a path.
+
+Names of sequences come from files of others (seqinfo.ini, manifests, suites). A name is a label: it says what something
+is called, never where it is written. `file_name` turns any label into a name inside one folder.
 """
 
 from __future__ import annotations
 
+import hashlib
+import re
 import struct
+import unicodedata
 import zlib
-from html.parser import HTMLParser
+from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePath
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, is_control
 from sim.io.files import tables
-from sim.io.files.tables import Rules
 
 NAMES = frozenset({"__macosx", ".ds_store", "thumbs.db", "ehthumbs.db", "desktop.ini", "@eadir", "icon\r"})
 APPLE_DOUBLE = "._"  # beginning of the files in which macOS keeps attributes on disks that cannot store them
@@ -48,24 +55,28 @@ def marked_png(picture: bytes) -> bytes:
     return picture[:IHDR_END] + SOFTWARE + picture[IHDR_END:]
 
 
-def is_ours(path: Path, marks: Rules | None = None) -> bool | None:
+# types of the values of keys that a .json file of ours always has, and no other program writes, by key
+Marks = Mapping[str, type]
+
+
+def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
     """Returns True if flockscope wrote the file, False if not, None if it is missing or cannot be parsed.
 
-    marks: of a .json file, rules for keys that such a file of ours always has and no other program writes.
+    marks: of a .json file.
     """
     if not path.is_file():
         return None
     try:
         if path.suffix == ".json" and marks:
             found = tables.read_json(path)
-            return all(key in found and rule.accepts(found[key]) for key, rule in marks.items())
+            return all(isinstance(found.get(key), kind) for key, kind in marks.items())
         kinds = {".parquet": tables.is_own_table, ".html": _page, ".png": _picture, ".mp4": _video}
         return path.suffix in kinds and kinds[path.suffix](path)
     except (InputError, OSError, ValueError):
         return None
 
 
-def refuse_foreign_file(path: Path, marks: Rules | None = None) -> None:
+def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
     """Raises InputError if there is a file at `path` that is not ours: only our own files are replaced unasked."""
     if path.exists() and not is_ours(path, marks):
         raise InputError(
@@ -74,26 +85,9 @@ def refuse_foreign_file(path: Path, marks: Rules | None = None) -> None:
         )  # fmt: skip
 
 
-class _Generator(HTMLParser):
-    """Reads a page. State: name, the generator that the page names last, "" for none."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.name = ""
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Keeps the content of a <meta name="generator">."""
-        found = dict(attrs)
-        if tag == "meta" and found.get("name") == "generator":
-            self.name = found.get("content") or ""
-
-
 def _page(path: Path) -> bool:
     with path.open("rb") as file:
-        head = file.read(HEAD).decode("utf-8", "replace")
-    parser = _Generator()
-    parser.feed(head)
-    return parser.name == GENERATOR
+        return f'<meta name="generator" content="{GENERATOR}">'.encode() in file.read(HEAD)
 
 
 def _picture(path: Path) -> bool:
@@ -109,3 +103,54 @@ def _video(path: Path) -> bool:
             return container.metadata.get("comment") == GENERATOR
     except av.FFmpegError:
         return False
+
+
+LONGEST = 200  # bytes of a file name made from a label: 255 less temporary prefixes and our suffixes
+FORBIDDEN = frozenset('/\\:*?"<>|')  # by Windows, or on network drives
+RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)  # devices of Windows
+
+
+def file_name(label: str) -> str:
+    """Returns the file name for a label: the label itself if it is harmless on all usual systems, else a changed one.
+
+    Different labels may give one name.
+    """
+    name = "".join("_" if _is_forbidden(c) else c for c in label)
+    if name[:1] in ("", "."):
+        name = "_" + name[1:]
+    if name[-1] in (".", " "):
+        name = name[:-1] + "_"
+    if RESERVED.fullmatch(name):
+        name = "_" + name
+    body = name.encode()
+    if len(body) <= LONGEST:
+        return name
+    digest = hashlib.sha256(label.encode("utf-8", "surrogatepass")).hexdigest()[:16]
+    return body[: LONGEST - 17].decode("utf-8", "ignore") + "-" + digest
+
+
+def _is_forbidden(character: str) -> bool:
+    return character in FORBIDDEN or is_control(character)
+
+
+def output_path(folder: str | Path, label: str, ending: str = "") -> Path:
+    """Returns the path of the file or folder for a label, directly inside `folder`; nothing is created."""
+    return Path(folder) / (file_name(label) + ending)
+
+
+def output_paths(folder: str | Path, labels: Iterable[str], ending: str = "", source: object = "") -> list[Path]:
+    """Returns the `output_path` of each label; InputError, about `source`, if two labels give one path."""
+    paths, seen = [], dict[str, str]()
+    for label in labels:
+        path = output_path(folder, label, ending)
+        # Some file systems keep only one of two names that differ in case or in composed accents alone.
+        key = unicodedata.normalize("NFC", path.name).casefold()
+        if key in seen:
+            both = f"the name {label!r} twice" if label == seen[key] else f"the names {seen[key]!r} and {label!r}"
+            raise InputError(
+                file=source, got=f"{both}, for one {path.name}", expected="unique names",
+                remedy="rename one, or take one at a time",
+            )  # fmt: skip
+        seen[key] = label
+        paths.append(path)
+    return paths

@@ -1,78 +1,50 @@
 """The project's Parquet tables and JSON files, to bytes and strictly back.
 
 Each column of a table has a unit, and the table has metadata in its schema. Equal content gives equal bytes. nan is
-null in JSON. Rules say what the values of a JSON file must be, so that a reader never meets a value of another kind.
+null in JSON. pydantic models say what the values of a JSON file must be, so that a reader never meets a value of
+another kind.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field, ValidationError
 
 from scenarios.errors import InputError
-from scenarios.limits import JSON_BYTES, is_number
+from scenarios.limits import COORDINATE, FRAME_RATES, FRAMES, INTEGER, JSON_BYTES, SCALES
 from scenarios.reading import parse_json, require_regular
 from sim.types import Array, Ints
 
+M = TypeVar("M", bound=BaseModel)
 
-@dataclass(frozen=True)
-class Rule:
-    """What a value must be."""
-
-    accepts: Callable[[Any], bool]  # returns True for a right value, whatever the type
-    words: str  # for the error
-
-
-Rules = Mapping[str, Rule]  # rules by key
-
-TEXT = Rule(lambda v: isinstance(v, str), "a text")
-TABLE = Rule(lambda v: isinstance(v, dict), "an object")
-FLAG = Rule(lambda v: isinstance(v, bool), "true or false")
+# Numbers of JSON files. pydantic takes lists for tuples; numbers are strict, so that no text or bool is one.
+Number = Annotated[float, Field(strict=True, ge=-COORDINATE, le=COORDINATE)]
+Rate = Annotated[float, Field(strict=True, ge=FRAME_RATES[0], le=FRAME_RATES[1])]  # frames per second
+Scale = Annotated[float, Field(strict=True, ge=SCALES[0], le=SCALES[1])]  # px per m
+FrameNumber = Annotated[int, Field(strict=True, ge=1, le=FRAMES)]
+Count = Annotated[int, Field(strict=True, ge=0, le=FRAMES)]  # of frames
+Id = Annotated[int, Field(strict=True, ge=0, le=INTEGER)]
+Pair = tuple[Number, Number]
+Triple = tuple[Number, Number, Number]
 
 
-def whole(low: int, high: int) -> Rule:
-    """Returns the rule for whole numbers from `low` to `high`, both included."""
-    return Rule(
-        lambda v: isinstance(v, int) and not isinstance(v, bool) and low <= v <= high,
-        f"a whole number from {low} to {high}",
-    )
-
-
-def number(low: float, high: float) -> Rule:
-    """Returns the rule for numbers from `low` to `high`, both included."""
-    return Rule(lambda v: is_number(v, low, high), f"a number from {low:g} to {high:g}")
-
-
-def one_of(*words: str) -> Rule:
-    """Returns the rule for one of these texts."""
-    return Rule(lambda v: v in words, f"one of {', '.join(words)}")
-
-
-def list_of(rule: Rule) -> Rule:
-    """Returns the rule for lists, possibly empty, whose values all follow `rule`."""
-    return Rule(lambda v: isinstance(v, list) and all(map(rule.accepts, v)), f"a list, each {rule.words}")
-
-
-def or_none(rule: Rule) -> Rule:
-    """Returns the rule for null, and for values that follow `rule`."""
-    return Rule(lambda v: v is None or rule.accepts(v), f"null, or {rule.words}")
-
-
-def check_values(path: Path, values: Any, rules: Rules, remedy: str, *, inside: str = "") -> None:
-    """Raises InputError, with the key, for the first value that does not follow its rule."""
-    if not isinstance(values, dict):
-        raise InputError(file=path, place=inside, got=repr(values), expected=TABLE.words, remedy=remedy)
-    for key, rule in rules.items():
-        if (inside or key in values) and not rule.accepts(values.get(key)):
-            got = repr(values[key]) if key in values else "nothing"
-            place = f"{inside}.{key}" if inside else key
-            raise InputError(file=path, place=place, got=got, expected=rule.words, remedy=remedy)
+def validated(path: Path, value: Any, kind: type[M], remedy: str, place: str = "") -> M:
+    """Returns a value read from JSON as a model; InputError names the first place in it that is wrong."""
+    try:
+        return kind.model_validate(value)
+    except ValidationError as error:
+        first = error.errors()[0]
+    steps = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in first["loc"])
+    got = "nothing" if first["type"] == "missing" else repr(first["input"])
+    expected = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+    raise InputError(file=path, place=(place + steps).removeprefix("."), got=got, expected=expected, remedy=remedy)
 
 
 FORMAT = 1
@@ -134,31 +106,9 @@ class StoredTable:
             raise InputError(file=self.file, got=f"no column {name}", expected="that column", remedy=REDO)
         return self.columns[name]
 
-    def fact(self, name: str) -> Any:
-        """Returns the value `name` of the table's metadata."""
-        if name not in self.facts:
-            raise InputError(file=self.file, place="schema", got=f"no {name}", expected="that value", remedy=REDO)
-        return self.facts[name]
-
-    def count(self, name: str, limit: int) -> int:
-        """Returns the metadata `name`, a whole number from 0 to `limit`; raises InputError for another value."""
-        value = self.fact(name)
-        fits = isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= limit
-        self.reject(not fits, name, repr(value), f"a whole number from 0 to {limit}")
-        return int(value)
-
-    def number(self, name: str, low: float, high: float) -> float:
-        """Returns the metadata `name`, a number from `low` to `high`; raises InputError for another value."""
-        value = self.fact(name)
-        self.reject(not is_number(value, low, high), name, repr(value), f"a number from {low:g} to {high:g}")
-        return float(value)
-
-    def frames(self, name: str) -> set[int]:
-        """Returns the metadata `name`, a list of whole numbers, as a set; raises InputError for another value."""
-        value = self.fact(name)
-        fits = isinstance(value, list) and all(isinstance(v, int) for v in value)
-        self.reject(not fits, name, repr(value), "a list of frames")
-        return set(value)
+    def facts_as(self, kind: type[M]) -> M:
+        """Returns the table's metadata as a model."""
+        return validated(self.file, self.facts, kind, REDO, "schema")
 
     def cuts(self, first: int, count: int) -> Ints:
         """Returns the first row of each of `count` frames from `first` on, and the end of the last: (count + 1,)."""

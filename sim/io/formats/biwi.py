@@ -20,7 +20,8 @@ from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, crowded, read_number, read_numbers, read_text
-from sim.io.formats.group_labels import labelled_truth_fields, require_size
+from sim.io.formats.labels import labelled_truth_fields, require_size
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Frame, Ints, Sequence, Truth
 
 FPS = 2.5
@@ -132,9 +133,9 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
     return truth.replace(group=label, **labelled_truth_fields(frame, id, label, pos, vel, fps=fps, length=length))
 
 
-def open_folder(folder: Path, *, fps: float | None = None) -> Sequence:
-    """Returns the recording in `folder` as Sequence, without pictures and detections. fps: None: 2.5."""
-    rate = FPS if fps is None else fps
+def open_folder(folder: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
+    """Returns the recording in `folder` as Sequence, without pictures and detections, by default at 2.5 fps."""
+    rate = options.fps or FPS
     length = int(_table(folder)[1].max(initial=0))
 
     def frames() -> Iterator[Frame]:

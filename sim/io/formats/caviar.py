@@ -23,9 +23,9 @@ from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
 from scenarios.reading import read_regular
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import read_number, whole_number
-from sim.io.formats.group_labels import labelled_truth_fields, require_size
-from sim.io.formats.velocity import differentiate
-from sim.scene.boxes import scale_of_all_boxes, scale_of_first_boxes
+from sim.io.formats.labels import differentiate, labelled_truth_fields, require_size
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Frame, Ints, Sequence, Truth
 
@@ -59,7 +59,7 @@ def read_xml(path: Path) -> CaviarRecording:
     rows: list[tuple[float, ...]] = []
     listed, labelled, hypotheses = set[int](), False, root.find("frame/objectlist/object/hypothesislist") is not None
     for element in root.iterfind("frame"):
-        index = _whole(path, "frame", element, "number", FRAMES - 1) + 1
+        index = int(_number(path, "frame", element, "number", FRAMES - 1)) + 1
         listed.add(index)
         labelled = labelled or element.find("grouplist") is not None
         label = _labels(path, index, element)
@@ -104,30 +104,18 @@ def _root(path: Path) -> ET.Element:
     return root
 
 
-def _number(path: Path, place: str, element: ET.Element, key: str) -> float:
-    text = element.get(key)
+def _number(path: Path, place: str, element: ET.Element, key: str, largest: int = 0) -> float:
+    """Returns the attribute `key`, a whole number from 0 to `largest` if that is given."""
+    text = element.get(key) or ""
     try:
-        value = read_number(text or "")
+        value = whole_number(text) if largest else read_number(text)
     except ValueError:
         value = float("nan")
-    if not abs(value) <= COORDINATE:
+    if not (0 if largest else -COORDINATE) <= value <= (largest or COORDINATE):
         raise InputError(
-            file=path, place=f"{place}: {element.tag} {key}", got=repr(text),
-            expected=f"a number within {COORDINATE:g}", remedy="correct it",
-        )  # fmt: skip
-    return value
-
-
-def _whole(path: Path, place: str, element: ET.Element, key: str, limit: int = LAST_ID) -> int:
-    text = element.get(key)
-    try:
-        value = whole_number(text or "")
-    except ValueError:
-        value = -1
-    if not 0 <= value <= limit:
-        raise InputError(
-            file=path, place=f"{place}: {element.tag} {key}", got=repr(text),
-            expected=f"a whole number from 0 to {limit}", remedy="correct it",
+            file=path, place=f"{place}: {element.tag} {key}", got=repr(element.get(key)),
+            expected=f"a whole number from 0 to {largest}" if largest else f"a number within {COORDINATE:g}",
+            remedy="correct it",
         )  # fmt: skip
     return value
 
@@ -147,7 +135,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
             continue
         if members & label.keys():
             warnings.warn(f"{path}: frame {index - 1}: a person in two groups; the first holds", stacklevel=3)
-        number = _whole(path, f"frame {index - 1}", group, "id")
+        number = int(_number(path, f"frame {index - 1}", group, "id", LAST_ID))
         label.update({m: number for m in sorted(members) if m not in label})
     return label
 
@@ -155,7 +143,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
 def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
     """Returns (frame, id, label, centre x, centre y, width, height), px; label -1 for alone."""
     place = f"frame {index - 1}"
-    id, box = _whole(path, place, person, "id"), person.find("box")
+    id, box = int(_number(path, place, person, "id", LAST_ID)), person.find("box")
     if box is None:
         raise InputError(file=path, place=place, got="an object without box", expected="a box", remedy="add it")
     x, y, w, h = (_number(path, place, box, key) for key in ("xc", "yc", "w", "h"))
@@ -203,14 +191,14 @@ def _measured(found: CaviarRecording, vel: Array, fps: float, px_per_m: float) -
     return {"events": tuple(events), "near": near, "labelled": np.isin(np.arange(1, found.length + 1), listed)}
 
 
-def open_file(path: Path, *, fps: float | None = None, px_per_m: float | None = None) -> Sequence:
+def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns the CAVIAR file `path` as Sequence, without pictures and detections.
 
     px_per_m: None: the median of the longer sides of the first 100 boxes / 1.7 m; `source["px_per_m_frames"]` is then
     the last frame of these boxes.
     """
-    found = read_xml(path)
-    rate = _frame_rate(path, found) if fps is None else fps
+    found, px_per_m = read_xml(path), options.px_per_m
+    rate = options.fps or _frame_rate(path, found)
     scale, learned = scale_of_first_boxes(found.frame, found.size.max(axis=1)) if px_per_m is None else (px_per_m, 0)
 
     def frames() -> Iterator[Frame]:

@@ -13,18 +13,17 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture, is_number
+from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
 from sim.io.files.numeric_text import read_number, read_text
-from sim.io.files.own_files import is_hidden
 from sim.io.formats import mot_text
-from sim.io.formats.box_columns import BoxScale, size_doubt
 from sim.io.formats.calibration import scaled_to_image
-from sim.io.formats.mot_table import read_table
+from sim.io.formats.mot_table import read_table, size_doubt
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
-from sim.types import Camera, Frame, Image, Ints, Sequence, Truth
+from sim.types import Frame, Image, Ints, Sequence, Truth
 
 DEFAULT_FPS = 25.0
 
@@ -74,76 +73,31 @@ def read_seqinfo(path: Path) -> SeqInfo:
     )
 
 
-def frame_rate(given: float | None, found: float | None, path: Path | None = None) -> float:
+def frame_rate(given: float | None, found: float | None) -> float:
     """Returns the frames per second: `given` (--fps), else `found` in the recording, else 25 with a warning."""
     if given is not None:
-        low, high = FRAME_RATES
-        if not is_number(given, low, high):
-            expected = f"a number from {low:g} to {high:g}"
-            raise InputError(place="fps", got=given, expected=expected, remedy="correct --fps")
         return given
     if found is None:
-        video = None if path is None else _video_beside(path)
         # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
-        # A video beside the text tells which rate is right.
-        if video is not None and video[1] != DEFAULT_FPS:
-            text = f"{path}: without a frame rate; taken at {DEFAULT_FPS:g} fps, but {video[0].name} beside it has "
-            text += f"{video[1]:g}: give --fps {video[1]:g}"
         warnings.warn(text, stacklevel=3)
         return DEFAULT_FPS
     return found
 
 
-def _is_video(path: Path) -> bool:
-    from sim.io.formats import video
-
-    return path.suffix.lower() in video.SUFFIXES and not is_hidden(path) and path.is_file()
-
-
-def _video_beside(path: Path) -> tuple[Path, float] | None:
-    from sim.io.formats import video
-
-    around = [path.parent, path] if path.is_dir() else [path.parent]
-    found = [p for folder in around for p in sorted(folder.iterdir()) if _is_video(p)]
-    own = [p for p in found if p.stem == path.stem or p.parent == path] or (found if not path.is_dir() else [])
-    if len(own) != 1:
-        return None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return own[0], float(f"{video.open_video(own[0]).fps:.5g}")
-    except InputError:
-        return None
-
-
-def open_folder(
-    path: Path,
-    *,
-    fps: float | None = None,
-    px_per_m: float | None = None,
-    camera: Camera | None = None,
-    images: bool = True,
-    background: BackgroundChoice | None = None,
-    person_class: int | None = None,
-    box_scale: BoxScale | None = None,
-) -> Sequence:
+def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a MOTChallenge folder (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
-    img1_right/ holds the pictures of the right camera of a rectified pair. Options as of `open_source`. The length is
-    that of seqinfo.ini, else the last frame of texts and pictures. The truth is read, and checked, when asked for.
+    img1_right/ holds the pictures of the right camera of a rectified pair. The length is that of seqinfo.ini, else the
+    last frame of texts and pictures. The truth is read, and checked, when asked for.
     """
-    ini = path / "seqinfo.ini"
-    info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
-    rate = frame_rate(fps, info.fps, path)
-    scale = float("nan") if px_per_m is None else px_per_m
+    info, images, background = _info(path), options.images, options.background
+    person_class, box_scale = options.person_class, options.box_scale
+    rate = frame_rate(options.fps, info.fps)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found = mot_text.read_detections(det, info.length, person_class, box_scale) if is_present(det) else None
-    if box_scale is not None and found is None:
-        remedy = "leave it out: labels are not scaled"
-        raise InputError(
-            file=path, got="--box-scale", expected="none for a recording without det/det.txt", remedy=remedy
-        )
+    if found is None:
+        options.reject(path, "a recording without det/det.txt", "labels are not scaled", "box_scale")
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)
@@ -152,13 +106,12 @@ def open_folder(
         raise InputError(file=path, got="nothing that tells its length", expected=expected, remedy="complete it")
     _refuse_beyond(path, pictures, length)
     seen = pictures.first_size() if images else None
-    size = _picture_size(ini, info.image_size, seen)
+    size = _picture_size(path / "seqinfo.ini", info.image_size, seen)
     doubt = "" if found is None or found.box is None or size is None else size_doubt(found.box, size)
     if doubt:
         warnings.warn(f"{det}: {doubt}", stacklevel=2)
-    if background is not None and not pictures.files:
-        got, remedy = "--background", "leave it out: it has none"
-        raise InputError(file=path, got=got, expected="none for a recording without pictures", remedy=remedy)
+    if not pictures.files:
+        options.reject(path, "a recording without pictures", "it has none", "background")
     choice = (background or BackgroundChoice()).of(length, path, size) if pictures.files else None
 
     def bare() -> Iterator[Frame]:
@@ -178,25 +131,28 @@ def open_folder(
         return pictures.read(wanted, seen if images else pictures.first_size())
 
     def truth() -> Truth:
-        return mot_text.read_truth(gt, info.name, rate, length, scale, person_class)
+        return mot_text.read_truth(gt, info.name, rate, length, options.scale, person_class)
 
     shown = {} if choice is None else {"background": str(choice)}
     return Sequence(
         name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
         load_truth=truth if gt.is_file() else None,
-        image_size=size, camera=None if camera is None else scaled_to_image(camera, size, path),
-        px_per_m=scale, has_images=images and bool(pictures.files),
+        image_size=size, camera=options.camera and scaled_to_image(options.camera, size, path),
+        px_per_m=options.scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **_named(person_class, box_scale), **shown},
+        source={"kind": "mot", "path": str(path), **_named(options), **shown},
     )  # fmt: skip
 
 
 def left_pictures(path: Path) -> PictureFolder:
     """Returns the picture files of the left camera of a MOTChallenge folder, by frame."""
+    return _find_pictures(path, _info(path))
+
+
+def _info(path: Path) -> SeqInfo:
     ini = path / "seqinfo.ini"
-    info = read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
-    return _find_pictures(path, info)
+    return read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
 
 
 def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
@@ -225,21 +181,12 @@ def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, in
     return stated or seen
 
 
-def open_text(
-    path: Path,
-    *,
-    fps: float | None = None,
-    px_per_m: float | None = None,
-    camera: Camera | None = None,
-    person_class: int | None = None,
-    box_scale: BoxScale | None = None,
-) -> Sequence:
+def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a MOT text as Sequence without pictures: detections if every id is -1, else truth.
 
-    Options as of `open_source`. The camera is not scaled.
+    The camera is not scaled.
     """
-    rate = frame_rate(fps, None, path)
-    scale = float("nan") if px_per_m is None else px_per_m
+    rate, person_class, box_scale = frame_rate(options.fps, None), options.person_class, options.box_scale
     table = read_table(path, boxless=True)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
@@ -253,13 +200,13 @@ def open_text(
             yield Frame(index, (index - 1) / rate, detections=here)
 
     def truth() -> Truth:
-        return mot_text.read_truth(path, path.stem, rate, length, scale, person_class, box_scale)
+        return mot_text.read_truth(path, path.stem, rate, length, options.scale, person_class, box_scale)
 
     return Sequence(
         name=path.stem, fps=rate, length=length, frames=frames,
         load_truth=None if only_detections else truth,
-        camera=camera, px_per_m=scale, has_detections=only_detections,
-        source={"kind": "mot text", "path": str(path), **_named(person_class, box_scale)},
+        camera=options.camera, px_per_m=options.scale, has_detections=only_detections,
+        source={"kind": "mot text", "path": str(path), **_named(options)},
     )  # fmt: skip
 
 
@@ -269,6 +216,6 @@ def _labelled_frames(path: Path) -> Ints:
     return np.unique(np.concatenate([np.zeros(0, np.int64), *frames]))
 
 
-def _named(person_class: int | None, box_scale: BoxScale | None) -> dict[str, Any]:
-    given = {"class": person_class, "box_scale": box_scale}
+def _named(options: RecordingOptions) -> dict[str, Any]:
+    given = {"class": options.person_class, "box_scale": options.box_scale}
     return {key: value for key, value in given.items() if value is not None}

@@ -4,24 +4,261 @@ Lines have 6 to 10 columns, the first of which are frame (from 1), id, and the b
 Column 7 is a confidence or flag. 8 or 9 columns go on with class and visibility (from MOT16 on), 10 columns with the
 ground position x, y, z in m, unknown where z is -1 (MOT15). Lines of 4 columns are no MOTChallenge text: they are
 frame, id and the ground position x, y in m. A wrong line raises InputError that names it.
+
+Decides which rows of a MOTChallenge text are people, which are distractors, and if it has ground positions.
+
+People are told by class (column 8) and flag (column 7). A distractor looks like a person: people on vehicles (class 2),
+static people (7), other distractors (8), reflections (12), and in MOT20 vehicles without a motor (6). The benchmark
+leaves a track on a distractor out of the scores. Which tracks lie on distractors follows from a matching with all
+labelled rows, so the other unscored rows are kept, too. Columns 8 to 10 are ground positions if people in them move as
+people; other programs write categories, occlusion flags, zeros or pixels there.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from scenarios.errors import InputError
+from scenarios.reading import is_present
 from sim.arrays import repeated_ids
-from sim.io.formats.box_columns import BoxScale, corner_doubt, require_pixels
-from sim.io.formats.mot_people import ground_positions, labelled_people, of_class, require_metres, unscored_rows
-from sim.io.formats.mot_table import MotTable, read_table
-from sim.io.formats.velocity import differentiate
-from sim.scene.boxes import scale_of_all_boxes
-from sim.types import Array, Bools, Detections, Ints, Plane, Truth
+from sim.io.formats.labels import differentiate
+from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.options import BoxScale
+from sim.scene.visibility import scale_of_all_boxes
+from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
+
+# step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
+LONGEST = 12.0
+
+ENOUGH = 10  # rows or steps that are needed to judge by how many of them something is true
+
+# share of rows at the position of another row of their frame, above which these are no positions of people
+SHARED = 0.1
+
+MOVED = 0.5  # A box that moves by more than this share of its height belongs to somebody who does not stand
+
+# files beside a text, or in the folder above it, that vouch for positions in m
+VOUCHERS = ("manifest.json", "camera.json", "run.json")
+
+
+FAST = 12.0  # m/s that nobody keeps up. Half of the steps above it are centimetres, or a wrong frame rate.
+
+
+def ground_positions(table: MotTable) -> Array | None:
+    """Returns the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1); None if there are none.
+
+    Warns, and returns None, if people cannot move so and no file beside the text vouches for metres.
+    """
+    known, doubt = _known(table)
+    if doubt:
+        text = f"{table.rows.file}: columns 8 to 10 are not taken as metres: {doubt}; the boxes are used"
+        warnings.warn(text, stacklevel=3)
+    return None if known is None else np.where(known[:, None], table.rest[:, 1:4], np.nan)
+
+
+def has_ground(table: MotTable) -> bool:
+    """Returns True if `ground_positions` gives positions, without its warning."""
+    return _known(table)[0] is not None
+
+
+def _known(table: MotTable) -> tuple[Bools | None, str]:
+    if table.rest.shape[1] < 4:
+        return None, ""
+    xyz, known = table.rest[:, 1:4], np.asarray(table.rest[:, 3] != -1)
+    if not known.any():
+        return None, ""
+    if table.rows.values.shape[1] != GROUND_COLUMNS and not _vouched(table):
+        alone = len(known) == len(np.unique(table.frame))
+        same = len(known) > 1 and bool((xyz == xyz[0]).all())
+        # All rows equal: a category, or a value that stands for "unknown".
+        if same and (not alone or bool((xyz == np.round(xyz)).all())):
+            return None, ""
+        doubt = _doubt(table, known)
+        if doubt:
+            return None, doubt
+    return known, ""
+
+
+def require_metres(table: MotTable, fps: float) -> None:
+    """Raises InputError if a text of positions alone cannot be in metres: it has no boxes to use instead."""
+    if table.rows.values.shape[1] != GROUND_COLUMNS or _vouched(table):
+        return
+    first, second = _steps(table.frame, table.id)
+    speed = _pace(table.rest[:, 1:3], table.frame, first, second) * fps
+    if len(speed) >= ENOUGH and np.median(speed) > FAST:
+        raise InputError(
+            file=table.rows.file, place="columns x, y", got=f"half of the steps faster than {np.median(speed):.3g} m/s",
+            expected="positions in m", remedy="if they are in cm or mm, name them x_cm,y_cm or x_mm,y_mm in the first "
+            f"line, as frame,id,x_cm,y_cm; pixels need boxes; else correct --fps, here {fps:g}",
+        )  # fmt: skip
+
+
+def _vouched(table: MotTable) -> bool:
+    file = table.rows.file
+    return any(is_present(folder / name) for folder in (file.parent, file.parent.parent) for name in VOUCHERS)
+
+
+def _doubt(table: MotTable, known: Bools) -> str:
+    rows = np.flatnonzero(known)
+    xy, frame, id = table.rest[rows, 1:3], table.frame[rows], table.id[rows]
+    places, count = np.unique(np.c_[frame, xy], axis=0, return_counts=True)
+    if count[count > 1].sum() > SHARED * len(rows):
+        return "people of one frame have the same position"
+    if len(rows) > 3 and (xy == np.round(xy)).all() and 2 * len(np.unique(xy, axis=0)) <= len(places):
+        return "they hold few whole numbers, as categories or flags do"
+    inside = ((xy >= table.box[rows, :2]) & (xy <= table.box[rows, :2] + table.box[rows, 2:])).all(axis=1)
+    if len(rows) >= ENOUGH and inside.mean() > 0.5:
+        return "most lie inside their own boxes, as pixels do"
+    first, second = _steps(frame, id)
+    if not len(first):
+        return ""
+    if _stand_while_boxes_move(table.box[rows], id, first, second, np.hypot(*(xy[second] - xy[first]).T)):
+        return "they stay the same while the boxes move"
+    pace = _pace(xy, frame, first, second)
+    if len(pace) >= ENOUGH and np.quantile(pace, 0.75) > LONGEST:
+        return f"a quarter of the steps are longer than {LONGEST:g} m per frame"
+    return ""
+
+
+def _steps(frame: Ints, id: Ints) -> tuple[Ints, Ints]:
+    order = np.lexsort((frame, id))
+    order = order[id[order] >= 0]
+    pairs = np.flatnonzero(np.diff(id[order]) == 0)
+    return order[pairs], order[pairs + 1]
+
+
+def _pace(xy: Array, frame: Ints, first: Ints, second: Ints) -> Array:
+    return np.asarray(np.hypot(*(xy[second] - xy[first]).T) / np.maximum(frame[second] - frame[first], 1))
+
+
+def _stand_while_boxes_move(box: Array, id: Ints, first: Ints, second: Ints, step: Array) -> bool:
+    people, who = np.unique(id[first], return_inverse=True)
+    centre = box[:, :2] + box[:, 2:] / 2
+    way = np.bincount(who, np.hypot(*(centre[second] - centre[first]).T))
+    height = np.bincount(who, box[first, 3]) / np.bincount(who)
+    moves = way > MOVED * height
+    stands = np.bincount(who, step > 0, minlength=len(people)) == 0
+    return bool(moves.any() and (moves & stands).sum() > moves.sum() / 2)
+
+
+DISTRACTORS = (2, 7, 8, 12)  # classes of distractors from MOT16 on
+
+MOT20 = "MOT20"  # begins the names of MOT20's sequences
+
+MOT20_DISTRACTORS = (*DISTRACTORS, 6)
+
+# columns after the box in labels of MOTChallenge: flag, class, visibility. More columns have other classes.
+LABEL_COLUMNS = 3
+
+CLASSES = range(1, 14)  # classes of MOTChallenge. A text with another class has classes of its own, and no distractors.
+
+
+def unscored_rows(table: MotTable, people: Bools, name: str, person_class: int | None) -> Unscored | None:
+    """Returns the labelled rows beside `people` (N,), sorted by frame; None if no distractor is among them."""
+    found = classes_of(table, person_class is not None)
+    if (
+        found is None
+        or table.rest.shape[1] > LABEL_COLUMNS
+        or person_class not in (None, PEDESTRIAN)
+        or not np.isin(found, CLASSES).all()
+    ):
+        return None
+    mot20 = any(each.startswith(MOT20) for each in (name, table.rows.file.resolve().parent.parent.name))
+    distractor = np.isin(found, MOT20_DISTRACTORS if mot20 else DISTRACTORS)
+    rows = np.flatnonzero(~people & (table.id >= 0) & ~table.without_box())
+    if not distractor[rows].any():
+        return None
+    rows = rows[np.argsort(table.frame[rows], kind="stable")]
+    return Unscored(table.frame[rows], table.box[rows], distractor[rows])
+
+
+PEDESTRIAN = 1  # class of a person from MOT16 on
+
+LABELS = "gt.txt"  # name of a text of labels. Its column 7 is a flag; that of another text may be a confidence.
+
+LAST_CLASS = 100  # greatest class of the usual sets of classes; COCO has up to 91
+
+SHOWN = 8  # most values that a message lists
+
+
+def labelled_people(table: MotTable, person_class: int | None) -> Bools:
+    """Returns flags (N,) of rows that are people: an id from 0, another flag than 0, the right class.
+
+    person_class: the class of people; None: 1, with a warning about rows of other classes.
+    """
+    keep, file = np.asarray(table.id >= 0), table.rows.file
+    if len(keep) and not keep.any():
+        raise InputError(
+            file=file, place="column 2", got=f"negative ids in all {len(keep)} rows", expected="ids from 0",
+            remedy="give each person an id",
+        )  # fmt: skip
+    flag = table.rest[:, 0] if table.rest.shape[1] else np.ones(len(keep))
+    # Column 7 of another text may be a confidence.
+    if file.name == LABELS or (np.isin(flag, (0, 1, -1)).all() and flag.any()):
+        keep &= flag != 0
+        if len(keep) and not keep.any():
+            raise InputError(
+                file=file, place="column 7", got=f"0 in all {len(keep)} rows, which leaves nobody",
+                expected="another flag than 0 for people", remedy="write 1 in column 7 of rows that count",
+            )  # fmt: skip
+    elif (flag == 0).all() and len(keep):
+        text = f"{file}: column 7 is 0 in all {len(keep)} rows; it is taken as a confidence, and all rows count"
+        warnings.warn(text, stacklevel=2)
+    if person_class is not None and classes_of(table, True) is None:
+        raise InputError(
+            file=file, place="--class", got=f"{table.rows.values.shape[1]} columns without classes",
+            expected="a class in column 8", remedy="leave --class out",
+        )  # fmt: skip
+    return of_class(table, keep, person_class)
+
+
+def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
+    """Returns `keep` (N,) without the rows of other classes than that of people."""
+    found = classes_of(table, person_class is not None)
+    if found is None or not keep.any():
+        return keep
+    wanted = PEDESTRIAN if person_class is None else person_class
+    people: Bools = np.asarray(keep & (found == wanted))
+    file = table.rows.file
+    values, counts = np.unique(found[keep & ~people], return_counts=True)
+    words = ", ".join(f"{n} rows of class {v:g}" for v, n in zip(values[:SHOWN], counts[:SHOWN], strict=True))
+    words += ", …" if len(values) > SHOWN else ""
+    if not people.any():
+        raise InputError(
+            file=file, place="column 8", got=words, expected=f"people, of class {wanted}",
+            remedy="name the class of people with --class N",
+        )  # fmt: skip
+    if len(values) and person_class is None:
+        warnings.warn(f"{file}: {words} are left out; people are class {wanted} (--class says otherwise)", stacklevel=3)
+    return people
+
+
+def classes_of(table: MotTable, named: bool) -> Array | None:
+    """Returns column 8 (N,) if it holds classes, else None. named: True if the user named one (--class)."""
+    if table.rest.shape[1] < 2 or table.rows.values.shape[1] == GROUND_COLUMNS:
+        return None
+    column = table.rest[:, 1]
+    if (column == -1).all():
+        return None
+    if table.rest.shape[1] < 4:
+        return column
+    if (column < 0).any() or (column != np.round(column)).any():
+        return None
+    # If columns 8 to 10 are no metres, column 8 may be a category, as in VisDrone.
+    return column if named or (table.rest[:, 3] == -1).all() or _one_for_each(table, column) else None
+
+
+def _one_for_each(table: MotTable, column: Array) -> bool:
+    if (table.id < 0).any() or column.max(initial=0) < 2 or column.max(initial=0) > LAST_CLASS or has_ground(table):
+        return False
+    order = np.lexsort((column, table.id))
+    same = np.diff(table.id[order]) == 0
+    return bool(same.any() and not np.diff(column[order])[same].any())
+
 
 FEW = 0.02  # share of scores outside [0, 1] up to which they count as outliers of scores in [0, 1]
 
@@ -110,13 +347,6 @@ def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
     if ground is None or np.isnan(ground).any():
         table.rows.reject(boxless, "a box, or x, y, z in every line", "give each line a box or a ground position")
     return boxless
-
-
-def ground_cells(xyz: Sequence[float]) -> str:
-    """Returns the last three cells "x,y,z" of a MOT line for a position in m."""
-    # z = -1 would mean unknown.
-    x, y, z = (f"{v:.3f}" for v in xyz)
-    return f"{x},{y},{z if z != '-1.000' else '-1.001'}"
 
 
 def read_truth(

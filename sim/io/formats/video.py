@@ -15,10 +15,11 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.calibration import scaled_to_image
-from sim.io.pictures import video_decoding
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.io.pictures import video_files
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import fill_gaps, require_size, size_of
-from sim.types import Array, Bools, Camera, Frame, Image, Sequence
+from sim.types import Array, Bools, Frame, Image, Sequence
 
 SUFFIXES = (
     ".mp4", ".m4v", ".mov", ".3gp", ".mkv", ".webm", ".avi", ".wmv", ".flv", ".ogv", ".mpg", ".mpeg",
@@ -28,37 +29,29 @@ RATES = (0.1, 300.0)  # plausible frames/s
 AGREE = 0.02  # relative difference allowed between the container's rate and that of the time stamps
 GAP, GAPS = 1.0, 5.0  # a gap without frames is reported if longer than 1 s and than 5 usual steps
 DEFAULT_FPS = 25.0
-ANY = BackgroundChoice()
 
 
-def open_video(
-    path: Path,
-    *,
-    fps: float | None = None,
-    px_per_m: float | None = None,
-    camera: Camera | None = None,
-    background: BackgroundChoice = ANY,
-) -> Sequence:
-    """Returns a video file as Sequence whose pictures are decoded while iterating. Options as of `open_source`.
+def open_video(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
+    """Returns a video file as Sequence whose pictures are decoded while iterating.
 
     A frame that cannot be decoded has no picture, with a warning. Times are those of the file if the rate varies.
     """
-    index = video_decoding.index_packets(path)
+    index = video_files.index_packets(path)
     length = len(index.stamps)
-    first = next((picture for _, picture in video_decoding.decode_frames(path, index)), None)
+    first = next((picture for _, picture in video_files.decode_frames(path, index)), None)
     if first is None:
         got = f"{length} frames, none of which can be decoded" if length else "no frame"
-        raise InputError(file=path, got=got, expected="a video with pictures", remedy=video_decoding.REMEDY)
+        raise InputError(file=path, got=got, expected="a video with pictures", remedy=video_files.REMEDY)
     for words in missing(index):
         warnings.warn(f"{path.name}: {words}", stacklevel=2)
     if index.aspect != 1:
         words = f"pixels of shape {index.aspect.numerator}:{index.aspect.denominator} are made square"
         warnings.warn(f"{path.name}: {words}: pictures of {size_of(first)[0]}×{size_of(first)[1]} px", stacklevel=2)
     # Some packets of VP8 are not shown, so the length is unknown.
-    size, known = size_of(first), None if index.codec in video_decoding.HIDDEN else length
-    rate, words = frame_rate(path.name, fps, index)
-    choice = background.of(length, path, size)
-    times = None if fps is not None or index.ranks() is None or is_steady(index.times()) else index.times()
+    size, known = size_of(first), None if index.codec in video_files.HIDDEN else length
+    rate, words = frame_rate(path.name, options.fps, index)
+    choice = (options.background or BackgroundChoice()).of(length, path, size)
+    times = None if options.fps is not None or index.ranks() is None or is_steady(index.times()) else index.times()
 
     def bare(k: int) -> Frame:
         return Frame(k, (k - 1) / rate if times is None else float(times[k - 1] - times[0]))
@@ -69,15 +62,15 @@ def open_video(
 
     return Sequence(
         name=path.stem, fps=rate, length=known, frames=frames,
-        image_size=size, camera=None if camera is None else scaled_to_image(camera, size, path, index.aspect),
-        px_per_m=float("nan") if px_per_m is None else px_per_m, has_images=True,
+        image_size=size, has_images=True,
+        camera=options.camera and scaled_to_image(options.camera, size, path, index.aspect), px_per_m=options.scale,
         load_background=BackgroundSample(choice, length, path, lambda wanted: _pictures(path, index, size, wanted)),
         source={"kind": "video", "path": str(path), "fps": words, "background": str(choice)},
         bare=None if known is None else lambda: map(bare, range(1, known + 1)),
     )  # fmt: skip
 
 
-def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
+def missing(index: video_files.PacketIndex) -> Iterator[str]:
     """Yields a text for each part of a video that is missing: its end, or a gap in time."""
     times, length = index.times(), len(index.stamps)
     step = np.diff(times)
@@ -95,7 +88,7 @@ def missing(index: video_decoding.PacketIndex) -> Iterator[str]:
         yield f"nothing for {step[gaps[0] - 1]:.1f} s after frame {gaps[0]}{more}; frames are numbered without the gap"
 
 
-def frame_rate(name: str, given: float | None, index: video_decoding.PacketIndex) -> tuple[float, str]:
+def frame_rate(name: str, given: float | None, index: video_files.PacketIndex) -> tuple[float, str]:
     """Returns (frames per second, text that says where they come from), with a warning if they are a guess."""
     if given is not None:
         return given, f"{given:g}, as given"
@@ -130,7 +123,7 @@ def is_steady(times: Array) -> bool:
     return bool(np.abs(off).max() <= (times[-1] - times[0]) / (len(times) - 1) / 2)
 
 
-def stamped_rate(index: video_decoding.PacketIndex) -> float:
+def stamped_rate(index: video_files.PacketIndex) -> float:
     """Returns the frames per second by the packets' time stamps, without gaps; 0 with fewer than two stamps."""
     step = np.diff(index.times())
     step = step[~_is_gap(step)]
@@ -138,9 +131,9 @@ def stamped_rate(index: video_decoding.PacketIndex) -> float:
 
 
 def _pictures(
-    path: Path, index: video_decoding.PacketIndex, size: tuple[int, int], wanted: list[int] | None = None
+    path: Path, index: video_files.PacketIndex, size: tuple[int, int], wanted: list[int] | None = None
 ) -> Iterator[tuple[int, Image]]:
     return (
         (k, require_size(picture, size, path, f"frame {k}"))
-        for k, picture in video_decoding.decode_frames(path, index, wanted)
+        for k, picture in video_files.decode_frames(path, index, wanted)
     )

@@ -19,15 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError
-from sim import hashing
+from sim import hashing, streams
 from sim.io.files import atomic
 from sim.io.files.tables import Column, StoredTable, read_table, table_bytes
-from sim.io.pictures import video_decoding
+from sim.io.pictures import video_files
 from sim.io.pictures.picture_folder import require_size
-from sim.io.pictures.video_encoding import VideoWriter, write_video
-from sim.io.store import streams
-from sim.io.store.manifest import REDO
-from sim.io.store.seal import file_facts
+from sim.io.pictures.video_files import VideoWriter, write_video
+from sim.io.store.seal import REDO, file_facts
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95
@@ -73,7 +71,7 @@ class StreamWriter:
             return
         name = streams.file_name(self.stream, self.images, self.pixels.count)
         body = encoded(picture, streams.suffix(self.stream, self.images))
-        atomic.write_unsynced(self.folder / name, body)
+        atomic.write_inside(self.folder / name, body)
         self.files |= file_facts({name: body})
 
     def __enter__(self) -> StreamWriter:
@@ -120,7 +118,7 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
     files = {name: facts for output in outputs.values() for name, facts in output.files.items()}
     if known and sequence.truth is not None:
         body = pixel_table(sequence.truth, known)
-        atomic.write_unsynced(folder / TABLE, body)
+        atomic.write_inside(folder / TABLE, body)
         files |= file_facts({TABLE: body})
     pixels = {name: output.pixels.hex() for name, output in outputs.items()}
     return WrittenPictures(wanted, streams.coding(wanted, images), pixels, files)
@@ -244,7 +242,7 @@ class StoredPictures:
         self.body(name)
         path, found = self.folder / name, 0
         for found, (_, picture) in enumerate(
-            video_decoding.decode_frames(path, video_decoding.index_packets(path), wanted), 1
+            video_files.decode_frames(path, video_files.index_packets(path), wanted), 1
         ):
             yield require_size(picture, self.size, path, f"frame {found}")
         if found != (count if wanted is None else len(wanted)):

@@ -13,19 +13,22 @@ import io
 from collections.abc import Iterable
 from collections.abc import Sequence as Series
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field, model_validator
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, FRAMES, is_number
+from scenarios.limits import COORDINATE, FRAMES, INTEGER
+from sim.io.files import tables
 from sim.io.files.numeric_text import read_text, whole_number
-from sim.io.files.tables import Column, StoredTable, json_list, nan_to_none, read_document, table_bytes
+from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, StoredTable, none_to_nan, validated
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
 ORDER_KEYS = ("id", "kind", "fired", "time", "before", "after", "event")
+GroupId = Annotated[int, Field(strict=True, ge=-1, le=INTEGER)]
 
 
 def event_dict(event: GroupEvent) -> dict[str, Any]:
@@ -34,73 +37,47 @@ def event_dict(event: GroupEvent) -> dict[str, Any]:
         "kind": event.kind, "start": int(event.start), "end": int(event.end),
         "emitted": None if event.emitted is None else int(event.emitted),
         "before": [int(g) for g in event.before], "after": [int(g) for g in event.after],
-        "members": [int(m) for m in event.members], "pos": [nan_to_none(float(v)) for v in event.pos],
+        "members": [int(m) for m in event.members], "pos": [tables.nan_to_none(float(v)) for v in event.pos],
     }  # fmt: skip
 
 
 def events_bytes(events: Iterable[GroupEvent]) -> bytes:
     """Returns the events.json of a truth, one event per line."""
-    return json_list("events", map(event_dict, events))
+    return tables.json_list("events", map(event_dict, events))
+
+
+class _Event(BaseModel):
+    kind: Literal[EVENT_KINDS]  # type: ignore[valid-type]
+    start: FrameNumber
+    end: FrameNumber
+    emitted: FrameNumber | None
+    before: tuple[GroupId, ...]
+    after: tuple[GroupId, ...]
+    members: tuple[Id, ...]
+    pos: tuple[Number | None, Number | None]
+    frame: FrameNumber | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.start > self.end:
+            raise ValueError("start not after end")
+        return self
+
+
+class _Events(BaseModel):
+    events: list[_Event]
 
 
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
     """Reads an events.json as pairs (event, frame whose tracks reported it, None if not stored)."""
-    found = read_document(path).get("events")
-    if not isinstance(found, list):
-        raise InputError(file=path, place="events", got=type(found).__name__, expected="a list", remedy="correct it")
-    return [(_event(path, k, e), _frame(path, k, e)) for k, e in enumerate(found)]
-
-
-def _frame(path: Path, k: int, e: dict[str, Any]) -> int | None:
-    try:
-        return None if e.get("frame") is None else _number_from(1, e["frame"])
-    except (TypeError, ValueError) as error:
-        raise _bad_event(path, k, f"frame {error}", "a frame, or null") from None
-
-
-def _event(path: Path, k: int, e: Any) -> GroupEvent:
-    try:
-        x, y = (_coordinate(v) for v in e["pos"])
-        event = GroupEvent(
-            str(e["kind"]), _number_from(1, e["start"]), _number_from(1, e["end"]),
-            None if e["emitted"] is None else _number_from(1, e["emitted"]),
-            _numbers_from(-1, e["before"]), _numbers_from(-1, e["after"]), _numbers_from(0, e["members"]), (x, y),
-        )  # fmt: skip
-    except KeyError as error:
-        raise _bad_event(path, k, f"no key {error}", "an event with all its keys") from None
-    except (TypeError, ValueError) as error:
-        raise _bad_event(path, k, str(error), "whole numbers as frames and ids, and pos [x, y]") from None
-    if event.kind not in EVENT_KINDS:
-        raise _bad_event(path, k, repr(event.kind), f"a kind out of {', '.join(EVENT_KINDS)}")
-    if not event.start <= event.end <= FRAMES:
-        expected = f"frames from 1 to {FRAMES}, start not after end"
-        raise _bad_event(path, k, f"frames {event.start} to {event.end}", expected)
-    return event
-
-
-def _number_from(least: int, value: Any) -> int:
-    # True is no number.
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise ValueError(f"{value!r}, which is no whole number from {least} on")
-    return value
-
-
-def _numbers_from(least: int, values: Any) -> tuple[int, ...]:
-    if not isinstance(values, list):
-        raise ValueError(f"{values!r}, which is no list")
-    return tuple(_number_from(least, value) for value in values)
-
-
-def _coordinate(value: Any) -> float:
-    if value is None:
-        return float("nan")
-    if not is_number(value, -COORDINATE, COORDINATE):
-        raise ValueError(f"{value!r}, which is no coordinate within {COORDINATE:g}")
-    return float(value)
-
-
-def _bad_event(path: Path, k: int, got: str, expected: str) -> InputError:
-    return InputError(file=path, place=f"events[{k}]", got=got, expected=expected, remedy="correct the event")
+    found = validated(path, tables.read_document(path), _Events, "correct the event").events
+    return [
+        (
+            GroupEvent(**e.model_dump(exclude={"frame", "pos"}), pos=(none_to_nan(e.pos[0]), none_to_nan(e.pos[1]))),
+            e.frame,
+        )
+        for e in found
+    ]
 
 
 def near_bytes(near: Near) -> bytes:
@@ -133,35 +110,27 @@ def _near_row(path: Path, number: int, line: str) -> tuple[int, int, int, int]:
 
 def script_bytes(orders: Iterable[Order]) -> bytes:
     """Returns script.json, one order of the script per line."""
-    return json_list("orders", ({key: getattr(o, key) for key in ORDER_KEYS} for o in orders))
+    return tables.json_list("orders", ({key: getattr(o, key) for key in ORDER_KEYS} for o in orders))
+
+
+class _Order(BaseModel):
+    id: str
+    kind: str
+    fired: FrameNumber | None
+    before: tuple[tuple[Id, ...], ...]
+    after: tuple[tuple[Id, ...], ...]
+    time: Annotated[float, Field(strict=True, ge=0, le=COORDINATE)] | None = None
+    event: Id | None = None
+
+
+class _Orders(BaseModel):
+    orders: tuple[_Order, ...] = ()
 
 
 def read_script(path: Path) -> tuple[Order, ...]:
     """Reads the orders of a script.json; a missing list gives none."""
-    found = read_document(path).get("orders", [])
-    if not isinstance(found, list):
-        raise InputError(file=path, place="orders", got=type(found).__name__, expected="a list", remedy="restore it")
-    return tuple(_order(path, k, order) for k, order in enumerate(found))
-
-
-def _order(path: Path, k: int, o: Any) -> Order:
-    try:
-        fired = None if o["fired"] is None else _number_from(1, o["fired"])
-        time, event = o.get("time"), o.get("event")
-        if time is not None and not is_number(time, 0, COORDINATE):
-            raise ValueError(f"time {time!r}, which is no time in s")
-        event = None if event is None else _number_from(0, event)
-        return Order(str(o["id"]), str(o["kind"]), fired, _people(o["before"]), _people(o["after"]), time, event)
-    except (KeyError, TypeError, ValueError) as error:
-        got = f"no key {error}" if isinstance(error, KeyError) else str(error)
-        expected = "an order with id, kind, fired, before and after"
-        raise InputError(file=path, place=f"orders[{k}]", got=got, expected=expected, remedy="restore it") from None
-
-
-def _people(groups: Any) -> tuple[tuple[int, ...], ...]:
-    if not isinstance(groups, list):
-        raise ValueError(f"{groups!r}, which is no list")
-    return tuple(_numbers_from(0, group) for group in groups)
+    found = validated(path, tables.read_document(path), _Orders, "restore it").orders
+    return tuple(Order(**order.model_dump()) for order in found)
 
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")
@@ -195,7 +164,7 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
     missing = [first + k for k, g in enumerate(frames) if g is None]
     memberless = [first + k for k, g in enumerate(frames) if g is not None and len(g.members) < len(g.id)]
     facts = {"first": first, "frames": len(frames), "missing": missing, "memberless": memberless}
-    return table_bytes(columns, facts)
+    return tables.table_bytes(columns, facts)
 
 
 def _lists(rows: list[tuple[Any, ...]], ids: list[Ints], empty: NDArray[Any]) -> list[NDArray[Any]]:
@@ -207,10 +176,17 @@ def _stack(parts: list[Array], width: int) -> Array:
     return np.concatenate([np.zeros((0, width)), *parts])
 
 
+class _GroupFacts(BaseModel):
+    first: Count
+    frames: Count
+    missing: set[int]
+    memberless: set[int]
+
+
 def read_groups(table: StoredTable) -> list[Groups | None]:
     """Returns the groups of each frame stored in a groups.parquet; None where they are unknown."""
-    first, count = table.count("first", FRAMES), table.count("frames", FRAMES)
-    missing, memberless = table.frames("missing"), table.frames("memberless")
+    facts = table.facts_as(_GroupFacts)
+    first, count = facts.first, facts.frames
     axes = AXES if table.has("z") else AXES[:2]
     id, size = table.ints("group"), table.floats("size")
     pos, vel = table.floats(*axes), table.floats(*(f"v{a}" for a in axes))
@@ -221,9 +197,9 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
     found: list[Groups | None] = []
     for k in range(count):
         r = slice(int(cuts[k]), int(cuts[k + 1]))
-        who = () if first + k in memberless else tuple(members[r])
+        who = () if first + k in facts.memberless else tuple(members[r])
         some = Groups(id[r], who, pos[r], vel[r], extent[r], size[r], tuple(hulls[r]))
-        found.append(None if first + k in missing else some)
+        found.append(None if first + k in facts.missing else some)
     return found
 
 

@@ -1,34 +1,116 @@
 """Seals: a JSON document, written last into a folder, that names each file with its hash, and the hash of itself.
 
-manifest.json seals a stored sequence, run.json the tracks of a run.
+manifest.json seals a stored sequence, run.json the tracks of a run: they are complete if and only if they have one.
+manifest.json also holds the identity of the sequence and versions, but no time, host or path, so the same seed,
+scenario and versions give the same bytes. run.json says which tracker ran and on what.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping
+import json
+from collections.abc import Container, Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, Field, StrictBool
 
 from scenarios.errors import InputError
+from scenarios.limits import INTEGER, PICTURE_SIZES, fits_picture
 from sim import hashing
 from sim.io.files import tables
+from sim.io.files.own_files import Marks, is_ours
+from sim.io.files.tables import Count, FrameNumber, Id, Rate, Scale, validated
+from sim.streams import IMAGES, STREAMS, check_streams, coding, file_name, is_picture
+from sim.types import BACKGROUNDS, Sequence
+
+MANIFEST, RUN = "manifest.json", "run.json"
+# what every manifest.json and run.json of ours has, also of an older version, and no other program writes
+MARKS: Marks = {"scenario_hash": str, "content_hash": str}
+RUN_MARKS: Marks = {"boxes": str}
+
+REDO = "run the same `flockscope generate` again"
+AGAIN = "track again"
+OLD = "delete run.json, then track again; tracks of another program are read without it"
+
+EXACT = "tracks.parquet"
+PAIRS = "pairs.parquet"
+# names of the files of a run; files of other names in its folder belong to somebody else
+NAMES = ("tracks.txt", "tracks.mot.txt", EXACT, "groups.csv", "groups.parquet", PAIRS, "events.json", RUN)
+# files that stand for the whole run if they are given alone; tracks.mot.txt is a text as other programs read it
+WHOLE = ("tracks.txt", EXACT)
+
+
+def _inside(name: str) -> str:
+    path = PurePosixPath(name)
+    if not name or path.is_absolute() or ".." in path.parts or "\0" in name:
+        raise ValueError("names inside the folder")
+    return name
+
+
+def _size(size: tuple[int, int]) -> tuple[int, int]:
+    if not fits_picture(*size):
+        raise ValueError(f"[width, height], {PICTURE_SIZES}")
+    return size
+
+
+class _Facts(BaseModel):
+    """What a seal states of a file."""
+
+    sha256: str
+    bytes: Id
+
+
+class _Sealed(BaseModel):
+    """The keys of each seal that are checked."""
+
+    files: dict[Annotated[str, AfterValidator(_inside)], _Facts]
+    truth_hash: str | None = None
+
+
+class _SequenceFacts(BaseModel):
+    name: str
+    fps: Rate
+    length: Count
+    image_size: Annotated[tuple[Id, Id], AfterValidator(_size)] | None
+    px_per_m: Scale | None
+
+
+class _Manifest(_Sealed):
+    """The keys of manifest.json that readers use."""
+
+    format: Any
+    sequence: _SequenceFacts
+    seed: Id
+    repeat: Id
+    truth_hash: str
+    content_hash: str
+    scenario_hash: str
+    streams: tuple[Literal[STREAMS], ...] = ()  # type: ignore[valid-type]
+    images: Literal[IMAGES] | None = None  # type: ignore[valid-type]
+    stride: FrameNumber = 1
+
+
+class _Run(_Sealed):
+    """The keys of run.json that commands read."""
+
+    boxes: Literal["measured", "projected", "none"]
+    tracker: str = ""
+    sequence: str = ""
+    config: dict[str, Any] | None = None
+    grouping: dict[str, Any] | None = None
+    sensor: dict[str, Any] | None = None
+    seed: Annotated[int, Field(strict=True, ge=-INTEGER, le=INTEGER)] | None = None
+    detections: str | None = None
+    background: str | None = None
+    plane: str | None = None
+    causal: StrictBool | None = None
+    fps: Rate | None = None
+    px_per_m: Annotated[float, Field(strict=True)] | None = None
 
 
 def file_facts(files: Mapping[str, bytes]) -> dict[str, dict[str, Any]]:
     """Returns what a seal states of each file, {"sha256", "bytes"} by name, sorted. files: content by name."""
     return {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in sorted(files.items())}
-
-
-def check_facts(path: Path, files: Any, remedy: str) -> None:
-    """Raises InputError if `files` does not have the form of `file_facts`, or a name leads out of the folder."""
-    expected = "names inside the folder, each with sha256 and bytes"
-    if not isinstance(files, dict):
-        raise InputError(file=path, place="files", got=type(files).__name__, expected=expected, remedy=remedy)
-    for name, facts in files.items():
-        inside = name and not PurePosixPath(name).is_absolute() and ".." not in PurePosixPath(name).parts
-        right = isinstance(facts, dict) and isinstance(facts.get("sha256"), str) and isinstance(facts.get("bytes"), int)
-        if not inside or "\0" in name or not right:
-            raise InputError(file=path, place="files", got=repr(name), expected=expected, remedy=remedy)
 
 
 def with_hash(document: dict[str, Any]) -> dict[str, Any]:
@@ -37,17 +119,21 @@ def with_hash(document: dict[str, Any]) -> dict[str, Any]:
     return {**body, "sha256": hashing.canonical_hash(body)}
 
 
-def require_intact(path: Path, document: dict[str, Any], remedy: str, *, exact: bool = False) -> None:
-    """Raises InputError if a seal was altered; `exact` also compares its bytes, down to the last blank."""
-    if document["sha256"] != with_hash(document)["sha256"] or (
-        exact and path.read_bytes() != tables.json_document(document)
-    ):
+def _read(path: Path, kind: type[_Sealed], remedy: str) -> dict[str, Any]:
+    document = tables.read_document(path, OLD if kind is _Run else remedy)
+    if "sha256" not in document:
+        expected = "one that names each file with its hash"
+        raise InputError(file=path, got="no hashes: an older version", expected=expected, remedy=OLD)
+    # A manifest may be reformatted; run.json is compared down to the last blank.
+    changed = kind is _Run and path.read_bytes() != tables.json_document(document)
+    if changed or document["sha256"] != with_hash(document)["sha256"]:
         raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=remedy)
-    check_facts(path, document["files"], remedy)
+    validated(path, document, kind, remedy)
+    return document
 
 
 def damaged_files(
-    folder: Path, files: dict[str, Any], *, seal: str, remedy: str, size_only: Container[str] = ()
+    folder: Path, files: dict[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: Container[str] = ()
 ) -> Iterator[InputError]:
     """Yields an error for each file that is missing, unreadable or not as stated.
 
@@ -56,18 +142,149 @@ def damaged_files(
     """
     for name, facts in files.items():
         path = folder / name
-        wanted = f"the file of {facts['bytes']} bytes that {seal} names"
         try:
             size = path.stat().st_size if path.is_file() else None  # a FIFO would block its reader
-            whole = size == facts["bytes"] and (name in size_only or _hash_of(path) == facts["sha256"])
+            whole = size == facts["bytes"] and (
+                name in size_only or hashing.file_hash(path.read_bytes()) == facts["sha256"]
+            )
         except OSError:
             size, whole = None, False
-        if whole:
-            continue
-        kind = "truncated" if size is not None and size < facts["bytes"] else "altered"
-        got = "missing" if size is None else f"{kind}: {size} bytes"
-        yield InputError(file=path, got=got, expected=wanted, remedy=remedy)
+        if not whole:
+            kind = "truncated" if size is not None and size < facts["bytes"] else "altered"
+            got = "missing" if size is None else f"{kind}: {size} bytes"
+            expected = f"the file of {facts['bytes']} bytes that {seal} names"
+            yield InputError(file=path, got=got, expected=expected, remedy=remedy)
 
 
-def _hash_of(path: Path) -> str:
-    return hashing.file_hash(path.read_bytes())
+def is_sequence(folder: Path) -> bool:
+    """Returns True if the folder is a stored sequence, perhaps an incomplete one."""
+    return (folder / MANIFEST).is_file() or (folder / "scenario.toml").is_file()
+
+
+def is_own_sequence(folder: Path) -> bool:
+    """Returns True if flockscope wrote the sequence: its manifest or, without a readable one, a table is ours."""
+    return any(is_ours(path, MARKS) for path in (folder / MANIFEST, *folder.rglob("*.parquet")))
+
+
+def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (), images: str = "jpg") -> dict[str, Any]:
+    """Returns the fields of a manifest that identify a sequence.
+
+    scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies.
+    """
+    wanted = check_streams(streams, images)
+    return {
+        "format": tables.FORMAT, "schema": 1, "engine": hashing.ENGINE, "seed": seed, "repeat": repeat,
+        "scenario_hash": hashing.scenario_hash(scenario), "streams": list(wanted), "images": coding(wanted, images),
+    }  # fmt: skip
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Reads the manifest.json of a sequence folder, and checks its seal and values, but no other file."""
+    path = folder / MANIFEST
+    if not path.is_file():
+        raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
+    manifest = _read(path, _Manifest, REDO)
+    if manifest.get("streams") and manifest["sequence"]["image_size"] is None:
+        expected = "the size of the pictures"
+        raise InputError(file=path, place="sequence.image_size", got="null", expected=expected, remedy=REDO)
+    return manifest
+
+
+def pictures_of(manifest: dict[str, Any]) -> tuple[str, ...]:
+    """Returns the files of a manifest that hold pictures; their hash is checked when they are read."""
+    return tuple(filter(is_picture, manifest["files"]))
+
+
+def read_whole_manifest(folder: Path) -> dict[str, Any]:
+    """Returns the manifest of a sequence that is exported: it must name every file of the sequence."""
+    manifest = read_manifest(folder)
+    length, images = manifest["sequence"]["length"], manifest.get("images") or "png"
+    wanted = ["scenario.toml", "seqinfo.ini"]
+    for stream in manifest.get("streams", ()):
+        count = BACKGROUNDS if stream == "background" else length
+        wanted += [file_name(stream, images, k) for k in range(1, count + 1)]
+    missing = [name for name in wanted if name not in manifest["files"]]
+    if missing:
+        got = f"no {missing[0]}" + (f" and {len(missing) - 1} more" if len(missing) > 1 else "")
+        expected = "every file of the sequence"
+        raise InputError(file=folder / MANIFEST, place="files", got=got, expected=expected, remedy=REDO)
+    # A stranger's dataset must not make an export read files elsewhere.
+    inside = folder.resolve()
+    for name in (MANIFEST, *manifest["files"]):
+        if not (folder / name).resolve().is_relative_to(inside):
+            raise InputError(
+                file=folder / name, got="a link that leads out of the sequence", expected="a file of the sequence",
+                remedy="export a copy that holds the files themselves (cp -rL)",
+            )  # fmt: skip
+    return manifest
+
+
+def is_run(folder: Path) -> bool:
+    """Returns True if the folder holds a run of ours, perhaps an unfinished or damaged one."""
+    paths = [folder / name for name in (RUN, EXACT) if (folder / name).is_file()]
+    # A file that cannot be parsed may be ours.
+    return any(is_ours(path, RUN_MARKS) is not False for path in paths)
+
+
+def run_folder(path: Path) -> Path | None:
+    """Returns the folder of the run that a path (folder or file of ours) leads to; None if it is no run's."""
+    folder = path if path.is_dir() else path.parent if path.name in NAMES else None
+    return folder if folder is not None and is_run(folder) else None
+
+
+def reject_foreign(folder: Path) -> None:
+    """Raises InputError if a file that is not ours, or a stored sequence, would be changed by a run here."""
+    for place in (folder.absolute(), *folder.absolute().parents):
+        if is_ours(place / MANIFEST, MARKS):
+            raise InputError(
+                file=folder, got=f"a place inside the stored sequence {place.name}", expected="a folder of its own",
+                remedy="choose another --out",
+            )  # fmt: skip
+    found = [name for name in (RUN, EXACT, *NAMES) if (folder / name).exists()]
+    if found and not is_ours(folder / found[0], RUN_MARKS):
+        got = "a file of another program, or a damaged one"
+        raise InputError(
+            file=folder / found[0], got=got, expected="a new folder, or one with a run",
+            remedy="choose another --out, or move the file; delete a damaged run",
+        )  # fmt: skip
+
+
+def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
+    """Returns the run.json of a run: `info` with the facts of all its other files (content by name) and its hash."""
+    stated = {"format": tables.FORMAT, **info, "files": file_facts(files)}
+    read = json.loads(tables.json_text(stated))  # hashed as it will be read
+    validated(Path(RUN), read, _Run, "correct info")
+    return tables.json_document(with_hash(read))
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """Returns the run.json of a folder, whose seal must be intact to the last blank; no other file is read."""
+    if not (folder / RUN).is_file():
+        got, expected = f"tracks without {RUN}", "a run that was finished"
+        raise InputError(file=folder, got=got, expected=expected, remedy=f"incomplete: {AGAIN}")
+    return _read(folder / RUN, _Run, AGAIN)
+
+
+def run_problems(folder: Path, run: dict[str, Any]) -> Iterator[InputError]:
+    """Yields an error for each file of a run that is missing, altered, or of another run."""
+    yield from damaged_files(folder, run["files"], RUN, AGAIN)
+    for name in NAMES:
+        if name not in run["files"] and name != RUN and (folder / name).exists():
+            got, expected = f"a file that {RUN} does not name", "the files of one run"
+            yield InputError(file=folder / name, got=got, expected=expected, remedy=AGAIN)
+
+
+def check_run(folder: Path) -> dict[str, Any]:
+    """Returns the run.json of a folder whose run is whole; raises the first problem otherwise."""
+    run = read_run(folder)
+    for problem in run_problems(folder, run):
+        raise problem
+    return run
+
+
+def tracked_hash(sequence: Sequence) -> str | None:
+    """Returns the SHA-256 of the truth that was tracked; None for a sequence without labels."""
+    stated = sequence.source.get("truth_hash")
+    if stated is not None:
+        return str(stated)
+    return None if sequence.truth is None else hashing.labels_hash(sequence.truth)

@@ -14,30 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
-from scenarios.printable import printable
+from scenarios.errors import InputError, printable
 from sim import hashing
+from sim.hashing import versions
 from sim.io.files import atomic, tables
 from sim.io.files.own_files import is_side_file
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.stored_pictures import NO_PICTURES, StoredPictures, WrittenPictures, write_pictures
-from sim.io.store import truth_files
+from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.group_files import read_script
-from sim.io.store.manifest import (
-    MANIFEST,
-    REDO,
-    check_manifest,
-    damaged_files,
-    identity,
-    is_own_sequence,
-    read_manifest,
-    with_hash,
-)
-from sim.io.store.seal import file_facts
-from sim.io.store.streams import check_streams, file_name
+from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
+from sim.streams import check_streams
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
-from sim.versions import versions
 
 
 def write_sequence(
@@ -77,7 +66,7 @@ def write_sequence(
         pictures = write_pictures(partial, sequence, wanted, images)
         files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
         for name, body in files.items():
-            atomic.write_unsynced(partial / name, body)
+            atomic.write_inside(partial / name, body)
         names |= {*files, *pictures.files}
     return folder
 
@@ -117,51 +106,32 @@ def sequence_files(
     if found:
         files |= truth_files.detection_files(found, sequence.fps, sequence.scene)
     files = dict(sorted(files.items()))
-    manifest = _manifest(sequence, found, len(frames), scenario, seed, repeat, pictures)
-    listed = dict(sorted((file_facts(files) | pictures.files).items()))
-    return {**files, MANIFEST: tables.json_document(with_hash({**manifest, "files": listed}))}
-
-
-def _manifest(
-    sequence: Sequence,
-    found: list[Detections],
-    length: int,
-    scenario: str,
-    seed: int,
-    repeat: int,
-    pictures: WrittenPictures,
-) -> dict[str, Any]:
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
-    return {
-        **identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
+    manifest: dict[str, Any] = {
+        **seal.identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
         **{key: sequence.source[key] for key in ("origin", "stride") if key in sequence.source},
-        "pixels": pictures.pixels,
-        "truth_hash": truth,
+        "pixels": pictures.pixels, "truth_hash": truth,
         "content_hash": hashing.content_hash(truth, found, pictures.pixels),
         "sequence": {
-            "name": sequence.name,
-            "fps": sequence.fps,
-            "length": length,
+            "name": sequence.name, "fps": sequence.fps, "length": len(frames),
             "image_size": None if sequence.image_size is None else list(sequence.image_size),
             "px_per_m": tables.nan_to_none(sequence.px_per_m),
         },
         "versions": versions(bool(pictures.streams)),
-    }
+        "files": dict(sorted((seal.file_facts(files) | pictures.files).items())),
+    }  # fmt: skip
+    return {**files, MANIFEST: tables.json_document(seal.with_hash(manifest))}
 
 
 def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> bytes:
-    width, height = sequence.image_size or (0, 0)
-    folder, _, name = file_name("left", "png" if pictures.images == "png" else "jpg", 1).partition("/")
     # imDir is always img1, so that MOTChallenge tools accept it.
-    lines = [
-        f"name={printable(sequence.name)}",
-        f"imDir={folder}",
-        f"frameRate={str(sequence.fps).removesuffix('.0')}",
-        f"seqLength={length}",
-    ]
+    values = {"name": printable(sequence.name), "imDir": "img1", "frameRate": str(sequence.fps).removesuffix(".0")}
+    values["seqLength"] = str(length)
     if sequence.image_size is not None:
-        lines += [f"imWidth={width}", f"imHeight={height}", f"imExt={Path(name).suffix}"]
-    return "\n".join(["[Sequence]", *lines, ""]).encode()
+        width, height = sequence.image_size
+        suffix = ".png" if pictures.images == "png" else ".jpg"
+        values |= {"imWidth": str(width), "imHeight": str(height), "imExt": suffix}
+    return "\n".join(["[Sequence]", *(f"{key}={value}" for key, value in values.items()), ""]).encode()
 
 
 def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -> Sequence:
@@ -170,8 +140,8 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     background: frames for background models, in place of the stored empty ones. Pictures are checked when they are
     read.
     """
-    manifest = check_manifest(folder / MANIFEST, read_manifest(folder))
-    for error in damaged_files(folder, manifest, pictures=False):
+    manifest = read_manifest(folder)
+    for error in seal.damaged_files(folder, manifest["files"], size_only=seal.pictures_of(manifest)):
         raise error
     about, has, pictures = manifest["sequence"], manifest["files"].keys(), StoredPictures(folder, manifest)
     size, length, fps = about["image_size"], about["length"], about["fps"]
@@ -181,15 +151,20 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
 
     scripted = "gt/script.json" in has and "origin" not in special
 
+    def require_length(name: str, found: int) -> None:
+        if found != length:
+            expected = f"{length} frames, as manifest.json says"
+            raise InputError(file=folder / name, got=f"{found} frames", expected=expected, remedy=REDO)
+
     @lru_cache(maxsize=1)
     def detections() -> list[Detections]:
         found = truth_files.read_detections(folder / "det" / "det.parquet")
-        _require_length(folder / "det" / "det.parquet", len(found), length)
+        require_length("det/det.parquet", len(found))
         return found
 
     def truth() -> Truth:
         found = truth_files.read_truth(folder)
-        _require_length(folder / "gt" / "truth.parquet", found.length, length)
+        require_length("gt/truth.parquet", found.length)
         return found
 
     def bare() -> Iterator[Frame]:
@@ -222,12 +197,6 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     )  # fmt: skip
 
 
-def _require_length(path: Path, found: int, length: int) -> None:
-    if found != length:
-        expected = f"{length} frames, as manifest.json says"
-        raise InputError(file=path, got=f"{found} frames", expected=expected, remedy=REDO)
-
-
 def _background(
     pictures: StoredPictures, choice: BackgroundChoice | None, length: int
 ) -> tuple[Callable[[], Image] | None, dict[str, str]]:
@@ -246,7 +215,7 @@ def _background(
 def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:
     # Computed again from the stored scenario, scene and script.
     from scenarios import load
-    from sim.sequence import named_people
+    from sim.crowd.population import named_people
 
     scene, orders = read_scene(folder / "scene.json"), read_script(folder / "gt" / "script.json")
     return named_people(load(folder / "scenario.toml"), scene, manifest["seed"], manifest["repeat"], orders)

@@ -10,29 +10,206 @@ boxes (px), and velocities from the last 0.5 s.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from pydantic import BaseModel
 
 from scenarios.errors import InputError
+from sim.arrays import repeated_ids
 from sim.io.files import tables
 from sim.io.files.atomic import hold_lock, replace_sealed
-from sim.io.formats.box_columns import BoxScale, require_pixels
-from sim.io.formats.mot_people import ground_positions, of_class, require_metres
-from sim.io.formats.mot_table import MotTable, read_table
-from sim.io.formats.mot_text import ground_cells, reject_duplicate_ids, unit_scores
-from sim.io.formats.velocity import chords
-from sim.io.store.group_files import event_dict, groups_bytes, groups_csv, read_events, read_groups_csv
-from sim.io.store.run_seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
-from sim.io.store.track_tables import RunRows, flatten, read_track_table, track_table
-from sim.io.store.truth_files import with_ground_height
+from sim.io.files.tables import Column, Count, Rate, table_bytes
+from sim.io.formats.labels import chords
+from sim.io.formats.mot_table import MotTable, read_table, require_pixels
+from sim.io.formats.mot_text import (
+    ground_positions,
+    of_class,
+    reject_duplicate_ids,
+    require_metres,
+    unit_scores,
+)
+from sim.io.formats.options import BoxScale
+from sim.io.store import group_files
+from sim.io.store.group_files import AXES
+from sim.io.store.seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
+from sim.io.store.truth_files import BOX, mot_text, score_and_place, scores_or_ones, with_ground_height
 from sim.scene.body import PERSON_HEIGHT
-from sim.types import Array, Bools, Camera, GroupEvent, Ints, Plane, Scene, Tracks
+from sim.types import Array, Camera, GroupEvent, Groups, Ints, Plane, Scene, Tracks
 
 WIDTH = 0.50  # m, diameter of the upright cylinder
+
+
+@dataclass(frozen=True)
+class RunRows:
+    """The tracks of all frames of one tracker, R rows in the order of frames."""
+
+    # plane, unit: of all tracks
+    plane: Any
+    unit: Any
+    frame: Any  # (R,) from the tracks' index, from 1
+    # id, group (R,): of the track and of its group, -1 for alone. pos, vel (R, D) m or px (per s), D = 3 in the plane
+    # "space", else 2.
+    id: Any
+    group: Any
+    pos: Array
+    vel: Array
+    cov: Array  # (R, 2D, 2D) covariance of position and velocity
+    box: Array  # (R, 4) left, top, width, height in px, nan in a frame without boxes
+    boxless: Any  # (R,) True in such a frame
+    score: Array  # (R,) 1 if the tracker gives none
+
+    def reject_faults(self, file: object, remedy: str) -> None:
+        """Raises InputError for the first fault, with its frame: a wrong id or group, or number."""
+        for wrong, got, expected in self._checks():
+            row = int(np.argmax(wrong)) if wrong.any() else None
+            if row is not None:
+                place = f"frame {self.frame[row]}, id {self.id[row]}"
+                raise InputError(file=file, place=place, got=got, expected=expected, remedy=remedy)
+
+    def _checks(self) -> Iterator[tuple[Any, str, str]]:
+        yield self.id < 0, "a negative id", "ids from 0"
+        yield repeated_ids(self.frame, self.id), "an id a second time in the frame", "unique ids in a frame"
+        yield self.group < -1, "a group below -1", "groups from 0, or -1 for alone"
+        if self.unit == "group":
+            yield self.group != self.id, "a group that is not the id", "group equal to id where the unit is group"
+        for name in ("pos", "score"):
+            yield _rows_with(~np.isfinite(getattr(self, name))), f"NaN or infinity in {name}", "finite numbers"
+        # nan means unknown.
+        for name in ("vel", "cov"):
+            yield _rows_with(np.isinf(getattr(self, name))), f"infinity in {name}", "finite numbers, or nan for unknown"
+        box = ~np.isfinite(self.box).all(axis=1) & ~self.boxless
+        yield box, "NaN or infinity in box", "a box, as others of the frame have"
+
+
+def _rows_with(wrong: Any) -> Any:
+    return wrong.reshape(len(wrong), int(np.prod(wrong.shape[1:]))).any(axis=1)
+
+
+def flatten(every: list[Tracks]) -> RunRows:
+    """Returns the rows of all frames of one tracker; without tracks none, in the plane "ground"."""
+    kinds = {(t.plane, t.unit) for t in every}
+    assert len(kinds) <= 1, f"a tracker stays in one plane and unit: {sorted(kinds)}"
+    plane, unit = next(iter(kinds), ("ground", "person"))
+    d = 3 if plane == "space" else 2
+    counts = [len(t.id) for t in every]
+
+    def join(parts: list[Any], empty: Any) -> Any:
+        return np.concatenate([empty, *parts])
+
+    ids = np.zeros(0, np.int64)
+    no_box = [np.full((len(t.id), 4), np.nan) if t.box is None else t.box for t in every]
+    return RunRows(
+        plane, unit, np.repeat(np.array([t.index for t in every], np.int64), counts),
+        join([t.id for t in every], ids), join([t.group for t in every], ids),
+        join([t.pos for t in every], np.zeros((0, d))), join([t.vel for t in every], np.zeros((0, d))),
+        join([t.cov for t in every], np.zeros((0, 2 * d, 2 * d))), join(no_box, np.zeros((0, 4))),
+        np.repeat(np.array([t.box is None for t in every], bool), counts),
+        join([scores_or_ones(t.score, len(t.id)) for t in every], np.zeros(0)),
+    )  # fmt: skip
+
+
+def _state(plane: str) -> list[str]:
+    axes = AXES[:3] if plane == "space" else AXES[:2]
+    return [*axes, *(f"v{a}" for a in axes)]
+
+
+def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
+    """Returns tracks.parquet, a row per track and frame. rows: those of `every`, one Tracks per frame."""
+    unit, state = "px" if rows.plane == "image" else "m", _state(rows.plane)
+    values = np.concatenate([rows.pos, rows.vel], axis=1)
+    units = [f"{unit}/s" if name.startswith("v") else unit for name in state]
+    columns = [
+        Column("frame", rows.frame),
+        Column("id", rows.id),
+        Column("group", rows.group),
+        *(Column(name, values[:, k], u) for k, (name, u) in enumerate(zip(state, units, strict=True))),
+        *(Column(name, rows.box[:, k], "px") for k, name in enumerate(BOX)),
+        Column("score", rows.score),
+        *(
+            Column(f"cov_{a}_{b}", rows.cov[:, i, j], f"{units[i]} {units[j]}")
+            for i, a in enumerate(state)
+            for j, b in enumerate(state)
+        ),
+    ]
+    facts = {
+        "plane": rows.plane, "unit": rows.unit, "fps": fps, "first": every[0].index if every else 1,
+        "frames": len(every), "boxless": [t.index for t in every if t.box is None],
+        "derived": bool(every) and all(t.derived for t in every),
+    }  # fmt: skip
+    return table_bytes(columns, facts)
+
+
+def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
+    """Returns pairs.parquet: how probable it is that two people belong together.
+
+    frame (R,): from 1. a, b (R,): ids. probability (R,): 0 to 1.
+    """
+    return table_bytes(
+        [Column("frame", frame), Column("a", a), Column("b", b), Column("probability", probability, "1")], {}
+    )
+
+
+class _TrackFacts(BaseModel):
+    plane: Literal["ground", "space", "image"]
+    unit: Literal["person", "group"]
+    fps: Rate
+    first: Count
+    frames: Count
+    boxless: set[int]
+    derived: bool = False
+
+
+def read_track_table(folder: Path) -> list[Tracks]:
+    """Returns the tracks of tracks.parquet, with the groups of groups.parquet, without events."""
+    table = tables.read_table(folder / EXACT)
+    f = table.facts_as(_TrackFacts)
+    state = _state(f.plane)
+    d = len(state) // 2
+    values, frame = table.floats(*state), table.ints("frame")
+    cov = table.floats(*(f"cov_{a}_{b}" for a in state for b in state)).reshape(-1, 2 * d, 2 * d)
+    rows = RunRows(
+        f.plane, f.unit, frame, table.ints("id"), table.ints("group"), values[:, :d], values[:, d:], cov,
+        table.floats(*BOX), np.isin(frame, list(f.boxless)), table.floats("score"),
+    )  # fmt: skip
+    rows.reject_faults(table.file, tables.REDO)
+    groups, found = _groups(folder / "groups.parquet", f.first, f.frames), []
+    for index, (a, b) in enumerate(pairwise(table.cuts(f.first, f.frames).tolist()), f.first):
+        r, box = slice(a, b), None if index in f.boxless else rows.box[a:b]
+        found.append(
+            Tracks(
+                index, (index - 1) / f.fps, f.plane, f.unit, rows.id[r], rows.group[r], rows.pos[r], rows.vel[r],
+                rows.cov[r], box, rows.score[r], groups[index - f.first], derived=f.derived,
+            )
+        )  # fmt: skip
+    return found
+
+
+def _groups(path: Path, first: int, count: int) -> list[Groups | None]:
+    if not path.is_file():
+        return [None] * count
+    table = tables.read_table(path)
+    stated = table.facts.get("first"), table.facts.get("frames")
+    got, expected = f"groups of frames from {stated[0]}, {stated[1]} in all", f"from {first}, {count} in all"
+    table.reject(stated != (first, count), "schema", got, expected)
+    found = group_files.read_groups(table)
+    for index, some in enumerate(found, first):
+        fault = None if some is None else _group_fault(some)
+        table.reject(fault is not None, f"frame {index}", str(fault), "unique ids from 0 and finite places")
+    return found
+
+
+def _group_fault(groups: Groups) -> str | None:
+    if len(groups.id) and groups.id.min() < 0:
+        return f"group {groups.id.min()}"
+    if len(np.unique(groups.id)) != len(groups.id):
+        return "a group a second time"
+    places = [groups.pos, *groups.hull]
+    return None if all(np.isfinite(place).all() for place in places) else "NaN or infinity in a place or hull"
 
 
 def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["measured", "projected", "none"]:
@@ -121,7 +298,7 @@ def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
 
     A person in two groups gets the one with the higher id. Members without a track stay in the groups.
     """
-    every = read_groups_csv(path, len(found))
+    every = group_files.read_groups_csv(path, len(found))
     answers = []
     for tracks, groups in zip(found, every, strict=True):
         group = tracks.group.copy()
@@ -184,34 +361,19 @@ def tracks_files(
         text_box = upright_boxes(camera, place)
     files = {
         EXACT: track_table(rows, every, fps),
-        "tracks.txt": _text(rows, text_box, place, full=True),
-        "tracks.mot.txt": _text(rows, text_box, place, full=False),
+        "tracks.txt": mot_text(rows.frame, rows.id, text_box, score_and_place(rows.score, place)),
+        "tracks.mot.txt": mot_text(rows.frame, rows.id, text_box, (f"{score:.4f}" for score in rows.score.tolist())),
     }
     first = every[0].index if every else 1
     groups = [t.groups for t in every]
     if any(g is not None for g in groups):
-        files["groups.parquet"] = groups_bytes(groups, first, "px" if rows.plane == "image" else "m")
-        files["groups.csv"] = groups_csv(groups, None, first)
+        files["groups.parquet"] = group_files.groups_bytes(groups, first, "px" if rows.plane == "image" else "m")
+        files["groups.csv"] = group_files.groups_csv(groups, None, first)
     if pairs is not None:
         files[PAIRS] = pairs
-    events = [{**event_dict(e), "frame": t.index} for t in every for e in t.events]
+    events = [{**group_files.event_dict(e), "frame": t.index} for t in every for e in t.events]
     files["events.json"] = tables.json_list("events", events)
     return {**files, RUN: sealed_run({**(info or {}), "boxes": boxes}, files)}
-
-
-def _text(rows: RunRows, box: Array, place: Array | None, *, full: bool) -> bytes:
-    boxed: Bools = np.asarray(np.isfinite(box).all(axis=1) & (box[:, 2:] > 0).all(axis=1))
-    places = [[np.nan] * 3] * len(rows.id) if place is None else place.tolist()
-    placed: Bools = np.asarray(np.isfinite(np.reshape(places, (-1, 3))).all(axis=1))
-    lines = []
-    for k, (frame, id, score) in enumerate(
-        zip(rows.frame.tolist(), rows.id.tolist(), rows.score.tolist(), strict=True)
-    ):
-        left, top, width, height = box[k].tolist()
-        corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed[k] else "-1,-1,-1,-1"
-        where = ground_cells(places[k]) if placed[k] else "-1,-1,-1"
-        lines.append(f"{frame},{id},{corner},{score:.4f}" + (f",{where}\n" if full else "\n"))
-    return "".join(lines).encode()
 
 
 def read_tracks(path: str | Path, *, fps: float | None = None, length: int | None = None) -> list[Tracks]:
@@ -264,7 +426,7 @@ def _with_events(found: list[Tracks], folder: Path) -> list[Tracks]:
         return found
     first, last = (found[0].index, found[-1].index) if found else (1, 0)
     by_frame: dict[int, list[GroupEvent]] = {}
-    for k, (event, frame) in enumerate(read_events(path)):
+    for k, (event, frame) in enumerate(group_files.read_events(path)):
         at = next(index for index in (frame, event.emitted, event.end) if index is not None)
         if not first <= at <= last:
             raise InputError(

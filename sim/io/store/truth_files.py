@@ -6,29 +6,21 @@ is written only for a truth with boxes.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
+from pydantic import BaseModel
 
 from scenarios.errors import InputError
-from scenarios.limits import FRAME_RATES, FRAMES, SCALES
 from scenarios.reading import is_present
-from sim.io.files.tables import REDO, Column, StoredTable, nan_to_none, read_table, table_bytes
-from sim.io.formats.mot_text import ground_cells
-from sim.io.store.group_files import (
-    events_bytes,
-    groups_bytes,
-    groups_csv,
-    near_bytes,
-    read_events,
-    read_groups,
-    read_near,
-    read_script,
-    script_bytes,
-)
+from sim.io.files import tables
+from sim.io.files.tables import REDO, Column, Count, FrameNumber, Rate, Scale, StoredTable, read_table, table_bytes
+from sim.io.store import group_files
 from sim.scene.terrain import height_at
-from sim.types import Array, Bools, Detections, Groups, Scene, Truth
+from sim.types import Array, Bools, Detections, Groups, Ints, Scene, Truth
 
 BOX = ("box_left", "box_top", "box_width", "box_height")
 VISIBLE = ("visible_left", "visible_top", "visible_width", "visible_height")
@@ -37,19 +29,21 @@ SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 
 def truth_files(truth: Truth) -> dict[str, bytes]:
     """Returns the files under gt/ of a truth, content by name: those for which it has values."""
-    files = {"gt/truth.parquet": _table(truth), "gt/script.json": script_bytes(truth.orders)}
+    files = {"gt/truth.parquet": _table(truth), "gt/script.json": group_files.script_bytes(truth.orders)}
     if truth.box is not None:
-        files["gt/gt.txt"] = _mot_text(truth, truth.box)
+        seen = has_box(truth.box)
+        visibility = [f"1,1,{v:.3f}" for v in truth.visibility[seen].tolist()]
+        files["gt/gt.txt"] = mot_text(truth.frame[seen], truth.id[seen], truth.box[seen], visibility)
     if truth.groups is not None:
-        files["gt/groups.parquet"] = groups_bytes(truth.groups, 1, "m")
+        files["gt/groups.parquet"] = group_files.groups_bytes(truth.groups, 1, "m")
     if truth.groups_px is not None:
-        files["gt/groups_px.parquet"] = groups_bytes(truth.groups_px, 1, "px")
+        files["gt/groups_px.parquet"] = group_files.groups_bytes(truth.groups_px, 1, "px")
     if truth.groups is not None or truth.groups_px is not None:
-        files["gt/groups.csv"] = groups_csv(truth.groups, truth.groups_px)
+        files["gt/groups.csv"] = group_files.groups_csv(truth.groups, truth.groups_px)
     if truth.events is not None:
-        files["gt/events.json"] = events_bytes(truth.events)
+        files["gt/events.json"] = group_files.events_bytes(truth.events)
     if truth.near is not None:
-        files["gt/near.csv"] = near_bytes(truth.near)
+        files["gt/near.csv"] = group_files.near_bytes(truth.near)
     return files
 
 
@@ -67,7 +61,7 @@ def _table(truth: Truth) -> bytes:
     singles = ((name, unit, getattr(truth, name)) for name, unit in SINGLE)
     columns += [Column(name, array, unit) for name, unit, array in singles if array is not None]
     facts = {
-        "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": nan_to_none(truth.px_per_m),
+        "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": tables.nan_to_none(truth.px_per_m),
         "labelled": None if truth.labelled is None else _spans(truth.labelled),
     }  # fmt: skip
     return table_bytes(columns, facts)
@@ -79,49 +73,74 @@ def _spans(flags: Bools) -> list[list[int]]:
     return [[int(a) + 1, int(b)] for a, b in edges.reshape(-1, 2)]
 
 
-def _flags(table: StoredTable, spans: Any, length: int) -> Bools:
-    flags, ends = np.zeros(length, bool), range(1, length + 1)
-    for span in spans if isinstance(spans, list) else [spans]:
-        fits = isinstance(span, list) and len(span) == 2 and all(type(v) is int and v in ends for v in span)
-        table.reject(not fits, "labelled", repr(span), f"[first, last] frames from 1 to {length}")
-        flags[span[0] - 1 : span[1]] = True
+def _flags(table: StoredTable, spans: list[tuple[int, int]], length: int) -> Bools:
+    flags = np.zeros(length, bool)
+    for first, last in spans:
+        table.reject(max(first, last) > length, "labelled", f"[{first}, {last}]", f"frames from 1 to {length}")
+        flags[first - 1 : last] = True
     return flags
 
 
-def _mot_text(truth: Truth, box: Array) -> bytes:
+def has_box(box: Array) -> Bools:
+    """Returns which of the boxes (R, 4) are known and not empty, (R,)."""
+    return np.asarray(np.isfinite(box).all(axis=1) & (box[:, 2:] > 0).all(axis=1))
+
+
+def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
+    """Returns MOTChallenge text: frame, id, box, and the cells `rest` of each row; an unknown box is four times -1."""
     lines = []
-    rows = zip(truth.frame.tolist(), truth.id.tolist(), box.tolist(), truth.visibility.tolist(), strict=True)
-    for frame, id, (left, top, width, height), visibility in rows:
-        if np.isfinite([left, top, width, height]).all() and width > 0 and height > 0:
-            size = f"{max(width, 0.01):.2f},{max(height, 0.01):.2f}"
-            lines.append(f"{frame},{id},{left:.2f},{top:.2f},{size},1,1,{visibility:.3f}\n")
+    rows = zip(frame.tolist(), id.tolist(), box.tolist(), has_box(box).tolist(), rest, strict=True)
+    for f, i, (left, top, width, height), boxed, end in rows:
+        corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed else "-1,-1,-1,-1"
+        lines.append(f"{f},{i},{corner},{end}\n")
     return "".join(lines).encode()
+
+
+def score_and_place(score: Array, place: Array | None) -> list[str]:
+    """Returns the cells conf, x, y, z of MOT lines; place: (R, 3) m, with nan or None for unknown."""
+    places = np.full((len(score), 3), np.nan) if place is None else place
+    return [f"{s:.4f},{_cells(xyz)}" for s, xyz in zip(score.tolist(), places.tolist(), strict=True)]
+
+
+def _cells(xyz: list[float]) -> str:
+    if not np.isfinite(xyz).all():
+        return "-1,-1,-1"
+    x, y, z = (f"{v:.3f}" for v in xyz)
+    return f"{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown
+
+
+class _TruthFacts(BaseModel):
+    name: str
+    fps: Rate
+    length: Count
+    px_per_m: Scale | None
+    labelled: list[tuple[FrameNumber, FrameNumber]] | None
 
 
 def read_truth(folder: Path) -> Truth:
     """Reads the truth of a sequence folder; what is not stored becomes None."""
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
-    length, labelled = table.count("length", FRAMES), table.fact("labelled")
-    px_per_m = table.fact("px_per_m")
+    facts = table.facts_as(_TruthFacts)
+    length = facts.length
 
     def several(*names: str) -> Array | None:
         return table.floats(*names) if table.has(names[0]) else None
 
     frame, id = table.ints("frame"), table.ints("id")
     _check_rows(table, length)
+    events = group_files.read_events(gt / "events.json") if is_present(gt / "events.json") else None
     return Truth(
-        name=str(table.fact("name")), fps=table.number("fps", *FRAME_RATES), length=length,
-        px_per_m=float("nan") if px_per_m is None else table.number("px_per_m", *SCALES),
+        name=facts.name, fps=facts.fps, length=length, px_per_m=tables.none_to_nan(facts.px_per_m),
         frame=frame, id=id, group=table.ints("group"),
         pos=several("x", "y"), vel=several("vx", "vy"), box=several(*BOX), visible_box=several(*VISIBLE),
         visibility=table.floats("visibility"),
         z=several("z"), heading=several("heading"), height=several("height"), truncation=several("truncation"),
         groups=_groups(gt / "groups.parquet"), groups_px=_groups(gt / "groups_px.parquet"),
-        labelled=None if labelled is None else _flags(table, labelled, length),
-        events=tuple(e for e, _ in read_events(gt / "events.json")) if is_present(gt / "events.json") else None,
-        near=read_near(gt / "near.csv") if is_present(gt / "near.csv") else None,
-        orders=read_script(gt / "script.json"),
+        labelled=None if facts.labelled is None else _flags(table, facts.labelled, length),
+        events=None if events is None else tuple(e for e, _ in events),
+        near=group_files.read_near(gt / "near.csv") if is_present(gt / "near.csv") else None,
+        orders=group_files.read_script(gt / "script.json"),
     )  # fmt: skip
 
 
@@ -139,7 +158,7 @@ def _check_rows(table: StoredTable, length: int) -> None:
 def _groups(path: Path) -> tuple[Groups, ...] | None:
     if not is_present(path):
         return None
-    return tuple(g if g is not None else Groups.none() for g in read_groups(read_table(path)))
+    return tuple(g if g is not None else Groups.none() for g in group_files.read_groups(read_table(path)))
 
 
 def detection_files(detections: list[Detections], fps: float, scene: Scene | None = None) -> dict[str, bytes]:
@@ -154,11 +173,9 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     counts = [len(d.pos) for d in detections]
     pos = np.concatenate([np.zeros((0, len(axes))), *(d.pos for d in detections)])
     score = np.concatenate([np.zeros(0), *(scores_or_ones(d.score, len(d.pos)) for d in detections)])
-    columns = [
-        Column("frame", np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), counts)),
-        *(Column(a, pos[:, k], unit) for k, a in enumerate(axes)),
-        Column("score", score),
-    ]
+    frame = np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), counts)
+    places = (Column(a, pos[:, k], unit) for k, a in enumerate(axes))
+    columns = [Column("frame", frame), *places, Column("score", score)]
     if moving:
         vel = np.concatenate([d.vel for d in detections if d.vel is not None])
         columns += [Column(f"v{a}", vel[:, k], f"{unit}/s") for k, a in enumerate(axes)]
@@ -166,7 +183,10 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     if box is not None:
         columns += [Column(name, box[:, k], "px") for k, name in enumerate(BOX)]
     facts = {"plane": plane, "frames": len(detections), "fps": fps}
-    text = _det_text(columns[0].values, box, score, None if plane == "image" else with_ground_height(pos, scene))
+    rest = score_and_place(score, None if plane == "image" else with_ground_height(pos, scene))
+    # An alarm at the picture's edge may be a box without width.
+    shown = np.full((len(score), 4), np.nan) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
+    text = mot_text(frame, np.full(len(frame), -1), shown, rest)
     return {"det/det.parquet": table_bytes(columns, facts), "det/det.txt": text}
 
 
@@ -189,30 +209,21 @@ def with_ground_height(pos: Array, scene: Scene | None) -> Array:
     return np.concatenate([pos, z[:, None]], axis=1)
 
 
-def _det_text(frame: Any, box: Array | None, score: Array, ground: Array | None) -> bytes:
-    boxes = np.full((len(score), 4), -1.0) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
-    lines = []
-    for k, f in enumerate(frame):
-        corner = "-1,-1,-1,-1" if box is None else ",".join(f"{v:.2f}" for v in boxes[k])
-        place = "-1,-1,-1" if ground is None else ground_cells(ground[k])
-        lines.append(f"{f},-1,{corner},{score[k]:.4f},{place}\n")
-    return "".join(lines).encode()
+class _DetectionFacts(BaseModel):
+    plane: Literal["ground", "space", "image"]
+    frames: Count
+    fps: Rate
 
 
 def read_detections(path: Path) -> list[Detections]:
     """Reads a det.parquet: one Detections per frame, from frame 1."""
     table = read_table(path)
     axes = ("x", "y", "z") if table.has("z") else ("x", "y")
-    pos, score, fps = table.floats(*axes), table.floats("score"), table.number("fps", *FRAME_RATES)
-    plane = table.fact("plane")
-    table.reject(plane not in ("ground", "space", "image"), "plane", f"{plane!r}", "ground, space or image")
+    pos, score, facts = table.floats(*axes), table.floats("score"), table.facts_as(_DetectionFacts)
     vel = table.floats(*(f"v{a}" for a in axes)) if table.has("vx") else None
     box = table.floats(*BOX) if table.has(BOX[0]) else None
-    count = table.count("frames", FRAMES)
-    cuts = table.cuts(1, count)
     found = []
-    for k in range(count):
-        r = slice(int(cuts[k]), int(cuts[k + 1]))
-        cut = (pos[r], None if vel is None else vel[r], None if box is None else box[r], score[r])
-        found.append(Detections(k + 1, k / fps, plane, *cut))
+    for k, (a, b) in enumerate(pairwise(table.cuts(1, facts.frames).tolist())):
+        cut = (pos[a:b], None if vel is None else vel[a:b], None if box is None else box[a:b], score[a:b])
+        found.append(Detections(k + 1, k / facts.fps, facts.plane, *cut))
     return found

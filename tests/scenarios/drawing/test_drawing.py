@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from scenarios.drawing.plan_svg import svg
+from scenarios.drawing.plan import svg
 from scenarios.drawing.words import text
 from scenarios.loading.resolve import load, names
 

@@ -42,14 +42,14 @@ def test_a_scenario_file_is_one_entry(path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "place", "got"),
     [
-        ("entry = []", "entry", "no entry"),
+        ("entry = []", "entry", "[]"),
         ("entrys = []", "entrys", "unknown key"),
-        ("entry = [{ name = 'a' }]", "entry.0", "no scenario"),
+        ("entry = [{ name = 'a' }]", "entry.0.scenario", "nothing"),
         ("entry = [{ scenario = 'tour.toml', repet = 2 }]", "entry.0.repet", "unknown key"),
         ("entry = [{ scenario = 'tour.toml', repeat = 0 }]", "entry.0.repeat", "0"),
         ("entry = [{ scenario = 'tour.toml', repeat = 1000000000 }]", "entry.0.repeat", "1000000000"),
-        ("entry = [{ scenario = 'tour.toml', repeat = true }]", "entry.0.repeat", "True"),
-        ("entry = [{ scenario = 'tour.toml', set = [3] }]", "entry.0.set", "[3]"),
+        ("entry = [{ scenario = 'tour.toml', repeat = true }]", "entry.0.repeat", "true"),
+        ("entry = [{ scenario = 'tour.toml', set = [3] }]", "entry.0.set.0", "3"),
         ("entry = [{ scenario = 'tour.toml' }, { scenario = 'tour.toml' }]", "entry", "two entries"),
         ("entry = [3]", "entry.0", "3"),
         ("entry = [{ scenario = 'tour.toml', name = 'a b' }]", "entry.0.name", "'a b'"),

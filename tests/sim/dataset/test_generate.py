@@ -13,7 +13,7 @@ from sim.dataset.generate import generate
 from sim.dataset.splits import split_of
 from sim.io.files import atomic
 from sim.io.source import open_source
-from sim.io.store.manifest import with_hash
+from sim.io.store.seal import with_hash
 from sim.io.store.validate import validate
 from sim.workers.start import WorkerOptions
 from tests.fake_simulator import content, scenario

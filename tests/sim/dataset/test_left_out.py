@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from scenarios.errors import OrderError, WorkError
-from sim.dataset import sequence_job
+from sim.dataset import generate as sequence_job
 from sim.dataset.generate import generate
 from tracking.tuning.search import PlayedScenes, _unfulfilled
 

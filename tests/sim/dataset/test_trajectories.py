@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
 
-from sim.dataset.trajectories import GAP, LIMIT, resample, smoothing_spline
+from sim.dataset.replay import GAP, LIMIT, resample, smoothing_spline
 
 RATE = 2.5
 

@@ -3,7 +3,7 @@ import pytest
 
 from scenarios.schema.sensor import BoxNoise, Memory
 from sim.detector.box_noise import box_errors, perturb_boxes
-from sim.detector.correlated_noise import correlated_normals
+from sim.detector.draws import correlated_normals
 from sim.scene.camera import foot_points, project
 from tests.reference_sense import above, pinhole
 

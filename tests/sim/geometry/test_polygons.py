@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from sim.geometry.footprints import FOOTPRINT, footprint_hull, footprint_hulls
 from sim.geometry.hull_kernels import convex_hulls
 from sim.geometry.polygons import (
+    FOOTPRINT,
     area,
     contains,
     convex_hull,
+    footprint_hull,
+    footprint_hulls,
     gap_pairs,
     intersection_pairs,
     iou_matrix,

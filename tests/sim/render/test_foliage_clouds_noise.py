@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation, map_coordinates
 
-from scenarios.errors import InputError
-from scenarios.schema.picture import Light, Picture
+from scenarios.schema.scenario import Light, Picture
 from sim.hashing import canonical_hash
 from sim.render.camera_view import NODE_STEP
 from sim.render.renderer import make_renderer
@@ -138,9 +137,9 @@ def test_a_pixel_is_the_mean_of_its_samples(view: str, samples: int) -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(InputError, match="foliage"):
+    with pytest.raises(ValueError, match="foliage"):
         make_renderer(motion_in(0), VIEWS["high"], DARK, Picture(foliage=1.5)).frame(1)
-    with pytest.raises(InputError, match="foliage"):
+    with pytest.raises(ValueError, match="foliage"):
         make_renderer(motion_in(0), VIEWS["high"], DARK, Picture(foliage=-0.1)).frame(1)
-    with pytest.raises(InputError, match="cloud"):
+    with pytest.raises(ValueError, match="cloud"):
         make_renderer(motion_in(0), VIEWS["high"], Light(cloud=-0.1)).frame(1)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sim.scene.body import BODY, HEAD, ellipsoids, person_boxes
-from sim.scene.boxes import BOXES, scale_of_first_boxes, with_visibility
 from sim.scene.camera import project
 from sim.scene.terrain import height_at
+from sim.scene.visibility import BOXES, scale_of_first_boxes, with_visibility
 from sim.truth.label import bodies
 from sim.types import Camera, Scene, Stairs, Truth
 from tests.reference_sense import above, crowd, pinhole, surface

@@ -11,8 +11,7 @@ from scenarios.limits import SCALES, is_number
 from scenarios.schema.scenario import CameraSpec
 from sim.io.formats.calibration import read_calibration
 from sim.scene.body import person_boxes
-from sim.scene.camera import camera_rotation, px_per_m_at_centre
-from sim.scene.camera_check import require_camera
+from sim.scene.camera import camera_rotation, px_per_m_at_centre, require_camera
 from sim.scene.camera_placement import MARGIN, place_camera
 from sim.sequence import simulate
 from sim.types import Camera, Motion

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.scene.camera import camera_rotation, disparity, project, to_ground
-from sim.scene.stereo import back_project, pair_jacobian, project_pair
+from sim.scene.camera import back_project, camera_rotation, disparity, pair_jacobian, project, project_pair, to_ground
 from sim.types import Camera
 
 

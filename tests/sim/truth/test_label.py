@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.geometry.footprints import footprint_hull
-from sim.geometry.polygons import area, convex_hull
+from sim.geometry.polygons import area, convex_hull, footprint_hull
 from sim.scene.body import Ellipsoids, contour, ellipsoids, outlines, person_boxes
 from sim.scene.camera import project
 from sim.truth.group_hulls import box_groups, frame_groups, groups_over_time

@@ -266,7 +266,7 @@ def test_ctrl_c_at_many_moments(name, place, capsys):
 @pytest.mark.parametrize("name", WRITING)
 def test_interrupted_and_full_disk_while_writing(name, error, code, as_json, place, capsys, monkeypatch):
     """Whatever of writing fails, nothing is seen of it afterwards."""
-    for function in ("fsync", "replace", "rename"):
+    for function in ("replace", "rename"):
         monkeypatch.setattr(os, function, _raise(error))
     assert run(words(COMMANDS[name][0], place) + ["--json"] * as_json) == code
     monkeypatch.undo()

@@ -12,7 +12,7 @@ import pytest
 import typer
 
 from scenarios.errors import InputError
-from scenarios.loading.overrides import apply_settings
+from scenarios.loading.toml_files import apply_settings
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import Scenario
 from sim.io.store.sequence_folder import sequence_files

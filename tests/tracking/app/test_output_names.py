@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from sim.io.store.manifest import read_manifest, with_hash
+from sim.io.store.seal import read_manifest, with_hash
 from tracking.app.cli import run
 
 ROWS = "1,1,10,10,20,40,1,1,1\n2,1,11,10,20,40,1,1,1\n3,1,12,10,20,40,1,1,1\n"

@@ -12,7 +12,7 @@ import pytest
 from rich.table import Table
 
 from scenarios.errors import InputError
-from sim.io.store.manifest import read_manifest, with_hash
+from sim.io.store.seal import read_manifest, with_hash
 from tests.short_scene import SCENE
 from tracking.app import progress
 from tracking.app.cli import run

@@ -14,7 +14,7 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from sim.io.files.atomic import lock_folder
 from sim.io.source import open_source
-from sim.io.store.run_seal import read_run
+from sim.io.store.seal import read_run
 from sim.io.store.validate import validate
 from sim.types import Sequence
 from tests.refusals import refused

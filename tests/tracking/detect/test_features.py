@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from sim.scene.stereo import project_pair
+from sim.scene.camera import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import FeatureRules, Features, slopes
 
@@ -87,7 +87,7 @@ def test_a_point_without_disparity_is_not_returned() -> None:
 
 def test_the_stated_covariance_of_a_velocity_is_that_of_its_errors() -> None:
     """At 8 m with the paper's camera and 0.25 px: 1.7 m/s along the line of sight, over 10 frames."""
-    from sim.scene.stereo import back_project, point_covariances, project_pair
+    from sim.scene.camera import back_project, point_covariances, project_pair
 
     camera, r, n = rig(0.0), np.random.default_rng(1), 3000
     X = (camera.position + 8.0 * camera.rotation[2])[None]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.scene.stereo import project_pair
+from sim.scene.camera import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect import blobs
 from tracking.detect.stereo_people import PersonLimits, person_mask, sizes

@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from scenarios.loading.resolve import load
 from scenarios.schema.sensor import Memory
-from sim.detector.correlated_noise import correlated_normals
+from sim.detector.draws import correlated_normals
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth

@@ -12,7 +12,7 @@ import pytest
 from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
 from scenarios.errors import InputError
-from sim.versions import runtime
+from sim.hashing import runtime
 from tests.tuning_toys import toy_plan
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig

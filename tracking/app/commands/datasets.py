@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scenarios.errors import InputError
-from scenarios.printable import counted
+from scenarios.errors import InputError, counted
 from tracking.app import option_parsing
 from tracking.app.command_options import CocoOptions, GenerateOptions, ReplayCommandOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult

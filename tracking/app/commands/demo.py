@@ -8,8 +8,8 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from scenarios.printable import printable
-from sim.io.files.output_paths import output_path
+from scenarios.errors import printable
+from sim.io.files.own_files import output_path
 from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_result import CommandResult

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.printable import printable
+from scenarios.errors import printable
 from sim.types import Sequence as Recording
 from sim.types import Truth
 from tracking.app import option_parsing

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from scenarios.errors import InputError
 from sim.io.formats.mot_folder import frame_rate
-from sim.io.source import RecordingOptions, holds_sequences, open_source
-from sim.io.store.run_seal import WHOLE, reject_foreign, run_folder
+from sim.io.formats.options import RecordingOptions
+from sim.io.source import holds_sequences, open_source
+from sim.io.store.seal import WHOLE, reject_foreign, run_folder
 from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import GroupOptions

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.printable import counted, printable, shortened
+from scenarios.errors import counted, printable, shortened
 from sim.types import EVENT_KINDS
 from tracking.app.commands.score_tables import empty_table, with_title
 from tracking.grouping.plausibility import median_speed

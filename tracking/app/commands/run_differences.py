@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from scenarios.printable import printable
+from scenarios.errors import printable
 
 FACTS = {
     "tracker": "tracker",

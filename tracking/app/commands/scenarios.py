@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.loading import suites as suite
 from scenarios.loading import toml_files
-from scenarios.loading.resolve import Entry, dump, load, names, resolve, suite_names
+from scenarios.loading.resolve import Entry, dump, find_suite, load, names, read_suite, resolve, suite_names
 from scenarios.schema.scenario import Scenario
 from tracking.app.command_options import ScenariosOptions
 from tracking.app.command_result import CommandResult
@@ -37,7 +36,7 @@ def scenarios(options: ScenariosOptions) -> CommandResult:
 def catalogue() -> CommandResult:
     """Returns every scenario and suite of the catalogue with its line of description, sorted by name."""
     scenarios = {name: load(name).about for name in names()}
-    suites = {name: suite.about(suite.find_suite(name)) for name in suite_names()}
+    suites = {name: read_suite(find_suite(name)).about for name in suite_names()}
     text = ["Scenarios", *_rows(scenarios), "", "Suites", *_rows(suites)]
     return CommandResult({"scenarios": scenarios, "suites": suites}, "\n".join(text))
 
@@ -61,7 +60,7 @@ def _is_suite(name: str) -> bool:
 
 
 def _explain_scenario(scenario: Scenario, drawing: Path | None) -> CommandResult:
-    from scenarios.drawing.plan_svg import svg
+    from scenarios.drawing.plan import svg
     from scenarios.drawing.words import text
 
     words = text(scenario)
@@ -123,8 +122,9 @@ def _type(node: Node) -> str:
     for choices in (node.get("enum"), [node["const"]] if "const" in node else None):
         if choices:
             return " | ".join(map(json.dumps, choices))
-    if "anyOf" in node:
-        return " or ".join(_type(inner) for inner in node["anyOf"] if inner.get("type") != "null")
+    for choices in (node.get("anyOf"), node.get("oneOf")):
+        if choices:
+            return " or ".join(_type(inner) for inner in choices if inner.get("type") != "null")
     if "prefixItems" in node:
         return f"[{', '.join(map(_type, node['prefixItems']))}]"
     return f"[{_type(node['items'])}, …]" if "items" in node else str(node.get("type", "value"))

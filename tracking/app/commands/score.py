@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.box_columns import parse_box_scale
+from sim.io.formats.options import parse_box_scale
 from sim.types import Array, Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult

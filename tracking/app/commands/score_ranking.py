@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
-from scenarios.printable import counted, printable, shortened
+from scenarios.errors import InputError, counted, printable, shortened
 from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult

@@ -8,7 +8,7 @@ from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
 from typing import Any
 
-from sim.io.formats.box_columns import BoxScale
+from sim.io.formats.options import BoxScale
 from sim.types import Sequence
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter

@@ -10,8 +10,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import InputError
-from scenarios.printable import counted, printable
+from scenarios.errors import InputError, counted, printable
 from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
@@ -57,7 +56,7 @@ class TrackerSetup:
 def track(options: TrackOptions) -> CommandResult:
     """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
     from sim.io.files.atomic import lock_folder
-    from sim.io.store.run_seal import reject_foreign
+    from sim.io.store.seal import reject_foreign
     from tracking.running.tracker_registry import find
 
     setup = _setup(options)
@@ -96,7 +95,7 @@ def _step(meter: ProgressMeter, name: str, _: int) -> None:
 def _track_sequence(
     setup: TrackerSetup, sequence: Sequence, folder: Path, progress: Callable[[int], None] | None = None
 ) -> dict[str, Any]:
-    from sim.io.store.run_seal import tracked_hash
+    from sim.io.store.seal import tracked_hash
 
     tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
     run = setup.run(sequence, progress)

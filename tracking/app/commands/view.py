@@ -6,8 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from scenarios.errors import InputError
-from sim.io.files.output_paths import output_paths
-from sim.io.files.own_files import refuse_foreign_file
+from sim.io.files.own_files import output_paths, refuse_foreign_file
 from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app import option_parsing

@@ -8,8 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from scenarios.errors import InputError
-from scenarios.printable import counted
+from scenarios.errors import InputError, counted
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import marked_png
 from sim.types import Array, GroupEvent, Image, Ints, Sequence, Truth

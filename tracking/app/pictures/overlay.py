@@ -13,7 +13,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.files.atomic import new_file
 from sim.io.files.own_files import GENERATOR
-from sim.io.pictures.video_encoding import write_video
+from sim.io.pictures.video_files import write_video
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even_size, refuse_source
 from tracking.drawing.canvas import Canvas

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,9 +13,9 @@ from urllib.parse import quote
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.atomic import move_synced, staged_path
+from sim.io.files.atomic import staged_path
 from sim.io.files.own_files import GENERATOR, refuse_foreign_file
-from sim.io.pictures.video_encoding import rate_of, write_video
+from sim.io.pictures.video_files import rate_of, write_video
 from sim.types import Image, Sequence
 
 VideoPlacement = Literal["auto", "inside", "beside", "none"]
@@ -55,7 +56,7 @@ def page_video(
         if placement == "inside" or (placement == "auto" and partial.stat().st_size < LARGE):
             return PageVideo("", base64.b64encode(partial.read_bytes()).decode(), rate, lost)
         refuse_foreign_file(beside)
-        move_synced(partial, beside)
+        os.replace(partial, beside)
     return PageVideo(quote(beside.name), "", rate, lost)
 
 

@@ -63,7 +63,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.geometry.footprints import FOOTPRINT
+from sim.geometry.polygons import FOOTPRINT
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association import (

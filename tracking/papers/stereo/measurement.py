@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from sim.scene.stereo import pair_jacobian, project_pair
+from sim.scene.camera import pair_jacobian, project_pair
 from sim.types import Array, Camera
 from tracking.detect.features import SpacePoints
 

@@ -7,7 +7,7 @@ State of a group: an extended Kalman filter of position and velocity, X = (x, x'
 covariance of its points' positions and velocities; N, the number of its points.
 
     X_k+1 = Phi X_k + noise                                eqs 2, 3            space_group
-    Z = (u, v, d) = f(X) + noise                           eqs 4 to 6          measurement, sim.scene.stereo
+    Z = (u, v, d) = f(X) + noise                           eqs 4 to 6          measurement, sim.scene.camera
     Sigma <- alpha Sigma + (1 - alpha) C_y                 eq. 7               space_group
     (y - xi)' S^-1 (y - xi) < gamma                        eq. 8               association
     m_total = p(y)^k_p p(lambda)^k_v, the largest wins     eqs 9 to 11         association
@@ -62,7 +62,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.geometry.footprints import FOOTPRINT
+from sim.geometry.polygons import FOOTPRINT
 from sim.types import Context, Detections, Frame, Plane, Tracks
 from tracking.detect.features import SpacePoints
 from tracking.grouping.whole_groups import GroupIds

@@ -9,8 +9,8 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.export.kitti import calibration, kitti
 from sim.io.store import sequence_folder
-from sim.io.store.streams import decode_disparity
-from sim.scene.stereo import project_pair
+from sim.scene.camera import project_pair
+from sim.streams import decode_disparity
 from tests.sim.scene.test_stereo import rig
 
 

@@ -19,7 +19,7 @@ from sim.io.export.webdataset import size_of, webdataset
 from sim.io.files import atomic, tables
 from sim.io.source import open_source, sequence_folders
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import read_manifest, with_hash
+from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
 
 Sample = dict[str, bytes]
@@ -70,7 +70,7 @@ def test_a_sequence_is_a_sample_and_can_be_unpacked(data: Path, tmp_path: Path) 
         files["manifest.json"] = sample.pop("manifest.json")
         assert not sample
         for name, body in files.items():
-            atomic.write_unsynced(tmp_path / "back" / key.replace("%2E", ".") / name, body)
+            atomic.write_inside(tmp_path / "back" / key.replace("%2E", ".") / name, body)
     assert content(tmp_path / "back") == content(data)
     assert index["content_hash"] == content_hash(data) == content_hash(tmp_path / "back")
     assert [p for s in (tmp_path / "back").glob("*/*") for p in validate(s)] == []

@@ -13,10 +13,17 @@ from hypothesis import strategies as st
 
 from scenarios.errors import InputError
 from sim.io.files.atomic import PARTIAL
-from sim.io.files.output_paths import file_name, output_path, output_paths
-from sim.io.files.own_files import GENERATOR, is_ours, marked_png, refuse_foreign_file
-from sim.io.files.tables import TABLE, TEXT, Column, table_bytes
-from sim.io.pictures.video_encoding import write_video
+from sim.io.files.own_files import (
+    GENERATOR,
+    file_name,
+    is_ours,
+    marked_png,
+    output_path,
+    output_paths,
+    refuse_foreign_file,
+)
+from sim.io.files.tables import Column, table_bytes
+from sim.io.pictures.video_files import write_video
 
 EVIL = (
     "../../x", "/etc/passwd", "..", ".", "", "a\0b", "a/b", "a\\b", "C:x", "con", "NUL.txt", "\u202egnp.exe", "x" * 300,
@@ -64,7 +71,7 @@ def test_long_labels_with_one_beginning_stay_apart() -> None:
 
 META = '<meta name="generator" content="flockscope">'
 PAGE = f"<!doctype html><head>{META}</head>".encode()
-MARKS = {"a": TEXT, "b": TABLE}
+MARKS = {"a": str, "b": dict}
 
 
 def png() -> bytes:

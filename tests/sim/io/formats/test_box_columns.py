@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.formats.box_columns import parse_box_scale
 from sim.io.formats.mot_text import read_detections
+from sim.io.formats.options import parse_box_scale
 from sim.io.source import open_source
 from sim.io.store.track_files import read_track_text
 

@@ -3,8 +3,8 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.formats import mot_text
+from sim.io.formats.labels import chords, differentiate
 from sim.io.formats.mot_text import unit_scores
-from sim.io.formats.velocity import chords, differentiate
 from sim.io.source import open_source
 from tests.small_videos import write_video
 

@@ -9,7 +9,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.pictures import picture_folder as pictures
 from sim.io.pictures.background_sample import BackgroundChoice, parse_choice
-from sim.io.pictures.picture_folder import declared_size, is_bearable, read_picture
+from sim.io.pictures.picture_folder import declared_size, read_picture
 from sim.io.source import open_source
 from tests.small_videos import SIZE, picture
 
@@ -20,7 +20,6 @@ def test_headers(suffix, shape):
     image = np.random.default_rng(0).integers(0, 255, shape, np.uint8)
     body = cv2.imencode(f".{suffix}", image)[1].tobytes()
     assert declared_size(body) == (shape[1], shape[0])
-    assert is_bearable(body)
     for cut in range(0, min(len(body), 200), 7):
         declared_size(body[:cut])
 
@@ -41,7 +40,6 @@ def test_a_bomb_is_no_readable_picture(tmp_path, monkeypatch):
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
     (tmp_path / "b.png").write_bytes(bomb(30_000))
     assert read_picture(tmp_path / "b.png") is None
-    assert declared_size(bomb(30_000)) == (30_000, 30_000)
 
 
 def test_samples_of_large_pictures(tmp_path):

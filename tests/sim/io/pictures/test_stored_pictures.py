@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError, WorkError
+from sim import streams
 from sim.hashing import file_hash
 from sim.io.source import open_source
-from sim.io.store import sequence_folder, streams
-from sim.io.store.manifest import with_hash
+from sim.io.store import sequence_folder
+from sim.io.store.seal import with_hash
 from sim.io.store.validate import validate
 
 SCENARIO = 'schema = 1\nname = "fake"\n'

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from sim.io.pictures import video_encoding
-from sim.io.pictures.video_encoding import BT601, NARROW, write_video
+from sim.io.pictures import video_files as video_encoding
+from sim.io.pictures.video_files import BT601, NARROW, write_video
 from tests.small_videos import SIZE, picture
 
 

@@ -19,8 +19,7 @@ from scenarios.errors import InputError
 from sim.io.files import tables
 from sim.io.files.tables import json_document
 from sim.io.store import seal
-from sim.io.store.run_seal import NAMES, check_run, read_run
-from sim.io.store.seal import with_hash
+from sim.io.store.seal import NAMES, check_run, read_run, with_hash
 from sim.io.store.track_files import read_tracks, tracks_files, write_tracks
 from sim.io.store.validate import validate
 from tests.sealing import seal_again
@@ -157,7 +156,7 @@ def test_a_sealed_fault_is_a_fault(tmp_path, make_tracks, monkeypatch, fault):
         write_tracks(tmp_path / "t", wrong, fps=10.0)
     assert not (tmp_path / "t").exists()
     with monkeypatch.context() as patch:
-        patch.setattr("sim.io.store.track_tables.RunRows.reject_faults", lambda *_: None)
+        patch.setattr("sim.io.store.track_files.RunRows.reject_faults", lambda *_: None)
         write_tracks(tmp_path / "t", wrong, fps=10.0)
     with pytest.raises(InputError, match=words) as error:
         read_tracks(tmp_path / "t")
@@ -189,7 +188,7 @@ PROGRAM = """
 import os, pickle, sys
 from pathlib import Path
 from sim.io.files import atomic
-from sim.io.store.run_seal import NAMES
+from sim.io.store.seal import NAMES
 
 root, files = Path(sys.argv[1]), pickle.loads(Path(sys.argv[2]).read_bytes())
 atomic.SYNC_THREADS = 1
@@ -322,7 +321,7 @@ def test_right_values_and_further_keys(tmp_path, make_tracks):
 
 def test_half_an_id_in_a_table(tmp_path, make_tracks, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr("sim.io.store.track_tables.RunRows.reject_faults", lambda *_: None)
+        patch.setattr("sim.io.store.track_files.RunRows.reject_faults", lambda *_: None)
         wrong = [t.replace(id=t.id.astype(float) + 0.5) for t in make_tracks(1)]
         write_tracks(tmp_path / "t", wrong, fps=10.0)
     with pytest.raises(InputError, match="id: got a column of float64"):

@@ -14,7 +14,7 @@ from sim.io.files.tables import json_document
 from sim.io.formats.mot_folder import read_seqinfo
 from sim.io.source import open_source
 from sim.io.store import sequence_folder
-from sim.io.store.manifest import MANIFEST, with_hash
+from sim.io.store.seal import MANIFEST, with_hash
 from sim.io.store.sequence_folder import open_sequence, write_sequence
 from sim.io.store.validate import validate
 from sim.types import Frame, Sequence

@@ -15,7 +15,7 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.io.source import open_source
 from sim.io.store.group_files import event_dict
-from sim.io.store.run_seal import NAMES, check_run
+from sim.io.store.seal import NAMES, check_run
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import Tracks

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.geometry.footprints import footprint_hull
-from sim.geometry.polygons import area, convex_hull
+from sim.geometry.polygons import area, convex_hull, footprint_hull
 from sim.types import Sequence
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page import page_rows

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
-from sim.scene.stereo import back_project, point_covariances, project_pair
+from sim.scene.camera import back_project, point_covariances, project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo.config import StereoConfig

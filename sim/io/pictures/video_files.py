@@ -3,6 +3,11 @@
 Decoding uses one thread, so that every machine gets the same pictures. The number of a frame is the rank of its time
 stamp if the stamps can be trusted. Otherwise decoded pictures are counted, and a packet that cannot be decoded counts
 as one.
+
+Writes H.264 videos that browsers can play and seek: mp4, yuv420p, a key frame each second, the index in front.
+
+One thread is used and no date is written, so the same pictures give the same bytes. libav ignores a write that fails
+or takes only a part, as on a full disk, so the pictures of the finished video are counted.
 """
 
 from __future__ import annotations
@@ -17,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, WorkError
 from scenarios.limits import FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.reading import require_regular
 from sim.types import Array, Image
@@ -208,3 +213,104 @@ def _picture(frame: Any, aspect: Fraction) -> Image:
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), np.uint8)
     turns = round(frame.rotation / 90) % 4
     return np.ascontiguousarray(np.rot90(image, turns)) if turns else image
+
+
+QUALITY = 18  # x264's constant rate factor: visually near the original
+WRITTEN_COLOURS, WRITTEN_RANGE = 6, 1  # libav's numbers of the colour matrix and range that OpenCV converts to
+
+
+def rate_of(fps: float) -> Fraction:
+    """Returns `fps` as the nearest fraction with a denominator up to 1001."""
+    return Fraction(fps).limit_denominator(1001)
+
+
+@contextmanager
+def write_video(
+    path: Path, size: tuple[int, int], fps: float, quality: int = QUALITY, comment: str = ""
+) -> Iterator[VideoWriter]:
+    """Yields a VideoWriter for an H.264 mp4 file, which is complete after the block.
+
+    size: (width, height) px, both even. quality: x264's constant rate factor, lower is better. Raises OSError if the
+    file cannot be written, and WorkError if the finished video lacks pictures.
+    """
+    if size[0] % 2 or size[1] % 2:
+        raise InputError(
+            place="--images mp4", got="pictures of {}×{} px".format(*size), expected="an even width and height",
+            remedy="take --images jpg or png, or another camera.image",
+        )  # fmt: skip
+    path.write_bytes(b"")  # libav makes no file without pictures
+    made = VideoWriter(path, size, fps, quality, comment)
+    try:
+        yield made
+        made.end()
+    finally:
+        made.close()
+    written = _pictures_in(path) if made.count else 0
+    if written != made.count:
+        raise WorkError(
+            file=path, got=f"{written} of {made.count} pictures in the finished video", expected="all of them",
+            remedy="free some room on the disk, then run it again",
+        )  # fmt: skip
+
+
+def _pictures_in(path: Path) -> int:
+    import av
+
+    try:
+        with av.open(str(path)) as container:
+            return sum(packet.size > 0 and not packet.is_corrupt for packet in container.demux(video=0))
+    except (av.FFmpegError, IndexError):
+        return 0
+
+
+class VideoWriter:
+    """A video that is being written; made by `write_video`, which also ends and closes it.
+
+    State: libav's open container and stream, and `count`, the number of pictures added.
+    """
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: float, quality: int, comment: str):
+        import av
+
+        self._path, self.count = path, 0
+        self._container: Any = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
+        if comment:
+            self._container.metadata["comment"] = comment
+        group = str(max(1, round(fps)))
+        # x264's macroblock tree reads memory that it never wrote where pictures are not a multiple of 128 px wide, and
+        # the same pictures give other bytes now and then.
+        options = {"crf": str(quality), "preset": "veryfast", "g": group, "bf": "2", "threads": "1", "mbtree": "0"}
+        self._stream: Any = self._container.add_stream("libx264", rate=rate_of(fps), options=options)
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = "yuv420p"
+        context = self._stream.codec_context
+        # The same pictures give the same bytes.
+        context.thread_count = 1
+        context.color_range = WRITTEN_RANGE
+        context.colorspace = context.color_primaries = context.color_trc = WRITTEN_COLOURS
+
+    def add(self, picture: Image) -> None:
+        """Appends a picture (H, W, 3) BGR uint8."""
+        import av
+        import cv2
+
+        width, height = self._stream.width, self._stream.height
+        if picture.shape[:2] != (height, width):
+            raise InputError(
+                file=self._path, place=f"picture {self.count + 1}",
+                got="{1}×{0} px".format(*picture.shape), expected=f"{width}×{height} px, the size of the video",
+                remedy="give pictures of one size",
+            )  # fmt: skip
+        planes = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420), np.uint8)
+        frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
+        frame.color_range, frame.colorspace = WRITTEN_RANGE, WRITTEN_COLOURS
+        self._container.mux(self._stream.encode(frame))
+        self.count += 1
+
+    def end(self) -> None:
+        """Writes the frames that the encoder still holds."""
+        self._container.mux(self._stream.encode(None))
+
+    def close(self) -> None:
+        """Writes the index of the file and closes the container."""
+        self._container.close()
