@@ -30,8 +30,7 @@ from tracking.scoring.people_comparison import IncomparableError, Similarity
 if TYPE_CHECKING:
     import pyarrow
 
-UNKNOWN = "unknown"
-"""Stands for the input of tracks without run.json."""
+UNKNOWN = "unknown"  # Stands for the input of tracks without run.json.
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,8 +25,7 @@ from tracking.running.user_code import tracker_failed, user_code
 Scale = Literal["linear", "log", "int", "categorical", "vector"]
 Value = float | int | str | bool | tuple[float, ...]
 
-PRESETS = Path(__file__).parent / "presets"
-"""Folder with a folder for each preset, which holds TRACKER.toml."""
+PRESETS = Path(__file__).parent / "presets"  # Folder with a folder for each preset, which holds TRACKER.toml.
 
 
 @dataclass(frozen=True)

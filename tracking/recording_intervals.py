@@ -28,8 +28,7 @@ def scale_of(score: Score) -> Scale:
     return "length" if score.low == 0 else "plain"
 
 
-SCALES = tuple(map(scale_of, ALL))
-"""The scale of every score, in the order of the catalogue."""
+SCALES = tuple(map(scale_of, ALL))  # The scale of every score, in the order of the catalogue.
 
 
 def recording_differences(

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from tracking.app.constants_page import constants_table
 from tracking.config import Config
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.grouping.link_rule import LinkRule
@@ -34,13 +33,4 @@ PAGES = [
 def test_the_page_holds_the_table(config: type[Config], page: str) -> None:
     assert config.table() in (REFERENCE / page).read_text(encoding="utf-8"), (
         f"put {config.__name__}.table() into {page}"
-    )
-
-
-@pytest.mark.parametrize(
-    ("package", "page"), [("group_pda", "group-pda.md"), ("relational", "relational.md"), ("joint", "joint.md")]
-)
-def test_the_page_of_a_tracker_holds_its_constants(package: str, page: str) -> None:
-    assert constants_table(package) in (REFERENCE / "trackers" / page).read_text(encoding="utf-8"), (
-        f"put the output of python -m tracking.app.constants_page {package} into the page"
     )

@@ -27,8 +27,7 @@ from tracking.app.command_result import (
 from tracking.running.interrupts import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
-LONGEST_WARNING = 400
-"""Characters of a warning that are shown at most."""
+LONGEST_WARNING = 400  # Characters of a warning that are shown at most.
 
 
 def run_command(app: typer.Typer, arguments: list[str]) -> int:

@@ -38,8 +38,7 @@ from tracking.detect.background_kernels import Floats
 from tracking.detect.background_settings import BRIGHT, FOREGROUND_SLOWER, BackgroundSettings
 from tracking.detect.background_training import FLOOR, check_frame, thresholds, train
 
-INTERLEAVE = 4
-"""Each frame adapts every fourth row, with the rate of four frames; four frames adapt all rows."""
+INTERLEAVE = 4  # Each frame adapts every fourth row, with the rate of four frames; four frames adapt all rows.
 
 
 class Background:

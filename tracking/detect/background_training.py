@@ -27,27 +27,22 @@ from tracking.detect import background_training_kernels as kernels
 from tracking.detect.background_kernels import Floats
 from tracking.detect.brightness_gain import frame_gains
 
-LEAST_FRAMES = 10
-"""Fewest frames of a sample: SHARE of fewer frames are too few values for a standard deviation."""
+LEAST_FRAMES = 10  # Fewest frames of a sample: SHARE of fewer frames are too few values for a standard deviation.
+# Grey levels: least sigma, and least noise from which the normalisers are computed. Compressed frames stay constant and
+# then jump by a level or two. With a lower floor these jumps would be foreground. OpenCV's MOG2 has 2, too.
 FLOOR = 2.0
-"""Grey levels: least sigma, and least noise from which the normalisers are computed. Compressed frames stay constant
-and then jump by a level or two. With a lower floor these jumps would be foreground. OpenCV's MOG2 has 2, too."""
-INLIER = 3.5
-"""A frame is an inlier of a pixel if all its channels lie within so many sigmas of E."""
+INLIER = 3.5  # A frame is an inlier of a pixel if all its channels lie within so many sigmas of E.
+# Share of the frames in which the background must be visible; a thing at rest in so many frames may replace it.
 SHARE = 0.35
-"""Share of the frames in which the background must be visible; a thing at rest in so many frames may replace it."""
-AS_SIGMA = 2.2
-"""Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it."""
-ROUNDS = 10
-"""Most rounds of step 1; inliers settle after three or four."""
+AS_SIGMA = 2.2  # Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it.
+ROUNDS = 10  # Most rounds of step 1; inliers settle after three or four.
+# Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds.
 CLEAN = 6.0
-"""Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds."""
-WIDEST = 20.0
-"""Grey levels: a pixel whose first sigma is larger has no background (`valid` is False)."""
+WIDEST = 20.0  # Grey levels: a pixel whose first sigma is larger has no background (`valid` is False).
+# Thresholds are taken from the clean pixels if these have at least this share of the values of all inliers.
 FEWEST_CLEAN = 0.05
-"""Thresholds are taken from the clean pixels if these have at least this share of the values of all inliers."""
+# Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins.
 BINS, SPAN = 4000, 20.0
-"""Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins."""
 
 
 @dataclass(frozen=True)

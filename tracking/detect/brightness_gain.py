@@ -11,12 +11,10 @@ import numpy as np
 from sim.types import Bools, Image
 from tracking.detect.background_kernels import Floats
 
-POINTS = 6000
-"""About so many pixels, on a regular grid, are used for the estimate."""
+POINTS = 6000  # About so many pixels, on a regular grid, are used for the estimate.
+# Grey levels between which a pixel is usable: noise dominates below, the camera clips above.
 DARKEST, BRIGHTEST = 16.0, 235.0
-"""Grey levels between which a pixel is usable: noise dominates below, the camera clips above."""
-FEWEST = 50
-"""Fewest usable grid pixels from which the factor of a channel is estimated."""
+FEWEST = 50  # Fewest usable grid pixels from which the factor of a channel is estimated.
 
 
 def grid(high: int, wide: int) -> tuple[slice, slice]:

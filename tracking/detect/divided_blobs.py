@@ -18,14 +18,10 @@ from sim.types import Array
 from tracking.detect.blobs import Blobs
 from tracking.detect.person_size import PersonSize
 
-FILLED = math.pi / 4
-"""Share of a person's box that the person fills."""
-FEWEST, MOST = 0.25, 0.75
-"""A blob of r times a person's area holds from r + FEWEST to r + MOST people, rounded down."""
-LEAST = 0.3
-"""A blob with a smaller share of a person's area is left out: a part of a person, or noise."""
-ROUNDS = 5
-"""Rounds of k-means."""
+FILLED = math.pi / 4  # Share of a person's box that the person fills.
+FEWEST, MOST = 0.25, 0.75  # A blob of r times a person's area holds from r + FEWEST to r + MOST people, rounded down.
+LEAST = 0.3  # A blob with a smaller share of a person's area is left out: a part of a person, or noise.
+ROUNDS = 5  # Rounds of k-means.
 
 
 def divided(found: Blobs, people: Array, size: PersonSize) -> Array:

@@ -10,8 +10,7 @@ import numpy as np
 
 from sim.types import Array, Detections
 
-BOX_TIME = 0.5
-"""Time constant with which the size of a person's box follows measured boxes, s."""
+BOX_TIME = 0.5  # Time constant with which the size of a person's box follows measured boxes, s.
 
 
 def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array | None]:

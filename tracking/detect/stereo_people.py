@@ -18,12 +18,9 @@ from sim.types import Array, Bools, Camera
 from tracking.detect.blobs import Blobs
 from tracking.detect.subtraction_stereo import Disparities
 
-QUANTILES = 0.1, 0.9
-"""Ranges are those between these quantiles: matches may be wrong."""
-NORMAL_RANGE = 2.563
-"""Range of a normal distribution between these quantiles, in standard deviations."""
-LEAST_POINTS = 5
-"""Points with a disparity that a region needs to be measured."""
+QUANTILES = 0.1, 0.9  # Ranges are those between these quantiles: matches may be wrong.
+NORMAL_RANGE = 2.563  # Range of a normal distribution between these quantiles, in standard deviations.
+LEAST_POINTS = 5  # Points with a disparity that a region needs to be measured.
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ import numpy as np
 
 from sim.types import Array, Scene
 
-MARGIN = 1.0
-"""m: the least margin of a plan round people and objects."""
+MARGIN = 1.0  # m: the least margin of a plan round people and objects.
 
 
 def plan_area(scene: Scene | None, places: Array) -> tuple[Array, Array] | None:

@@ -26,11 +26,10 @@ from tracking.drawing.canvas import (
     text,
 )
 
-FOOTPRINT = 0.3
-"""m: radius of the disc that a group's hull keeps round each member."""
+FOOTPRINT = 0.3  # m: radius of the disc that a group's hull keeps round each member.
 
+# Directions, in px from a disc's centre, in which its id may be written; the first is preferred.
 LABEL_DIRECTIONS = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (1, 0), (-1, 0), (0, -1))
-"""Directions, in px from a disc's centre, in which its id may be written; the first is preferred."""
 
 
 def draw_scene(canvas: Canvas, scene: Scene | None) -> None:

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
     from tracking.objective import ObjectiveScorer
 
 T = TypeVar("T")
-DEFAULT_LIMIT = 256 * 2**20
-"""Bytes that a SourceCache keeps by default."""
-TIMES_COUNTED = 2
-"""How often the bytes of a source are counted; after that it holds all that it will hold."""
+DEFAULT_LIMIT = 256 * 2**20  # Bytes that a SourceCache keeps by default.
+TIMES_COUNTED = 2  # How often the bytes of a source are counted; after that it holds all that it will hold.
 
 
 class OpenedSource:

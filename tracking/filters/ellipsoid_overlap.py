@@ -13,8 +13,7 @@ import numpy as np
 
 from sim.types import Array
 
-STEPS = 60
-"""Halvings of the interval in which f has its maximum."""
+STEPS = 60  # Halvings of the interval in which f has its maximum.
 
 
 def separation(d: Array, A: Array, B: Array) -> float:

@@ -19,12 +19,10 @@ from tracking.fitting.grouping_scenes import PairScene
 from tracking.grouping.belief import SITUATIONS, Belief, Table, situations
 from tracking.grouping.pair_evidence import NAMES
 
-KNOTS = 10
-"""Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %."""
+KNOTS = 10  # Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %.
+# Weights of the penalties: of curvature; of squared log-odds, and, twice, of their differences between situations.
 CURVED, LARGE = 3e-4, 1e-4
-"""Weights of the penalties: of curvature; of squared log-odds, and, twice, of their differences between situations."""
-STEPS = 200
-"""Most iterations."""
+STEPS = 200  # Most iterations.
 
 
 @dataclass(frozen=True)

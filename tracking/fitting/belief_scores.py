@@ -7,8 +7,7 @@ import numpy as np
 from sim.types import Array, Bools
 from tracking.fitting.belief import PairSample
 
-BINS = 15
-"""Of equal width, between the probabilities 0 and 1."""
+BINS = 15  # Of equal width, between the probabilities 0 and 1.
 
 
 def belief_scores(sample: PairSample, log_odds: Array) -> dict[str, float]:

@@ -23,20 +23,15 @@ from scenarios.loading.toml_files import parse, toml_value
 from sim.types import Array, Ints
 from tracking.grouping.pair_evidence import NAMES, evidence, frames_per_step, step_positions
 
-FROZEN = Path(__file__).with_name("belief.toml")
-"""The default belief."""
+FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
 KIND = "belief"
-UNSEEN = -4.0
-"""Belief about two people who are too far apart for a row: log-odds."""
+UNSEEN = -4.0  # Belief about two people who are too far apart for a row: log-odds.
+# m/s: a pair counts as standing below the first, as walking above the second, in between in proportion.
 STANDS, WALKS = 0.2, 0.6
-"""m/s: a pair counts as standing below the first, as walking above the second, in between in proportion."""
-FEW, MANY = 1.0, 6.0
-"""Other people within 3 m: a pair counts as among few at the first, among many at the second."""
+FEW, MANY = 1.0, 6.0  # Other people within 3 m: a pair counts as among few at the first, among many at the second.
 SPEED, OTHERS = NAMES.index("speed, 5 s"), NAMES.index("others, 5 s")
-SITUATIONS = ("walking", "standing", "walking_among_many", "standing_among_many")
-"""Columns of a table."""
-NUMBERS = ("bias", "stay", "come", "memory", "arrival")
-"""Numbers of `Belief` in its file."""
+SITUATIONS = ("walking", "standing", "walking_among_many", "standing_among_many")  # Columns of a table.
+NUMBERS = ("bias", "stay", "come", "memory", "arrival")  # Numbers of `Belief` in its file.
 
 
 @dataclass(frozen=True, slots=True, eq=False)

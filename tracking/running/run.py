@@ -27,12 +27,11 @@ from tracking.running.time_limit import TimeLimited
 if TYPE_CHECKING:
     from tracking.grouping.pair_probabilities import PairProbabilities
 
+# Keys of run.json that follow from tracks and sequence, whoever made the tracks.
 OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "frames")
-"""Keys of run.json that follow from tracks and sequence, whoever made the tracks."""
 
 
-MOST = 0.5
-"""Share of weak detections from which on a warning is given."""
+MOST = 0.5  # Share of weak detections from which on a warning is given.
 
 
 @dataclass(frozen=True, eq=False)

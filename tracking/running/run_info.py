@@ -18,11 +18,9 @@ from tracking.running.detection_mode import input_kind
 from tracking.running.image_scale import ImageScale
 from tracking.running.prepare import PreparedTracker
 
-PACKAGES = ("flockscope", "numpy", "scipy")
-"""Packages whose versions run.json holds."""
+PACKAGES = ("flockscope", "numpy", "scipy")  # Packages whose versions run.json holds.
 
-SENSOR_SETTINGS_SHOWN = 6
-"""Most sensor settings that `input_summary` shows; run.json holds all of them."""
+SENSOR_SETTINGS_SHOWN = 6  # Most sensor settings that `input_summary` shows; run.json holds all of them.
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ _PERFECT_SENSOR = {
     "noise_m": 0.0,
     "box": "amodal",
 }
+# Settings by which hidden and small people are detected as well as others.
 _SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
-"""Settings by which hidden and small people are detected as well as others."""
 
 
 def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:

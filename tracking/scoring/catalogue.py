@@ -280,8 +280,7 @@ ALL = (
     ),
 )
 
-CATALOGUE = MappingProxyType({score.key: score for score in ALL})
-"""Every score by key, in display order."""
+CATALOGUE = MappingProxyType({score.key: score for score in ALL})  # Every score by key, in display order.
 
 
 def table() -> str:

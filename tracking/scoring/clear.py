@@ -22,8 +22,8 @@ from tracking.scoring.matching import solve_frame
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, ratio
 
 BONUS = 1000.0  # added to the weight of a pair that was matched in the previous frame
+# A person matched in more than 80 % of its frames is mostly tracked, in less than 20 % mostly lost.
 MOSTLY, LOST = 0.8, 0.2
-"""A person matched in more than 80 % of its frames is mostly tracked, in less than 20 % mostly lost."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

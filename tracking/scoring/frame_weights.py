@@ -25,8 +25,7 @@ from tracking.scoring.position_errors import weighted_positions
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
 from tracking.scoring.weighted_sums import WeightedScores, mean_of_known
 
-PORTION = 100
-"""Draws that are computed together: bounds memory."""
+PORTION = 100  # Draws that are computed together: bounds memory.
 
 
 def weighted_scorers(

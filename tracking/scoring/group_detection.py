@@ -29,8 +29,8 @@ from tracking.scoring.people_and_groups import GroupRows, PersonRows
 from tracking.scoring.rows import FrameRows
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, ratio
 
+# Numerator and denominator of T, by the name of the scores; integers avoid rounding.
 TOLERANCES = {"right_groups": (2, 3), "exact_groups": (1, 1)}
-"""Numerator and denominator of T, by the name of the scores; integers avoid rounding."""
 
 
 def weighted_detection(

@@ -13,8 +13,8 @@ from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.people_and_groups import PersonRows, Surface
 from tracking.scoring.position_errors import REACH
 
+# How two people are compared: IoU of boxes, or distance of positions on the ground or in the image.
 Similarity = Literal["boxes", "ground", "image"]
-"""How two people are compared: IoU of boxes, or distance of positions on the ground or in the image."""
 
 
 class IncomparableError(ValueError):

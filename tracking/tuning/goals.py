@@ -12,11 +12,10 @@ from scenarios.errors import InputError
 from scenarios.loading.toml_files import closest
 from tracking.environment.episodes import Episode
 
-SPEED = "frames/s"
-"""Key of the tracker's speed. It is the only goal that differs between two runs of the same episode."""
+SPEED = "frames/s"  # Key of the tracker's speed. It is the only goal that differs between two runs of the same episode.
 
+# Scores that every episode has; other scores need the whole catalogue to be computed.
 FAST_KEYS = ("objective", "HOTA", "group_F1")
-"""Scores that every episode has; other scores need the whole catalogue to be computed."""
 
 
 @dataclass(frozen=True)

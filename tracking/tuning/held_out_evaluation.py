@@ -24,11 +24,10 @@ from tracking.tuning.search_plan import SearchPlan
 if TYPE_CHECKING:
     from tracking.tuning.study import SearchStudy
 
+# Scores that are compared on the test scenes beside the goals.
 COMPARED_KEYS = ("objective", "HOTA", "group_F1", "pairwise_F1", "event_F1")
-"""Scores that are compared on the test scenes beside the goals."""
 
-STORED = "judged "
-"""Prefix of the study attributes in which episodes are stored."""
+STORED = "judged "  # Prefix of the study attributes in which episodes are stored.
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,9 @@ from typing import Any
 
 from optuna.storages.journal import JournalFileBackend
 
-SUFFIX = ".locks"
-"""What the name of the lock file adds to the name of the journal."""
-CHOOSING, WRITING, FIRST_TRIAL = 0, 1, 2
-"""Bytes of the lock file."""
-HEAD = b'{"op_code":'
-"""How every journal begins."""
+SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
+CHOOSING, WRITING, FIRST_TRIAL = 0, 1, 2  # Bytes of the lock file.
+HEAD = b'{"op_code":'  # How every journal begins.
 
 
 class TrialLocks:

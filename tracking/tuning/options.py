@@ -13,12 +13,10 @@ if TYPE_CHECKING:
     from sim.types import DetectionMode, Tracker
     from tracking.scoring.people_comparison import Similarity
 
-Scenes = str | Path | Sequence[str | Path]
-"""A suite, a scenario, a TOML file, or a list of these."""
+Scenes = str | Path | Sequence[str | Path]  # A suite, a scenario, a TOML file, or a list of these.
+# progress(finished, trials, text): called with the number of finished trials, the number planned (None if unknown), and
+# what is done now.
 Progress = Callable[[int, int | None, str], None]
-"""progress(finished, trials, text): called with the number of finished trials, the number planned (None if unknown),
-and what is done now.
-"""
 
 
 @dataclass(frozen=True, kw_only=True)

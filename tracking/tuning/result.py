@@ -20,12 +20,9 @@ from tracking.tuning.comparison import Candidate, Comparison, TrialRecord
 from tracking.tuning.plots import history_plot, importance_plot, pareto_plot
 from tracking.tuning.search_plan import SearchPlan, seeds_text
 
-PACKAGES = ("flockscope", "optuna", "numpy", "scipy", "numba")
-"""Packages whose versions are written into the files."""
-LONG = 40
-"""Characters of a setting that the text shows."""
-MANY = 4
-"""Greatest number of sensor settings that the text shows one by one."""
+PACKAGES = ("flockscope", "optuna", "numpy", "scipy", "numba")  # Packages whose versions are written into the files.
+LONG = 40  # Characters of a setting that the text shows.
+MANY = 4  # Greatest number of sensor settings that the text shows one by one.
 
 
 @dataclass(frozen=True)

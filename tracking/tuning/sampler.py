@@ -26,19 +26,14 @@ from tracking.config import Param
 from tracking.parameter_space import decode, encode
 from tracking.tuning.search_plan import SearchPlan
 
+# Attributes of a trial: number of the trial that it repeats, episodes played before pruning, error line.
 AGAIN, PRUNED, ERROR = "again", "pruned after", "error"
-"""Attributes of a trial: number of the trial that it repeats, episodes played before pruning, error line."""
 
-MOVED = 3
-"""Number of parameters that are moved, on average."""
-STEPS = (0.05, 1.0)
-"""Least and greatest standard deviation of a step; the range of a parameter is [-1, 1]."""
-PARENTS = 3
-"""Number of best trials that a trial may start from."""
-TPE_EVERY = 4
-"""Every so many trials one is drawn by TPE."""
-TPE_FROM = 10
-"""Number of complete trials before TPE is used."""
+MOVED = 3  # Number of parameters that are moved, on average.
+STEPS = (0.05, 1.0)  # Least and greatest standard deviation of a step; the range of a parameter is [-1, 1].
+PARENTS = 3  # Number of best trials that a trial may start from.
+TPE_EVERY = 4  # Every so many trials one is drawn by TPE.
+TPE_FROM = 10  # Number of complete trials before TPE is used.
 
 
 def distribution(p: Param) -> BaseDistribution:

@@ -15,16 +15,13 @@ from sim.dataset.splits import SPLITS, split_of
 from tracking.environment.episodes import Source, sources
 from tracking.tuning.options import Scenes
 
-EPISODES = {"train": 16, "val": 48, "test": 100}
-"""Least number of episodes that the default seeds of each split make."""
+EPISODES = {"train": 16, "val": 48, "test": 100}  # Least number of episodes that the default seeds of each split make.
 
-LEAST_SEEDS = 2
-"""Least number of default seeds of each scene."""
+LEAST_SEEDS = 2  # Least number of default seeds of each scene.
 
 OPTION = {"train": "--seeds", "val": "--validation", "test": "--test"}
 WORD = {"train": "training", "val": "validation", "test": "test"}
-CHECK_SUITES = ("friends-meet", "crossing")
-"""Candidates for the default of --check, in order of preference."""
+CHECK_SUITES = ("friends-meet", "crossing")  # Candidates for the default of --check, in order of preference.
 
 
 def suite_names(suite: Scenes) -> tuple[str, ...]:

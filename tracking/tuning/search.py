@@ -36,13 +36,11 @@ from tracking.tuning.search_plan import SearchPlan, search_plan
 if TYPE_CHECKING:
     from tracking.tuning.study import SearchStudy
 
-UNFULFILLED = "unfulfilled"
-"""Attribute of a study: for each training scene why it is left out, "" if it is not."""
-JOURNAL = ".journal"
-"""Suffix of the journal beside `--out`."""
+UNFULFILLED = "unfulfilled"  # Attribute of a study: for each training scene why it is left out, "" if it is not.
+JOURNAL = ".journal"  # Suffix of the journal beside `--out`.
 
+# What every .json file of a search has.
 RESULT_MARKS: Rules = {"settings": TABLE, "counts": TABLE, "taken_back": list_of(TEXT)}
-"""What every .json file of a search has."""
 
 
 @documented(TuneOptions, positional=3)

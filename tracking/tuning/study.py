@@ -23,11 +23,10 @@ from tracking.tuning.pruner import SignedRankPruner
 from tracking.tuning.sampler import AGAIN, ERROR, PRUNED, HillClimbingSampler, distribution, place_in_search
 from tracking.tuning.search_plan import SearchPlan
 
-SETTINGS = "settings"
-"""Attribute of a study that holds the identity of its plan."""
+SETTINGS = "settings"  # Attribute of a study that holds the identity of its plan.
 
+# States of a finished trial. PRUNED means impossible parameters; one stopped early is COMPLETE with an estimate.
 FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
-"""States of a finished trial. PRUNED means impossible parameters; one stopped early is COMPLETE with an estimate."""
 
 
 class SearchStudy:

@@ -23,11 +23,9 @@ from tracking.tuning.sampler import ERROR, PRUNED
 from tracking.tuning.search_plan import SearchPlan
 from tracking.tuning.study import SearchStudy
 
-PAUSE = 0.5
-"""Seconds between two looks at whether other processes have finished."""
+PAUSE = 0.5  # Seconds between two looks at whether other processes have finished.
 
-LEAST_LOSS = 1e-12
-"""Least difference between the best value and the estimate of a pruned trial."""
+LEAST_LOSS = 1e-12  # Least difference between the best value and the estimate of a pruned trial.
 
 
 def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> None:

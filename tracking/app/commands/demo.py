@@ -27,11 +27,9 @@ from tracking.running.run import TrackingRun
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
 SEEDS = range(40_000, 40_003)
 QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
-PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)
-"""The scene that is rendered and tracked from its pictures."""
+PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is rendered and tracked from its pictures.
 
-QUICK_PIXEL_SETTINGS = ("camera.fps=5",)
-"""What --quick changes in that scene."""
+QUICK_PIXEL_SETTINGS = ("camera.fps=5",)  # What --quick changes in that scene.
 
 
 def demo(out: Path, *, quick: bool) -> CommandResult:

@@ -45,8 +45,8 @@ PEOPLE_CAPTION = "<code>{tracker}</code>: boxes of people with ids, hulls of the
 GROUPS_CAPTION = (
     "<code>{tracker}</code>: groups with hull, extent (dotted), arrow to where it is in 1 s, number of people (~)"
 )
+# The note on a tracker that reports groups only.
 WITHOUT_PEOPLE = "<p>This tracker reports groups without people, so people cannot be scored.</p>"
-"""The note on a tracker that reports groups only."""
 
 
 @dataclass(frozen=True)

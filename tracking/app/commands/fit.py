@@ -16,14 +16,14 @@ from tracking.app import option_parsing
 from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.command_result import CommandResult
 
+# Seeds of the simulated detections whose statistics are shown beside the measured ones.
 CHECK_SEEDS = range(30_000, 30_008)
-"""Seeds of the simulated detections whose statistics are shown beside the measured ones."""
 
+# The statistics that the text shows; --json has all of them.
 SHOWN = (
     "missed", "misses: mean run, s", "false alarms per frame", "false alarms: at people", "false alarms: mean stay, s",
     "overlap, 10% quantile", "overlap, 50% quantile", "overlap, 90% quantile", "error correlation after 0.2 s",
 )  # fmt: skip
-"""The statistics that the text shows; --json has all of them."""
 
 
 def fit_sensor(options: FitSensorOptions) -> CommandResult:

@@ -22,8 +22,8 @@ from tracking.grouping.pair_probabilities import pair_probabilities
 from tracking.running import run as runs
 from tracking.running.run import TrackingRun
 
+# Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence.
 TEXT = "mot text"
-"""Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence."""
 
 
 def group(options: GroupOptions) -> CommandResult:

@@ -15,11 +15,9 @@ from tracking.app.commands.score_tables import empty_table, with_title
 from tracking.grouping.plausibility import median_speed
 from tracking.running.run import TrackingRun
 
-LISTED = 20
-"""Most groups that are listed one by one."""
+LISTED = 20  # Most groups that are listed one by one.
 
-LONGEST_LIST = 60
-"""Most characters of a list of members."""
+LONGEST_LIST = 60  # Most characters of a list of members.
 
 Row = dict[str, Any]
 

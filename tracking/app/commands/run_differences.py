@@ -7,6 +7,7 @@ from typing import Any
 
 from scenarios.printable import printable
 
+# Keys of run.json and the words for them, in the order of the output. The input is a column of the ranking.
 FACTS = {
     "tracker": "tracker",
     "seed": "seed",
@@ -17,13 +18,11 @@ FACTS = {
     "boxes": "boxes",
     "truth_hash": "truth hash of what was tracked",
 }
-"""Keys of run.json and the words for them, in the order of the output. The input is a column of the ranking."""
 
+# Keys of run.json that hold settings by name; each setting is compared by itself.
 TABLES = {"config": "parameter", "grouping": "grouping"}
-"""Keys of run.json that hold settings by name; each setting is compared by itself."""
 
-SHOWN = 3
-"""Most values of a run that the text shows."""
+SHOWN = 3  # Most values of a run that the text shows.
 
 
 def run_differences(infos: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:

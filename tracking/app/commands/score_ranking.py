@@ -40,12 +40,10 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scores
 from tracking.stats import FEWEST, SURE
 
-COLUMNS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")
-"""Scores beside the one that ranks."""
+COLUMNS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")  # Scores beside the one that ranks.
 
 INDICATIVE = f"intervals are indicative under {SURE:g} s: the recording lasts {{seconds:.4g}} s"
-LONGEST_INPUT = 40
-"""Characters of an input that a table shows at most."""
+LONGEST_INPUT = 40  # Characters of an input that a table shows at most.
 
 
 @dataclass(frozen=True)

@@ -25,11 +25,11 @@ from tracking.running.run import TrackingRun
 from tracking.running.run_info import input_summary
 from tracking.running.time_limit import TimeLimited
 
+# What --json repeats of each run.json.
 ROW_KEYS = (
     "sequence", "detections", "input", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames",
     "frames_per_second", "whole_frames_per_second",
 )  # fmt: skip
-"""What --json repeats of each run.json."""
 
 
 @dataclass(frozen=True)

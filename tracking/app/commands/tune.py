@@ -15,8 +15,9 @@ from tracking.app.options_from_dataclass import options_from
 from tracking.app.progress import ProgressMeter
 from tracking.tuning.options import TuneOptions
 
+# Options that other commands have, too.
 SHARED = {"set": Set, "workers": Workers, "cluster": Cluster, "step_timeout": StepTimeout}
-"""Options that other commands have, too."""
+# Types on the command line that do not follow from the default.
 TYPES = {
     "tracker": str,
     "suite": list[str],
@@ -24,9 +25,7 @@ TYPES = {
     "detections": Literal["image", "truth", "file"] | None,
     "similarity": Literal["boxes", "ground", "image"] | None,
 }
-"""Types on the command line that do not follow from the default."""
-REQUIRED = ("out", "trials")
-"""Options that `tracking.tune` has defaults for and the command has not."""
+REQUIRED = ("out", "trials")  # Options that `tracking.tune` has defaults for and the command has not.
 COMMA_SEPARATED = ("only",)
 SEEDS = ("seeds", "validation", "test")
 NO_CHECK = "none"

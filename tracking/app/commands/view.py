@@ -17,11 +17,9 @@ from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.running.run import TrackingRun
 
-Step = Callable[[str], None]
-"""Reports that one picture of the named sequence is done."""
+Step = Callable[[str], None]  # Reports that one picture of the named sequence is done.
 
-Write = Callable[[Sequence, Path, Step], None]
-"""Writes the file of one sequence."""
+Write = Callable[[Sequence, Path, Step], None]  # Writes the file of one sequence.
 
 
 def view(options: ViewOptions) -> CommandResult:

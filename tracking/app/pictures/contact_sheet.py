@@ -19,22 +19,19 @@ from tracking.drawing.layer_painting import KIND_COLOUR, event_words, kind_colou
 from tracking.drawing.plan_area import MARGIN, plan_area
 from tracking.drawing.plan_view import draw_group_hulls, draw_people, draw_scene, draw_trails
 
+# px before the sheet is shrunk to half its size: width of a panel; heights of the sheet's head and foot; gap between
+# panels; height of a panel's title.
 WIDTH, HEAD, FOOT, GAP, TITLE = 880, 76, 96, 20, 40
-"""px before the sheet is shrunk to half its size: width of a panel; heights of the sheet's head and foot; gap between
-panels; height of a panel's title."""
 
-MANY = 40
-"""Ids are left out of plans with more people than this."""
+MANY = 40  # Ids are left out of plans with more people than this.
 
-RING_MARGIN = 0.7
-"""m between an event's ring and the outermost of its members."""
+RING_MARGIN = 0.7  # m between an event's ring and the outermost of its members.
 
 
+# Kinds of events that are shown, with their rank; events of rank 0 come first. Enter and leave are not shown.
 SHOWN_KINDS = {"merge": 0, "split": 0, "cross": 1, "queue": 1, "form": 2, "dissolve": 2}
-"""Kinds of events that are shown, with their rank; events of rank 0 come first. Enter and leave are not shown."""
 
-CLOSE_SECONDS = 1.0
-"""s: events that begin within this time share a picture."""
+CLOSE_SECONDS = 1.0  # s: events that begin within this time share a picture.
 
 
 def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:

@@ -29,11 +29,9 @@ from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.running.run import grouped
 
 TruthPlacement = Literal["beside", "over", "only"]
-Panel = list[tuple[Layer, LayerStyle]]
-"""The layers that are drawn over one copy of the picture, the lowest first."""
+Panel = list[tuple[Layer, LayerStyle]]  # The layers that are drawn over one copy of the picture, the lowest first.
 
-LOW = 400
-"""px: pictures less high than this are shown at twice their size."""
+LOW = 400  # px: pictures less high than this are shown at twice their size.
 
 BANNER_HEIGHT = 32
 GREY = (128, 128, 128)

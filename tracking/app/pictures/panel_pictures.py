@@ -15,12 +15,10 @@ from tracking.drawing.canvas import FLOOR, GRID, INK, Canvas, colour
 from tracking.drawing.layer_painting import LayerStyle, draw_label, paint_layer
 from tracking.drawing.layers import Layer, layer_of_truth
 
-OBJECTS = (150, 140, 132)
-"""Colour of walls and pillars in a picture of ids."""
+OBJECTS = (150, 140, 132)  # Colour of walls and pillars in a picture of ids.
 
 GREY = 128
-QUANTILE = 0.99
-"""The scale of disparity runs from the 1 % to the 99 % quantile of the frame's disparities."""
+QUANTILE = 0.99  # The scale of disparity runs from the 1 % to the 99 % quantile of the frame's disparities.
 
 
 class PanelPictures:

@@ -33,11 +33,11 @@ from tracking.running.run import grouped
 
 HERE = Path(__file__).parent
 
+# The scripts of the page, in the order in which they run.
 SCRIPTS = (
     "decode.js", "draw.js", "whole_groups.js", "plan.js", "camera_view.js", "image.js", "timeline.js", "video.js",
     "page.js",
 )  # fmt: skip
-"""The scripts of the page, in the order in which they run."""
 
 
 def write_page(

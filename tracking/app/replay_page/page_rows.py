@@ -18,27 +18,20 @@ from numpy.typing import NDArray
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 from tracking.app.replay_page.group_timeline import Bar, bars, links
 
-SCALE = {"ground": 100, "space": 100, "image": 2}
-"""Encoded steps per m or px of a position, by plane."""
+SCALE = {"ground": 100, "space": 100, "image": 2}  # Encoded steps per m or px of a position, by plane.
 
-MOVING = 0.1
-"""People slower than this (m/s on the ground, px/s in the image) have no direction."""
+MOVING = 0.1  # People slower than this (m/s on the ground, px/s in the image) have no direction.
 
 
-MAX_CORNERS = 24
-"""Corners of an encoded hull at most."""
+MAX_CORNERS = 24  # Corners of an encoded hull at most.
 
-LEAST_CORNER = {"ground": 0.02, "image": 1.0}
-"""m, px: corners of a hull that stand out by less are left out."""
+LEAST_CORNER = {"ground": 0.02, "image": 1.0}  # m, px: corners of a hull that stand out by less are left out.
 
-SPEED_SCALE = {"ground": 10, "image": 1}
-"""Encoded steps per m/s and px/s."""
+SPEED_SCALE = {"ground": 10, "image": 1}  # Encoded steps per m/s and px/s.
 
-NIL = -99_999
-"""Stands for an unknown number (nan) in a column."""
+NIL = -99_999  # Stands for an unknown number (nan) in a column.
 
-Json = dict[str, Any]
-"""An object that `json` can write."""
+Json = dict[str, Any]  # An object that `json` can write.
 
 
 @dataclass(frozen=True, eq=False)

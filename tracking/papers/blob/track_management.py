@@ -25,12 +25,10 @@ SAME = 0.5  # IoU of a box with the hull of several predicted boxes from which o
 SLACK = 0.02
 LARGEST_SCALE = 2.0  # largest scale of a track relative to the sequence's; the least is its inverse
 
-SCALE, RHO, BORN, SCORE, HITS, MISSES = range(6)
-"""Rows of `numbers`."""
-CONFIRMED, MEASURED, MISS_EXPLAINED = range(3)
-"""Rows of `flags`."""
+SCALE, RHO, BORN, SCORE, HITS, MISSES = range(6)  # Rows of `numbers`.
+CONFIRMED, MEASURED, MISS_EXPLAINED = range(3)  # Rows of `flags`.
+# Attributes that are views of the rows of `numbers` and `flags`.
 NUMBERS, FLAGS = ("scale", "rho", "born", "score", "hits", "misses"), ("confirmed", "measured", "miss_explained")
-"""Attributes that are views of the rows of `numbers` and `flags`."""
 
 
 class TrackedPeople:

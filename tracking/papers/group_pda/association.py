@@ -18,8 +18,7 @@ from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
-FASTEST = 2.0
-"""m/s: nobody walks faster than this relative to a group (walking distance)."""
+FASTEST = 2.0  # m/s: nobody walks faster than this relative to a group (walking distance).
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,8 @@ from sim.types import Array, Bools, Image, Ints
 from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import COLOUR_BINS, ScaledParameters
 
-LEVELS = 4
-"""Levels of each of the three channels: LEVELS cubed is COLOUR_BINS."""
-SMOOTHING = 0.05
-"""People, spread evenly over all bins, that are added to a histogram."""
+LEVELS = 4  # Levels of each of the three channels: LEVELS cubed is COLOUR_BINS.
+SMOOTHING = 0.05  # People, spread evenly over all bins, that are added to a histogram.
 
 
 def colour_bins(image: Image, points: Array) -> Ints:

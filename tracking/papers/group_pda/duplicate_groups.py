@@ -15,8 +15,7 @@ from tracking.filters.components import regions_overlap
 from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-LEAST_MEASURED = 0.55
-"""Two groups may be one and the same if a smaller share of their people together is measured."""
+LEAST_MEASURED = 0.55  # Two groups may be one and the same if a smaller share of their people together is measured.
 
 
 def may_be_one(bank: GroupBank, i: int, j: int) -> bool:

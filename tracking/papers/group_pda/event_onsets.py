@@ -16,13 +16,13 @@ import numpy as np
 from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
 from sim.types import Array
 
+# s before and after a moment over which a velocity is a chord. For a merge it is longer, as whole groups turn slowly
+# and bodies hide each other; a part leaves at once.
 MERGE_CHORD, SPLIT_CHORD = 0.7, 0.4
-"""s before and after a moment over which a velocity is a chord. For a merge it is longer, as whole groups turn slowly
-and bodies hide each other; a part leaves at once."""
+# Factor on the velocity at which groups merge: a chord across the onset still contains motion from before it.
 MERGE_CHORD_MARGIN = 1.2
-"""Factor on the velocity at which groups merge: a chord across the onset still contains motion from before it."""
+# Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
 REACH = 1.1
-"""Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three."""
 
 
 class PairMoment(NamedTuple):

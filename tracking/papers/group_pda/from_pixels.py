@@ -15,12 +15,9 @@ from tracking.detect.typical_person import DEPTH, SHOULDERS
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.running.image_scale import required
 
-WIDTH_PER_HEIGHT = 0.3
-"""Width over height of a person in the image if there is no camera."""
-GRID = 0.1
-"""m: distance of the points of the grid."""
-LEAST_SINE_TILT = 0.2
-"""Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured."""
+WIDTH_PER_HEIGHT = 0.3  # Width over height of a person in the image if there is no camera.
+GRID = 0.1  # m: distance of the points of the grid.
+LEAST_SINE_TILT = 0.2  # Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured.
 
 
 class ForegroundPoints:

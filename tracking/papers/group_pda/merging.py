@@ -26,15 +26,12 @@ from tracking.papers.group_pda.event_onsets import REACH, PairHistory, PairMomen
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, alike_velocities
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-HISTORY_TIME = 5.0
-"""s of a pair's past that are kept."""
+HISTORY_TIME = 5.0  # s of a pair's past that are kept.
+# Factor on gamma for merging: groups merge at a smaller distance than they split, as their extents are noisy.
 GATE_MARGIN = 0.9
-"""Factor on gamma for merging: groups merge at a smaller distance than they split, as their extents are noisy."""
-PATIENCE = 1.5
-"""s for which the history of a pair is kept while one of the groups cannot merge."""
+PATIENCE = 1.5  # s for which the history of a pair is kept while one of the groups cannot merge.
 
-Pair = tuple[int, int]
-"""Ids of two groups, the smaller first."""
+Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 
 
 class NearPair(NamedTuple):

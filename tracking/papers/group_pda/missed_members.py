@@ -18,10 +18,8 @@ from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-RECENT_TIME = 3.0
-"""s for which a group's points are kept, to date the onset of a split."""
-RECENT_POINTS = 64
-"""At most so many points of a group are kept of each frame."""
+RECENT_TIME = 3.0  # s for which a group's points are kept, to date the onset of a split.
+RECENT_POINTS = 64  # At most so many points of a group are kept of each frame.
 
 
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:

@@ -15,10 +15,8 @@ from tracking.papers.joint.config import SCALES, JointConfig
 from tracking.papers.joint.individuals import Proposal, precision_of, process_noise
 from tracking.papers.joint.individuals_kernels import group_dynamics, own_dynamics
 
-STATE = 4
-"""Columns of a state: x, y, m, and vx, vy, m/s."""
-MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)
-"""What random numbers are drawn for."""
+STATE = 4  # Columns of a state: x, y, m, and vx, vy, m/s.
+MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)  # What random numbers are drawn for.
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ import numpy as np
 from sim.types import Bools, Ints
 from tracking.papers.joint.decentralised_filter import Nested, effective_share
 
-SPAN = 1.0
-"""Time over which ancestors are counted, s."""
+SPAN = 1.0  # Time over which ancestors are counted, s.
 
 
 class ParticleHealth:

@@ -18,12 +18,10 @@ from sim.types import Array, GroupEvent, Ints
 from tracking.grouping.group_labels import part_sets
 from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, event_of_change
 
+# Kinds of events that the tracker reports itself.
 OWN_EVENTS = ("merge", "split", "form", "dissolve", "enter", "leave")
-"""Kinds of events that the tracker reports itself."""
-CHORD = 0.5
-"""Time over which velocities are measured, s."""
-ARRIVAL = 1.0
-"""s: people who were together so soon after they were first seen arrived together."""
+CHORD = 0.5  # Time over which velocities are measured, s.
+ARRIVAL = 1.0  # s: people who were together so soon after they were first seen arrived together.
 
 
 class ReportedEvents:

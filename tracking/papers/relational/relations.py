@@ -15,8 +15,8 @@ from tracking.papers.relational.config import NEWCOMER_SHARE, ParticleConfig, Re
 from tracking.papers.relational.tracker import COUPLING, JOINING, RELATIONS, Particle
 from tracking.papers.relational.transition_kernels import DISTANCE, VELOCITY
 
+# Rules of transition_kernels by which every partner counts fully, as in the paper.
 ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
-"""Rules of transition_kernels by which every partner counts fully, as in the paper."""
 
 
 class Relational(Particle):

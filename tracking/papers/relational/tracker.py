@@ -38,8 +38,8 @@ from tracking.papers.relational.occluders import covered_by_people, hidden_share
 from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
 from tracking.running.image_scale import required
 
+# What random numbers are drawn for. Relations have streams of their own, so that they change no other draw.
 MOTION, BIRTHS, RESAMPLING, SPREAD, RELATIONS, JOINING, COUPLING = range(7)
-"""What random numbers are drawn for. Relations have streams of their own, so that they change no other draw."""
 
 
 @dataclass

@@ -15,10 +15,8 @@ from sim.scene.stereo import pair_jacobian, project_pair
 from sim.types import Array, Camera
 from tracking.detect.features import SpacePoints
 
-POS, VEL = [0, 2, 4], [1, 3, 5]
-"""Entries of the state that are the position and the velocity."""
-LEAST_DENSITY = 0.25
-"""Least density of features that counts, relative to the highest of the group (ours)."""
+POS, VEL = [0, 2, 4], [1, 3, 5]  # Entries of the state that are the position and the velocity.
+LEAST_DENSITY = 0.25  # Least density of features that counts, relative to the highest of the group (ours).
 
 
 class Measurement(Protocol):

@@ -24,9 +24,9 @@ from tracking.grouping.whole_groups import NO_ID, WholeGroupEvent
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.space_group import SpaceGroup
 
+# s: a group that came less long ago, and did not split from another one, enters with the other one; that is no merge
+# (ours).
 SETTLED = 1.0
-"""s: a group that came less long ago, and did not split from another one, enters with the other one; that is no merge
-(ours)."""
 
 
 def merge(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:

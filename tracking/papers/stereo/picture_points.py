@@ -17,16 +17,11 @@ from tracking.detect.stereo_people import PersonLimits, person_mask
 from tracking.detect.subtraction_stereo import SubtractionStereo
 from tracking.papers.stereo.config import StereoConfig
 
-BLOCK = 0.27
-"""m: width of the block that is compared in matching."""
-PERSON = 0.5, 3.0, 0.1
-"""m: least and largest height and least width of a foreground region that is a person (sec. 2)."""
-FEATURE_SPACING = 0.09
-"""m: least distance of a new feature from the others in the image."""
-BACK_CHECK = 0.7
-"""px: a feature ends if u or v is so far off after following it forwards and backwards (ours)."""
-MOST_FEATURES = 400
-"""Largest number of features."""
+BLOCK = 0.27  # m: width of the block that is compared in matching.
+PERSON = 0.5, 3.0, 0.1  # m: least and largest height and least width of a foreground region that is a person (sec. 2).
+FEATURE_SPACING = 0.09  # m: least distance of a new feature from the others in the image.
+BACK_CHECK = 0.7  # px: a feature ends if u or v is so far off after following it forwards and backwards (ours).
+MOST_FEATURES = 400  # Largest number of features.
 
 
 class PicturePoints:

@@ -15,10 +15,8 @@ from tracking.detect.features import SpacePoints, slopes
 from tracking.filters.assignment import optimal
 from tracking.papers.stereo.config import StereoConfig
 
-FASTEST = 2.0
-"""m/s: a point moves no faster than this relative to its prediction."""
-SPEED = 1.3
-"""m/s: standard deviation of the velocity of a point that was not seen before."""
+FASTEST = 2.0  # m/s: a point moves no faster than this relative to its prediction.
+SPEED = 1.3  # m/s: standard deviation of the velocity of a point that was not seen before.
 
 
 class PointLinks:

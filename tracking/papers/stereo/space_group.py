@@ -25,10 +25,8 @@ from tracking.papers.stereo.measurement import POS, VEL, Measurement, measured_s
 if TYPE_CHECKING:
     from filterpy.kalman import ExtendedKalmanFilter
 
-VELOCITY_SPREAD = 0.25
-"""m/s: standard deviation of velocities that a group's spread is shrunk to (ours)."""
-LEAST_VARIANCE = 1e-6
-"""m^2, m^2/s^2: least eigenvalue of a spread."""
+VELOCITY_SPREAD = 0.25  # m/s: standard deviation of velocities that a group's spread is shrunk to (ours).
+LEAST_VARIANCE = 1e-6  # m^2, m^2/s^2: least eigenvalue of a spread.
 
 
 @dataclass

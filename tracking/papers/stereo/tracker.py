@@ -40,12 +40,9 @@ from tracking.papers.stereo.space_group import SpaceGroup, measure, motion_model
 from tracking.papers.stereo.splitting import split
 from tracking.running.image_scale import required
 
-LEAST_GROUP = 5
-"""From pixels: least number of linked features that form a group."""
-LEAST_FEATURES = 3
-"""From pixels: least number of features that update a group (sec. 3.3)."""
-FEATURE_OUTLINE = 0.5
-"""Share of a person's footprint that a feature covers, as features lie all over the body."""
+LEAST_GROUP = 5  # From pixels: least number of linked features that form a group.
+LEAST_FEATURES = 3  # From pixels: least number of features that update a group (sec. 3.3).
+FEATURE_OUTLINE = 0.5  # Share of a person's footprint that a feature covers, as features lie all over the body.
 
 
 class Stereo:
