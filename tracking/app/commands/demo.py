@@ -12,6 +12,7 @@ from scenarios.printable import printable
 from sim.io.files.output_paths import output_path
 from sim.types import Sequence
 from tracking.app import option_parsing
+from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.demo_page import PixelScene, RankingTable, ResultSection, demo_page
 from tracking.app.commands.score import summary
@@ -32,15 +33,15 @@ PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is re
 QUICK_PIXEL_SETTINGS = ("camera.fps=5",)  # What --quick changes in that scene.
 
 
-def demo(out: Path, *, quick: bool) -> CommandResult:
-    """Writes simulated scenes, tracks and pages into the folder `out`; scenes that are already there are kept."""
+def demo(options: DemoOptions) -> CommandResult:
+    """Writes simulated scenes, tracks and pages into the folder --out; scenes that are already there are kept."""
     from sim.dataset.generate import generate
     from sim.io.files.atomic import write_file
     from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
     from sim.workers.start import WorkerOptions
 
-    start = time.monotonic()
+    start, out, quick = time.monotonic(), options.out, options.quick
     refuse_foreign_file(option_parsing.output_folder(out) / "index.html")
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     with ProgressMeter("generate") as meter:

@@ -1,33 +1,87 @@
-"""Runs a command line: prints the command's result, and turns every exception into an exit code and one clear line."""
+"""From the words of a command line to an exit code: commands made of options dataclasses, their results and errors.
+
+Of an option given twice click takes the last. Python reads `1_0` as 10, and the digits of other scripts. A
+`StrictCommand` refuses both. Every exception becomes an exit code and one clear line.
+"""
 
 from __future__ import annotations
 
 import errno
+import inspect
 import io
 import os
 import sys
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stdout
-from typing import Any
+from dataclasses import fields
+from typing import Annotated, Any, get_type_hints
 
 import typer
+from typer.core import TyperCommand
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.printable import printable, shortened
-from tracking.app.command_result import (
-    DEBUG,
-    INTERRUPTED,
-    CommandResult,
-    as_flockscope_error,
-    print_error,
-    print_interrupted,
-    print_result,
-)
+from tracking.app import command_result
+from tracking.app.command_result import INTERRUPTED, CommandResult, print_error, print_interrupted
+from tracking.keyword_options import signature_parameter
 from tracking.running.interrupts import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
 LONGEST_WARNING = 400  # Characters of a warning that are shown at most.
+JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
+
+
+def add_command(app: typer.Typer, name: str, options: type, run: Callable[[Any], CommandResult]) -> None:
+    """Adds the command `name`, which calls `run` with an instance of the dataclass `options`, whose docstring is its help.
+
+    Typer reads a command's options from the signature of its function, here one keyword for every field."""
+
+    def command(**values: Any) -> CommandResult:
+        del values["json"]
+        return run(options(**values))
+
+    types, keyword = get_type_hints(options), inspect.Parameter.KEYWORD_ONLY
+    parameters = [signature_parameter(f, keyword, Annotated[types[f.name], _declared(f)]) for f in fields(options)]
+    parameters.append(inspect.Parameter("json", keyword, default=False, annotation=JSON))
+    made: Any = command
+    made.__signature__, made.__doc__ = inspect.Signature(parameters), options.__doc__
+    made.__annotations__ = {p.name: p.annotation for p in parameters}
+    app.command(name, cls=StrictCommand)(made)
+
+
+def _declared(f: Any) -> Any:
+    m = f.metadata
+    flag = f"--{f.name.replace('_', '-')}" if m["flag"] is None else m["flag"]
+    more = {"metavar": m["metavar"], "help": m["help"], "min": m["low"], "max": m["high"]}
+    return typer.Option(flag, **more) if flag else typer.Argument(**more)
+
+
+class StrictCommand(TyperCommand):
+    """A command that raises InputError for an option given twice, unless it may be, and for numbers in other digits."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parses the words of the command line after the command's name, as Typer does."""
+        given, _, params = self.make_parser(ctx).parse_args(args=list(args))
+        for param, times in Counter(params).items():
+            if times > 1 and param.param_type_name == "option" and not (param.multiple or param.is_eager):
+                name, last = param.opts[0], given[param.name]
+                got = f"it {times} times" + (f", the last time {last}" if isinstance(last, str) else "")
+                raise InputError(place=name, got=got, expected="it once", remedy=f"leave one {name} only")
+        rest = super().parse_args(ctx, args)
+        for param in params:
+            text = given.get(param.name)
+            if isinstance(text, str) and isinstance(ctx.params.get(param.name), int | float):
+                _check_number(param.opts[0], text)
+        return rest
+
+
+def _check_number(option: str, text: str) -> None:
+    from sim.io.files.numeric_text import is_number_text
+
+    if not is_number_text(text):
+        raise InputError(place=option, got=repr(text), expected="a number in digits 0 to 9", remedy="correct it")
 
 
 def run_command(app: typer.Typer, arguments: list[str]) -> int:
@@ -51,7 +105,7 @@ def _run_and_print(app: typer.Typer, arguments: list[str], as_json: bool) -> int
         result = _run_quietly(app, arguments) if as_json else _run(app, arguments)
         return _print(result, as_json) if isinstance(result, CommandResult) else result
     except FlockscopeError as error:
-        if error.__cause__ is not None and os.environ.get(DEBUG):
+        if error.__cause__ is not None and os.environ.get(command_result.DEBUG):
             raise
         return print_error(error, as_json)
 
@@ -81,7 +135,7 @@ def _run(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
     except (Exception, SystemExit, GeneratorExit) as error:
         if _comes_from_interrupt(error):
             raise KeyboardInterrupt from None
-        raise as_flockscope_error(error) from error
+        raise command_result.as_flockscope_error(error) from error
     if result == INTERRUPTED:  # what typer returns for Ctrl-C
         raise KeyboardInterrupt
     return result if isinstance(result, CommandResult) else int(result or 0)
@@ -107,7 +161,7 @@ def _usage(error: Any) -> InputError:
 
 def _print(result: CommandResult, as_json: bool) -> int:
     try:
-        return print_result(result, as_json)
+        return command_result.print_result(result, as_json)
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python tries to write the rest when it exits
         if error.errno == errno.EPIPE:

@@ -2,46 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import pytest
 import typer
 
+from tracking.app.command_line import add_command, run_command
 from tracking.app.command_result import CommandResult
-from tracking.app.command_runner import run_command
-from tracking.app.options_from_dataclass import options_from
+from tracking.keyword_options import option
 
 
 @dataclass(frozen=True, kw_only=True)
 class FruitOptions:
-    """Options of the command below."""
+    """Sell fruit."""
 
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Which fruit.")]
-    colour: Annotated[str | None, typer.Option("--colour", metavar="C", help="Its colour.")] = None
-    out: Annotated[Path, typer.Option("--out", help="Where to.")]
-    count: Annotated[int, typer.Option("--count", min=1, help="How many.")] = 3
-    settings: Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a value.")] = field(
-        default_factory=list
-    )
+    name: str = option("Which fruit.", metavar="NAME", flag="")
+    colour: str | None = option("Its colour.", None, metavar="C")
+    out: Path = option("Where to.")
+    count: int = option("How many.", 3, low=1)
+    settings: list[str] = option("Set a value.", [], flag="--set", metavar="K=V")
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoOptions:
+    """Makes the first command one of two."""
 
 
 @pytest.fixture
 def app() -> typer.Typer:
     made = typer.Typer(rich_markup_mode=None)
-
-    @made.command()
-    @options_from(FruitOptions)
-    def fruit(options: FruitOptions) -> CommandResult:
-        """Sell fruit."""
-        return CommandResult({}, repr(options))
-
-    @made.command()
-    def other() -> CommandResult:
-        """Makes the first command one of two."""
-        return CommandResult({})
-
+    add_command(made, "fruit", FruitOptions, lambda options: CommandResult({}, repr(options)))
+    add_command(made, "other", NoOptions, lambda options: CommandResult({}))
     return made
 
 
