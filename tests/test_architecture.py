@@ -120,7 +120,7 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
     assert names
     hidden = (
         "tracking.scoring",
-        "tracking.running.truth_detections",
+        "tracking.running.detection_mode",
         "tracking.app",
         "sim.truth.label",
         "sim.truth.merge_split_events",

@@ -11,8 +11,7 @@ from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.distributions import FrameModel
 from tracking.papers.joint.tracker import Joint
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
-from tracking.papers.relational.relations import Relational
-from tracking.papers.relational.tracker import Particle
+from tracking.papers.relational.tracker import Particle, Relational
 from tracking.papers.stereo.tracker import Stereo
 
 FPS, FRAMES = 10.0, 45

@@ -34,7 +34,7 @@ JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object instea
 
 
 def add_command(app: typer.Typer, name: str, options: type, run: Callable[[Any], CommandResult]) -> None:
-    """Adds the command `name`, which calls `run` with an instance of the dataclass `options`, whose docstring is its help.
+    """Adds the command `name`, which calls `run` with the dataclass `options`, whose docstring is its help.
 
     Typer reads a command's options from the signature of its function, here one keyword for every field."""
 

@@ -24,8 +24,7 @@ from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
 from sim.types import DetectionMode, Image, Tracker
 from tracking.config import Config
-from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, SourceCache
-from tracking.environment.episode_source import Source, SourceSpec, sources
+from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, Source, SourceCache, SourceSpec, sources
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
 from tracking.keyword_options import documented, from_keywords, option

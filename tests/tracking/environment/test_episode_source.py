@@ -11,7 +11,7 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.dataset.generate import generate
 from sim.sequence import simulate
-from tracking.environment.episode_source import Source, sources
+from tracking.environment.episode_cache import Source, sources
 
 
 def test_a_suite_with_seeds_in_order():

@@ -9,9 +9,9 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Sequence, Tracks
+from tracking.running.detection_mode import from_truth, perfect
 from tracking.running.prepare import prepare
 from tracking.running.run import track
-from tracking.running.truth_detections import from_truth, perfect
 from tracking.scoring import evaluate
 
 

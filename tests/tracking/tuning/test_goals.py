@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.errors import InputError
 from tracking.environment.episodes import Episode
-from tracking.tuning.goals import SPEED, Goal, finite_mean, goals_of
+from tracking.tuning.comparison import SPEED, Goal, finite_mean, goals_of
 
 
 def episode(seconds: float = 1.0, frames: int = 10, **scores: float) -> Episode:

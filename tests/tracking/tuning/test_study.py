@@ -19,9 +19,8 @@ from tests.tuning_toys import toy_plan
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.tuning.journal import LockedJournal, TrialLocks
 from tracking.tuning.sampler import distribution, place_in_search
-from tracking.tuning.study import FINISHED, open_study
+from tracking.tuning.study import FINISHED, LockedJournal, TrialLocks, open_study
 
 
 def test_distributions_are_the_declarations(tmp_path):
@@ -150,7 +149,7 @@ def test_another_file_is_left_as_it_is(tmp_path, content):
 def test_a_lock_lives_as_long_as_its_process(tmp_path):
     path = tmp_path / "locks"
     hold = (
-        "import sys; from pathlib import Path; from tracking.tuning.journal import TrialLocks\n"
+        "import sys; from pathlib import Path; from tracking.tuning.study import TrialLocks\n"
         "locks = TrialLocks(Path(sys.argv[1])); locks.hold_trial(7); print('held', flush=True); sys.stdin.read()"
     )
     other = subprocess.Popen(

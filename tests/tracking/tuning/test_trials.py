@@ -7,8 +7,7 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from tests.tuning_toys import toy_plan
 from tracking.environment.episodes import Episode
-from tracking.tuning.study import open_study
-from tracking.tuning.trials import run_trials
+from tracking.tuning.study import open_study, run_trials
 
 
 class Game:

@@ -67,8 +67,7 @@ def _mean(values: list[float]) -> float:
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments."""
     from sim.io.files.atomic import write_file
-    from tracking.fitting.belief import fit_belief, sample_of
-    from tracking.fitting.belief_scores import belief_scores
+    from tracking.fitting.belief import belief_scores, fit_belief, sample_of
     from tracking.fitting.grouping_scenes import pair_scenes
 
     out = option_parsing.output_file(options.out, ".toml")

@@ -21,8 +21,7 @@ from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
-from tracking.running.run import TrackingRun
-from tracking.running.run_info import input_summary
+from tracking.running.run import TrackingRun, input_summary
 from tracking.running.time_limit import TimeLimited
 
 # What --json repeats of each run.json.

@@ -28,7 +28,7 @@ from tracking.app.replay_page.page_rows import (
     rows_of_truth,
 )
 from tracking.app.replay_page.video import PageVideo
-from tracking.drawing.plan_area import plan_area
+from tracking.drawing.plan_view import plan_area
 from tracking.running.run import grouped
 
 HERE = Path(__file__).parent

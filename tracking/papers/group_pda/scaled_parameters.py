@@ -22,7 +22,7 @@ MISS_PROB = 0.02  # Prior probability of the miss hypothesis (ours).
 # People among a group's points who are another group's, per group size, above which extent and size rest (ours).
 FREEZE_SHARE = 0.1
 LEAST_PEOPLE = 0.25  # From pixels: components with less foreground, in people, are noise (ours).
-COLOUR_BINS = 64  # Bins of a group's colour histogram (tracking.papers.group_pda.colour).
+COLOUR_BINS = 64  # Bins of a group's colour histogram (tracking.papers.group_pda.from_pixels).
 # Slot ASSOCIATION of the kernels' rules by value of the config's `association`.
 ASSOCIATIONS = {
     "pda": kernels.PREFIXES, "nearest": kernels.NEAREST, "all": kernels.ALL, "none": kernels.UNCONSTRAINED

@@ -9,7 +9,7 @@ import pytest
 
 from sim.types import Sequence, Tracks
 from tests.groups_as_wholes import wholes
-from tracking.app.commands.demo_page import WITHOUT_PEOPLE, PixelScene, ResultSection, demo_page
+from tracking.app.commands.demo import WITHOUT_PEOPLE, PixelScene, ResultSection, demo_page
 from tracking.app.commands.score_tables import SequenceScores
 from tracking.scoring import evaluate
 

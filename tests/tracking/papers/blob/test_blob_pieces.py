@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracking.detect import blobs
-from tracking.papers.blob import blob_pieces
+from tracking.papers.blob import update_from_pixels
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -18,7 +18,7 @@ def test_the_union_of_pieces_is_the_blob_of_their_pixels(seed):
         mask[top : top + high, left : left + wide] = True
     pieces = blobs.find(mask, 1)
     assert len(pieces) == 3
-    found, var = blob_pieces.union(pieces.area, pieces.ellipse)
+    found, var = update_from_pixels.union(pieces.area, pieces.ellipse)
     v, u = np.nonzero(mask)
     at = np.stack([u, v], 1) + 0.5
     n, cov = np.array([float(len(at))]), np.cov(at.T, bias=True)[None] + np.eye(2) / 12
@@ -32,5 +32,5 @@ def test_a_piece_belongs_to_the_nearest_track_that_holds_it():
     centre = np.array([[102.0, 90], [300, 120], [200, 100], [101, 100]])
     d2 = np.array([[30.0, 9, 9, 1], [20, 9, 9, 2], [99, 50, 9, 9]])
     free = np.array([True, True, True, False])
-    assert blob_pieces.owners(centre, boxes, d2, free).tolist() == [1, 2, -1, -1]
-    assert blob_pieces.owners(centre, boxes[:0], d2[:0], free).tolist() == [-1] * 4
+    assert update_from_pixels.owners(centre, boxes, d2, free).tolist() == [1, 2, -1, -1]
+    assert update_from_pixels.owners(centre, boxes[:0], d2[:0], free).tolist() == [-1] * 4

@@ -9,7 +9,7 @@ from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context, Frame
 from tests import painted
 from tests.painted import overlap
-from tracking.detect import typical_person
+from tracking.detect import person_size
 from tracking.detect.person_size import PersonSize
 from tracking.papers.blob.tracker import Blob
 
@@ -97,7 +97,7 @@ def test_a_person_half_in_the_colour_of_shadow_is_seen():
 def test_expected_from_above_is_a_turned_ellipse():
     size = PersonSize(Context(FPS, 40.0, camera=camera(40.0), image_size=(WIDE, HIGH)))
     assert size.reliable
-    axes = 40 * np.array([typical_person.SHOULDERS, typical_person.DEPTH])
+    axes = 40 * np.array([person_size.SHOULDERS, person_size.DEPTH])
     assert size.axes(np.zeros((1, 2)))[0] == pytest.approx(axes)
     assert size.at(np.zeros((1, 2)))[0] == pytest.approx(np.full(2, np.sqrt(np.square(axes).mean())))
     for heading in (0.0, 0.8, 1.6):

@@ -20,9 +20,8 @@ from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
-from tracking.papers.group_pda.merging import GroupMerging, merged
+from tracking.papers.group_pda.merging_and_splitting import GroupMerging, merged, split
 from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
-from tracking.papers.group_pda.splitting import split
 
 STATES = ["nothing", "null", "measured"]
 PLAIN = reference.Rules(

@@ -10,7 +10,7 @@ from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint import partition_kernels
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.distributions import FrameModel, stam_cumulated
-from tracking.papers.joint.estimate import binder_partition, groups_of, histogram_partition
+from tracking.papers.joint.report import binder_partition, groups_of, histogram_partition
 
 SCALES = np.array([0.5, 2.0])
 PAIRS = np.array([[0, 0], [0.7, 0], [10, 0], [10.7, 0]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.truth.identity import Identities
-from tracking.papers.joint.reported_events import ReportedEvents
+from tracking.papers.joint.report import ReportedEvents
 
 FPS = 10.0
 

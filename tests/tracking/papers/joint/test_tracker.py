@@ -9,7 +9,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
 from tracking.papers.joint.config import LARGEST_DISTANCE, JointConfig
-from tracking.papers.joint.individuals import process_noise
+from tracking.papers.joint.distributions import process_noise
 from tracking.papers.joint.partition_kernels import canonical, pair_sums
 from tracking.papers.joint.people import People
 from tracking.papers.joint.tracker import Joint

@@ -8,7 +8,7 @@ import pytest
 from sim.types import Context, Detections, Frame
 from tests.reference_relational import drawn
 from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
-from tracking.papers.relational.relations import Relational
+from tracking.papers.relational.tracker import Relational
 
 
 def two(count):

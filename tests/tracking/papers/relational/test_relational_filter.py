@@ -14,14 +14,12 @@ from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
 from tests.reference_relational import drawn, relate, relations
 from tracking.filters.person_streams import birth_keys
-from tracking.grouping.belief import UNSEEN, default_belief
+from tracking.grouping.belief import UNSEEN, default_belief, pair_probabilities
 from tracking.grouping.pair_evidence import frames_per_step
-from tracking.grouping.pair_probabilities import pair_probabilities
 from tracking.papers.relational import association_sums_kernels, sensor, sensor_kernels, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.relations import Relational
-from tracking.papers.relational.tracker import Particle
+from tracking.papers.relational.tracker import Particle, Relational
 from tracking.running.prepare import prepare
 
 ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])

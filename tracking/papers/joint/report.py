@@ -2,6 +2,10 @@
 
 A merge or split is reported when the partition changes. Its start is the frame in which the parts came together, or
 parted, in the past that is known then.
+
+The state estimate (sec. 4): means of the individuals, and one partition for all particles.
+
+Group ids of a tracker that finds groups of people itself, frame by frame, by the identity rule of the truth.
 """
 
 from __future__ import annotations
@@ -12,11 +16,60 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.truth.identity import GroupChange, Members
+from sim.truth.identity import GroupChange, Identities, Members
 from sim.truth.merge_split_rules import frames_of
-from sim.types import Array, GroupEvent, Ints
+from sim.types import Array, Bools, GroupEvent, Groups, Ints
 from tracking.grouping.group_labels import part_sets
 from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, event_of_change
+from tracking.papers.joint import partition_kernels
+
+
+def moments(state: Array, weights: Array) -> tuple[Array, Array]:
+    """Returns means (K, 4) and covariances (K, 4, 4) of states (N_x, K, 4); weights (N_x, K): sum 1 for each person."""
+    mean = np.einsum("ik,ikd->kd", weights, state)
+    away = state - mean
+    return mean, np.einsum("ik,ikd,ike->kde", weights, away, away)
+
+
+def kept_while_missed(now: Array, id: Ints, seen: Bools, before: Array, before_id: Ints) -> Array:
+    """Returns the probability that each pair is in one group, (K, K), which stays while one of the two is not measured
+    (ours)."""
+    out = now.copy()
+    _, new, old = np.intersect1d(id, before_id, assume_unique=True, return_indices=True)
+    rows, both = np.ix_(new, new), seen[new][:, None] & seen[new]
+    out[rows] = np.where(both, now[rows], before[np.ix_(old, old)])
+    return out
+
+
+def binder_partition(together: Array, label: Ints, before: Ints) -> list[Ints]:
+    """Returns the groups of two or more people, as arrays of rows: the partition of least expected Binder loss
+    (ours)."""
+    gain = together - 0.5
+    sampled = np.empty(len(together), np.int64)
+    partition_kernels.best_sampled(gain, label, sampled)
+    starts = [sampled, _numbered(before)]
+    gains = [partition_kernels.binder_moves(gain, start) for start in starts]
+    return groups_of(starts[int(np.argmax(gains))])
+
+
+def histogram_partition(label: Ints, weights: Array) -> list[Ints]:
+    """Returns the groups of two or more people by the histogram of Fig. 3: each person has the label of most weight."""
+    votes = np.empty((label.shape[2], label.shape[2]))
+    partition_kernels.head_votes(label, weights, votes)
+    return groups_of(votes.argmax(axis=1))
+
+
+def groups_of(label: Ints) -> list[Ints]:
+    """Returns the rows of each label (K,) that two or more people carry."""
+    found = (np.flatnonzero(label == g) for g in np.unique(label))
+    return [rows for rows in found if len(rows) > 1]
+
+
+def _numbered(group: Ints) -> Ints:
+    alone = group < 0
+    named = np.where(alone, group.max(initial=0) + 1 + np.arange(len(group)), group)
+    return np.asarray(np.unique(named, return_inverse=True)[1] + 1)
+
 
 # Kinds of events that the tracker reports itself.
 OWN_EVENTS = ("merge", "split", "form", "dissolve", "enter", "leave")
@@ -74,3 +127,14 @@ class ReportedEvents:
         chord, vel = frames_of(CHORD, self.fps), np.full_like(pos, np.nan)
         vel[chord:] = (pos[chord:] - pos[:-chord]) * self.fps / chord
         return ids, TrackedMotion(pos, vel, self.fps)
+
+
+def known_groups(identities: Identities, ids: Ints) -> Ints:
+    """Returns the id of each person's group, (N,), as `identities` has it, -1 for a person alone; ids (N,)."""
+    group_of = {person: group for group, people in identities.groups.items() for person in people}
+    return np.array([group_of.get(person, -1) for person in ids.tolist()], np.int64)
+
+
+def no_groups(group: Ints) -> Groups | None:
+    """Returns empty Groups if nobody is in a group, which says so; else None: hulls are derived from the group ids."""
+    return Groups.none() if (group < 0).all() else None
