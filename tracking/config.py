@@ -97,12 +97,7 @@ class ParamUse(TypedDict, total=False):
 
 
 def param(
-    default: Value,
-    values: tuple[Any, ...],
-    unit: str,
-    meaning: str,
-    scale: Scale = "linear",
-    **use: Unpack[ParamUse],
+    default: Value, values: tuple[Any, ...], unit: str, meaning: str, scale: Scale = "linear", **use: Unpack[ParamUse]
 ) -> Any:
     """Declares a parameter as a field of a config.
 

@@ -18,13 +18,7 @@ from numpy.typing import NDArray
 
 from sim.types import Array, Bools, Image
 from tracking.detect.blobs_kernels import runs
-from tracking.detect.subtraction_stereo_kernels import (
-    STEPS,
-    block_match,
-    filtered_pair,
-    left_right,
-    reach,
-)
+from tracking.detect.subtraction_stereo_kernels import STEPS, block_match, filtered_pair, left_right, reach
 
 MULTIPLE = 16  # Numbers of disparities are multiples of it, as those of OpenCV's matcher.
 LEAST_BLOCK = 5  # px: least width of the compared block that OpenCV allows.

@@ -8,16 +8,7 @@ import cv2
 import numpy as np
 
 from sim.types import Array, GroupEvent, Image
-from tracking.drawing.canvas import (
-    FLOOR,
-    INK,
-    TRAIL_SECONDS,
-    Canvas,
-    Colour,
-    ascii_only,
-    box_corners,
-    colour,
-)
+from tracking.drawing.canvas import FLOOR, INK, TRAIL_SECONDS, Canvas, Colour, ascii_only, box_corners, colour
 from tracking.drawing.layers import GroupMark, Layer
 
 CAPTION_SECONDS = 2.5  # s for which an event's caption is shown.

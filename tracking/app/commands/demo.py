@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -31,28 +32,6 @@ from tracking.running import tracker_registry
 from tracking.running.run import TrackingRun
 from tracking.scoring.catalogue import CATALOGUE
 
-STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 76rem; padding: 0 1rem; color: #1b1f24 }
-table { border-collapse: collapse; margin: 0 0 2rem } th, td { padding: .25rem .8rem; text-align: right }
-th:first-child, td:first-child { text-align: left; white-space: nowrap } td small { white-space: nowrap }
-th[title] { text-decoration: underline dotted #8a8f98; cursor: help } thead th { border-bottom: 2px solid #1b1f24 }
-tfoot td { border-top: 1px solid #8a8f98; font-weight: 600 }
-small { color: #57606a; font-weight: 400 }
-.films { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); gap: 1rem }
-.wide { overflow-x: auto } figure { margin: 0 0 1rem; max-width: 640px } figcaption { color: #57606a; font-size: .9em }
-summary { cursor: pointer; font-weight: 600; padding: .3rem 0 }
-video { display: block; width: 100%; border-radius: 8px }
-"""
-INTRO = """<h1>flockscope demo</h1>
-<p>Scenes in which groups merge, split, cross and queue were simulated, tracked and scored. Trackers that got the same
-input are ranked. Trackers that share a rank have no sure difference; the oracle is the best that the input allows
-without smoothing. Point at a heading to read what it means; ↓ marks scores where lower is better. A dash means that
-there is nothing to score, for example people where a tracker reports only groups.</p>
-"""
-FROM_PIXELS = """<h2>One scene, from its pictures</h2>
-<p>The same {frames} frames were tracked by background subtraction. The videos show trails, groups, events; thin white
-boxes are the truth. Each name opens a replay: the tracks beside the truth, with a timeline of events.</p>
-"""
 EXTREMES = """<p>Best and worst scene of <code>{run}</code>: <a href="{best}">{best_name}</a> ({key} {most}) and
 <a href="{worst}">{worst_name}</a> ({least}).</p>
 """
@@ -103,12 +82,14 @@ class RankingTable:
 
 def demo_page(root: Path, scene: PixelScene, tables: list[RankingTable], sections: list[ResultSection]) -> str:
     """Returns the page as HTML: rankings, videos and scores of the scene with pictures, then, folded, each section."""
-    generator = f'<meta charset="utf-8"><meta name="generator" content="{GENERATOR}">'
-    head = f'<!doctype html><html lang="en">{generator}<title>flockscope demo</title><style>{STYLE}</style>'
-    first = "\n".join(_ranking(table, sections, root) for table in tables)
-    pixels = FROM_PIXELS.format(frames=scene.frames) + _videos(root, scene) + _score_table(scene.section, root)
-    rest = "\n".join(_section_html(section, root) for section in sections)
-    return f"{head}{INTRO}{first}{pixels}<h2>Every scene</h2>{rest}</html>\n"
+    parts = {
+        "GENERATOR": GENERATOR, "FRAMES": str(scene.frames),
+        "RANKINGS": "\n".join(_ranking(table, sections, root) for table in tables),
+        "PIXELS": _videos(root, scene) + _score_table(scene.section, root),
+        "SECTIONS": "\n".join(_section_html(section, root) for section in sections),
+    }  # fmt: skip
+    page = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
+    return re.sub("@@([A-Z]+)@@", lambda found: parts[found[1]], page)
 
 
 def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> str:

@@ -17,14 +17,7 @@ from sim.io.pictures.video_encoding import write_video
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even_size, refuse_source
 from tracking.drawing.canvas import Canvas
-from tracking.drawing.layer_painting import (
-    LayerStyle,
-    draw_banner,
-    draw_captions,
-    draw_label,
-    letter_size,
-    paint_layer,
-)
+from tracking.drawing.layer_painting import LayerStyle, draw_banner, draw_captions, draw_label, letter_size, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.running.run import grouped
 

@@ -18,15 +18,7 @@ import numpy as np
 
 from sim.io.files.atomic import write_file
 from sim.types import Array, Camera, Scene, Sequence, Tracks, Truth
-from tracking.app.replay_page.page_rows import (
-    SCALE,
-    Json,
-    PageRows,
-    deltas,
-    encode_rows,
-    rows_of_tracks,
-    rows_of_truth,
-)
+from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
 from tracking.app.replay_page.video import PageVideo
 from tracking.drawing.plan_view import plan_area
 from tracking.running.run import grouped

@@ -107,29 +107,15 @@ class RelationalConfig(ParticleConfig):
 
     tracker: ClassVar[str] = "relational"
 
-    coupling_time: float = param(
-        0.15,
-        (0.0, 10.0),
-        "s",
-        "time in which people who walk together approach their mean velocity (ours); 0: they have it (sec. 3.2)",
-    )
-    common_noise: float = param(
-        0.8,
-        (0.0, 1.0),
-        "share",
-        "of the velocity noise's variance, common to people who walk together (ours); 0: none (sec. 3.2)",
-    )
-    relation_evidence: str = param(
-        "belief",
-        ("belief", "state"),
-        "",
-        "who walks together in the long run, by the belief or the particle's state (ours)",
-        "categorical",
-        online=False,
-    )
-    relation_rate: float = param(
-        1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
-    )
+    # fmt: off
+    coupling_time: float = param(0.15, (0.0, 10.0), "s",
+        "time in which people who walk together approach their mean velocity (ours); 0: they have it (sec. 3.2)")
+    common_noise: float = param(0.8, (0.0, 1.0), "share",
+        "of the velocity noise's variance, common to people who walk together (ours); 0: none (sec. 3.2)")
+    relation_evidence: str = param("belief", ("belief", "state"), "",
+        "who walks together in the long run, by the belief or the particle's state (ours)", "categorical", online=False)
+    relation_rate: float = param(1.6, (0.01, 20.0), "1/s",
+        "rate at which the relation of a pair approaches its equilibrium (ours)", "log")
     relation_bias: float = param(5.9, (-40.0, 40.0), "", "log odds of walking together at the same place (ours)")
     relation_distance: float = param(3.3, (0.0, 40.0), "1/m", "loss of log odds per metre of distance (ours)")
     relation_velocity: float = param(5.9, (0.0, 40.0), "s/m", "loss of log odds per m/s of velocity difference (ours)")
