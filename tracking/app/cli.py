@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[Any, str]] = {
     "track": (options.TrackOptions, "track:track"),
     "group": (options.GroupOptions, "group:group"),
     "score": (options.ScoreOptions, "score:score"),
+    "errors": (options.ErrorsOptions, "errors:errors"),
     "tune": (CommandLine, "tune:tune"),
     "replay": (options.ReplayCommandOptions, "datasets:replay"),
     "fit sensor": (options.FitSensorOptions, "fit:fit_sensor"),

@@ -144,6 +144,22 @@ class ScoreOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ErrorsOptions:
+    """List what went wrong in a run: each error with its frames, people, cause and cost, and a sum by cause."""
+
+    truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
+    tracks: Path = ARGUMENT("Output of `track`, or MOT text.", metavar="TRACKS")
+    limit: int = option("Number of errors to show, the dearest first; --json has all.", 20, low=0, metavar="N")
+    similarity: Literal["boxes", "ground", "image"] | None = option(
+        "How true and tracked people are compared. Default: by the data.", None)
+    fps: float | None = FPS()
+    px_per_m: float | None = SCALE()
+    person_class: int | None = PERSON_CLASS()
+    box_scale: str | None = BOX_SCALE()
+    workers: int = PROCESSES()
+
+
+@dataclass(frozen=True, kw_only=True)
 class ReplayCommandOptions:
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
