@@ -16,7 +16,7 @@ one that begins with a true split likewise. A *false group* has no true group in
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,7 +38,8 @@ class GroupError:
     group: int | None  # id of the true group, None for a false one
     people: tuple[int, ...]  # ids of its people; of a false group, of the true people in it
     others: tuple[int, ...]  # ids of further true people in the estimated groups
-    rows: tuple[int, ...]  # tracked rows whose group is wrong: they belong together, or of a false group to none
+    rows: tuple[int, ...]  # tracked rows that belong together; () for a false group
+    alone: tuple[int, ...]  # tracked rows in the estimated groups that belong to no group
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,16 +119,15 @@ def _errors_of_groups(of: Memberships, ids: Ints) -> Iterator[GroupError]:
                 continue
             members = [row for frame in frames for row in of.true[frame][g]]
             rows = [j for j in of.track[members].tolist() if j >= 0]
-            people = set(ids[members].tolist())
-            yield GroupError(
-                kind,
-                frames[0],
-                frames[-1],
-                g,
-                tuple(sorted(people)),
-                _others(of, frames, rows, ids, people),
-                tuple(rows),
-            )
+            others, alone = _others(of, frames, set(rows))
+            people = _ids(of, rows, ids)
+            beside = tuple(id for id in _ids(of, others, ids) if id not in people)
+            yield GroupError(kind, frames[0], frames[-1], g, people, beside, tuple(rows), tuple(alone))
+
+
+def _ids(of: Memberships, rows: Iterable[int], ids: Ints) -> tuple[int, ...]:
+    """Returns the ids of the true people of some tracked rows."""
+    return tuple(sorted({int(ids[of.person[j]]) for j in rows if of.person[j] >= 0}))
 
 
 def _stretches(over_time: list[tuple[int, str]]) -> Iterator[tuple[str, list[int]]]:
@@ -139,27 +139,34 @@ def _stretches(over_time: list[tuple[int, str]]) -> Iterator[tuple[str, list[int
             frames = []
 
 
-def _others(of: Memberships, frames: list[int], rows: list[int], ids: Ints, people: set[int]) -> tuple[int, ...]:
-    mine, found = set(rows), set()
+def _others(of: Memberships, frames: list[int], mine: set[int]) -> tuple[list[int], list[int]]:
+    """Returns the tracked rows of others in estimated groups with some of `mine`; and those that belong to no group."""
+    others, alone = [], []
     for frame in frames:
-        for members in of.est.get(frame, {}).values():
-            if mine.intersection(members):
-                found.update(ids[of.person[j]] for j in members if of.person[j] >= 0)
-    return tuple(sorted(int(id) for id in found - people))
+        grouped = _grouped(of, frame)
+        for rows in of.est.get(frame, {}).values():
+            if mine.intersection(rows):
+                others += [j for j in rows if j not in mine]
+                alone += [j for j in rows if j not in grouped]
+    return others, alone
+
+
+def _grouped(of: Memberships, frame: int) -> set[int]:
+    """Returns the tracked rows of a frame whose people are in a true group."""
+    return {j for rows in of.true.get(frame, {}).values() for j in of.track[rows].tolist()}
 
 
 def _false_groups(of: Memberships, ids: Ints) -> Iterator[GroupError]:
     over_time: dict[int, list[tuple[int, str]]] = {}
     for frame, groups in of.est.items():
-        grouped = {j for rows in of.true.get(frame, {}).values() for j in of.track[rows].tolist()}
+        grouped = _grouped(of, frame)
         for e, rows in groups.items():
             if not grouped.intersection(rows):
                 over_time.setdefault(e, []).append((frame, "false group"))
     for e, frames_of in over_time.items():
         for kind, frames in _stretches(frames_of):
             rows = [j for frame in frames for j in of.est[frame][e]]
-            people = sorted({int(ids[of.person[j]]) for j in rows if of.person[j] >= 0})
-            yield GroupError(kind, frames[0], frames[-1], None, tuple(people), (), tuple(rows))
+            yield GroupError(kind, frames[0], frames[-1], None, _ids(of, rows, ids), (), (), tuple(rows))
 
 
 def _named(error: GroupError, of: Memberships, events: Sequence[GroupEvent], reach: float) -> GroupError:

@@ -64,6 +64,7 @@ def scores(
     group = run.group.copy()
     for error in errors:
         if isinstance(error, GroupError):
+            group[list(error.alone)] = ALONE
             group[list(error.rows)] = ALONE if error.group is None else _fresh(run.group) + error.group
     true, est = run.matched.pairs.true, run.matched.pairs.est
     rows = np.array(list(new), np.int64)
