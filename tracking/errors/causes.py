@@ -13,7 +13,7 @@ A cause is a fact of the truth, not a proof. The first that holds is named:
     clutter     any other ghost
     apart       people of one group are more than 2 m apart
     beside      strangers walk within 1.5 m of the group
-    none        none of these: the tracker alone
+    tracker     none of these: the tracker alone
 """
 
 from __future__ import annotations
@@ -96,13 +96,13 @@ def cause_of_person(error: PersonError, of: Facts) -> Cause:
         if of.detected is not None and 2 * (unseen := ~of.detected[gap]).sum() >= len(gap):
             return Cause("undetected", f"not detected for {unseen.sum() / of.fps:.1f} s")
     if error.kind == "late" and frames < CONFIRMED:
-        return Cause("none")
+        return Cause("tracker")
     around = _around(error, of)
     near = _nearest(around, of)
     if near is not None and near[0] < NEAR:
         return Cause("near", f"{near[0]:.2f} m from person {near[1]}")
     turn = _turn(around, of)
-    return Cause("turned", f"turned by {np.rad2deg(turn):.0f}°") if turn > TURN else Cause("none")
+    return Cause("turned", f"turned by {np.rad2deg(turn):.0f}°") if turn > TURN else Cause("tracker")
 
 
 def _around(error: PersonError, of: Facts) -> Ints:
@@ -186,7 +186,7 @@ def cause_of_group(error: GroupError, of: Facts) -> Cause:
     frame = (error.start + error.end) // 2
     rows = np.array([row for id in error.people if (row := of.row(frame, id)) != NOBODY], np.int64)
     if len(rows) < 2:
-        return Cause("none")
+        return Cause("tracker")
     gaps = np.hypot(*(of.pos[rows][:, None] - of.pos[rows][None]).transpose(2, 0, 1)) / of.metre
     np.fill_diagonal(gaps, np.inf)
     if error.group is not None and gaps.min(axis=1).max() > APART:
@@ -198,4 +198,4 @@ def cause_of_group(error: GroupError, of: Facts) -> Cause:
             return Cause("beside", f"{d:.1f} m from others")
     if error.group is None and gaps.min() < BESIDE:
         return Cause("beside", f"{gaps.min():.1f} m apart")
-    return Cause("none")
+    return Cause("tracker")

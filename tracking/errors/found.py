@@ -12,13 +12,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim.types import Array, Bools, Sequence, Tracks
+from sim.types import Array, Bools, Ints, Sequence, Tracks
 from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group, cause_of_person, facts
 from tracking.errors.groups import GroupError, group_errors
 from tracking.errors.people import PersonError, matched_people, person_errors
 from tracking.errors.repairs import ComparedRun, scores
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.evaluation import MatchedSides, Scorer
+from tracking.scoring.people_and_groups import Surface
 from tracking.scoring.people_comparison import Similarity
 from tracking.scoring.position_errors import REACH
 from tracking.scoring.rows import FrameRows, find_rows
@@ -105,7 +106,7 @@ def _prepared(compared: MatchedSides, seen: MatchedSides | None) -> tuple[Compar
     sides, pairs = compared.sides, compared.people
     assert pairs is not None, "a tracker of whole groups reports no people"
     boxes = compared.similarity == "boxes"
-    surface = "ground" if compared.similarity == "ground" else "image"
+    surface: Surface = "ground" if compared.similarity == "ground" else "image"
     true_pos, pos = sides.true.positions_on(surface, "ground"), sides.est.positions_on(surface, sides.plane)
     assert true_pos is not None
     assert pos is not None
@@ -131,7 +132,7 @@ def _prepared(compared: MatchedSides, seen: MatchedSides | None) -> tuple[Compar
     return run, facts(sides.truth, kept, true_pos, metre, detected), pos
 
 
-def _groups(tracks: SequenceOf[Tracks], rows: FrameRows) -> Array:
+def _groups(tracks: SequenceOf[Tracks], rows: FrameRows) -> Ints:
     """Returns the group of each tracked row, (S,), by the members that groups name."""
     group = np.full(len(rows), -1, np.int64)
     for t in tracks:

@@ -3,14 +3,15 @@
 A true group is found in a frame if an estimated group has more than half of the people of both (group_F1). A group
 that is not found is in one of these states; a stretch of frames in one state is an error:
 
-    unseen     too few members are tracked: errors of people, not of the group
-    missed     its tracked members are in no group
-    divided    its tracked members are in several groups, or some of them in none
-    engulfed   most of it is in one group with most of another true group
-    strangers  most of it is in one group with too many others
+    unseen            too few members are tracked: errors of people, not of the group
+    missed group      its tracked members are in no group
+    divided group     its tracked members are in several groups, or some of them in none
+    engulfed group    most of it is in one group with most of another true group
+    strangers joined  most of it is in one group with too many others
 
 A stretch that begins with a true merge is a *late merge*, or a *missed merge* if the group is not found before it ends;
-one that begins with a true split likewise. A *false group* has no true group in part or whole.
+one that begins with a true split likewise. A missed group that begins with the group itself and is found later is a
+*late group*. A *false group* has no true group in part or whole.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from sim.types import Bools, GroupEvent, Ints
 AT_THE_EVENT = 1.0  # s: a stretch that begins so soon after an event belongs to it
 JOINS, PARTS = ("merge", "form"), ("split", "dissolve")
 ALONE = -1
+MISSED, DIVIDED, ENGULFED, STRANGERS = "missed group", "divided group", "engulfed group", "strangers joined"
 
 
 @dataclass(frozen=True)
@@ -93,12 +95,12 @@ def states(of: Memberships, frame: int) -> Iterator[tuple[int, str]]:
         elif 2 * seen <= len(rows):
             yield g, "unseen"
         elif not common:
-            yield g, "missed"
+            yield g, MISSED
         elif 2 * common <= len(rows):
-            yield g, "divided"
+            yield g, DIVIDED
         else:
             most = (h for h, counts in inside.items() if h != g and 2 * counts[e] > len(true[h]))
-            yield g, "strangers" if next(most, None) is None else "engulfed"
+            yield g, STRANGERS if next(most, None) is None else ENGULFED
 
 
 def group_errors(of: Memberships, ids: Ints, events: Sequence[GroupEvent], fps: float) -> list[GroupError]:
@@ -177,15 +179,17 @@ def _named(error: GroupError, of: Memberships, events: Sequence[GroupEvent], rea
         ours = error.group in (*event.before, *event.after) or set(error.people) & set(event.members)
         if not ours or not event.start - 1 <= error.start <= event.start + reach:
             continue
-        if event.kind in JOINS and error.kind in ("missed", "divided"):
+        if event.kind in JOINS and error.kind in (MISSED, DIVIDED):
             return replace(error, kind=f"{_when(error, of)} merge")
-        if event.kind in PARTS and error.kind in ("engulfed", "strangers"):
+        if event.kind in PARTS and error.kind in (ENGULFED, STRANGERS):
             return replace(error, kind=f"{_when(error, of)} split")
-    return error
+    first = min(frame for frame in of.true if error.group in of.true[frame])
+    late = error.kind == MISSED and error.start == first and _when(error, of) == "late"
+    return replace(error, kind="late group") if late else error
 
 
 def _when(error: GroupError, of: Memberships) -> str:
     """Returns "late" if the group is found after the error, else "missed"."""
     later = (frame for frame in of.frames if frame > error.end and error.group in of.true.get(frame, {}))
-    found = any((error.group, "found") in states(of, frame) for frame in later)
+    found = any(state == "found" for frame in later for g, state in states(of, frame) if g == error.group)
     return "late" if found else "missed"

@@ -91,9 +91,9 @@ FAULTS = {
     "switch after a gap": (lambda t, k: lost(renamed(t, 5, 50, k), 5, k - 5, k - 1), [("switch", -5, 0)]),
     "swap": (swapped, [("switch", 0, 0), ("switch", 0, 0)]),
     "ghost": (lambda t, k: with_ghost(t, k, k + 5), [("ghost", 0, 5)]),
-    "missed group": (lambda t, k: regrouped(t, [1, 2], -1, k, k + 9), [("missed", 0, 9)]),
-    "engulfed group": (lambda t, k: regrouped(t, [1, 2, 3, 4], 7, k, k + 9), [("engulfed", 0, 9)] * 2),
-    "strangers": (lambda t, k: regrouped(t, [1, 2, 5, 6], 7, k, k + 9), [("strangers", 0, 9)]),
+    "missed group": (lambda t, k: regrouped(t, [1, 2], -1, k, k + 9), [("missed group", 0, 9)]),
+    "engulfed group": (lambda t, k: regrouped(t, [1, 2, 3, 4], 7, k, k + 9), [("engulfed group", 0, 9)] * 2),
+    "strangers": (lambda t, k: regrouped(t, [1, 2, 5, 6], 7, k, k + 9), [("strangers joined", 0, 9)]),
 }  # fmt: skip
 
 
@@ -169,7 +169,7 @@ def test_merges_and_splits(start: int, end: int, groups: dict[int, list[int]], k
     [
         ("hidden", {"visibility": 0.1}),
         ("edge", {"truncation": 0.6}),
-        ("none", {}),
+        ("tracker", {}),
     ],
 )
 def test_causes_of_a_gap(cause: str, changes: dict[str, float]) -> None:
