@@ -25,6 +25,7 @@ COMMANDS: dict[str, tuple[Any, str]] = {
     "group": (options.GroupOptions, "group:group"),
     "score": (options.ScoreOptions, "score:score"),
     "errors": (options.ErrorsOptions, "errors:errors"),
+    "compare": (options.CompareOptions, "compare:compare"),
     "tune": (CommandLine, "tune:tune"),
     "replay": (options.ReplayCommandOptions, "datasets:replay"),
     "fit sensor": (options.FitSensorOptions, "fit:fit_sensor"),

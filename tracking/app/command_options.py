@@ -160,6 +160,18 @@ class ErrorsOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CompareOptions:
+    """Compare stored scores with those of a baseline. Exit code 1 if a score is surely worse."""
+
+    baseline: Path = ARGUMENT("Scores of `score --json`, or of --save.", metavar="BASELINE.json")
+    now: Path = ARGUMENT("Scores of the same sequences.", metavar="NOW.json")
+    by: list[str] = option(
+        "Score to compare; can be given several times. Default: objective.", [], metavar="SCORE", flag="--by")
+    tolerance: float = option("Difference that does not matter.", 0.01, low=0.0)
+    save: Path | None = option("Write the compared scores of NOW, as the next baseline.", None, metavar="FILE.json")
+
+
+@dataclass(frozen=True, kw_only=True)
 class ReplayCommandOptions:
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
