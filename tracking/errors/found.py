@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group,
 from tracking.errors.groups import GroupError, group_errors
 from tracking.errors.people import PersonError, matched_people, person_errors
 from tracking.errors.repairs import ComparedRun, scores
+from tracking.oracle import oracle
+from tracking.running.run import TrackingRun
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.evaluation import MatchedSides, Scorer
 from tracking.scoring.people_and_groups import Surface
@@ -31,7 +34,36 @@ class FoundError:
 
     error: PersonError | GroupError
     cause: Cause
-    cost: float  # what its repair alone adds: HOTA, or group_F1 of errors of groups
+    cost: float | None  # what its repair alone adds: HOTA, or group_F1 of errors of groups; None: not asked for
+
+    @property
+    def who(self) -> str:
+        """The people and tracks concerned, in words."""
+        error = self.error
+        if isinstance(error, GroupError):
+            others = f" with {' '.join(map(str, error.others))}" if error.others else ""
+            return f"people {' '.join(map(str, error.people))}{others}"
+        if error.person is None:
+            return f"track {error.after}"
+        ids = " → ".join(str(id) for id in dict.fromkeys((error.before, error.after)) if id is not None)
+        return f"person {error.person}" + (f", track {ids}" if ids else "")
+
+    def facts(self, fps: float) -> dict[str, Any]:
+        """Returns the error as values for JSON: frames from 1, seconds, ids, cause and words."""
+        error = self.error
+        who: dict[str, Any] = (
+            {"of": "groups", "people": list(error.people), "others": list(error.others), "before": None, "after": None}
+            if isinstance(error, GroupError)
+            else {
+                "of": "people", "people": [] if error.person is None else [error.person], "others": [],
+                "before": error.before, "after": error.after,
+            }
+        )  # fmt: skip
+        return {
+            "kind": error.kind, "start": error.start, "end": error.end,
+            "seconds": (error.end - error.start + 1) / fps, "who": self.who, **who,
+            "cause": self.cause.name, "detail": self.cause.text, "cost": self.cost,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -55,11 +87,24 @@ class RunErrors:
     left: dict[str, float] = field(default_factory=dict)  # what is missing after all repairs
 
 
+def errors_of_run(
+    sequence: Sequence, run: TrackingRun, similarity: Similarity | None = None, costs: bool = True
+) -> RunErrors | None:
+    """Returns the errors of a run, by the input that it names; None without truth, or of a tracker of whole groups."""
+    if sequence.truth is None or any(t.unit == "group" for t in run):
+        return None
+    seen = oracle(sequence, run.info, similarity) if run.info.get("detections") is not None else None
+    return find_errors(sequence, run, seen, similarity, costs)
+
+
 def find_errors(
     sequence: Sequence, tracks: SequenceOf[Tracks], seen: SequenceOf[Tracks] | None = None,
-    similarity: Similarity | None = None,
+    similarity: Similarity | None = None, costs: bool = True,
 ) -> RunErrors:  # fmt: skip
-    """Returns the errors of a run of people; seen: tracks of true ids that show which people were detected."""
+    """Returns the errors of a run of people; seen: tracks of true ids that show which people were detected.
+
+    Without costs, the costs and gains are not known, which is much quicker.
+    """
     assert sequence.truth is not None, "errors need a truth"
     scorer = Scorer(sequence.truth)
     given = [tracks] if seen is None else [tracks, seen]
@@ -73,10 +118,10 @@ def find_errors(
     ]
     every: list[PersonError | GroupError] = [*people, *groups]
     whole = scores(run)
-    found = [FoundError(e, cause, _cost(run, e, whole)) for e, cause in zip(every, causes, strict=True)]
+    worth = [_cost(run, error, whole) if costs else None for error in every]
+    found = [FoundError(*one) for one in zip(every, causes, worth, strict=True)]
     found.sort(key=lambda one: (one.error.start, one.error.end))
-    rows, left = _by_cause(run, found, whole, of.fps)
-    return RunErrors(found, whole, rows, left)
+    return RunErrors(found, whole, *(_by_cause(run, found, whole, of.fps) if costs else ([], {})))
 
 
 def _cost(run: ComparedRun, error: PersonError | GroupError, whole: dict[str, float]) -> float:
@@ -90,7 +135,7 @@ def _by_cause(
     parts: dict[tuple[str, str], list[FoundError]] = {}
     for one in found:
         parts.setdefault((one.error.kind, one.cause.name), []).append(one)
-    order = sorted(parts, key=lambda key: -sum(one.cost for one in parts[key]))
+    order = sorted(parts, key=lambda key: -sum(one.cost or 0.0 for one in parts[key]))
     rows, repaired, last = [], [], whole
     for key in order:
         repaired += [one.error for one in parts[key]]

@@ -184,7 +184,7 @@ def _named(error: GroupError, of: Memberships, events: Sequence[GroupEvent], rea
         if event.kind in PARTS and error.kind in (ENGULFED, STRANGERS):
             return replace(error, kind=f"{_when(error, of)} split")
     first = min(frame for frame in of.true if error.group in of.true[frame])
-    late = error.kind == MISSED and error.start == first and _when(error, of) == "late"
+    late = error.kind == MISSED and error.start <= first + reach and _when(error, of) == "late"
     return replace(error, kind="late group") if late else error
 
 

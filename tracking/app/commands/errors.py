@@ -15,10 +15,8 @@ from tracking.app.commands.score_tables import empty_table, with_title
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
-from tracking.errors.found import FoundError, RunErrors, find_errors
-from tracking.errors.groups import GroupError
+from tracking.errors.found import RunErrors, errors_of_run
 from tracking.errors.repairs import SHOWN
-from tracking.oracle import oracle
 
 Job = tuple[StoredTracks, Any, Any]  # stored tracks, similarity, factor of boxes of texts
 
@@ -45,7 +43,7 @@ def errors(options: ErrorsOptions) -> CommandResult:
                 "name": name,
                 "scores": one.scores,
                 "left": one.left,
-                "errors": [_row(error, rate) for error in one.errors],
+                "errors": [error.facts(rate) for error in one.errors],
             }
             for name, rate, one in zip(names, fps, found, strict=True)
         ],
@@ -68,22 +66,9 @@ def errors_of(sequence: Sequence, job: Job) -> RunErrors:
             file=stored.path, got="a tracker of whole groups", expected="tracks of people",
             remedy="score it with `flockscope score`",
         )  # fmt: skip
-    known = run.info.get("detections") is not None
-    return find_errors(sequence, run, oracle(sequence, run.info, similarity) if known else None, similarity)
-
-
-def _row(found: FoundError, fps: float) -> dict[str, Any]:
-    error = found.error
-    whole = isinstance(error, GroupError)
-    people = list(error.people) if isinstance(error, GroupError) else [error.person] if error.person is not None else []
-    return {
-        "kind": error.kind, "of": "groups" if whole else "people", "start": error.start, "end": error.end,
-        "seconds": (error.end - error.start + 1) / fps, "people": people,
-        "others": list(error.others) if isinstance(error, GroupError) else [],
-        "before": None if isinstance(error, GroupError) else error.before,
-        "after": None if isinstance(error, GroupError) else error.after,
-        "cause": found.cause.name, "detail": found.cause.text, "cost": found.cost,
-    }  # fmt: skip
+    found = errors_of_run(sequence, run, similarity)
+    assert found is not None, "labels and people are there"
+    return found
 
 
 def _causes(found: SequenceOf[RunErrors]) -> list[dict[str, Any]]:
@@ -116,28 +101,19 @@ def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: i
     lost.add_row("position", "", "", "", *(f"{_mean([run.left[k] for run in found]):+.3f}" for k in SHOWN))
     now = "  ".join(f"{k} {_mean([run.scores[k] for run in found]):.3f}" for k in SHOWN)
     every = [(name, rate, error) for name, rate, run in zip(names, fps, found, strict=True) for error in run.errors]
-    dearest = sorted(every, key=lambda item: -item[2].cost)[:limit]
+    dearest = sorted(every, key=lambda item: -(item[2].cost or 0.0))[:limit]
     listed = empty_table()
     for name in ("sequence", "frames", "kind", "who", "cause"):
         listed.add_column(name, overflow="fold")
     listed.add_column("cost", justify="right")
-    for name, _, error in dearest:
-        listed.add_row(printable(name), *_words(error), f"{error.cost:.4f}")
+    for name, rate, error in dearest:
+        facts = error.facts(rate)
+        span = f"{facts['start']}–{facts['end']}"
+        listed.add_row(
+            printable(name), span, facts["kind"], error.who, facts["detail"] or facts["cause"], f"{error.cost:.4f}"
+        )
     title = f"the {len(dearest)} dearest of {len(every)} errors; cost: HOTA, of groups group_F1"
     return Group(with_title(f"where the score is lost; now {now}", lost), with_title(title, listed))
-
-
-def _words(found: FoundError) -> tuple[str, str, str, str]:
-    error = found.error
-    if isinstance(error, GroupError):
-        who = " ".join(map(str, error.people)) + (f" with {' '.join(map(str, error.others))}" if error.others else "")
-    elif error.person is None:
-        who = f"track {error.after}"
-    else:
-        ids = " → ".join(str(id) for id in (error.before, error.after) if id is not None)
-        who = f"person {error.person}" + (f", track {ids}" if ids else "")
-    cause = found.cause.name + (f": {found.cause.text}" if found.cause.text else "")
-    return f"{error.start}–{error.end}", error.kind, who, cause
 
 
 def _mean(values: list[float]) -> float:
