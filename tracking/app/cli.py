@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[Any, str]] = {
     "track": (options.TrackOptions, "track:track"),
     "group": (options.GroupOptions, "group:group"),
     "score": (options.ScoreOptions, "score:score"),
+    "stress": (options.StressOptions, "stress:stress"),
     "errors": (options.ErrorsOptions, "errors:errors"),
     "compare": (options.CompareOptions, "compare:compare"),
     "tune": (CommandLine, "tune:tune"),

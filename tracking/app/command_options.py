@@ -144,6 +144,32 @@ class ScoreOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class StressOptions:
+    """Play trackers on scenes that get harder along an axis, and find where they break."""
+
+    trackers: list[str] = ARGUMENT("Trackers to compare: names, file.py:Class or module:Class.", metavar="TRACKER…")
+    vary: str = option(
+        "Axis: detection, clutter, noise, occlusion, people, gap, velocity-difference, frame-rate, camera-height, "
+        "tilt, light or contrast, or KEY; with =EASY:HARD its ends.", metavar="AXIS")
+    suite: list[str] = option("Scenario or suite. Can be given several times.", metavar="NAME", flag="--suite")
+    seeds: str = option("Seeds that may be played, from A to B - 1.", "20000:20020", metavar="A:B")
+    out: Path = OUT()
+    by: str = option("The score.", "objective", metavar="SCORE")
+    share: float = option(
+        "A tracker breaks where its score falls to this share of its easy value.", 0.8, low=0.0, high=1.0)
+    start: int = option("Seeds that are played at first.", 4, low=2, metavar="N")
+    episodes: int | None = option("Stop after about so many episodes.", None, low=1, metavar="N")
+    minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
+    detections: Literal["image", "truth", "file"] | None = option(
+        "Input of the trackers. Default: file, if they can.", None)
+    settings: list[str] = SET()
+    sensor: Path | None = SENSOR()
+    step_timeout: float | None = STEP_TIMEOUT()
+    workers: int = WORKERS()
+    cluster: str | None = CLUSTER()
+
+
+@dataclass(frozen=True, kw_only=True)
 class ErrorsOptions:
     """List what went wrong in a run: each error with its frames, people, cause and cost, and a sum by cause."""
 
