@@ -38,8 +38,7 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Tracks, Truth
 from tracking import track
-from tracking.fitting.belief import fit_belief, sample_of
-from tracking.fitting.belief_scores import BINS, belief_scores, reliability
+from tracking.fitting.belief import BINS, belief_scores, fit_belief, reliability, sample_of
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouped_tracks import derive, without_groups

@@ -31,10 +31,10 @@ from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Tracks, Truth
-from tracking.recording_intervals import SCALES, presence
+from tracking.ranking import SCALES, presence
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.frame_weights import weighted_scorers
+from tracking.scoring.evaluation import weighted_scorers
 from tracking.stats import block_intervals, mean_interval
 
 KEYS = ("HOTA", "IDF1", "MOTA", "IDSW", "group_F1_hull", "event_F1")

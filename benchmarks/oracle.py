@@ -41,8 +41,8 @@ from sim.types import Sequence as Recording
 from tracking.oracle import oracle
 from tracking.running.run import track
 from tracking.scoring.evaluation import Scorer
-from tracking.scoring.hota import hota
 from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.track_scores import hota
 
 RECORDINGS = "recordings"
 REAL = (PETS, CAMPUS, TOWN_CENTRE)

@@ -39,16 +39,15 @@ from tracking.environment.episodes import Episode, Source
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
-from tracking.recording_intervals import recording_differences
+from tracking.ranking import recording_differences
 from tracking.running.run import track
 from tracking.running.tracker_registry import find
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.frame_weights import weighted_scorers
+from tracking.scoring.evaluation import weighted_scorers
 from tracking.tuning import tune
 from tracking.tuning.options import TuneOptions
 from tracking.tuning.search_plan import search_plan
-from tracking.tuning.study import open_study
-from tracking.tuning.trials import run_trials
+from tracking.tuning.study import open_study, run_trials
 
 SUITES = Path(__file__).parent / "tuning_suites"
 DRAWS = 200

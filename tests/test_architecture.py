@@ -77,7 +77,7 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
     names = of("tracking.papers", "tracking.detect")
     assert names
     hidden = (
-        "tracking.scoring", "tracking.running.truth_detections", "tracking.app", "sim.truth.label",
+        "tracking.scoring", "tracking.running.detection_mode", "tracking.app", "sim.truth.label",
         "sim.truth.merge_split_events", "sim.truth.group_hulls", "sim.truth.crossing_events",
         "sim.truth.queue_detection", "sim.io", "sim.sequence",
     )  # fmt: skip

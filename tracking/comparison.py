@@ -17,21 +17,17 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import Array, Sequence, Tracks
 from tracking.oracle import oracle
-from tracking.ranking import Ranking, rank
-from tracking.recording_intervals import recording_rankings
-from tracking.running.run import TrackingRun
-from tracking.running.run_info import input_name
+from tracking.ranking import Ranking, rank, recording_rankings
+from tracking.running.run import TrackingRun, input_name
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import Scorer, Scores
-from tracking.scoring.frame_weights import weighted_scorers
+from tracking.scoring.evaluation import Scorer, Scores, weighted_scorers
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import IncomparableError, Similarity
 
 if TYPE_CHECKING:
     import pyarrow
 
-UNKNOWN = "unknown"
-"""Stands for the input of tracks without run.json."""
+UNKNOWN = "unknown"  # Stands for the input of tracks without run.json.
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +132,7 @@ def compare(
     Args:
         sequences: Labelled sequences.
         runs: By name, the tracks of each sequence in the order of `sequences`, as `track` returns them.
-        similarity: Of people, "boxes", "ground" or "image"; None: by the data (tracking.scoring.one_plane).
+        similarity: Of people, "boxes", "ground" or "image"; None: by the data (tracking.scoring.people_comparison).
         group_match: Of groups, by "hull" or "members".
         blocks: Number of draws of blocks of frames for the intervals of a single recording; 0: none.
 

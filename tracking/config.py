@@ -25,8 +25,7 @@ from tracking.running.user_code import tracker_failed, user_code
 Scale = Literal["linear", "log", "int", "categorical", "vector"]
 Value = float | int | str | bool | tuple[float, ...]
 
-PRESETS = Path(__file__).parent / "presets"
-"""Folder with a folder for each preset, which holds TRACKER.toml."""
+PRESETS = Path(__file__).parent / "presets"  # Folder with a folder for each preset, which holds TRACKER.toml.
 
 
 @dataclass(frozen=True)
@@ -98,12 +97,7 @@ class ParamUse(TypedDict, total=False):
 
 
 def param(
-    default: Value,
-    values: tuple[Any, ...],
-    unit: str,
-    meaning: str,
-    scale: Scale = "linear",
-    **use: Unpack[ParamUse],
+    default: Value, values: tuple[Any, ...], unit: str, meaning: str, scale: Scale = "linear", **use: Unpack[ParamUse]
 ) -> Any:
     """Declares a parameter as a field of a config.
 

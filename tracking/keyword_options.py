@@ -1,18 +1,19 @@
-"""Keyword options of a public function or class, declared once as the fields of a frozen dataclass.
+"""Options of a public function, class or command, declared once as the fields of a frozen dataclass.
 
-The dataclass holds name, type, default, range and help text of every option. The function takes `**options`, builds the
-dataclass with `from_keywords`, and gets its signature and the list of options in its docstring from `documented`.
+The dataclass holds name, type, default, range and help text of every option. A function takes `**options`, builds the
+dataclass with `from_keywords`, and gets its signature and the list of options in its docstring from `documented`. A
+command is made of it by `tracking.app.command_line`.
 
     @dataclass(frozen=True, kw_only=True)
     class FitOptions:
-        folds: int = field(default=5, metadata=option("Number of folds.", low=2))
+        folds: int = option("Number of folds.", 5, low=2)
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, field, fields
 from typing import Any, TypeVar
 
 from scenarios.errors import InputError
@@ -22,23 +23,32 @@ F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 
 
-def option(
-    help: str, *, low: float | None = None, below: float | None = None, metavar: str | None = None
-) -> dict[str, Any]:
-    """Returns the metadata of a dataclass field for an option, with the keys help, low, below, metavar."""
-    return {"help": help, "low": low, "below": below, "metavar": metavar}
+def option(help: str, default: Any = MISSING, **more: Any) -> Any:
+    """Declares an option as a field of a dataclass; without a default it is required, and a list starts empty.
+
+    Args:
+        help: Its meaning.
+        default: Its value if it is not given.
+        more: low: the least allowed value; high: the greatest; below: what it must be less than; metavar: what stands
+            for its value in the help of a command; flag: its name on the command line if it differs from that of the
+            field, "" for an argument without a name.
+    """
+    metadata = {"help": help, "low": None, "high": None, "below": None, "metavar": None, "flag": None, **more}
+    return (
+        field(default_factory=list, metadata=metadata) if default == [] else field(default=default, metadata=metadata)
+    )
 
 
 def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
     """Returns an instance of the options dataclass `kind` with the given values by name and otherwise its defaults."""
-    known = [f for f in fields(kind) if f.init]  # type: ignore[arg-type]
+    known = fields(kind)  # type: ignore[arg-type]
     names = [f.name for f in known]
     for name in given:
         if name not in names:
             expected, remedy = f"one of {', '.join(names)}", f"did you mean {closest(name, names)}?"
             raise InputError(place=f"{function}(…)", got=f"{name}=…", expected=expected, remedy=remedy)
     for f in known:
-        if _required(f) and f.name not in given:
+        if required(f) and f.name not in given:
             raise InputError(place=f"{function}(…)", got="nothing", expected=f"{f.name}=…", remedy=f"give {f.name}")
     return kind(**given)
 
@@ -46,7 +56,7 @@ def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
 def check_ranges(options: Any) -> None:
     """Raises InputError at the first number of an options dataclass that lies outside its declared range."""
     for f in fields(options):
-        low, below, value = f.metadata.get("low"), f.metadata.get("below"), getattr(options, f.name)
+        low, below, value = f.metadata["low"], f.metadata["below"], getattr(options, f.name)
         if low is None or (value >= low and (below is None or value < below)):
             continue
         expected = f"{low:g} or more" if below is None else f"a number from {low:g} to under {below:g}"
@@ -60,10 +70,11 @@ def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
     """
 
     def decorate(function: F) -> F:
-        own = list(inspect.signature(function).parameters.values())
-        options = [_parameter(f, k < positional) for k, f in enumerate(fields(kind))]
+        kinds = [inspect.Parameter.POSITIONAL_OR_KEYWORD] * positional + [inspect.Parameter.KEYWORD_ONLY] * 99
+        own = [p for p in inspect.signature(function).parameters.values() if p.name == "self"]
+        options = [signature_parameter(f, k) for f, k in zip(fields(kind), kinds, strict=False)]
         made: Any = function
-        made.__signature__ = inspect.Signature([*(p for p in own if p.name == "self"), *options])
+        made.__signature__ = inspect.Signature([*own, *options])
         made.__doc__ = f"{inspect.getdoc(function)}\n\nOptions:\n\n{options_text(kind)}\n"
         return function
 
@@ -72,14 +83,15 @@ def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
 
 def options_text(kind: type) -> str:
     """Returns the options of an options dataclass, one a line."""
-    return "\n".join(f"{f.name}{'' if _required(f) else f'={f.default!r}'}: {f.metadata['help']}" for f in fields(kind))
+    return "\n".join(f"{f.name}{'' if required(f) else f'={f.default!r}'}: {f.metadata['help']}" for f in fields(kind))
 
 
-def _required(f: Field[Any]) -> bool:
+def required(f: Field[Any]) -> bool:
+    """Returns True if an option has no default."""
     return f.default is MISSING and f.default_factory is MISSING
 
 
-def _parameter(f: Field[Any], positional: bool) -> inspect.Parameter:
-    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD if positional else inspect.Parameter.KEYWORD_ONLY
-    default = inspect.Parameter.empty if _required(f) else f.default
-    return inspect.Parameter(f.name, kind, default=default, annotation=f.type)
+def signature_parameter(f: Field[Any], kind: Any, annotation: Any = None) -> inspect.Parameter:
+    """Returns an option as a parameter of a signature."""
+    default = inspect.Parameter.empty if required(f) else [] if f.default is MISSING else f.default
+    return inspect.Parameter(f.name, kind, default=default, annotation=annotation or f.type)

@@ -20,8 +20,7 @@ from tracking.grouping.foot_points import groups_of_people
 from tracking.running.prepare import prepare
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import Scorer
-from tracking.scoring.one_plane import in_one_plane
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people_comparison import Similarity, in_one_plane
 
 
 class _Detections:

@@ -26,8 +26,7 @@ from tracking.config import Config, Param, Value
 
 T = TypeVar("T")
 Space = tuple[Param, ...]
-HALVINGS = 6
-"""Bisections on the line from an allowed config to one that is not."""
+HALVINGS = 6  # Bisections on the line from an allowed config to one that is not.
 
 
 def space_of(kind: type[Config], mode: DetectionMode | None = None, *, online: bool = False) -> Space:

@@ -2,19 +2,29 @@
 
 Two runs are parted if the paired interval of their difference does not hold 0. The intervals of all pairs hold together
 with 95 %: Student's, at the level 5 % / number of pairs (Bonferroni). With two runs it is the usual paired interval. On
-a single recording the intervals come from weights of its frames (tracking.recording_intervals). A run's rank range goes
+a single recording the intervals come from weights of its frames (tracking.ranking). A run's rank range goes
 from 1 + the number of runs that are surely better, to the number of runs that are not surely worse. Runs that nothing
 parts share their ranks.
+
+95 % intervals of all scores of a single recording, by weights of blocks of its frames.
+
+`tracking.scoring.evaluation` gives the scores under weights, `tracking.stats` draws weights and makes intervals.
+This module says how long a block is, and on which scale the error of each score is nearly symmetric.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
-from sim.types import Array, Bools, Ints
-from tracking.stats import FEWEST, joint_level, mean_interval, student
+from sim.types import Array, Bools, Ints, Truth
+from tracking.scoring.annotated_frames import annotated_frames
+from tracking.scoring.catalogue import ALL, CATALOGUE, Score
+from tracking.scoring.rows import numbered
+from tracking.stats import DRAWS, FEWEST, LEVEL, Scale, block_intervals, joint_level, mean_interval, student
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,3 +79,65 @@ def _joint_intervals(scores: Array) -> tuple[Array, Array, Array]:
     less = difference.mean(axis=2)
     half = t * difference.std(axis=2, ddof=1) / np.sqrt(count)
     return less, less - half, less + half
+
+
+def scale_of(score: Score) -> Scale:
+    """Returns on which scale the error of a score is nearly symmetric."""
+    if score.unit == "count":
+        return "count"
+    if score.unit == "1":
+        return "share" if score.low == 0 else "below one"
+    return "length" if score.low == 0 else "plain"
+
+
+SCALES = tuple(map(scale_of, ALL))  # The scale of every score, in the order of the catalogue.
+
+
+def recording_differences(
+    truth: Truth, first: Callable[[Array], Array], second: Callable[[Array], Array], draws: int = DRAWS
+) -> tuple[Array, Array, Array]:
+    """Returns the differences (K,) of two runs of one recording, first - second, and their 95 % intervals."""
+
+    def difference(weights: Array) -> Array:
+        return first(weights) - second(weights)
+
+    return block_intervals(difference, truth.length, truth.fps, _presence(truth), draws)
+
+
+def recording_rankings(
+    truth: Truth, scores: Sequence[Callable[[Array], Array]], draws: int = DRAWS
+) -> dict[str, Ranking]:
+    """Returns the ranking of R runs of one recording by each score of the catalogue."""
+    runs, keys = len(scores), len(ALL)
+    pairs = list(combinations(range(runs), 2))
+
+    def columns(weights: Array) -> Array:
+        own = [score(weights) for score in scores]
+        return np.hstack([*own, *(own[i] - own[j] for i, j in pairs)])
+
+    plain: Scale = "plain"
+    scales = [*SCALES * runs, *[plain] * (len(pairs) * keys)]
+    levels = np.repeat([*[LEVEL] * runs, *[joint_level(len(pairs))] * len(pairs)], keys)
+    ends = block_intervals(columns, truth.length, truth.fps, _presence(truth), draws, scales, levels)
+    own, less = (np.array(ends).reshape(3, -1, keys)[:, part] for part in (slice(runs), slice(runs, None)))
+    found = {}
+    for k, (key, entry) in enumerate(CATALOGUE.items()):
+        of_pairs = np.zeros((3, runs, runs))
+        for n, (i, j) in enumerate(pairs):
+            mean, low, high = less[:, n, k]
+            of_pairs[:, i, j], of_pairs[:, j, i] = (mean, low, high), (-mean, -high, -low)
+        mean, low, high = own[:, :, k]
+        found[key] = ordered((mean, low, high), tuple(of_pairs), entry.better == "higher", 1)  # type: ignore[arg-type]
+    return found
+
+
+def _presence(truth: Truth) -> float:
+    return presence(truth.id) * truth.length / max(annotated_frames(truth).count, 1)
+
+
+def presence(id: Ints) -> float:
+    """Returns the mean number of frames for which a person is present, 1 without people."""
+    if not len(id):
+        return 1.0
+    frames = np.bincount(numbered(id)[1])
+    return float(np.square(frames).sum() / frames.sum())

@@ -15,25 +15,18 @@ import numpy as np
 
 from sim.types import Array
 
-DRAWS = 2000
-"""Draws of weights, or bootstrap samples."""
-LEVEL = 0.95
-"""Confidence level of all intervals."""
-NORMAL = 1.959963984540054
-"""A standard normal variable lies within +- NORMAL with probability LEVEL."""
-FEWEST = 6
-"""A difference over fewer sequences is never called sure."""
-SHORTEST_BLOCK = 1.0
-"""s: least length of a block of frames."""
-BLOCKS = (5, 20)
-"""Least and greatest number of blocks of a recording."""
+DRAWS = 2000  # Draws of weights, or bootstrap samples.
+LEVEL = 0.95  # Confidence level of all intervals.
+NORMAL = 1.959963984540054  # A standard normal variable lies within +- NORMAL with probability LEVEL.
+FEWEST = 6  # A difference over fewer sequences is never called sure.
+SHORTEST_BLOCK = 1.0  # s: least length of a block of frames.
+BLOCKS = (5, 20)  # Least and greatest number of blocks of a recording.
+# A score that is unknown in a larger share of the draws gets no interval: too few blocks have what it counts.
 UNKNOWN_DRAWS = 0.05
-"""A score that is unknown in a larger share of the draws gets no interval: too few blocks have what it counts."""
-SURE = 60.0
-"""s: the interval of a shorter recording is only indicative."""
+SURE = 60.0  # s: the interval of a shorter recording is only indicative.
 
+# What values a score can have: 0 to 1; up to 1; numbers of things; above 0; any.
 Scale = Literal["share", "below one", "count", "length", "plain"]
-"""What values a score can have: 0 to 1; up to 1; numbers of things; above 0; any."""
 
 
 def mean_interval(values: Array) -> tuple[Array, Array, Array]:

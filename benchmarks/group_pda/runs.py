@@ -26,7 +26,7 @@ from tracking.detect.background_training import Trained, train
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.running.run import TrackingRun, track
 from tracking.scoring import evaluate
-from tracking.scoring.one_plane import in_one_plane
+from tracking.scoring.people_comparison import in_one_plane
 
 Row = dict[str, float]
 

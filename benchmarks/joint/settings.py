@@ -22,7 +22,7 @@ from benchmarks.joint.runs import (
 )
 from benchmarks.support import chart, tables
 from sim.types import Array, Ints
-from tracking.papers.joint import estimate
+from tracking.papers.joint import report
 from tracking.papers.joint.people import People
 
 COUNTS = (10, 25, 50, 100)
@@ -46,7 +46,7 @@ def _own_absence(people: People, group: Ints) -> Array:
 
 
 RULES: Mapping[str, tuple[object, str, object]] = {
-    "kept while missed": (estimate, "kept_while_missed", _as_now),
+    "kept while missed": (report, "kept_while_missed", _as_now),
     "absence of groups": (People, "absence", _own_absence),
 }
 """Rules without a parameter that the mode ablation switches off: owner, name and replacement by the name of the row."""

@@ -21,9 +21,9 @@ from benchmarks.support.tables import signed, table
 from sim.scene.camera import back_project, project_pair
 from sim.types import Array
 from tracking.detect.features import SpacePoints
-from tracking.papers.stereo import measurement, merging, picture_points, space_group, tracker
+from tracking.papers.stereo import group_life, points, space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.measurement import PairMeasurement
+from tracking.papers.stereo.space_group import PairMeasurement
 from tracking.stats import mean_interval
 
 ABLATIONS: Mapping[str, Mapping[str, object]] = {
@@ -63,10 +63,10 @@ def _largest_part(n: Array, P: Array) -> Array:
 RULES: Mapping[str, tuple[object, str, object]] = {
     "mean in space": (space_group, "mean_position", _mean_in_the_image),
     "expected places": (space_group, "expected_places", _measured_places),
-    "settled": (merging, "SETTLED", 0.0),
-    "P of a mean": (merging, "covariance_of_mean", _largest_part),
-    "least density": (measurement, "LEAST_DENSITY", 0.0),
-    "person or not": (picture_points, "PERSON", (0.0, 10.0, 0.0)),
+    "settled": (group_life, "SETTLED", 0.0),
+    "P of a mean": (group_life, "covariance_of_mean", _largest_part),
+    "least density": (space_group, "LEAST_DENSITY", 0.0),
+    "person or not": (points, "PERSON", (0.0, 10.0, 0.0)),
     "half a footprint": (tracker, "FEATURE_OUTLINE", 1.0),
 }
 """Owner, name and replacement by the name of the row."""

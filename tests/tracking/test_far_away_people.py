@@ -7,8 +7,7 @@ import pytest
 
 from sim.types import Camera, Context, Detections, Frame
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
-from tracking.papers.relational.relations import Relational
-from tracking.papers.relational.tracker import Particle
+from tracking.papers.relational.tracker import Particle, Relational
 from tracking.papers.stereo.tracker import Stereo
 
 FPS, FRAMES = 10.0, 45

@@ -10,7 +10,7 @@ from sim.types import Context
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.tracker import Joint
 from tracking.papers.relational.config import RelationalConfig
-from tracking.papers.relational.relations import Relational
+from tracking.papers.relational.tracker import Relational
 
 
 def after(tracker, people, count):

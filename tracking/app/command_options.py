@@ -1,382 +1,331 @@
 """The options of each command as one frozen dataclass: every field is an option, with its type, default and help text.
 
-`options_from_dataclass` turns a dataclass into a Typer command. Commands with less than four options have none;
-those of `tune` follow from `tracking.tuning.options`. The module imports Typer only, so that `--help` stays quick.
-"""
+The docstring of a dataclass is the help text of its command."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-import typer
+from tracking.keyword_options import option
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
-Set = Annotated[list[str], typer.Option("--set", metavar="K=V", help="Set a value. Can be given several times.")]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder to write to.")]
-Source = Annotated[
-    Path, typer.Argument(metavar="SOURCE", help="Sequence or dataset: generated, MOT, video, BIWI, CAVIAR.")
-]
-People = Annotated[
-    Path, typer.Argument(metavar="SOURCE|TRACKS", help="Labelled people, MOT text with ids, or output of `track`.")
-]
-Tracker = Annotated[
-    str, typer.Argument(metavar="TRACKER", help="Name of a tracker, or file.py:Class, or module:Class.")
-]
-Tracks = Annotated[Path | None, typer.Argument(metavar="TRACKS", help="Output of `track`, or MOT text.")]
-Detections = Annotated[
-    Literal["image", "truth", "file"] | None,
-    typer.Option(
-        help="Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow."
-    ),
-]
-Fps = Annotated[
-    float | None,
-    typer.Option("--fps", help="Frames per second of a recording, in place of its own. Not for generated sequences."),
-]
-Scale = Annotated[float | None, typer.Option("--px-per-m", help="Pixels per metre of a recording without a camera.")]
-PersonClass = Annotated[
-    int | None,
-    typer.Option("--class", min=0, metavar="N", help="Class of people (column 8) in MOT texts. Default: 1."),
-]
-BoxFactor = Annotated[
-    str | None,
-    typer.Option(
-        "--box-scale",
-        metavar="X|X,Y",
-        help="Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.",
-    ),
-]
-Calibration = Annotated[
-    Path | None,
-    typer.Option("--camera", metavar="FILE", help="Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair."),
-]
-Detector = Annotated[
-    Path | None, typer.Option("--sensor", metavar="FILE.toml", help="Detector profile, as `fit sensor` writes it.")
-]
-Workers = Annotated[
-    int, typer.Option("--workers", min=1, help="Processes. On a cluster: the least number of tasks at a time.")
-]
-Processes = Annotated[int, typer.Option("--workers", min=1, help="Processes that share the sequences.")]
-Cluster = Annotated[
-    str | None,
-    typer.Option("--cluster", metavar="tcp://HOST:PORT", help="Scheduler of a dask cluster that does the work."),
-]
-StepTimeout = Annotated[
-    float | None,
-    typer.Option(
-        "--step-timeout",
-        metavar="SECONDS",
-        help="Stop a tracker whose reset or step takes longer. It then runs in a process of its own.",
-    ),
-]
-Streams = Annotated[
-    str,
-    typer.Option(
-        "--streams", metavar="A,B,…", help="Pictures to store: left, right, disparity, ids, background; or none."
-    ),
-]
-Images = Annotated[
-    Literal["jpg", "png", "mp4"] | None,
-    typer.Option(help="Format of left, right and background pictures. Default: jpg."),
-]
-Rule = Annotated[
-    Path | None,
-    typer.Option(
-        "--grouping",
-        metavar="rule|belief|FILE.toml",
-        help="What derives groups (default: belief), or a file of `tune grouping` or `fit grouping`.",
-    ),
-]
-Probabilities = Annotated[
-    bool, typer.Option("--probabilities", help="Store the probability that two people belong together.")
-]
-Params = Annotated[
-    str | None,
-    typer.Option("--params", metavar="FILE.toml|PRESET", help="The tracker's parameters: a file, or paper."),
-]
-Background = Annotated[
-    str | None,
-    typer.Option("--background", metavar="first:N|spread:N", help="Frames a background model is trained on."),
-]
+# fmt: off
+ARGUMENT = partial(option, flag="")
+SET = partial(option, "Set a value. Can be given several times.", [], flag="--set", metavar="K=V")
+OUT = partial(option, "Folder to write to.", metavar="DIR")
+TOML = partial(option, metavar="FILE.toml", flag="--out")
+FILE = partial(option, flag="--out")
+NAMES = partial(ARGUMENT, "Scenarios, *.toml files or suites.", metavar="NAME…")
+SOURCE = partial(ARGUMENT, "Sequence or dataset: generated, MOT, video, BIWI, CAVIAR.", metavar="SOURCE")
+TRACKS = partial(ARGUMENT, "Output of `track`, or MOT text.", None, metavar="TRACKS")
+FPS = partial(option, "Frames per second of a recording, in place of its own. Not for generated sequences.", None)
+SCALE = partial(option, "Pixels per metre of a recording without a camera.", None)
+PERSON_CLASS = partial(
+    option, "Class of people (column 8) in MOT texts. Default: 1.", None, low=0, metavar="N", flag="--class")
+BOX_SCALE = partial(
+    option, "Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.", None,
+    metavar="X|X,Y")
+CAMERA = partial(option, "Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair.", None, metavar="FILE")
+SENSOR = partial(option, "Detector profile, as `fit sensor` writes it.", None, metavar="FILE.toml")
+WORKERS = partial(option, "Processes. On a cluster: the least number of tasks at a time.", 1, low=1)
+PROCESSES = partial(option, "Processes that share the sequences.", 1, low=1)
+CLUSTER = partial(option, "Scheduler of a dask cluster that does the work.", None, metavar="tcp://HOST:PORT")
+STEP_TIMEOUT = partial(
+    option, "Stop a tracker whose reset or step takes longer. It then runs in a process of its own.", None,
+    metavar="SECONDS")
+STREAMS = partial(
+    option, "Pictures to store: left, right, disparity, ids, background; or none.", "left", metavar="A,B,…")
+IMAGES = partial(option, "Format of left, right and background pictures. Default: jpg.", None)
+GROUPING = partial(
+    option, "What derives groups (default: belief), or a file of `tune grouping` or `fit grouping`.", None,
+    metavar="rule|belief|FILE.toml")
+SEEDS = partial(option, "Seeds from A to B - 1, or one seed.", metavar="A:B")
+FIT_SEEDS = partial(option, "Seeds of the scenes to fit to.", "30000:30002", metavar="A:B")
+CHECK = partial(option, "Other seeds, to score the fit with.", None, metavar="A:B")
+Images = Literal["jpg", "png", "mp4"] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DemoOptions:
+    """Generate scenes, track them, score the tracks and write a page with the results."""
+
+    quick: bool = option("Only the short scenes of the suite quick, with one seed.", False)
+    out: Path = OUT(default=Path("flockscope-demo"))
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScenariosOptions:
-    """Options of `scenarios`."""
+    """List scenarios and suites, or explain one with a drawing."""
 
-    name: Annotated[str | None, typer.Argument(help="Scenario, *.toml file or suite to explain.")] = None
-    settings: Set = field(default_factory=list)
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE.svg", help="Write a drawing of plan and script.")
-    ] = None
-    schema: Annotated[bool, typer.Option("--schema", help="List every key of a scenario file.")] = False
+    name: str | None = ARGUMENT("Scenario, *.toml file or suite to explain.", None)
+    settings: list[str] = SET()
+    out: Path | None = option("Write a drawing of plan and script.", None, metavar="FILE.svg")
+    schema: bool = option("List every key of a scenario file.", False)
 
 
 @dataclass(frozen=True, kw_only=True)
 class GenerateOptions:
-    """Options of `generate`."""
+    """Simulate scenarios and store them as a dataset."""
 
-    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
-    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one seed.")]
-    out: Out
-    settings: Set = field(default_factory=list)
-    sensor: Detector = None
-    streams: Streams = "left"
-    images: Images = None
-    stride: Annotated[
-        int, typer.Option("--stride", min=1, metavar="N", help="Store every N-th frame of the camera only.")
-    ] = 1
-    workers: Workers = 1
-    cluster: Cluster = None
+    names: list[str] = NAMES()
+    seeds: str = SEEDS()
+    out: Path = OUT()
+    settings: list[str] = SET()
+    sensor: Path | None = SENSOR()
+    streams: str = STREAMS()
+    images: Images = IMAGES()
+    stride: int = option("Store every N-th frame of the camera only.", 1, low=1, metavar="N")
+    workers: int = WORKERS()
+    cluster: str | None = CLUSTER()
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrackOptions:
-    """Options of `track`."""
+    """Run a tracker and store its tracks."""
 
-    tracker: Tracker
-    source: Source
-    out: Out
-    params: Params = None
-    settings: Set = field(default_factory=list)
-    detections: Detections = None
-    sensor: Detector = None
-    grouping: Rule = None
-    seed: Annotated[int, typer.Option("--seed", min=0, help="The tracker's seed.")] = 0
-    fps: Fps = None
-    px_per_m: Scale = None
-    camera: Calibration = None
-    background: Background = None
-    step_timeout: StepTimeout = None
-    person_class: PersonClass = None
-    box_scale: BoxFactor = None
-    workers: Processes = 1
+    tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
+    source: Path = SOURCE()
+    out: Path = OUT()
+    params: str | None = option("The tracker's parameters: a file, or paper.", None, metavar="FILE.toml|PRESET")
+    settings: list[str] = SET()
+    detections: Literal["image", "truth", "file"] | None = option(
+        "Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow.",
+        None)
+    sensor: Path | None = SENSOR()
+    grouping: Path | None = GROUPING()
+    seed: int = option("The tracker's seed.", 0, low=0)
+    fps: float | None = FPS()
+    px_per_m: float | None = SCALE()
+    camera: Path | None = CAMERA()
+    background: str | None = option("Frames a background model is trained on.", None, metavar="first:N|spread:N")
+    step_timeout: float | None = STEP_TIMEOUT()
+    person_class: int | None = PERSON_CLASS()
+    box_scale: str | None = BOX_SCALE()
+    workers: int = PROCESSES()
 
 
 @dataclass(frozen=True, kw_only=True)
 class GroupOptions:
-    """Options of `group`."""
+    """Find who belongs together, and what happened, for people whose ids are known."""
 
-    source: People
-    out: Out
-    grouping: Rule = None
-    probabilities: Probabilities = False
-    fps: Fps = None
-    px_per_m: Scale = None
-    camera: Calibration = None
-    person_class: PersonClass = None
-    box_scale: BoxFactor = None
+    source: Path = ARGUMENT("Labelled people, MOT text with ids, or output of `track`.", metavar="SOURCE|TRACKS")
+    out: Path = OUT()
+    grouping: Path | None = GROUPING()
+    probabilities: bool = option("Store the probability that two people belong together.", False)
+    fps: float | None = FPS()
+    px_per_m: float | None = SCALE()
+    camera: Path | None = CAMERA()
+    person_class: int | None = PERSON_CLASS()
+    box_scale: str | None = BOX_SCALE()
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScoreOptions:
-    """Options of `score`."""
+    """Score tracks against the truth."""
 
-    truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="Labelled sequence or dataset.")]
-    tracks: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="TRACKS…",
-            help="Output of `track`, MOT text, or a tracker class (file.py:Class); several are ranked.",
-        ),
-    ]
-    similarity: Annotated[
-        Literal["boxes", "ground", "image"] | None,
-        typer.Option(help="How true and tracked people are compared. Default: by the data."),
-    ] = None
-    group_match: Annotated[
-        Literal["hull", "members"], typer.Option("--group-match", help="How true and estimated groups are compared.")
-    ] = "hull"
-    blocks: Annotated[
-        int,
-        typer.Option(
-            "--blocks", min=0, metavar="N", help="Intervals for a single recording, by N draws of blocks of frames."
-        ),
-    ] = 0
-    by: Annotated[
-        str | None,
-        typer.Option(
-            "--by", metavar="SCORE", help="The score that ranks. Default: objective, or what all runs have of it."
-        ),
-    ] = None
-    all: Annotated[bool, typer.Option("--all", help="Show each sequence of a ranking, too.")] = False
-    csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write all scores of a ranking into this file.")
-    ] = None
-    fps: Fps = None
-    px_per_m: Scale = None
-    person_class: PersonClass = None
-    box_scale: BoxFactor = None
-    workers: Processes = 1
+    truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
+    tracks: list[str] = ARGUMENT(
+        "Output of `track`, MOT text, or a tracker class (file.py:Class); several are ranked.", metavar="TRACKS…")
+    similarity: Literal["boxes", "ground", "image"] | None = option(
+        "How true and tracked people are compared. Default: by the data.", None)
+    group_match: Literal["hull", "members"] = option("How true and estimated groups are compared.", "hull")
+    blocks: int = option("Intervals for a single recording, by N draws of blocks of frames.", 0, low=0, metavar="N")
+    by: str | None = option(
+        "The score that ranks. Default: objective, or what all runs have of it.", None, metavar="SCORE")
+    all: bool = option("Show each sequence of a ranking, too.", False)
+    csv: Path | None = option("Write all scores of a ranking into this file.", None, metavar="FILE")
+    fps: float | None = FPS()
+    px_per_m: float | None = SCALE()
+    person_class: int | None = PERSON_CLASS()
+    box_scale: str | None = BOX_SCALE()
+    workers: int = PROCESSES()
+
+
+@dataclass(frozen=True, kw_only=True)
+class StressOptions:
+    """Play trackers on scenes that get harder along an axis, and find where they break."""
+
+    trackers: list[str] = ARGUMENT("Trackers to compare: names, file.py:Class or module:Class.", metavar="TRACKER…")
+    vary: str = option(
+        "Axis: detection, clutter, noise, occlusion, people, gap, velocity-difference, frame-rate, camera-height, "
+        "tilt, light or contrast, or KEY; with =EASY:HARD its ends.", metavar="AXIS")
+    suite: list[str] = option("Scenario or suite. Can be given several times.", metavar="NAME", flag="--suite")
+    seeds: str = option("Seeds that may be played, from A to B - 1.", "20000:20020", metavar="A:B")
+    out: Path = OUT()
+    by: str = option("The score.", "objective", metavar="SCORE")
+    share: float = option(
+        "A tracker breaks where its score falls to this share of its easy value.", 0.8, low=0.0, high=1.0)
+    start: int = option("Seeds that are played at first.", 4, low=2, metavar="N")
+    episodes: int | None = option("Stop after about so many episodes.", None, low=1, metavar="N")
+    minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
+    detections: Literal["image", "truth", "file"] | None = option(
+        "Input of the trackers. Default: file, if they can.", None)
+    settings: list[str] = SET()
+    sensor: Path | None = SENSOR()
+    step_timeout: float | None = STEP_TIMEOUT()
+    workers: int = WORKERS()
+    cluster: str | None = CLUSTER()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorsOptions:
+    """List what went wrong in a run: each error with its frames, people, cause and cost, and a sum by cause."""
+
+    truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
+    tracks: Path = ARGUMENT("Output of `track`, or MOT text.", metavar="TRACKS")
+    limit: int = option("Number of errors to show, the dearest first; --json has all.", 20, low=0, metavar="N")
+    similarity: Literal["boxes", "ground", "image"] | None = option(
+        "How true and tracked people are compared. Default: by the data.", None)
+    fps: float | None = FPS()
+    px_per_m: float | None = SCALE()
+    person_class: int | None = PERSON_CLASS()
+    box_scale: str | None = BOX_SCALE()
+    workers: int = PROCESSES()
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions:
+    """Compare stored scores with those of a baseline. Exit code 1 if a score is surely worse."""
+
+    baseline: Path = ARGUMENT("Scores of `score --json`, or of --save.", metavar="BASELINE.json")
+    now: Path = ARGUMENT("Scores of the same sequences.", metavar="NOW.json")
+    by: list[str] = option(
+        "Score to compare; can be given several times. Default: objective.", [], metavar="SCORE", flag="--by")
+    tolerance: float = option("Difference that does not matter.", 0.01, low=0.0)
+    save: Path | None = option("Write the compared scores of NOW, as the next baseline.", None, metavar="FILE.json")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayCommandOptions:
-    """Options of `replay`."""
+    """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
-    source: Source
-    out: Out
-    camera: Annotated[
-        Path | None,
-        typer.Option(
-            "--camera", metavar="FILE.toml", help="Tables [camera], [sensor], [light], [picture]; each may be absent."
-        ),
-    ] = None
-    seeds: Annotated[
-        str,
-        typer.Option(
-            "--seeds", metavar="A:B", help="Seeds of bodies, looks and sensor. For real recordings from 20000 on."
-        ),
-    ] = "20000"
-    start: Annotated[float, typer.Option("--start", min=0.0, metavar="S", help="Second at which to begin.")] = 0.0
-    duration: Annotated[
-        float | None, typer.Option("--duration", metavar="S", help="Seconds to replay. Default: up to the end.")
-    ] = None
-    settings: Set = field(default_factory=list)
-    sensor: Detector = None
-    streams: Streams = "left"
-    images: Images = None
-    fps: Fps = None
-    calibration: Annotated[
-        Path | None,
-        typer.Option(
-            "--calibration",
-            metavar="FILE",
-            help="Calibration of a recording that has boxes only: camera.json or Tsai's XML.",
-        ),
-    ] = None
+    source: Path = SOURCE()
+    out: Path = OUT()
+    camera: Path | None = option(
+        "Tables [camera], [sensor], [light], [picture]; each may be absent.", None, metavar="FILE.toml")
+    seeds: str = option(
+        "Seeds of bodies, looks and sensor. For real recordings from 20000 on.", "20000", metavar="A:B")
+    start: float = option("Second at which to begin.", 0.0, low=0.0, metavar="S")
+    duration: float | None = option("Seconds to replay. Default: up to the end.", None, metavar="S")
+    settings: list[str] = SET()
+    sensor: Path | None = SENSOR()
+    streams: str = STREAMS()
+    images: Images = IMAGES()
+    fps: float | None = FPS()
+    calibration: Path | None = option(
+        "Calibration of a recording that has boxes only: camera.json or Tsai's XML.", None, metavar="FILE")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions:
-    """Options of `view`."""
+    """Write a page that replays a sequence in the browser: truth, tracks, and pictures if it has any."""
 
-    source: Source
-    tracks: Tracks = None
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FILE.html", help="Page to write; for several sequences, a folder.")
-    ]
-    video: Annotated[
-        Literal["auto", "inside", "beside", "none"],
-        typer.Option(help="Pictures inside the page, beside it as FILE.view.mp4, or none. auto: beside from 12 MB on."),
-    ] = "auto"
-    fps: Fps = None
-    px_per_m: Scale = None
-    camera: Calibration = None
+    source: Path = SOURCE()
+    tracks: Path | None = TRACKS()
+    out: Path = FILE("Page to write; for several sequences, a folder.", metavar="FILE.html")
+    video: Literal["auto", "inside", "beside", "none"] = option(
+        "Pictures inside the page, beside it as FILE.view.mp4, or none. auto: beside from 12 MB on.", "auto")
+    fps: float | None = FPS()
+    px_per_m: float | None = SCALE()
+    camera: Path | None = CAMERA()
 
 
 @dataclass(frozen=True, kw_only=True)
 class SheetOptions:
-    """Options of `sheet`."""
+    """Write a contact sheet: several frames of a sequence in one picture, with the truth."""
 
-    source: Source
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FILE.png", help="Picture to write; for several sequences, a folder.")
-    ]
-    frames: Annotated[int, typer.Option("--frames", min=1, max=64, help="Number of frames to show.")] = 8
-    fps: Fps = None
+    source: Path = SOURCE()
+    out: Path = FILE("Picture to write; for several sequences, a folder.", metavar="FILE.png")
+    frames: int = option("Number of frames to show.", 8, low=1, high=64)
+    fps: float | None = FPS()
 
 
 @dataclass(frozen=True, kw_only=True)
 class OverlayOptions:
-    """Options of `overlay`."""
+    """Write a video with boxes, ids, trails, groups and events drawn over the pictures."""
 
-    source: Source
-    tracks: Tracks = None
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FILE.mp4", help="Video to write; for several sequences, a folder.")
-    ]
-    truth: Annotated[
-        Literal["beside", "over", "only"] | None,
-        typer.Option(
-            help="Draw the truth: beside the tracks, over the same picture, or only it. Without TRACKS always only it."
-        ),
-    ] = None
-    fps: Fps = None
-    px_per_m: Scale = None
-    camera: Calibration = None
+    source: Path = SOURCE()
+    tracks: Path | None = TRACKS()
+    out: Path = FILE("Video to write; for several sequences, a folder.", metavar="FILE.mp4")
+    truth: Literal["beside", "over", "only"] | None = option(
+        "Draw the truth: beside the tracks, over the same picture, or only it. Without TRACKS always only it.", None)
+    fps: float | None = FPS()
+    px_per_m: float | None = SCALE()
+    camera: Path | None = CAMERA()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValidateOptions:
+    """Check that a dataset or stored tracks are complete, unaltered and consistent."""
+
+    folder: Path = ARGUMENT("A generated sequence or dataset, or stored tracks.", metavar="DIR")
 
 
 @dataclass(frozen=True, kw_only=True)
 class CocoOptions:
-    """Options of `export coco`."""
+    """Write COCO files, one per split, with track and group ids and masks."""
 
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A sequence or dataset with labelled boxes.")]
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", metavar="FILE.json", help="File to write; for several splits FILE-train.json, FILE-val.json, …"
-        ),
-    ]
-    min_visibility: Annotated[
-        float,
-        typer.Option("--min-visibility", min=0.0, max=1.0, metavar="V", help="Leave out people who are less visible."),
-    ] = 0.0
-    person_class: PersonClass = None
+    folder: Path = ARGUMENT("A sequence or dataset with labelled boxes.", metavar="DIR")
+    out: Path = FILE("File to write; for several splits FILE-train.json, FILE-val.json, …", metavar="FILE.json")
+    min_visibility: float = option("Leave out people who are less visible.", 0.0, low=0.0, high=1.0, metavar="V")
+    person_class: int | None = PERSON_CLASS()
+
+
+@dataclass(frozen=True, kw_only=True)
+class KittiOptions:
+    """Write stereo pairs, disparities and calibrations as in KITTI."""
+
+    folder: Path = ARGUMENT("A generated sequence or dataset with stereo pairs.", metavar="DIR")
+    out: Path = OUT()
 
 
 @dataclass(frozen=True, kw_only=True)
 class WebdatasetOptions:
-    """Options of `export webdataset`."""
+    """Write tar shards for streaming, in the format of the library webdataset."""
 
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A generated sequence or dataset.")]
-    out: Out
-    shard_size: Annotated[
-        str,
-        typer.Option(
-            "--shard-size", metavar="SIZE", help="Largest shard, as 500MB or 2GB; a larger sequence has its own."
-        ),
-    ] = "1GB"
-    samples: Annotated[
-        Literal["sequence", "frame"], typer.Option(help="A sample: a sequence with all its files, or a labelled frame.")
-    ] = "sequence"
+    folder: Path = ARGUMENT("A generated sequence or dataset.", metavar="DIR")
+    out: Path = OUT()
+    shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
+    samples: Literal["sequence", "frame"] = option(
+        "A sample: a sequence with all its files, or a labelled frame.", "sequence")
 
 
 @dataclass(frozen=True, kw_only=True)
 class FitSensorOptions:
-    """Options of `fit sensor`."""
+    """Measure the errors of a detector, so that simulated detections have the same errors."""
 
-    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Recordings with gt and det, pooled.")]
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write: a [sensor] table.")]
-    fps: Fps = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitRelationalOptions:
-    """Options of `fit relational`."""
-
-    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FILE.toml", help="File to write: parameters of relational, for --params.")
-    ]
-    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds from A to B - 1, or one seed.")] = (
-        "30000:30004"
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitJointOptions:
-    """Options of `fit joint`."""
-
-    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FILE.toml", help="File to write: parameters of joint, for --params.")
-    ]
-    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds of the scenes to fit to.")] = "30000:30002"
-    check: Annotated[str | None, typer.Option("--check", metavar="A:B", help="Other seeds, to score the fit with.")] = (
-        None
-    )
+    sources: list[Path] = ARGUMENT("Recordings with gt and det, pooled.", metavar="SOURCE…")
+    out: Path = TOML("File to write: a [sensor] table.")
+    fps: float | None = FPS()
 
 
 @dataclass(frozen=True, kw_only=True)
 class FitGroupingOptions:
-    """Options of `fit grouping`."""
+    """Fit the belief of who belongs together to simulated scenes."""
 
-    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Scenarios, *.toml files or suites.")]
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write, for --grouping.")]
-    seeds: Annotated[str, typer.Option("--seeds", metavar="A:B", help="Seeds of the scenes to fit to.")] = "30000:30002"
-    check: Annotated[str | None, typer.Option("--check", metavar="A:B", help="Other seeds, to score the fit with.")] = (
-        None
-    )
+    names: list[str] = NAMES()
+    out: Path = TOML("File to write, for --grouping.")
+    seeds: str = FIT_SEEDS()
+    check: str | None = CHECK()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitJointOptions:
+    """Learn the merges and splits of the tracker joint from simulated truth."""
+
+    names: list[str] = NAMES()
+    out: Path = TOML("File to write: parameters of joint, for --params.")
+    seeds: str = FIT_SEEDS()
+    check: str | None = CHECK()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitRelationalOptions:
+    """Learn the speed table and the relations of the tracker relational from simulated truth."""
+
+    names: list[str] = NAMES()
+    out: Path = TOML("File to write: parameters of relational, for --params.")
+    seeds: str = SEEDS(default="30000:30004")
+# fmt: on

@@ -15,15 +15,12 @@ from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, WorkError, is_control, printable
 
-STATUS = {0: "ok", 1: "failed", 2: "refused", 130: "interrupted"}
-"""The "status" of the JSON object, by exit code."""
+STATUS = {0: "ok", 1: "failed", 2: "refused", 130: "interrupted"}  # The "status" of the JSON object, by exit code.
 
 INTERRUPTED = 130
-DEBUG = "FLOCKSCOPE_DEBUG"
-"""With this environment variable set, an unexpected exception is raised with its traceback."""
+DEBUG = "FLOCKSCOPE_DEBUG"  # With this environment variable set, an unexpected exception is raised with its traceback.
 
-WIDTH = 160
-"""Columns of a table that goes to a file or another program."""
+WIDTH = 160  # Columns of a table that goes to a file or another program.
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 
-SUBJECTS = ("tracker", "sensor", "scenario")
-"""What a setting can belong to, as in `--set sensor.noise_m=0.2`."""
+SUBJECTS = ("tracker", "sensor", "scenario")  # What a setting can belong to, as in `--set sensor.noise_m=0.2`.
 
 
 def seeds(text: str, option: str = "--seeds") -> range:

@@ -17,11 +17,9 @@ if TYPE_CHECKING:
 
     from sim.types import Sequence
 
-PATIENCE = 2.0
-"""s before anything is shown."""
+PATIENCE = 2.0  # s before anything is shown.
 
-PAUSE = 10.0
-"""s between lines if stderr is no terminal."""
+PAUSE = 10.0  # s between lines if stderr is no terminal.
 
 
 def total_frames(sequences: Iterable[Sequence]) -> int | None:

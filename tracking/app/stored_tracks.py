@@ -15,23 +15,20 @@ from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.running.run import TrackingRun
 
-DEPTH = 3
-"""Tracks are looked for in this many levels of folders below the path."""
+DEPTH = 3  # Tracks are looked for in this many levels of folders below the path.
 
 EXPECTED = "a folder made by `flockscope track`, a folder of such folders, or MOTChallenge text"
 
+# Keys of run.json that say with what a sequence was tracked. Runs that are scored together have them in common.
 METHOD = ("tracker", "config", "grouping")
-"""Keys of run.json that say with what a sequence was tracked. Runs that are scored together have them in common."""
 
-SHOWN = 3
-"""Most parameters that the error on two configs names."""
+SHOWN = 3  # Most parameters that the error on two configs names.
 
 
+# Endings of files that hold no tracks.
 OTHER_FILES = (".toml", ".py", ".json", ".ini", ".html", ".svg", ".jpg", ".png", ".mp4", ".xml")
-"""Endings of files that hold no tracks."""
 
-DATASET = ("", "*", "*/*")
-"""Where a stored sequence lies below a sequence folder, a split of a dataset, or a dataset."""
+DATASET = ("", "*", "*/*")  # Where a stored sequence lies below a sequence folder, a split of a dataset, or a dataset.
 
 
 @dataclass(frozen=True)

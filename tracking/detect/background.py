@@ -28,7 +28,7 @@ import numpy as np
 
 from sim.types import Bools, Image
 from tracking.detect import background_kernels as kernels
-from tracking.detect import brightness_gain
+from tracking.detect import background_training
 from tracking.detect.background_kernels import BACKGROUND as BACKGROUND
 from tracking.detect.background_kernels import DARK as DARK
 from tracking.detect.background_kernels import FOREGROUND as FOREGROUND
@@ -38,8 +38,7 @@ from tracking.detect.background_kernels import Floats
 from tracking.detect.background_settings import BRIGHT, FOREGROUND_SLOWER, BackgroundSettings
 from tracking.detect.background_training import FLOOR, check_frame, thresholds, train
 
-INTERLEAVE = 4
-"""Each frame adapts every fourth row, with the rate of four frames; four frames adapt all rows."""
+INTERLEAVE = 4  # Each frame adapts every fourth row, with the rate of four frames; four frames adapt all rows.
 
 
 class Background:
@@ -76,7 +75,7 @@ class Background:
         self.s, self.b = (np.where(self.valid, n, np.float32(np.inf)) for n in (trained.s, trained.b))
         self._counts = trained.counts
         self.gain: Floats = np.ones(3, np.float32)
-        self._grid = brightness_gain.grid(*self.valid.shape)
+        self._grid = background_training.grid(*self.valid.shape)
         self._grid_background = self.valid[self._grid]
         self._first_row = 0
         self._grey = bool((sample[..., :1] == sample).all())
@@ -147,9 +146,9 @@ class Background:
     def _estimate_gain(self, image: Image) -> Floats:
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
         mean = self.mean[:, *self._grid]
-        found = brightness_gain.gain(seen, mean, self._grid_background)
+        found = background_training.gain(seen, mean, self._grid_background)
         if found is None:
-            found = brightness_gain.gain(seen, mean, self.valid[self._grid])
+            found = background_training.gain(seen, mean, self.valid[self._grid])
         return self.gain if found is None else found
 
 

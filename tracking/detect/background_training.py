@@ -11,6 +11,11 @@ distortion, its colour's distance from the line through E in sigmas.
    s_i = a_i sqrt(sum (E / sigma)^2), which is 1 for independent Gaussian noise and holds at any gain (ours).
 3. Thresholds: quantiles of the normalised distortions at the detection rate (Gonzalez et al. 2006, Fig. 2), over
    pixels that were background in all frames of the sample; over all inliers if these pixels are too few.
+
+The brightness of a frame relative to the background model: one factor per colour channel (ours).
+
+The factor of a channel is the median of I / E over background pixels, I the frame's grey level and E the model's
+mean grey level. It has no unit and is 1 for a frame as bright as the model.
 """
 
 from __future__ import annotations
@@ -25,29 +30,74 @@ from scenarios.errors import InputError
 from sim.types import Bools, Image, Ints
 from tracking.detect import background_training_kernels as kernels
 from tracking.detect.background_kernels import Floats
-from tracking.detect.brightness_gain import frame_gains
 
-LEAST_FRAMES = 10
-"""Fewest frames of a sample: SHARE of fewer frames are too few values for a standard deviation."""
+POINTS = 6000  # About so many pixels, on a regular grid, are used for the estimate.
+# Grey levels between which a pixel is usable: noise dominates below, the camera clips above.
+DARKEST, BRIGHTEST = 16.0, 235.0
+FEWEST = 50  # Fewest usable grid pixels from which the factor of a channel is estimated.
+
+
+def grid(high: int, wide: int) -> tuple[slice, slice]:
+    """Returns two slices, of rows and of columns, that select a regular grid of pixels from an image of high x wide
+    px."""
+    step = max(1, int(np.sqrt(high * wide / POINTS)))
+    return slice(step // 2, None, step), slice(step // 2, None, step)
+
+
+def gain(image: Floats, mean: Floats, where: Bools) -> Floats | None:
+    """Returns a frame's brightness factor in each colour channel, (3,) float32, or None if no channel has enough
+    pixels."""
+    found = [_one_channel(i[where], e[where]) for i, e in zip(image, mean, strict=True)]
+    known = [factor for factor in found if factor is not None]
+    if not known:
+        return None
+    return np.array([np.mean(known) if factor is None else factor for factor in found], np.float32)
+
+
+def _one_channel(seen: Floats, mean: Floats) -> float | None:
+    usable = (mean > DARKEST) & (seen > DARKEST) & (seen < BRIGHTEST)
+    for _ in range(2):
+        if np.count_nonzero(usable) < FEWEST:
+            return None
+        factor = _median(seen[usable] / mean[usable])
+        usable = (factor * mean > DARKEST) & (factor * mean < BRIGHTEST) & (mean > DARKEST)
+    return factor
+
+
+def _median(values: Floats) -> float:
+    half = len(values) // 2
+    middle = np.partition(values, half)
+    above = middle[half]
+    return float(above if len(values) % 2 else (middle[:half].max() + above) / 2)
+
+
+def frame_gains(sample: Image) -> Floats:
+    """Returns the gain of each frame of a sample (K, H, W, 3) uint8, (K, 3) float32: a brightness factor per colour
+    channel."""
+    rows, columns = grid(*sample.shape[1:3])
+    values = np.moveaxis(sample[:, rows, columns], -1, 1).astype(np.float32)
+    middle = np.median(values, axis=0)
+    everywhere = np.ones(middle.shape[1:], bool)
+    found = [gain(v, middle, everywhere) for v in values]
+    return np.array([np.ones(3) if g is None else g for g in found], np.float32)
+
+
+LEAST_FRAMES = 10  # Fewest frames of a sample: SHARE of fewer frames are too few values for a standard deviation.
+# Grey levels: least sigma, and least noise from which the normalisers are computed. Compressed frames stay constant and
+# then jump by a level or two. With a lower floor these jumps would be foreground. OpenCV's MOG2 has 2, too.
 FLOOR = 2.0
-"""Grey levels: least sigma, and least noise from which the normalisers are computed. Compressed frames stay constant
-and then jump by a level or two. With a lower floor these jumps would be foreground. OpenCV's MOG2 has 2, too."""
-INLIER = 3.5
-"""A frame is an inlier of a pixel if all its channels lie within so many sigmas of E."""
+INLIER = 3.5  # A frame is an inlier of a pixel if all its channels lie within so many sigmas of E.
+# Share of the frames in which the background must be visible; a thing at rest in so many frames may replace it.
 SHARE = 0.35
-"""Share of the frames in which the background must be visible; a thing at rest in so many frames may replace it."""
-AS_SIGMA = 2.2
-"""Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it."""
-ROUNDS = 10
-"""Most rounds of step 1; inliers settle after three or four."""
+AS_SIGMA = 2.2  # Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it.
+ROUNDS = 10  # Most rounds of step 1; inliers settle after three or four.
+# Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds.
 CLEAN = 6.0
-"""Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds."""
-WIDEST = 20.0
-"""Grey levels: a pixel whose first sigma is larger has no background (`valid` is False)."""
+WIDEST = 20.0  # Grey levels: a pixel whose first sigma is larger has no background (`valid` is False).
+# Thresholds are taken from the clean pixels if these have at least this share of the values of all inliers.
 FEWEST_CLEAN = 0.05
-"""Thresholds are taken from the clean pixels if these have at least this share of the values of all inliers."""
+# Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins.
 BINS, SPAN = 4000, 20.0
-"""Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins."""
 
 
 @dataclass(frozen=True)

@@ -23,11 +23,11 @@ from sim.types import Array, Bools, Image
 from tracking.detect import blobs_kernels as kernels
 
 Labels = NDArray[np.int32]
+# Windows of the three operations, m. Opening removes narrower parts of the foreground, closing fills narrower gaps.
 MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15
-"""Windows of the three operations, m. Opening removes narrower parts of the foreground, closing fills narrower gaps."""
+# px: least disc of the opening. One pixel is no opening, which is so up to 40 px per m. At 20 px per m a disc of 3 px
+# is as wide as a head; it costs HOTA (`python -m benchmarks.foreground opening`).
 LEAST_OPEN = 1
-"""px: least disc of the opening. One pixel is no opening, which is so up to 40 px per m. At 20 px per m a disc of 3 px
-is as wide as a head; it costs HOTA (`python -m benchmarks.foreground opening`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,20 +25,14 @@ from sim.scene.camera import back_project, point_covariances
 from sim.types import Array, Bools, Camera, Image, Ints
 from tracking.detect.subtraction_stereo import Disparities, sampled
 
-WINDOW = (9, 9)
-"""px: width and height of the patch that KLT compares."""
-LEVELS = 2
-"""Levels of the picture pyramid above the picture itself."""
-QUALITY = 0.005
-"""Least quality of a corner, relative to the best one (Shi and Tomasi)."""
-BORDER = 1
-"""px: new corners keep away from the edge of their region by so much, as the ground shows through there."""
-SAMPLE = 1
-"""px: a feature's disparity is the median in a square of 2 SAMPLE + 1 px."""
+WINDOW = (9, 9)  # px: width and height of the patch that KLT compares.
+LEVELS = 2  # Levels of the picture pyramid above the picture itself.
+QUALITY = 0.005  # Least quality of a corner, relative to the best one (Shi and Tomasi).
+BORDER = 1  # px: new corners keep away from the edge of their region by so much, as the ground shows through there.
+SAMPLE = 1  # px: a feature's disparity is the median in a square of 2 SAMPLE + 1 px.
+# A disparity below so many standard deviations of its error is not used: the error of its depth is not normal.
 FAINT = 4.0
-"""A disparity below so many standard deviations of its error is not used: the error of its depth is not normal."""
-CENTRE = np.float32(0.5)
-"""px: OpenCV counts places from the centre of the first pixel, the camera from its corner."""
+CENTRE = np.float32(0.5)  # px: OpenCV counts places from the centre of the first pixel, the camera from its corner.
 
 
 @dataclass(frozen=True, eq=False)

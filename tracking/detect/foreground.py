@@ -23,12 +23,10 @@ from tracking.detect.background_settings import GHOST_TIME, MOST_FOREGROUND, Bac
 from tracking.detect.ghosts import Ghosts
 from tracking.detect.person_size import PersonSize
 
+# m^2 at the image's scale, and px: a blob that is smaller than either is noise.
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
-"""m^2 at the image's scale, and px: a blob that is smaller than either is noise."""
-ASSUMED_HEIGHT = 18.0
-"""m that the image is assumed to be high while its scale is unknown."""
-SAMPLED = 25
-"""About so many frames of the background sample are searched for people who stand alone."""
+ASSUMED_HEIGHT = 18.0  # m that the image is assumed to be high while its scale is unknown.
+SAMPLED = 25  # About so many frames of the background sample are searched for people who stand alone.
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """The size of a person in the image: height and width of a person's box at every foot point (ours).
 
 Three sources:
-- A pinhole camera. The box of an upright typical person (tracking.detect.typical_person) that stands at the foot
+- A pinhole camera. The box of an upright typical person (tracking.detect.person_size) that stands at the foot
   point.
 - A camera straight above. Everybody is the same ellipse, turned with the heading; its axes are used instead of the box.
 - No camera. Learned from lone blobs (blobs that may be one person each): the height is a line h = a + b v over the row
@@ -9,16 +9,39 @@ Three sources:
   most heights agree, refined by least squares of relative errors. So blobs of several people or of parts of people are
   outliers. Votes prefer the slope SLOPE, as blobs at one row contain no information about it.
 In all three cases height and width are then multiplied by factors on which most lone blobs agree.
+
+The person whom trackers expect before they have seen anybody: a prior in metres for any camera (ours).
+
+Its width and depth are the trackers' own belief about real people, not the body that the simulator draws. Its height is
+PERSON_HEIGHT, which defines the scale of an image. A real person with arms is some
+0.5 m wide and 0.3 m deep, so that the silhouette is some 0.42 m wide in the mean over headings. Stride, bags and wide
+clothes add to that; tracking.detect.person_size learns how much from people who stand alone.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sim.scene.body import PERSON_HEIGHT
+from sim.scene.body import PERSON_HEIGHT, person_boxes
 from sim.types import Array, Bools, Camera, Context
 from tracking.detect import person_size_kernels as kernels
-from tracking.detect import typical_person
+
+WIDTH = 0.42  # m, of the silhouette seen from the side, mean over headings
+SHOULDERS, DEPTH = 0.459, 0.272  # m, from straight above, where shoulders hide the arms: across and along the heading
+
+
+def boxes(camera: Camera, ground: Array) -> Array:
+    """Returns the boxes (N, 4), left, top, width, height, px, of upright typical people in a pinhole camera's image."""
+    n = len(ground)
+    tall, wide = np.full(n, PERSON_HEIGHT), np.full(n, WIDTH)
+    return person_boxes(camera, np.column_stack([ground, np.zeros(n)]), np.zeros(n), tall, wide, wide)
+
+
+def axes_from_above(camera: Camera) -> Array:
+    """Returns the longer and the shorter axis (2,), px, of a typical person under a camera that looks straight down."""
+    tall, wide, deep = np.array([PERSON_HEIGHT]), np.array([SHOULDERS]), np.array([DEPTH])
+    return np.sort(person_boxes(camera, np.zeros((1, 3)), np.zeros(1), tall, wide, deep)[0, 2:])[::-1]
+
 
 SLIM = 0.36  # width over height of a walking person's box: the first guess without a camera
 ASPECT_FACTOR = 2.0  # largest factor between a lone blob's width over height and the expected one
@@ -67,7 +90,7 @@ class PersonSize:
         self.box_ratios, self.box_over_ellipse = np.zeros((0, 2)), np.array(BOX_OVER_ELLIPSE)
         self.line, self.factor, self.agreed = (float("nan"), 0.0), np.ones(2), 0
         if context.camera is not None and context.camera.kind == "top":
-            self.axes_above, self.box_over_ellipse = typical_person.axes_from_above(context.camera), np.ones(2)
+            self.axes_above, self.box_over_ellipse = axes_from_above(context.camera), np.ones(2)
         elif context.camera is not None:
             self.low = -MARGIN * np.array(context.camera.image, float)
             self.table = _table(context.camera, self.low)
@@ -227,7 +250,7 @@ def _table(camera: Camera, low: Array) -> Array:
         seen = np.isfinite(ground).all(1)
         if not seen.any():
             break
-        box = typical_person.boxes(camera, ground[seen])
+        box = boxes(camera, ground[seen])
         found[seen] = box[:, :1:-1]
         aim[seen] += np.nan_to_num(foot[seen] - _feet(box))
     return np.asarray(found.T.reshape(2, size[1], size[0]))

@@ -1,4 +1,18 @@
-"""Detections as places in metres, and boxes of people who are tracked as points.
+"""From a picture to the detections of trackers of points: each foreground blob, or piece of one, is one detection.
+
+The foreground comes from tracking.detect.foreground. A blob that holds several people is one detection, so people who
+share a blob are missed but for one, unless blobs are divided (tracking.detect.point_detections).
+
+Blobs that hold several people, divided into pieces of a person's size (ours).
+
+How many people a blob may hold follows from its area: with r times a person's area, from r + 1/4 to r + 3/4, rounded
+down, and at least one. Within these limits it is the number of tracked people whose boxes are centred in the blob. A
+blob of less than LEAST of a person's area is left out.
+
+The pixels go to the nearest of as many centres, distances being in a person's width and height. The centres start at
+the tracked people, and in places far from these, and become the means of their pixels (k-means).
+
+Detections as places in metres, and boxes of people who are tracked as points.
 
 For trackers of points that report people with boxes: in the image a person keeps the size of the boxes that were
 measured, which follows them slowly.
@@ -6,12 +20,69 @@ measured, which follows them slowly.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from sim.types import Array, Detections
+from sim.types import Array, Context, Detections, Frame
+from tracking.detect.background_settings import BackgroundSettings
+from tracking.detect.blobs import Blobs
+from tracking.detect.foreground import Foreground, convex_areas
+from tracking.detect.person_size import PersonSize
+from tracking.running.image_scale import required
 
-BOX_TIME = 0.5
-"""Time constant with which the size of a person's box follows measured boxes, s."""
+FILLED = math.pi / 4  # Share of a person's box that the person fills.
+FEWEST, MOST = 0.25, 0.75  # A blob of r times a person's area holds from r + FEWEST to r + MOST people, rounded down.
+LEAST = 0.3  # A blob with a smaller share of a person's area is left out: a part of a person, or noise.
+ROUNDS = 5  # Rounds of k-means.
+
+
+def divided(found: Blobs, people: Array, size: PersonSize) -> Array:
+    """Returns the boxes (N, 4), left, top, width, height, px, of the people in the blobs of a frame."""
+    boxes = [np.zeros((0, 4))]
+    centre = people[:, :2] + people[:, 2:] / 2
+    foot = found.box[:, :2] + found.box[:, 2:] * np.array([0.5, 1.0])
+    tall, wide = size.at(foot).T if len(found) else np.zeros((2, 0))
+    for m, (box, area) in enumerate(zip(found.box, found.area.tolist(), strict=True)):
+        inside = centre[((centre >= box[:2]) & (centre <= box[:2] + box[2:])).all(axis=1)]
+        count = 1
+        if np.isfinite(tall[m]):
+            held = area / (FILLED * tall[m] * wide[m])
+            if held < LEAST:
+                continue
+            count = min(max(len(inside), int(held + FEWEST), 1), max(int(held + MOST), 1))
+        boxes.append(box[None] if count == 1 else _pieces(found, m, inside, count, np.array([wide[m], tall[m]])))
+    return np.concatenate(boxes)
+
+
+def _pieces(found: Blobs, row: int, known: Array, count: int, person: Array) -> Array:
+    left, top, width, height = found.box[row].astype(int).tolist()
+    v, u = np.nonzero(found.label[top : top + height, left : left + width] == row + 1)
+    pixels = (np.stack([u + left, v + top], axis=1) + 0.5) / person
+    centres = np.zeros((0, 2))
+    for _ in range(count):
+        choice = known / person if len(centres) < len(known) else pixels
+        from_here = pixels.mean(axis=0)[None] if not len(centres) else centres
+        centres = np.concatenate([centres, choice[_nearest(choice, from_here)[1].argmax()][None]])
+    for _ in range(ROUNDS):
+        owner = _nearest(pixels, centres)[0]
+        owned = np.bincount(owner, minlength=len(centres))
+        centres = centres[owned > 0]
+        owner = (np.cumsum(owned > 0) - 1)[owner]
+        sums = [np.bincount(owner, pixels[:, d]) for d in (0, 1)]
+        centres = np.stack(sums, axis=1) / owned[owned > 0][:, None]
+    owner = _nearest(pixels, centres)[0]
+    places = [pixels[owner == k] * person for k in range(len(centres))]
+    corners = [(p.min(axis=0) - 0.5, p.max(axis=0) + 0.5) for p in places if len(p)]
+    return np.array([np.concatenate([low, high - low]) for low, high in corners])
+
+
+def _nearest(points: Array, centres: Array) -> tuple[Array, Array]:
+    squared = np.square(points[:, None] - centres).sum(axis=2)
+    return squared.argmin(axis=1), squared.min(axis=1)
+
+
+BOX_TIME = 0.5  # Time constant with which the size of a person's box follows measured boxes, s.
 
 
 def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array | None]:
@@ -31,3 +102,49 @@ def followed_sizes(old: Array, new: Array, dt: Array | float) -> Array:
 def boxes_at(pos: Array, size: Array) -> Array | None:
     """Returns boxes (N, 4) left, top, width, height in px with the centres pos (N, 2) px; None if a size is unknown."""
     return np.concatenate([pos - size / 2, size], axis=1) if np.isfinite(size).all() else None
+
+
+class ForegroundBlobs:
+    """Foreground blobs as detections in the image.
+
+    State: settings; foreground, the pipeline with its background model; size: of a person at each place, from the
+    camera or learned from lone people in the background sample, if blobs are divided, else None. scale: px per metre,
+    the context's, or, if that is nan, learned from lone people.
+
+    The context must have a background sample (else AssertionError). Raises InputError if the scale is neither known nor
+    learned, if it is zero or negative, or if the sample cannot be used.
+    """
+
+    def __init__(self, settings: BackgroundSettings, context: Context, divide: bool = False) -> None:
+        """Train the background model; divide: blobs of several people are divided."""
+        assert context.background is not None
+        self.settings = settings
+        self.foreground = Foreground(context, settings)
+        self.size: PersonSize | None = None
+        if divide or np.isnan(context.px_per_m):
+            size = PersonSize(context)
+            self.foreground.learn_person_size(size, context.background)
+            self.size = size if divide else None
+            if np.isnan(context.px_per_m):
+                self.foreground.px_per_m = size.px_per_m
+        self.scale = self.foreground.px_per_m = required(self.foreground.px_per_m)
+
+    def follow(self, settings: BackgroundSettings) -> None:
+        """Replace the settings of the background model; what the model learned and the scale stay."""
+        self.settings = settings
+        self.foreground.follow(settings)
+
+    def detections(self, frame: Frame, people: Array) -> Detections | None:
+        """Returns the blobs of the frame's picture as detections; None without a picture, or if too much of it is
+        foreground."""
+        if frame.image is None:
+            return None
+        seen = self.foreground.segment(frame.image)
+        corners = [box[:2] + box[2:] * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) for box in people]
+        self.foreground.adapt(seen, convex_areas(self.foreground.shape, corners))
+        if not seen.plausible:
+            return None
+        found = self.foreground.person_blobs(seen.mask)
+        box = found.box if self.size is None else divided(found, people, self.size)
+        centre = box[:, :2] + box[:, 2:] / 2
+        return Detections(frame.index, frame.t, "image", centre, None, box, np.ones(len(box)))

@@ -18,22 +18,12 @@ from numpy.typing import NDArray
 
 from sim.types import Array, Bools, Image
 from tracking.detect.blobs_kernels import runs
-from tracking.detect.subtraction_stereo_kernels import (
-    STEPS,
-    block_match,
-    filtered_pair,
-    left_right,
-    reach,
-)
+from tracking.detect.subtraction_stereo_kernels import STEPS, block_match, filtered_pair, left_right, reach
 
-MULTIPLE = 16
-"""Numbers of disparities are multiples of it, as those of OpenCV's matcher."""
-LEAST_BLOCK = 5
-"""px: least width of the compared block that OpenCV allows."""
-LEAST_UNIQUE = 5
-"""Percent by which the best match must be better than the second best."""
-SHORT_BLOCK = 22
-"""px: widest block whose sums of differences, and 5 % more, are below 32768."""
+MULTIPLE = 16  # Numbers of disparities are multiples of it, as those of OpenCV's matcher.
+LEAST_BLOCK = 5  # px: least width of the compared block that OpenCV allows.
+LEAST_UNIQUE = 5  # Percent by which the best match must be better than the second best.
+SHORT_BLOCK = 22  # px: widest block whose sums of differences, and 5 % more, are below 32768.
 
 Disparities = NDArray[np.float32]
 

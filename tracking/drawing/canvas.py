@@ -20,14 +20,12 @@ INK, QUIET, GRID, FLOOR, THING, WALL = (
     (144, 133, 125),
     (60, 51, 45),
 )
+# Colours of ids as RRGGBB; an id takes the colour at its number modulo 10.
 PALETTE = ("0072b2", "b84a00", "00805e", "a33a7a", "6a51a3", "8a6d00", "b2182b", "20708c", "4d7c0f", "7a4a2a")
-"""Colours of ids as RRGGBB; an id takes the colour at its number modulo 10."""
 
-SHIFT = 4
-"""Fractional bits of the coordinates that cv2 is given."""
+SHIFT = 4  # Fractional bits of the coordinates that cv2 is given.
 
-TRAIL_SECONDS = 3.0
-"""s: how far back trails reach."""
+TRAIL_SECONDS = 3.0  # s: how far back trails reach.
 
 Colour = tuple[int, int, int]
 

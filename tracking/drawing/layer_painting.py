@@ -8,33 +8,20 @@ import cv2
 import numpy as np
 
 from sim.types import Array, GroupEvent, Image
-from tracking.drawing.canvas import (
-    FLOOR,
-    INK,
-    TRAIL_SECONDS,
-    Canvas,
-    Colour,
-    ascii_only,
-    box_corners,
-    colour,
-)
+from tracking.drawing.canvas import FLOOR, INK, TRAIL_SECONDS, Canvas, Colour, ascii_only, box_corners, colour
 from tracking.drawing.layers import GroupMark, Layer
 
-CAPTION_SECONDS = 2.5
-"""s for which an event's caption is shown."""
+CAPTION_SECONDS = 2.5  # s for which an event's caption is shown.
 
-CAPTIONS = 6
-"""Captions in a picture at most."""
+CAPTIONS = 6  # Captions in a picture at most.
 
-MANY = 60
-"""Ids of people are left out of frames with more people than this; of more groups only the first are named."""
+MANY = 60  # Ids of people are left out of frames with more people than this; of more groups only the first are named.
 
 PLAIN_INK = (250, 250, 250)
-ALARM = 6
-"""The id whose colour marks what a frame lacks, and events of unknown kind."""
+ALARM = 6  # The id whose colour marks what a frame lacks, and events of unknown kind.
 
+# The id whose colour an event's kind has.
 KIND_COLOUR = {"merge": 0, "split": 1, "cross": 3, "queue": 2, "form": 4, "dissolve": 5, "enter": 7, "leave": 9}
-"""The id whose colour an event's kind has."""
 
 
 @dataclass(frozen=True)

@@ -19,20 +19,17 @@ from sim.io.store.track_files import upright_boxes
 from sim.io.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
 
-BOX_MARGIN = 5.0
-"""px between members' boxes and the outline of their group."""
+BOX_MARGIN = 5.0  # px between members' boxes and the outline of their group.
 
-HIDDEN = 0.2
-"""A person whose visible share is below this gets a dashed box."""
+HIDDEN = 0.2  # A person whose visible share is below this gets a dashed box.
 
-NOT_CAPTIONED = ("enter", "leave")
-"""Kinds of events without a caption."""
+NOT_CAPTIONED = ("enter", "leave")  # Kinds of events without a caption.
 
+# Standard deviations: the ellipse at this distance holds 95 % of a normal distribution in the plane.
 SIGMA_95 = math.sqrt(5.991)
-"""Standard deviations: the ellipse at this distance holds 95 % of a normal distribution in the plane."""
 
+# The same for 99 %: the points d from a group's centre with d' E^-1 d = 9.21 for its extent E.
 SIGMA_99 = math.sqrt(9.21)
-"""The same for 99 %: the points d from a group's centre with d' E^-1 d = 9.21 for its extent E."""
 
 UNIT_CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 32, endpoint=False)) for f in (np.cos, np.sin)], axis=1)
 NO_POINTS = np.zeros((0, 2))

@@ -10,7 +10,7 @@ statistics of the run. A step's reward is S(frames so far) - S(frames before it)
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal, cast, get_args
 
 import gymnasium
@@ -24,8 +24,7 @@ from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
 from sim.types import DetectionMode, Image, Tracker
 from tracking.config import Config
-from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, SourceCache
-from tracking.environment.episode_source import Source, SourceSpec, sources
+from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, Source, SourceCache, SourceSpec, sources
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
 from tracking.keyword_options import documented, from_keywords, option
@@ -46,34 +45,23 @@ Floats = NDArray[np.float32]
 class TuningEnvOptions:
     """The keyword arguments of the environment; the metadata of each field hold its meaning."""
 
-    tracker: AnyTracker = field(metadata=option('Registered name, "file.py:Class", "module:Class" or a class.'))
-    suite: SourceSpec | Source = field(
-        default="quick",
-        metadata=option("Suite, scenario, TOML file, stored sequences, recording, Sequence, or a list of these."),
-    )
-    seeds: Iterable[int] = field(default=range(100), metadata=option("Seeds that scenarios are simulated with."))
-    set: Iterable[str] = field(default=(), metadata=option('Settings "key=value" of the scenarios.'))
-    detections: DetectionMode | None = field(
-        default=None, metadata=option("Input of the tracker, the same in all episodes.")
-    )
-    similarity: Similarity | None = field(
-        default=None, metadata=option('How people are compared: "ground", "image" or "boxes"; None: by the data.')
-    )
-    params: Params = field(
-        default=None, metadata=option("Parameters that an episode begins with; the tracker's defaults if None.")
-    )
-    decision_every: int | None = field(
-        default=None, metadata=option("Frames between two actions; None: one action per episode.")
-    )
-    observation: Observation = field(
-        default="statistics",
-        metadata=option('"statistics"; "parameters" adds the parameters in [-1, 1]; "none" is a single 0.'),
-    )
-    cache: int = field(
-        default=DEFAULT_LIMIT, metadata=option("Bytes of sequences that are kept for later episodes.", low=0)
-    )
-    tracker_seed: int = field(default=0, metadata=option("Seed of trackers that use random numbers."))
-    render_mode: str | None = field(default=None, metadata=option('"rgb_array" or None.'))
+    # fmt: off
+    tracker: AnyTracker = option('Registered name, "file.py:Class", "module:Class" or a class.')
+    suite: SourceSpec | Source = option(
+        "Suite, scenario, TOML file, stored sequences, recording, Sequence, or a list of these.", "quick")
+    seeds: Iterable[int] = option("Seeds that scenarios are simulated with.", range(100))
+    set: Iterable[str] = option('Settings "key=value" of the scenarios.', ())
+    detections: DetectionMode | None = option("Input of the tracker, the same in all episodes.", None)
+    similarity: Similarity | None = option(
+        'How people are compared: "ground", "image" or "boxes"; None: by the data.', None)
+    params: Params = option("Parameters that an episode begins with; the tracker's defaults if None.", None)
+    decision_every: int | None = option("Frames between two actions; None: one action per episode.", None)
+    observation: Observation = option(
+        '"statistics"; "parameters" adds the parameters in [-1, 1]; "none" is a single 0.', "statistics")
+    cache: int = option("Bytes of sequences that are kept for later episodes.", DEFAULT_LIMIT, low=0)
+    tracker_seed: int = option("Seed of trackers that use random numbers.", 0)
+    render_mode: str | None = option('"rgb_array" or None.', None)
+    # fmt: on
 
     def __post_init__(self) -> None:
         _check_choice("observation", self.observation, OBSERVATIONS)

@@ -2,31 +2,139 @@
 once.
 
 The memory is bounded by the bytes of the arrays that they hold.
+
+The sequences that episodes are played on: scenarios with seeds, stored or real recordings, sequences in memory.
+
+`sources` turns the names, files or sequences that a user gives into `Source`s; `Source.open` makes or reads one.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter, OrderedDict
-from collections.abc import Callable, Iterator
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from types import FunctionType, MethodType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Frame, Truth
-from tracking.environment.episode_source import Source
+from sim.types import Frame, Sequence, Truth
 
 if TYPE_CHECKING:
+    from scenarios.loading.resolve import Entry
     from tracking.objective import ObjectiveScorer
 
+
+SourceSpec = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One sequence to play on: a scenario entry with its seed, a path, or a Sequence in memory (exactly one of these).
+
+    A source with a Sequence in memory cannot be pickled.
+    """
+
+    name: str  # of the scenario or sequence
+    seed: int = 0  # of the simulation, or stated by the recording, else 0
+    entry: Entry | None = field(default=None, repr=False)
+    path: str = ""
+    sequence: Sequence | None = field(default=None, repr=False)
+
+    @cached_property
+    def key(self) -> tuple[object, ...]:
+        """A tuple that is equal for sources of the same sequence. It is computed once."""
+        if self.entry is not None:
+            content = self.entry.scenario.model_dump_json()
+            return self.name, self.seed, self.entry.repeat, hashlib.sha256(content.encode()).hexdigest()
+        return (str(Path(self.path).resolve()),) if self.path else (id(self.sequence),)
+
+    @property
+    def simulated(self) -> bool:
+        """True if the sequence is simulated from a scenario, False if it is stored or in memory."""
+        return self.entry is not None
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+        camera = self.entry.scenario.camera if self.entry is not None else None
+        return self.open().fps if camera is None else camera.fps
+
+    def open(self, streams: Iterable[str] = ()) -> Sequence:
+        """Returns the sequence: simulated, read from its path, or as it is if it is in memory."""
+        if self.sequence is not None:
+            return self.sequence
+        if self.entry is not None:
+            from sim.sequence import simulate
+
+            return simulate(self.entry.scenario, self.seed, self.entry.repeat, streams)
+        from sim.io.source import open_source
+
+        return open_source(self.path, images="left" in streams)[0]
+
+
+def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
+    """Returns the sources that `what` stands for: for each scenario or suite entry all its seeds, then the next.
+
+    A name in the catalogue counts before a folder of that name.
+
+    Args:
+        what: A suite's or scenario's name, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a
+            list.
+        seeds: Of scenarios; the others ignore them.
+        set: "key=value" settings for the scenarios.
+
+    Raises:
+        InputError: A name is unknown, a file or setting is wrong, there is no source, or there are settings but no
+            scenario.
+    """
+    if isinstance(what, str | Path | Sequence | Source):
+        what = (what,)
+    if not isinstance(seeds, Iterable):
+        remedy = f"write for example range({seeds})"
+        raise InputError(place="seeds", got=repr(seeds), expected="a range or a list of numbers", remedy=remedy)
+    if isinstance(set, str):
+        raise InputError(place="set", got=repr(set), expected='a list of "key=value"', remedy=f"write [{set!r}]")
+    numbers, settings = tuple(seeds), tuple(set)
+    found = tuple(source for item in what for source in _sources_of(item, numbers, settings))
+    if not found:
+        raise InputError(place="sources", got="none", expected="at least one", remedy="give a suite, or seeds")
+    if settings and not any(source.simulated for source in found):
+        got, remedy = ", ".join(settings), "leave the settings out"
+        raise InputError(place="set", got=got, expected="none for recordings", remedy=remedy)
+    return found
+
+
+def _sources_of(
+    item: str | Path | Sequence | Source, seeds: tuple[int, ...], settings: tuple[str, ...]
+) -> list[Source]:
+    if isinstance(item, Source):
+        return [item]
+    if isinstance(item, Sequence):
+        return [Source(item.name, int(item.source.get("seed", 0)), sequence=item)]
+    from scenarios.loading.resolve import names, resolve, suite_names
+
+    text = str(item)
+    known = text.endswith(".toml") or text.startswith("suite:") or text in (*names(), *suite_names())
+    if not known and Path(item).exists():
+        return _stored(Path(item))
+    return [Source(e.name, seed, entry=e) for e in resolve(text, settings) for seed in seeds]
+
+
+def _stored(path: Path) -> list[Source]:
+    from sim.io.source import open_source
+
+    found = open_source(path, images=False)
+    return [Source(s.name, int(s.source.get("seed", 0)), path=str(s.source.get("path", path))) for s in found]
+
+
 T = TypeVar("T")
-DEFAULT_LIMIT = 256 * 2**20
-"""Bytes that a SourceCache keeps by default."""
-TIMES_COUNTED = 2
-"""How often the bytes of a source are counted; after that it holds all that it will hold."""
+DEFAULT_LIMIT = 256 * 2**20  # Bytes that a SourceCache keeps by default.
+TIMES_COUNTED = 2  # How often the bytes of a source are counted; after that it holds all that it will hold.
 
 
 class OpenedSource:

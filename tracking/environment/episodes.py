@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
-from tracking.environment.episode_cache import OpenedSource, SourceCache
-from tracking.environment.episode_source import Source, sources
+from tracking.environment.episode_cache import OpenedSource, Source, SourceCache, sources
 from tracking.running.prepare import Params, prepare
 from tracking.running.time_limit import TimeLimited
 

@@ -16,12 +16,9 @@ from tracking.drawing.plan_view import draw_scene
 from tracking.environment.episode_cache import OpenedSource
 from tracking.environment.episodes import Rollout
 
-SIZE = (480, 640)
-"""Height and width of a plan, px."""
-STRIP = 32
-"""Height of the text line above the picture, px."""
-LETTER = 0.5
-"""Font scale of the text line."""
+SIZE = (480, 640)  # Height and width of a plan, px.
+STRIP = 32  # Height of the text line above the picture, px.
+LETTER = 0.5  # Font scale of the text line.
 
 
 def episode_picture(opened: OpenedSource, rollout: Rollout | None, score: float) -> Image:

@@ -21,13 +21,11 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 
-PLACE, RATE, VAR, COV, RATE_VAR = range(5)
-"""Rows of a bank's `state`."""
-DIRECTION, DIRECTION_VAR = range(2)
-"""Rows of `angle`."""
+PLACE, RATE, VAR, COV, RATE_VAR = range(5)  # Rows of a bank's `state`.
+DIRECTION, DIRECTION_VAR = range(2)  # Rows of `angle`.
+# rad^2: a measured direction with this variance or more carries no information. (An axis differs from any other by at
+# most pi / 2; a uniform distribution has a standard deviation of 52 deg.)
 VAGUE = np.radians(30.0) ** 2
-"""rad^2: a measured direction with this variance or more carries no information. (An axis differs from any other by at
-most pi / 2; a uniform distribution has a standard deviation of 52 deg.)"""
 
 
 def white_acceleration(dt: float, sigma: Array | float) -> Array:

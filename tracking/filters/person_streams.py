@@ -14,12 +14,9 @@ from sim.rng import ROLE
 from sim.types import Array
 from tracking.filters import person_streams_kernels
 
-Keys = NDArray[np.uint64]
-"""One number for each of K people, (K,)."""
-PLACE = 1000.0
-"""1/m: places are told apart to a millimetre."""
-NOBODY = np.zeros(1, np.uint64)
-"""The key of what belongs to all people together."""
+Keys = NDArray[np.uint64]  # One number for each of K people, (K,).
+PLACE = 1000.0  # 1/m: places are told apart to a millimetre.
+NOBODY = np.zeros(1, np.uint64)  # The key of what belongs to all people together.
 
 
 def birth_keys(points: Array, frame: int) -> Keys:

@@ -2,6 +2,8 @@
 
 Every scene weighs the same. The penalty is on the squared log-odds, on their differences between the situations
 (walking or standing, among few or many), and on the curvature of the tables.
+
+How well beliefs tell who belongs together: log loss, calibration error and F1 of rows of pairs.
 """
 
 from __future__ import annotations
@@ -19,12 +21,10 @@ from tracking.fitting.grouping_scenes import PairScene
 from tracking.grouping.belief import SITUATIONS, Belief, Table, situations
 from tracking.grouping.pair_evidence import NAMES
 
-KNOTS = 10
-"""Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %."""
+KNOTS = 10  # Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %.
+# Weights of the penalties: of curvature; of squared log-odds, and, twice, of their differences between situations.
 CURVED, LARGE = 3e-4, 1e-4
-"""Weights of the penalties: of curvature; of squared log-odds, and, twice, of their differences between situations."""
-STEPS = 200
-"""Most iterations."""
+STEPS = 200  # Most iterations.
 
 
 @dataclass(frozen=True)
@@ -104,3 +104,30 @@ def _curvature(at: Sequence[Array]) -> Array:
             rows.append(0.2 * np.sqrt((a + b) / 2) * row)
         offset += len(knots)
     return np.array(rows).reshape(-1, total)
+
+
+BINS = 15  # Of equal width, between the probabilities 0 and 1.
+
+
+def belief_scores(sample: PairSample, log_odds: Array) -> dict[str, float]:
+    """Returns pairs, log loss, calibration error and F1 of beliefs (R,) of a sample's rows, by name."""
+    true, weight = sample.together, sample.weight
+    loss = np.logaddexp(0.0, log_odds) - log_odds * true
+    bins = reliability(log_odds, true, weight)
+    hits, count = int((true & (log_odds > 0)).sum()), int(true.sum() + (log_odds > 0).sum())
+    return {
+        "pairs": float(sample.pairs),
+        "log loss": float(weight @ loss),
+        "calibration error": float(np.abs(bins[:, 0] * (bins[:, 1] - bins[:, 2]))[bins[:, 0] > 0].sum()),
+        "F1": 2 * hits / count if count else float("nan"),
+    }
+
+
+def reliability(log_odds: Array, true: Bools, weight: Array) -> Array:
+    """Returns share of the weight, mean probability and share of mates of each bin, (15, 3); nan in an empty one."""
+    probability = 1 / (1 + np.exp(-log_odds))
+    place = np.minimum((probability * BINS).astype(np.int64), BINS - 1)
+    total = np.bincount(place, weight, BINS)
+    means = [np.bincount(place, weight * x, BINS) for x in (probability, true)]
+    with np.errstate(invalid="ignore"):
+        return np.column_stack([total / weight.sum(), *(m / total for m in means)])

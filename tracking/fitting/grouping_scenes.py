@@ -18,15 +18,12 @@ from sim.types import Array, Bools, Ints, Truth
 from tracking.grouping.pair_evidence import evidence, frames_per_step, step_positions
 from tracking.tuning.grouping_episodes import SURVEYED, LabelErrors, with_label_errors
 
-SLOW = 2.5
-"""Frames/s of the slow copy."""
+SLOW = 2.5  # Frames/s of the slow copy.
 DETECTED = LabelErrors(0.1, 1e-3, filmed=False)
 MISSED = 0.05
-BEGINS = (0.0, 4.0, 8.0)
-"""s: times at which scenes of successive seeds begin, if at least LEAST s are left."""
+BEGINS = (0.0, 4.0, 8.0)  # s: times at which scenes of successive seeds begin, if at least LEAST s are left.
 LEAST = 10.0
-MOST_PAIRS = 300
-"""Pairs of a scene that are kept, drawn at random: bounds memory."""
+MOST_PAIRS = 300  # Pairs of a scene that are kept, drawn at random: bounds memory.
 
 
 @dataclass(frozen=True)

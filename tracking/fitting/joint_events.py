@@ -21,16 +21,12 @@ from sim.types import Array, Bools, Ints, Truth
 from tracking.papers.joint.group_events_kernels import FEATURES, partition_features
 from tracking.papers.joint.partition_kernels import canonical
 
-STRIDE = 0.2
-"""Time between two partitions that are looked at, s."""
+STRIDE = 0.2  # Time between two partitions that are looked at, s.
+# Standard deviations of the errors of places, m, and velocities, m/s, per axis.
 PLACE_ERROR, VELOCITY_ERROR = 0.05, 0.2
-"""Standard deviations of the errors of places, m, and velocities, m/s, per axis."""
-WRONG = 20
-"""Of as many partitions one is also given with an error."""
-RIDGE = 1e-3
-"""Weight of the squared coefficients, of standardised features, in the loss of a row."""
-LEAST = 5
-"""Fewest merges, and splits, from which a classifier is fitted."""
+WRONG = 20  # Of as many partitions one is also given with an error.
+RIDGE = 1e-3  # Weight of the squared coefficients, of standardised features, in the loss of a row.
+LEAST = 5  # Fewest merges, and splits, from which a classifier is fitted.
 MERGE, SPLIT, NONE = range(3)
 CLASSES = ("merge", "split", "none")
 

@@ -19,18 +19,13 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import Array, Bools, Ints, Truth
 
-LAG = 0.4
-"""Time over which changes of velocity are measured, s: steering is correlated over shorter times."""
-NEAR = 6.0
-"""Pairs farther apart teach nothing, m."""
-LEAST = 500
-"""Fewest rows from which anything is fitted."""
-RATES = tuple(0.05 * 2.0**k for k in range(9))
-"""Rates of relations that are tried, 1/s."""
+LAG = 0.4  # Time over which changes of velocity are measured, s: steering is correlated over shorter times.
+NEAR = 6.0  # Pairs farther apart teach nothing, m.
+LEAST = 500  # Fewest rows from which anything is fitted.
+RATES = tuple(0.05 * 2.0**k for k in range(9))  # Rates of relations that are tried, 1/s.
+# Standard deviation of the prior of each logistic weight, about 0: pairs that a line separates have finite weights.
 PRIOR = 5.0
-"""Standard deviation of the prior of each logistic weight, about 0: pairs that a line separates have finite weights."""
-STEPS = 50
-"""Most steps of Newton's method."""
+STEPS = 50  # Most steps of Newton's method.
 
 
 @dataclass(frozen=True)

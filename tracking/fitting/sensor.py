@@ -1,19 +1,264 @@
-"""`fit_sensor`: fits the whole profile of a detector, a `[sensor]` table, to its detections on labelled recordings."""
+"""`fit_sensor`: fits the whole profile of a detector, a `[sensor]` table, to its detections on labelled recordings.
+
+Fits the probability of detection, by visibility and box height, and how long misses persist.
+
+p = P · c(visibility) · min(1, height / (2 small)). P is the probability for a large person in full view. The factor c
+is piecewise linear over 5 evenly spaced visibilities and rises to c(1) = 1. small is half the height in px below which
+detection becomes less likely. P and c have the greatest likelihood for each candidate of `small`. Misses of one person
+persist, so successive rows (people in frames) carry little new information. `small` is therefore used only if the log
+likelihood gains more than 4 times the number of rows that carry as much information as one independent row.
+
+Fits the errors of detected boxes: mean and standard deviation, growth with occlusion, tails, and memory over time.
+
+Input: recordings whose detections are matched to labelled people. Errors are the four of
+`sim.detector.box_noise.box_errors`: of a box's middle (to the right), foot and top (downwards), in heights of the
+labelled box, and the logarithm of detected over labelled width. Their standard deviation is sd (1 + occluded (1 -
+visibility)): sd that of a person in full view, occluded its growth with the hidden share, visibility the visible share.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.schema.sensor import Sensor
-from sim.types import Array
+from scenarios.schema.sensor import BoxNoise, Memory, Sensor
+from sim.detector.box_noise import box_errors, seen_shift
+from sim.scene.camera import foot_points
+from sim.types import Array, Bools
 from sim.types import Sequence as Recording
-from tracking.fitting.box_noise import fit_box_noise, fit_points
 from tracking.fitting.detection_matching import MatchedRecording, match_sequence
+from tracking.fitting.error_correlation import correlations, fit_memory, miss_correlations
 from tracking.fitting.false_alarms import fit_false_alarms
-from tracking.fitting.misses import fit_misses
+
+NODES = 5
+SIZES = 16  # number of candidates of `small`
+PRIOR = 2.0  # weight, in rows per node, of the prior that c equals the visibility
+GAIN = 4.0  # gain in log likelihood per independent row that `small` needs
+FEW_MISSES = 10  # with fewer misses in all, no memory is fitted
+
+
+@dataclass(frozen=True)
+class DetectionProbability:
+    """Probability that a person is detected, by visibility (visible share, 0 to 1) and box height."""
+
+    best: float  # probability P for a large person in full view, 0 to 1
+    # factors c at the visibilities 0, 0.25, 0.5, 0.75 and 1, linear between them; ascending, the last is 1.
+    curve: tuple[float, ...]
+    small: float  # half the box height in px below which detection becomes less likely; 0: height has no effect
+
+    def at(self, visibility: Array, height: Array) -> Array:
+        """Returns best · c(visibility) · min(1, height / (2 small)), (R,); the last factor only if `small` is not 0."""
+        c = np.interp(visibility, np.linspace(0.0, 1.0, NODES), self.curve)
+        return self.best * c * (np.minimum(1.0, height / (2 * self.small)) if self.small else 1.0)
+
+
+def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbability, tuple[Memory, ...]]:
+    """Returns the probability of detection, and the parts of the misses' memory, () with fewer than 10 misses."""
+    hit = np.concatenate([m.hit for m in recordings])
+    visibility = np.concatenate([m.truth.visibility for m in recordings])
+    height = np.concatenate([_heights(m) for m in recordings])
+    plain, likelihood = _fit_probability(hit, visibility, height, 0.0)
+    gain = GAIN * _rows_per_independent_row(recordings, plain)
+    # misses persist, so that rows carry little new information: `small` must gain in independent rows
+    chosen = plain
+    least, most = np.quantile(height, (0.01, 0.9)) / 2
+    for small in np.geomspace(least, most, SIZES).round(1):
+        other, better = _fit_probability(hit, visibility, height, float(small))
+        if better > likelihood + gain:
+            chosen, likelihood, gain = other, better, 0.0
+    if (~hit).sum() < FEW_MISSES:
+        return chosen, ()
+    correlated = [
+        miss_correlations(m.truth, ~m.hit, 1.0 - chosen.at(m.truth.visibility, _heights(m))) for m in recordings
+    ]
+    return chosen, fit_memory(correlated)
+
+
+def _heights(m: MatchedRecording) -> Array:
+    """Returns the heights (R,), px, that decide on detection: from above, those that the shoulders stand for."""
+    assert m.truth.box is not None
+    from sim.scene.body import SHOULDER_SHARE
+
+    if m.camera is not None and m.camera.kind == "top":
+        return np.asarray(m.truth.box[:, 2:].max(axis=1) / SHOULDER_SHARE)
+    return m.truth.box[:, 3]
+
+
+def _fit_probability(hit: Bools, visibility: Array, height: Array, small: float) -> tuple[DetectionProbability, float]:
+    """Returns the likeliest probability of detection for a given `small`, and its log likelihood with the prior."""
+    from scipy.optimize import minimize
+
+    levels = np.linspace(0.0, 1.0, NODES)
+    weights = np.stack([np.interp(visibility, levels, row) for row in np.eye(NODES)], axis=1)
+    ramp = np.minimum(1.0, height / (2 * small)) if small else np.ones(len(hit))
+
+    def curve(x: Array) -> Array:
+        steps = 1.0 / (1.0 + np.exp(-x))  # P, then c[k] / c[k + 1] from the last to the first
+        return np.asarray(np.cumprod(steps)[::-1])
+
+    def loss(x: Array) -> float:
+        c = curve(x)
+        p = np.clip((weights @ c) * ramp, 1e-6, 1.0 - 1e-6)
+        believed = np.clip(c / c[-1], 1e-6, 1.0 - 1e-6)[:-1]
+        prior = PRIOR * (levels[:-1] * np.log(believed) + (1.0 - levels[:-1]) * np.log(1.0 - believed)).sum()
+        return -float(np.where(hit, np.log(p), np.log(1.0 - p)).sum() + prior)
+
+    found = minimize(loss, np.array([2.0, 1.0, 0.5, 0.0, -1.0]), method="L-BFGS-B", bounds=[(-9.0, 9.0)] * NODES)
+    c = curve(found.x)
+    return DetectionProbability(float(c[-1]), tuple(c / c[-1]), small), -float(found.fun)
+
+
+def _rows_per_independent_row(recordings: Sequence[MatchedRecording], probability: DetectionProbability) -> float:
+    """Returns how many labelled rows carry as much information as one independent row, at least 1."""
+    found = []
+    for m in recordings:
+        p = probability.at(m.truth.visibility, _heights(m))
+        z = (m.hit - p) / np.sqrt(np.maximum(p * (1.0 - p), 1e-3))
+        over_time = correlations(m.truth, z[:, None], np.ones(len(z), bool))
+        if len(over_time.lag):
+            area = float(np.trapezoid(np.clip(over_time.rho, 0.0, 1.0), over_time.lag))
+            found.append(1.0 + 2.0 * m.truth.fps * area)
+    return max(found, default=1.0)
+
+
+GROWTH = np.concatenate([[0.0], np.geomspace(0.1, 6.0, 40)])  # values of `occluded` to choose from
+TAILS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0, 20.0)  # excess kurtoses to choose from
+HALF = (0.3, 0.9)  # a row counts as half hidden if its visibility is between these
+BARELY = 0.25  # visibility: rows below it are left out, as their nearest box often belongs to someone else
+POINTS: tuple[Literal["own", "seen", "foot"], ...] = ("own", "seen", "foot")  # in order of preference
+FEW = 20  # with fewer half hidden rows, boxes are taken as amodal and errors as independent of visibility
+
+
+@dataclass(frozen=True)
+class ErrorSpread:
+    """A model of the errors of a box: mean + sd (1 + occluded (1 - visibility)) n, n random of variance 1."""
+
+    # (4,): mean error of middle, foot, top (box heights) and logarithm of the width, the same at any visibility
+    mean: Array
+    sd: Array  # (4,): standard deviation of the same errors for a person in full view (visibility 1)
+    occluded: float  # growth of the standard deviation with the hidden share 1 - visibility, 0 or more
+    likelihood: float  # log likelihood of the data the model was fitted to, up to a constant; 0 without data
+
+
+def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
+    """Returns whether detected boxes are of the visible part or of the whole person, and their errors.
+
+    If no detected row is a quarter visible, means, standard deviations and `occluded` are 0, and `memory` is None.
+    """
+    kind: Literal["visible", "amodal"] = "visible" if _of_visible_part(recordings) else "amodal"
+    best = _fit_spread(recordings, kind)
+    correlated, standardised = [], []
+    for m in recordings:
+        z = np.full((len(m.truth.id), 4), np.nan)
+        growth = 1.0 + best.occluded * (1.0 - m.truth.visibility[m.hit])
+        z[m.hit] = (_errors(m, kind) - best.mean) / np.maximum(best.sd * growth[:, None], 1e-9)
+        correlated.append(correlations(m.truth, z, m.hit))
+        standardised.append(z[m.hit])
+    pairs = [(round(float(a), 4), round(float(b), 4)) for a, b in zip(best.mean, best.sd, strict=True)]
+    across, foot, top, width = pairs
+    grown = round(best.occluded, 3)
+    parts = fit_memory(correlated) if best.sd.max() > 1e-6 else ()
+    heights = np.concatenate([_true(m, kind)[:, 3] for m in recordings])
+    least = float(best.sd[:3].min() * np.median(heights)) if len(heights) else 0.0
+    return kind, BoxNoise(
+        across=across, foot=foot, top=top, width=width, occluded=grown, tails=_tails(np.concatenate(standardised)),
+        floor_px=round(min(BoxNoise().floor_px, least), 4), memory=parts or None,
+    )  # fmt: skip
+
+
+def _tails(z: Array) -> float:
+    """Returns the likeliest excess kurtosis of TAILS for Student-t errors of variance 1."""
+    from scipy.special import gammaln
+
+    def likelihood(tails: float) -> float:
+        if not tails:
+            return -0.5 * float((z**2 + np.log(2 * np.pi)).sum())
+        # the excess kurtosis of a Student-t distribution is 6 / (v - 4)
+        v = 4.0 + 6.0 / tails
+        level = gammaln((v + 1) / 2) - gammaln(v / 2) - 0.5 * np.log(np.pi * (v - 2))
+        return float((level - (v + 1) / 2 * np.log1p(z**2 / (v - 2))).sum())
+
+    return max(TAILS, key=likelihood)
+
+
+def _of_visible_part(recordings: Sequence[MatchedRecording]) -> bool:
+    """True if detected boxes of half hidden people are nearer to the visible part than to the whole box."""
+    away: dict[str, list[Array]] = {"visible": [], "amodal": []}
+    for m in recordings:
+        visibility = m.truth.visibility[m.hit]
+        half, whole = (visibility > HALF[0]) & (visibility < HALF[1]), visibility >= HALF[1]
+        for kind, errors in away.items():
+            e = _errors(m, kind)
+            usual = np.median(e[whole], axis=0) if whole.any() else np.zeros(4)
+            errors.append(np.abs(e[half] - usual)[:, :3] * _true(m, kind)[half, 3:])
+    both = {kind: np.concatenate(errors) for kind, errors in away.items()}
+    return len(both["visible"]) >= FEW and float(both["visible"].mean()) < float(both["amodal"].mean())
+
+
+def _errors(m: MatchedRecording, kind: str) -> Array:
+    """Returns the errors (H, 4) of the H detected rows against their labelled boxes of a kind."""
+    return box_errors(m.box[m.match[m.hit]], _true(m, kind))
+
+
+def _true(m: MatchedRecording, kind: str) -> Array:
+    assert m.truth.box is not None
+    true = m.truth.box
+    if kind == "visible" and m.truth.visible_box is not None:
+        true = np.where(np.isfinite(m.truth.visible_box), m.truth.visible_box, true)
+    return true[m.hit]
+
+
+def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSpread:
+    e = np.concatenate([_errors(m, kind) for m in recordings])
+    hidden = np.concatenate([1.0 - m.truth.visibility[m.hit] for m in recordings])
+    clear = hidden <= 1.0 - BARELY
+    e, hidden = e[clear], hidden[clear]
+    if not len(e):
+        return ErrorSpread(np.zeros(4), np.zeros(4), 0.0, 0.0)
+    tried = GROWTH if (hidden > 1.0 - HALF[1]).sum() >= FEW else GROWTH[:1]
+    return max((_spread_of_growth(e, hidden, float(k)) for k in tried), key=lambda s: s.likelihood)
+
+
+def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
+    """Returns the spread of errors e (H, 4) if `occluded` is k; hidden (H,): 1 - visibility."""
+    growth = 1.0 + k * hidden
+    weight = 1.0 / growth**2
+    mean = weight @ e / weight.sum()
+    sd = np.sqrt(np.mean((e - mean) ** 2 * weight[:, None], axis=0))
+    near = np.mean(np.abs(e - mean) / growth[:, None], axis=0)  # scale of the Laplace distribution
+    # of a Laplace distribution, which large errors influence little
+    likelihood = -len(e) * float(np.log(np.maximum(near, 1e-6)).sum()) - 4 * float(np.log(growth).sum())
+    return ErrorSpread(mean, sd, k, likelihood)
+
+
+def fit_points(
+    recordings: Sequence[MatchedRecording], kind: str
+) -> tuple[Literal["own", "seen", "foot"], float | None]:
+    """Returns the setting `points` that explains the detections' ground positions best, and its deviation, m."""
+    found = [_point_errors(m, kind) for m in recordings if m.pos is not None and m.truth.pos is not None]
+    e = np.concatenate([np.zeros((3, 0, 2)), *found], axis=1)
+    best = int(np.abs(e).sum(axis=(1, 2)).argmin())
+    if best == POINTS.index("foot") or not e.shape[1]:
+        return "foot", None
+    return POINTS[best], float(np.sqrt(np.mean(e[best] ** 2)))
+
+
+def _point_errors(m: MatchedRecording, kind: str) -> Array:
+    assert m.pos is not None
+    assert m.truth.pos is not None
+    pos = m.pos[m.match[m.hit]]
+    own = pos - m.truth.pos[m.hit]
+    if m.camera is None:
+        return np.stack([own, own, own])
+    z = np.zeros(len(own)) if m.truth.z is None else m.truth.z[m.hit]
+    seen = own - seen_shift(_true(m, kind), _true(m, "amodal"), z, m.camera)
+    foot = pos - foot_points(m.box[m.match[m.hit]], z, m.camera)
+    return np.stack([own, seen, np.where(np.isfinite(foot), foot, own)])
+
 
 SCORES = 11  # number of quantiles of the scores, evenly spaced from 0 to 1
 LEAST = 50  # least number of labelled rows

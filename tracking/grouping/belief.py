@@ -4,11 +4,14 @@ The belief of a row (`pair_evidence`) is a sum of tables, read off by linear int
 people who walk and who stand, among few others and among many, mixed by the pair's speed and its others over 5 s.
 `flockscope fit grouping` fits the tables to simulated scenes and writes them as a text file; belief.toml beside this
 module is the default.
+
+How probable it is that two tracked people belong together, for every pair and frame: a table of pairs.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -20,23 +23,20 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import parse, toml_value
-from sim.types import Array, Ints
+from sim.truth.merge_split_rules import runs
+from sim.types import Array, Ints, Tracks
 from tracking.grouping.pair_evidence import NAMES, evidence, frames_per_step, step_positions
+from tracking.grouping.tracks_table import tabulate
 
-FROZEN = Path(__file__).with_name("belief.toml")
-"""The default belief."""
+FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
 KIND = "belief"
-UNSEEN = -4.0
-"""Belief about two people who are too far apart for a row: log-odds."""
+UNSEEN = -4.0  # Belief about two people who are too far apart for a row: log-odds.
+# m/s: a pair counts as standing below the first, as walking above the second, in between in proportion.
 STANDS, WALKS = 0.2, 0.6
-"""m/s: a pair counts as standing below the first, as walking above the second, in between in proportion."""
-FEW, MANY = 1.0, 6.0
-"""Other people within 3 m: a pair counts as among few at the first, among many at the second."""
+FEW, MANY = 1.0, 6.0  # Other people within 3 m: a pair counts as among few at the first, among many at the second.
 SPEED, OTHERS = NAMES.index("speed, 5 s"), NAMES.index("others, 5 s")
-SITUATIONS = ("walking", "standing", "walking_among_many", "standing_among_many")
-"""Columns of a table."""
-NUMBERS = ("bias", "stay", "come", "memory", "arrival")
-"""Numbers of `Belief` in its file."""
+SITUATIONS = ("walking", "standing", "walking_among_many", "standing_among_many")  # Columns of a table.
+NUMBERS = ("bias", "stay", "come", "memory", "arrival")  # Numbers of `Belief` in its file.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,3 +170,33 @@ def _table(path: str | Path, number: int, row: Any) -> Table:
 def _refuse(path: str | Path, place: str, got: object, expected: str) -> None:
     remedy = "write the file with: flockscope fit grouping"
     raise InputError(file=path, place=place, got=repr(got), expected=expected, remedy=remedy)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairProbabilities:
+    """Rows of pairs, sorted by frame, then ids: frame (R,) from 1; a, b (R,): ids, a < b; probability (R,), 0 to 1."""
+
+    frame: Ints
+    a: Ints
+    b: Ints
+    probability: Array
+
+
+def pair_probabilities(tracks: Sequence[Tracks], fps: float, px_per_m: float, belief: Belief) -> PairProbabilities:
+    """Returns the probability that two people belong together, for all pairs less than 4 m apart, in each frame.
+
+    The belief changes once in a step of at most 0.4 s and holds until the next.
+    """
+    table = tabulate(tracks, fps, px_per_m)
+    found = beliefs_of_tracks(table.frame, table.column, table.pos, table.length, fps, belief)
+    size = frames_per_step(fps)
+    known = found.step * size
+    row, frame = runs(known, np.minimum(known + size, table.length))
+    present = np.zeros((table.length, len(table.ids)), bool)
+    present[table.frame, table.column] = True
+    a, b = found.a[row], found.b[row]
+    both = present[frame, a] & present[frame, b]
+    row, frame, a, b = row[both], frame[both], a[both], b[both]
+    order = np.lexsort((b, a, frame))
+    probability = 1 / (1 + np.exp(-found.log_odds[row]))
+    return PairProbabilities(frame[order] + 1, table.ids[a[order]], table.ids[b[order]], probability[order])

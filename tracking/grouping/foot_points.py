@@ -19,8 +19,7 @@ from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tra
 from tracking.grouping.grouped_tracks import names_groups, with_groups, with_velocities
 from tracking.grouping.grouping_choice import Grouping
 
-CLIMB = 8
-"""Steps in which the height of the ground below a foot point is found."""
+CLIMB = 8  # Steps in which the height of the ground below a foot point is found.
 
 
 def plane_of_run(tracks: Sequence[Tracks]) -> str | None:

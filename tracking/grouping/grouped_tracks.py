@@ -35,8 +35,8 @@ from tracking.grouping.grouping_choice import Grouping, default_grouping, links_
 from tracking.grouping.merge_split_events import TrackedMotion, events_of_labels
 from tracking.grouping.tracks_table import TracksTable, boxes_of_rows, tabulate
 
+# Kinds of events in which the membership of groups changes.
 MEMBERSHIP_KINDS = frozenset(EVENT_KINDS) - {"cross", "queue"}
-"""Kinds of events in which the membership of groups changes."""
 
 
 def with_groups(

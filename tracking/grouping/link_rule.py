@@ -24,12 +24,9 @@ from sim.truth.merge_split_rules import (
 from sim.types import Array, Bools, Ints
 from tracking.config import Config, param
 
-CELLS = 4_000_000
-"""Most frames times pairs that are worked on together: bounds memory."""
-NEVER = 10.0
-"""m/s: velocities of people never differ by more, so that this value switches `diverge` off."""
-ARRIVAL = 1.0
-"""s: a link that began within this time of a track's first frame is an arrival, no merge."""
+CELLS = 4_000_000  # Most frames times pairs that are worked on together: bounds memory.
+NEVER = 10.0  # m/s: velocities of people never differ by more, so that this value switches `diverge` off.
+ARRIVAL = 1.0  # s: a link that began within this time of a track's first frame is an arrival, no merge.
 
 
 @dataclass(frozen=True)

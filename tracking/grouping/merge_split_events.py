@@ -17,16 +17,12 @@ from sim.truth.identity import GroupChange, PersonSet, lineage
 from sim.truth.merge_split_rules import HOLD_TIME, frames_of, separation, stretches
 from sim.types import Array, Bools, GroupEvent, Ints
 
-ABSENT = -2
-"""Label of a person who is absent; -1 is a person alone."""
+ABSENT = -2  # Label of a person who is absent; -1 is a person alone.
+# A switched link: its people a, b, True if switched on, first frame of the stretch that caused it.
 LinkSwitch = tuple[int, int, bool, int]
-"""A switched link: its people a, b, True if switched on, first frame of the stretch that caused it."""
-SEARCHED = 20.0
-"""s before the report in which the onset of a change is looked for."""
-BRIDGED = 0.5
-"""s: gaps in a stretch that do not end it."""
-LOOK_BACK = 20
-"""Frames before an event's start in which its position is looked for."""
+SEARCHED = 20.0  # s before the report in which the onset of a change is looked for.
+BRIDGED = 0.5  # s: gaps in a stretch that do not end it.
+LOOK_BACK = 20  # Frames before an event's start in which its position is looked for.
 
 
 @dataclass(frozen=True, slots=True, eq=False)

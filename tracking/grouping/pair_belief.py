@@ -24,8 +24,7 @@ from tracking.grouping.pair_evidence import (
     instant_evidence,
 )
 
-PAIR = 2**31
-"""Numbers of people are below this."""
+PAIR = 2**31  # Numbers of people are below this.
 
 
 class PairBelief:

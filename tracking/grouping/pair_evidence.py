@@ -15,20 +15,13 @@ import numpy as np
 from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_VELOCITY, close_pairs
 from sim.types import Array, Ints
 
-STEP = 0.4
-"""s: longest step, unless one frame lasts longer."""
-CHORD = 0.8
-"""s over which velocities are measured: two frames of a recording with 2.5 frames/s."""
-REACH = 4.0
-"""m: pairs farther apart have no evidence."""
-AROUND = 3.0
-"""m: others nearer than this to one of the pair are counted."""
-STANDING = 0.3
-"""m/s."""
-TOUCHING = 0.1
-"""m: least distance by which the growth of the distance is divided."""
-TIMES = (0.8, 5.0, 15.0)
-"""s: means over the past have weights exp(-age / time)."""
+STEP = 0.4  # s: longest step, unless one frame lasts longer.
+CHORD = 0.8  # s over which velocities are measured: two frames of a recording with 2.5 frames/s.
+REACH = 4.0  # m: pairs farther apart have no evidence.
+AROUND = 3.0  # m: others nearer than this to one of the pair are counted.
+STANDING = 0.3  # m/s.
+TOUCHING = 0.1  # m: least distance by which the growth of the distance is divided.
+TIMES = (0.8, 5.0, 15.0)  # s: means over the past have weights exp(-age / time).
 # Averaged over the pair's rows, with weights exp(-age / time). Unknown velocities leave nan out of the means.
 # velocity difference: of vectors, m/s. sideways, lengthwise: parts of the distance, m, across and along the mean
 # velocity of the two where that is at least 0.3 m/s, else the whole distance and nan. others: mean of the two numbers
@@ -43,10 +36,9 @@ QUANTITIES = (
 # Not averaged: distance, m, of the row; arrival gap, s, between the steps in which the two were first seen; first
 # distance, m, when both had been seen. The last two are nan if that was step 0: people were there before.
 NOW = ("distance", "arrival gap", "first distance")
+# Names of the columns of `PairRows.values`.
 NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *NOW)
-"""Names of the columns of `PairRows.values`."""
-PORTION = 100_000
-"""Rows worked on together: bounds memory."""
+PORTION = 100_000  # Rows worked on together: bounds memory.
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,13 +18,11 @@ from tracking.grouping.grouping_choice import Grouping, default_grouping
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.tracks_table import tabulate
 
+# m/s: a median speed above it is no crowd's. It is 0.6 to 1.4 in seq_hotel, zara01, mwt1gt, PETS09, TownCentre and
+# TUD-Campus.
 FAST = 3.0
-"""m/s: a median speed above it is no crowd's. It is 0.6 to 1.4 in seq_hotel, zara01, mwt1gt, PETS09, TownCentre and
-TUD-Campus."""
-LEAST_ROWS = 50
-"""Fewer velocities tell nothing."""
-MUCH = 1.5
-"""Times `alike` from which on velocities are reported as unusable; those of our trackers reach 0.9 at most."""
+LEAST_ROWS = 50  # Fewer velocities tell nothing.
+MUCH = 1.5  # Times `alike` from which on velocities are reported as unusable; those of our trackers reach 0.9 at most.
 
 
 def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float) -> Iterator[str]:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from sim.types import GroupEvent
 
-NO_ID = -1
-"""Id of a tentative group."""
+NO_ID = -1  # Id of a tentative group.
 
 
 class GroupIds:

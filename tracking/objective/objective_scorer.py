@@ -3,6 +3,11 @@
 The scores equal those of `tracking.scoring.evaluate`, by the same functions of tracking.scoring. The truth's side is
 prepared once. Only one step is replaced: of groups that must be derived from tracks, only the members are computed
 (`derived_members`), without hulls, ids and events.
+
+Members of the groups that the default grouping derives from tracked people, without shapes, ids and events.
+
+The groups are those of `tracking.grouping.grouped_tracks.derive`, in the same frames and with the same members. Links
+come from `links_of`; connected components are compiled.
 """
 
 from __future__ import annotations
@@ -12,18 +17,51 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.types import Ints, Tracks, Truth
+from sim.truth.merge_split_rules import frames_of
+from sim.types import Bools, Ints, Tracks, Truth
 from tracking.grouping.grouped_tracks import names_groups, with_groups
-from tracking.objective.derived_members import derived_members
+from tracking.grouping.grouping_choice import default_grouping, links_of
+from tracking.grouping.tracks_table import TracksTable, tabulate
 from tracking.scoring.evaluation import Scorer, objective_of
 from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
 from tracking.scoring.group_scores import f1, groups_found, shared_members
-from tracking.scoring.hota import hota
 from tracking.scoring.matching import mapped_people
-from tracking.scoring.one_plane import in_one_plane
 from tracking.scoring.people_and_groups import GroupRows, bare_groups
-from tracking.scoring.people_comparison import Similarity, people_pairs
+from tracking.scoring.people_comparison import Similarity, in_one_plane, people_pairs
 from tracking.scoring.rows import FrameRows, find_rows
+from tracking.scoring.track_scores import hota
+
+
+def derived_members(tracks: Sequence[Tracks], fps: float, px_per_m: float, labelled: Bools) -> tuple[FrameRows, Ints]:
+    """Returns frame and id of the K members of groups of two or more in labelled frames, and their group (K,), from 0.
+
+    Both are sorted by group, groups by frame. labelled (length + 1,): bool by frame number.
+    """
+    table = tabulate(tracks, fps, px_per_m, default_grouping().smooth)
+    group = _group_of_rows(table, fps, names_groups(tracks))
+    order = np.lexsort((group, table.frame))
+    order = order[(group[order] >= 0) & labelled[table.frame[order] + 1]]
+    frame, label = table.frame[order], group[order]
+    new = np.diff(frame, prepend=-1).astype(bool) | np.diff(label, prepend=-1).astype(bool)
+    number = np.cumsum(new) - 1
+    several = np.bincount(number, minlength=1)[number] > 1
+    order, new = order[several], new[several]
+    return FrameRows(table.frame[order] + 1, table.id[order]), np.cumsum(new) - 1
+
+
+def _group_of_rows(table: TracksTable, fps: float, named: bool) -> Ints:
+    """Returns a label for each of the R table rows, equal for members of one group in a frame, -1 alone."""
+    from tracking.objective.derived_members_kernels import connected_people
+
+    if named:
+        return table.group
+    rule = default_grouping()
+    links = links_of(table, fps, rule)
+    label: Ints = connected_people(
+        table.frame, table.column, table.length, len(table.ids), frames_of(rule.memory, fps),
+        links.frame, links.a, links.b, links.on,
+    )  # fmt: skip
+    return label
 
 
 class ObjectiveScorer:

@@ -19,8 +19,7 @@ from types import FrameType
 from typing import Any
 
 _received = threading.Event()
-_recorders: list[Any] = []
-"""The handler of the present block of `recorded_interrupts`, if there is one."""
+_recorders: list[Any] = []  # The handler of the present block of `recorded_interrupts`, if there is one.
 
 
 @contextmanager

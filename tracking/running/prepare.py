@@ -27,8 +27,8 @@ from tracking.running.time_limit import TimeLimited
 from tracking.running.tracks_check import ReportHistory, check_tracks
 from tracking.running.user_code import tracker_failed, user_code
 
+# A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults.
 Params = Config | Mapping[str, Any] | str | Path | None
-"""A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,11 +20,10 @@ from tracking.config import Config
 from tracking.running import tracker_registry
 from tracking.running.image_scale import learned_by
 
-GRACE = 5.0
-"""s after the limit at which a process ends itself, should its parent be gone."""
+GRACE = 5.0  # s after the limit at which a process ends itself, should its parent be gone.
 
+# s: greatest limit, 11 days. The timer of a pipe counts milliseconds in 32 bits, some 2.1 million s.
 LONGEST = 1_000_000
-"""s: greatest limit, 11 days. The timer of a pipe counts milliseconds in 32 bits, some 2.1 million s."""
 
 
 class TimeLimited:
@@ -107,8 +106,7 @@ class RemoteTracker:
         return tracks  # type: ignore[no-any-return]
 
 
-_made: dict[int, Tracker] = {}
-"""In the process: the tracker by its number; at most one."""
+_made: dict[int, Tracker] = {}  # In the process: the tracker by its number; at most one.
 
 
 def _call(request: tuple[str, tuple[Any, ...], float]) -> Any:

@@ -24,7 +24,7 @@ from tracking.running.user_code import tracker_failed, user_code, what_was_raise
 REGISTRY = {
     "blob": "tracking.papers.blob.tracker:Blob",
     "group-pda": "tracking.papers.group_pda.tracker:GroupPda",
-    "relational": "tracking.papers.relational.relations:Relational",
+    "relational": "tracking.papers.relational.tracker:Relational",
     "particle": "tracking.papers.relational.tracker:Particle",
     "joint": "tracking.papers.joint.tracker:Joint",
     "stereo": "tracking.papers.stereo.tracker:Stereo",

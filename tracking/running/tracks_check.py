@@ -15,8 +15,7 @@ import numpy as np
 from scenarios.errors import WorkError
 from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
 
-Fault = tuple[str, str]
-"""What the tracker returned, and what was expected instead."""
+Fault = tuple[str, str]  # What the tracker returned, and what was expected instead.
 
 
 @dataclass

@@ -21,14 +21,10 @@ import numpy as np
 
 from sim.types import Bools, GroupEvent, Ints, Tracks, Truth
 
-FEWEST = 5
-"""Labelled frames below which nothing is clear."""
-MANY = 8
-"""Labelled frames that are evenly spaced by chance next to never."""
-APART = 0.75
-"""Least share of labelled frames after which a frame without labels follows."""
-MOST = 0.5
-"""Least share of the steps between labelled frames that people outlast, or that are the usual one."""
+FEWEST = 5  # Labelled frames below which nothing is clear.
+MANY = 8  # Labelled frames that are evenly spaced by chance next to never.
+APART = 0.75  # Least share of labelled frames after which a frame without labels follows.
+MOST = 0.5  # Least share of the steps between labelled frames that people outlast, or that are the usual one.
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,7 @@ from sim.types import Array, Bools, Ints
 from tracking.scoring.rows import FrameRows, numbered
 
 EPS = float(np.finfo(float).eps)
-FOUND = 0.5
-"""Similarity from which a person or group counts as found: 1 m apart on the ground, or an IoU of 0.5."""
+FOUND = 0.5  # Similarity from which a person or group counts as found: 1 m apart on the ground, or an IoU of 0.5.
 CHUNK = 200_000  # pairs compared at once: bounds memory and fits the cache
 SLACK = 1e-6  # share of the coordinates' range: more than rounding can move a row along the sort axis of `_near`
 
@@ -86,9 +85,9 @@ class Pairs:
         )
 
 
+# Takes row indices i and j (P,) of both sides. Returns the positions (Q,) of the pairs to keep, and their similarities
+# (Q,).
 PairSimilarity = Callable[[Ints, Ints], tuple[Ints, Array]]
-"""Takes row indices i and j (P,) of both sides. Returns the positions (Q,) of the pairs to keep, and their similarities
-(Q,)."""
 
 
 def compare(

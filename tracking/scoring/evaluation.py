@@ -2,47 +2,69 @@
 
 This module decides what is compared (which frames, which similarity of people, which surface for groups). It calls the
 modules of the single scores and returns their results under the keys of the catalogue.
+
+Leaves tracked people on distractors out of the scores, as MOTChallenge does.
+
+In each frame the boxes of tracks are matched with those of all labelled rows, people or not. The matching is one to
+one, at an IoU of 0.5 or more and with the greatest total IoU. A tracked box that is matched to a distractor is left
+out. So a track is kept where it fits a person better, and a second track on one distractor counts as false.
+
+Scores of one recording as functions of weights of its frames, for intervals by resampling.
+
+Identities and matchings are those of the whole recording. The weight w(t) of frame t enters every sum: a match, a miss,
+a switch or an event of frame t counts w(t) times. So no frames are joined, and no switch or event is made by a join.
+Fixed are also the core frames and who counts for MT, PT and ML. Only IDF1, IDP, IDR and IDTP assign ids anew for each
+draw, as their definition is a best assignment. Weights of 1 give the scores of `evaluate`. Sums by frame are made once;
+each draw of weights is a matrix product.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from sim.types import Bools, Tracks, Truth
+from sim.types import Array, Bools, Tracks, Truth, Unscored
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.annotated_frames import annotated_frames, seen_in
-from tracking.scoring.candidate_pairs import Pairs
+from tracking.scoring.candidate_pairs import Pairs, box_pairs
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.clear import weighted_clear
-from tracking.scoring.distractors import without_distractors
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.group_scores import GroupMatch
-from tracking.scoring.hota import hota
-from tracking.scoring.identity import weighted_identity
 from tracking.scoring.matching import mapped_people
-from tracking.scoring.one_plane import from_pixels, grounded, in_one_plane, on_feet
-from tracking.scoring.people_and_groups import (
-    PersonRows,
-    Surface,
-    TrueGroups,
-    tracked_people,
-    true_groups,
-    true_people,
-)
+from tracking.scoring.people_and_groups import PersonRows, Surface, TrueGroups, tracked_people, true_groups, true_people
 from tracking.scoring.people_comparison import (
     IncomparableError,
     Similarity,
+    from_pixels,
+    grounded,
+    in_one_plane,
+    on_feet,
     people_pairs,
     plane_of,
 )
 from tracking.scoring.position_errors import weighted_positions
+from tracking.scoring.rows import FrameRows
+from tracking.scoring.track_scores import hota, weighted_clear, weighted_hota, weighted_identity
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
-from tracking.scoring.weighted_sums import unweighted
+from tracking.scoring.weighted_sums import WeightedScores, mean_of_known, unweighted
+
+
+def without_distractors(truth: Truth, unscored: Unscored, tracked: PersonRows) -> PersonRows:
+    """Returns the tracked people without those on distractors; all of them if they have no boxes."""
+    if tracked.box is None:
+        return tracked
+    assert truth.box is not None
+    frame = np.concatenate([truth.frame, unscored.frame])
+    order = np.argsort(frame, kind="stable")
+    box = np.concatenate([truth.box, unscored.box])[order]
+    distractor = np.concatenate([np.zeros(len(truth.frame), bool), unscored.distractor])[order]
+    matched = mapped_people(box_pairs(FrameRows(frame[order], order), tracked.rows, box, tracked.box))
+    return tracked.keep(~((matched >= 0) & distractor[matched]))
+
 
 __all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity", "evaluate"]
 
@@ -270,3 +292,46 @@ def objective_of(found: Mapping[str, float]) -> float:
     """Returns the mean of found["HOTA"] and found["group_F1"], or the one that is known, or nan."""
     known = [v for v in (found["HOTA"], found["group_F1"]) if v == v]
     return sum(known) / len(known) if known else float("nan")
+
+
+PORTION = 100  # Draws that are computed together: bounds memory.
+
+
+def weighted_scorers(
+    truth: Truth,
+    runs: Sequence[Sequence[Tracks]],
+    similarity: Similarity | None = None,
+    group_match: GroupMatch = "hull",
+    frames: int | range | None = None,
+) -> list[Callable[[Array], Array]]:
+    """Returns for each run of one sequence a function from weights of frames to scores; arguments as of `evaluate`.
+
+    The function takes D draws (D, length) of weights of the frames 1 … length, of mean 1, as counts are their sums.
+    It returns all scores (D, K) in the order of `CATALOGUE`, nan where the frames of a denominator have no weight.
+    """
+    found = Scorer(truth).compare(runs, similarity, frames)
+    return [_weighted(one, truth.length + 1, group_match) for one in found]
+
+
+def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Callable[[Array], Array]:
+    parts: list[WeightedScores] = []
+    if compared.people is not None:
+        compared.people.require_unique_ids()
+        parts += [scores(compared.people, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]
+        parts.append(weighted_positions(compared.sides))
+    if compared.groups is not None:
+        parts.append(weighted_groups_and_events(compared.sides, compared.groups, group_match))
+    place = {key: k for k, key in enumerate(CATALOGUE)}
+
+    def score(weights: Array) -> Array:
+        padded = np.pad(np.asarray(weights, float), ((0, 0), (1, 0)))  # frame 0 is no frame
+        out = np.full((len(padded), len(place)), np.nan)
+        for first in range(0, len(padded), PORTION):
+            rows = slice(first, first + PORTION)
+            for part in parts:
+                for key, values in part(padded[rows]).items():
+                    out[rows, place[key]] = values
+        out[:, place["objective"]] = mean_of_known(out[:, [place["HOTA"], place["group_F1"]]])
+        return out
+
+    return score

@@ -15,13 +15,7 @@ from sim.types import Bools, Groups, Ints, Tracks, Truth
 from tracking.scoring.annotated_frames import first_seen, widest_step
 from tracking.scoring.events import COUNTS_AS, HEADLINE, LATE, MatchedEvents, match_events
 from tracking.scoring.events_by_true_people import HULL_TIME, events_of_hulls, tracked_events, true_events
-from tracking.scoring.people_and_groups import (
-    GroupRows,
-    PersonRows,
-    Surface,
-    group_rows,
-    people_inside,
-)
+from tracking.scoring.people_and_groups import GroupRows, PersonRows, Surface, group_rows, people_inside
 
 CORE = 1.0  # s around the start of each true merge or split that the core scores leave out
 

@@ -21,38 +21,30 @@ from sim.types import Array, Bools, Ints, Tracks, Truth
 from tracking.scoring.candidate_pairs import FOUND, box_pairs, same_frame
 from tracking.scoring.rows import FrameRows
 
-FEW = 0.2
-"""Share of matching boxes below which other readings are tried."""
+FEW = 0.2  # Share of matching boxes below which other readings are tried.
 
-NONE = 0.02
-"""Share of matching boxes below which there is a warning, whatever is found."""
+NONE = 0.02  # Share of matching boxes below which there is a warning, whatever is found.
 
-CLEARLY = 0.3
-"""Share by which another reading must match more boxes."""
+CLEARLY = 0.3  # Share by which another reading must match more boxes.
 
-ABOUT = 0.85
-"""A simpler reading is preferred if it matches at least this part of what another one does."""
+ABOUT = 0.85  # A simpler reading is preferred if it matches at least this part of what another one does.
 
-PAIRS = 20_000
-"""Most pairs of boxes that are looked at, unless one frame has more."""
+PAIRS = 20_000  # Most pairs of boxes that are looked at, unless one frame has more.
 
-STEPS = 6
-"""Refinements of an estimated scale."""
+STEPS = 6  # Refinements of an estimated scale.
 
 SHIFTS = (1, -1, 2, -2, 5, -5, 10, -10)
 RATES = (2, 3, 4, 5, 6, 10, 12, 15, 25, 30)
 SCALES = (1.0, 1 / 3, 0.5, 2 / 3, 0.75, 4 / 3, 1.5, 2.0, 3.0, 4.0)
-UNITS = {0.01: "cm", 0.001: "mm", 0.3048: "ft"}
-"""Lengths in m that positions are given in by mistake."""
+UNITS = {0.01: "cm", 0.001: "mm", 0.3048: "ft"}  # Lengths in m that positions are given in by mistake.
 
+# Sides in px of square pictures that detectors stretch a picture to; 1: shares of the picture.
 SQUARES = (1, 320, 416, 512, 608, 640, 768, 800, 960, 1024, 1280)
-"""Sides in px of square pictures that detectors stretch a picture to; 1: shares of the picture."""
 
-SIDE = 3.0
-"""Side in m of the square that stands for a position."""
+SIDE = 3.0  # Side in m of the square that stands for a position.
 
+# What the tracks are: a text of another program, arrays, or a run of ours, whose detections were read wrongly.
 Given = Literal["text", "run", "arrays"]
-"""What the tracks are: a text of another program, arrays, or a run of ours, whose detections were read wrongly."""
 
 Order = Callable[[Array], Array]
 
@@ -61,6 +53,8 @@ def _from_corners(a: Array) -> Array:
     return np.concatenate([a[:, :2], a[:, 2:] - a[:, :2]], axis=1)
 
 
+# Left, top, width, height from four columns, by the names of the columns in a header line; the first is that of files
+# without one.
 BOX_ORDERS: dict[str, Order] = {
     "left,top,width,height": lambda a: a,
     "x1,y1,x2,y2": _from_corners,
@@ -69,8 +63,6 @@ BOX_ORDERS: dict[str, Order] = {
     "x1,x2,y1,y2": lambda a: _from_corners(a[:, [0, 2, 1, 3]]),
     "top,left,height,width": lambda a: a[:, [1, 0, 3, 2]],
 }
-"""Left, top, width, height from four columns, by the names of the columns in a header line; the first is that of
-files without one."""
 
 POINT_ORDERS: dict[str, Order] = {"x,y": lambda a: a, "y,x": lambda a: a[:, ::-1]}
 

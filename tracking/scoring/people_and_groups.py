@@ -17,8 +17,7 @@ from sim.types import Array, Bools, Groups, Ints, Tracks, Truth
 from tracking.scoring.candidate_pairs import compare
 from tracking.scoring.rows import FrameRows, find_rows
 
-Surface = Literal["ground", "image"]
-"""Where groups are compared: on the ground in m, or in the image in px."""
+Surface = Literal["ground", "image"]  # Where groups are compared: on the ground in m, or in the image in px.
 
 INSIDE = 0.3  # m: a person at most this far from a hull is a member, where a tracker names no members
 

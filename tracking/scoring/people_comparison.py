@@ -1,20 +1,32 @@
-"""How the people of a truth and of a tracker are compared: by boxes, or by positions on the ground or in the image."""
+"""How the people of a truth and of a tracker are compared: by boxes, or by positions on the ground or in the image.
+
+What is compared: a property of the data, so that the scores of any number of runs can be laid side by side.
+
+Calibrated data (positions on the ground, or boxes and a camera) are compared on the ground, boxes by the foot points of
+both sides.
+Other data are compared by overlap of boxes if everybody has one, else by position in the image. Tracks from pixels are
+never projected to the ground, as a blob's foot is no person's: with such a run, all runs of calibrated data are
+compared in the image.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
 import numpy as np
 
+from sim.truth.group_hulls import groups_over_time
 from sim.types import Array, Tracks, Truth
+from tracking.grouping.foot_points import boxed, can_stand, completed, feet, groups_of_people, moved_events, standing
+from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.people_and_groups import PersonRows, Surface
 from tracking.scoring.position_errors import REACH
 
+# How two people are compared: IoU of boxes, or distance of positions on the ground or in the image.
 Similarity = Literal["boxes", "ground", "image"]
-"""How two people are compared: IoU of boxes, or distance of positions on the ground or in the image."""
 
 
 class IncomparableError(ValueError):
@@ -52,3 +64,80 @@ def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
         }[surface]
         raise IncomparableError(f"no positions {where} to compare: score {other}")
     return np.zeros((0, 2)) if positions is None else positions
+
+
+def grounded(truth: Truth) -> Truth:
+    """Returns the truth with people and groups on the ground if it has boxes and a camera only; else unchanged."""
+    if truth.pos is not None or truth.box is None or truth.camera is None:
+        return truth
+    return on_feet(truth)
+
+
+def on_feet(truth: Truth) -> Truth:
+    """Returns a truth with boxes and a camera with people and groups where the boxes stand on the ground."""
+    assert truth.box is not None, "only boxes have feet"
+    assert truth.camera is not None, "only boxes of a calibrated sequence have feet on the ground"
+    pos = feet(truth.box, truth.camera, truth.scene)
+    there = np.isfinite(pos).all(axis=1)
+    rows = (truth.frame[there], truth.id[there], truth.group[there], pos[there], np.full_like(pos[there], np.nan))
+    labelled = truth.groups is not None or truth.groups_px is not None
+    groups = tuple(groups_over_time(*rows, 1, truth.length)) if labelled else None
+    return truth.replace(pos=pos, vel=None, groups=groups)
+
+
+def in_one_plane(
+    truth: Truth, runs: Sequence[Sequence[Tracks]], pixels: Sequence[bool], similarity: Similarity | None = None
+) -> tuple[list[Sequence[Tracks]], Similarity]:
+    """Returns the tracks of all runs of one sequence in one plane, and the similarity of people to use for all.
+
+    truth: as `grounded` returns it. pixels: for each run, whether it comes from pixels. Tracks that were moved to the
+    ground are to be compared with `on_feet`. Raises IncomparableError if a run on the ground must be moved to the
+    image, and has no boxes of people.
+    """
+    ground = similarity == "ground"
+    if similarity in (None, "boxes"):
+        ground = truth.pos is not None and all(
+            _can_be_grounded(truth, run, own) for run, own in zip(runs, pixels, strict=True)
+        )
+    moved = [
+        _on_ground(truth, run) if ground else _in_image(truth, run, own) for run, own in zip(runs, pixels, strict=True)
+    ]
+    if similarity is not None:
+        return moved, similarity
+    if ground:
+        return moved, "ground"
+    by_overlap = truth.camera is None and truth.box is not None and all(boxed(run) for run in runs)
+    return moved, "boxes" if by_overlap else "image"
+
+
+def from_pixels(run: Iterable[Tracks]) -> bool:
+    """Returns True if the tracker of a run worked on pictures, as its `info` says. Other tracks have no `info`."""
+    return getattr(run, "info", {}).get("detections") == "image"
+
+
+def _can_be_grounded(truth: Truth, run: Sequence[Tracks], pixels: bool) -> bool:
+    return plane_of(truth, run) != "image" or can_stand(run, truth.camera, pixels)
+
+
+def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
+    if truth.camera is None or not can_stand(run, truth.camera, pixels=False):
+        return run
+    return [standing(t, truth.camera, truth.scene) for t in run]
+
+
+def _in_image(truth: Truth, run: Sequence[Tracks], pixels: bool) -> Sequence[Tracks]:
+    if plane_of(truth, run) == "image":
+        if not can_stand(run, truth.camera, pixels) or all(t.derived for t in run):
+            return run
+        return completed(run, truth.fps, truth.px_per_m, camera=truth.camera, scene=truth.scene, pixels=pixels)
+    if not boxed(run):
+        what = "groups without people" if any(t.unit == "group" for t in run) else "people without boxes"
+        raise IncomparableError(f"runs in the image (px), and one on the ground (m) with {what}")
+    return [_track_in_image(t) for t in with_groups(run, truth.fps, truth.px_per_m)]
+
+
+def _track_in_image(t: Tracks) -> Tracks:
+    box = np.zeros((0, 4)) if t.box is None else t.box
+    middle, none = box[:, :2] + box[:, 2:] / 2, np.full((len(box), 2), np.nan)
+    moved = t.replace(plane="image", pos=middle, vel=none, events=moved_events(t.events, t.id, middle))
+    return moved.replace(groups=groups_of_people(moved))

@@ -29,8 +29,7 @@ from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, rati
 
 REACH = 2.0  # m: distance from which the similarity of two positions is 0; also the cut-off of GOSPA
 POWER = 2.0
-PARTS = ("localisation", "missed", "false")
-"""Parts of GOSPA."""
+PARTS = ("localisation", "missed", "false")  # Parts of GOSPA.
 
 
 def weighted_positions(sides: ComparedSides) -> WeightedScores:

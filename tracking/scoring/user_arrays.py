@@ -26,8 +26,7 @@ from tracking.scoring.people_comparison import Similarity
 COLUMNS = {"frame": (), "id": (), "pos": (2,), "box": (4,), "group": ()}  # name: shape of one row
 PERSON_HEIGHT = 1.7  # m: assumed height of the median box
 RANGES = {"frame": (1, FRAMES), "id": (0, 2**53), "group": (-1, 2**53), "pos": (-COORDINATE, COORDINATE)}
-RANGES |= {"box": RANGES["pos"]}
-"""Least and greatest value of a column, as in files."""
+RANGES |= {"box": RANGES["pos"]}  # Least and greatest value of a column, as in files.
 MEMORY = 10.0  # s: groups and events depend on what was there at most that long before
 
 Table = dict[str, Any]

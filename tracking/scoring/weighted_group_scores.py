@@ -2,6 +2,24 @@
 
 `evaluate` gives every frame the weight 1, intervals by resampling give it others. A score whose denominator is 0 is
 nan. `group_scores.py`, `group_detection.py` and `events.py` match both sides and count.
+
+Who is in one group: pairwise membership, G-MITRE, and the groups that are right up to a tolerance T.
+
+Pairwise membership: F1 over pairs of people who are in one group, independent of ids and shapes. Estimated pairs are
+pairs of tracked people, mapped to true people; a pair is right if the two are in one true group.
+
+G-MITRE: Solera, Calderara & Cucchiara (2016), "Socially Constrained Structural Learning for Groups Detection in Crowd",
+IEEE TPAMI 38(5). It is the MITRE score of Vilain et al. (1995), "A Model-Theoretic Coreference Scoring Scheme", after
+each person alone is joined to a fictitious person, and each other person's fictitious one is left alone. A group S of
+one partition then holds |S| - 1 links, of which |S| - p(S) are right, p(S) being the number of parts into which the
+other partition divides S.
+
+Groups right at T: Setti, Russell, Bassetti & Cristani (2015), "F-Formation Detection: Individuating Free-Standing
+Conversational Groups in Images", PLoS ONE 10(5), after Cristani et al. (2011), BMVC. A true group of n members is right
+if some estimated group holds at least ceil(T n) of them and at most ceil((1 - T) n) others.
+
+Both are means over frames. A precision or recall of a frame whose denominator is 0 is 1, as in the authors' programs.
+Departure: people who are missed, and tracks mapped to nobody, are parts of their own in G-MITRE.
 """
 
 from __future__ import annotations
@@ -11,7 +29,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.scoring.candidate_pairs import FOUND
+from tracking.scoring.candidate_pairs import FOUND, compare
 from tracking.scoring.events import HEADLINE, MatchedEvents, same_lineage
 from tracking.scoring.group_and_event_scores import (
     ComparedSides,
@@ -21,12 +39,13 @@ from tracking.scoring.group_and_event_scores import (
     tracked_groups,
     unknown_kinds,
 )
-from tracking.scoring.group_detection import pair_counts, weighted_detection
 from tracking.scoring.group_scores import (
     GroupComparison,
     GroupMatch,
+    SharedMembers,
     compare_groups,
     correct,
+    group_of_person,
     groups_found,
     hull_pairs,
     matched_groups,
@@ -35,10 +54,107 @@ from tracking.scoring.group_scores import (
     sizes,
     switch_frames,
 )
-from tracking.scoring.hota import weighted_hota
-from tracking.scoring.people_and_groups import GroupRows, TrueGroups
+from tracking.scoring.people_and_groups import GroupRows, PersonRows, TrueGroups
 from tracking.scoring.position_errors import gaussian_wasserstein
+from tracking.scoring.rows import FrameRows
+from tracking.scoring.track_scores import weighted_hota
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, mean_of_known, ratio
+
+# Numerator and denominator of T, by the name of the scores; integers avoid rounding.
+TOLERANCES = {"right_groups": (2, 3), "exact_groups": (1, 1)}
+
+
+def weighted_detection(
+    sides: ComparedSides, true: GroupRows, tracked: TrackedGroups, shared: SharedMembers
+) -> list[WeightedScores]:
+    """Returns the weighted F1, precision and recall of G-MITRE, and of the groups right at T = 2/3 and T = 1."""
+    size, est = len(sides.frames), tracked.counted
+    n, m = (np.bincount(groups.rows.frame, minlength=size) for groups in (true, est))
+    parts = []
+    if tracked.named:
+        parts.append(_means_over_frames("GMITRE", sides.frames, link_counts(sides, true, est), f1_of_means=False))
+    for name, tolerance in TOLERANCES.items():
+        hits = np.bincount(true.rows.frame[groups_right(true, est, shared, tolerance)], minlength=size)
+        parts.append(_means_over_frames(name, sides.frames, np.stack([n, m, hits]), f1_of_means=True))
+    return parts
+
+
+def link_counts(sides: ComparedSides, true: GroupRows, est: GroupRows) -> Array:
+    """Returns the links of G-MITRE by frame number, (3, size): true, estimated, right ones."""
+    size = len(sides.frames)
+    group, found = (group_of_person(g, len(p.rows))[:-1] for g, p in ((true, sides.true), (est, sides.est)))
+    mapped = np.flatnonzero(sides.mapping >= 0)
+    a, b, frame = group[sides.mapping[mapped]], found[mapped], sides.est.rows.frame[mapped]
+    common = (a >= 0) & (b >= 0)
+    first = np.unique(a[common] * len(est) + b[common], return_index=True)[1]
+    right = np.bincount(frame[(a < 0) == (b < 0)], minlength=size) - np.bincount(frame[common][first], minlength=size)
+    return np.array([_links(true, sides.true, group, size), _links(est, sides.est, found, size), right], float)
+
+
+def _links(groups: GroupRows, people: PersonRows, group: Ints, size: int) -> Array:
+    inside = np.bincount(groups.rows.frame, groups.count - 1, minlength=size)
+    return np.asarray(inside + np.bincount(people.rows.frame[group < 0], minlength=size), float)
+
+
+def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, tolerance: tuple[int, int]) -> Bools:
+    """Returns which true groups are right, (G,): some estimated group holds T of the members, and few others."""
+    part, whole = tolerance
+    i, j = np.divmod(shared.key, max(shared.width, 1))
+    n = true.count[i]
+    enough = shared.count >= -(-part * n // whole)
+    pure = est.count[j] - shared.count <= -((part - whole) * n // whole)
+    right = np.zeros(len(true), bool)
+    right[i[enough & pure]] = True
+    return right
+
+
+def _means_over_frames(name: str, frames: Bools, counts: Array, f1_of_means: bool) -> WeightedScores:
+    n, m, hits = counts
+    sums, every = FrameSums(len(frames)), np.flatnonzero(frames)
+    for key, part, whole in (("F1", 2 * hits, n + m), ("precision", hits, m), ("recall", hits, n)):
+        sums.add_mean(key, every, ratio(part, whole, empty=1.0)[every])
+
+    def score(weights: Array) -> dict[str, Array]:
+        s = sums.of(weights)
+        found = {f"{name}_{key}": mean(s, key) for key in ("F1", "precision", "recall")}
+        if f1_of_means:
+            p, r = found[f"{name}_precision"], found[f"{name}_recall"]
+            found[f"{name}_F1"] = np.where(p + r > 0, ratio(2 * p * r, p + r), p + r)
+        return found
+
+    return score
+
+
+def pair_counts(true: GroupRows, est: GroupRows, person: Ints) -> Ints:
+    """Returns how many pairs of people are in one group in each frame, (last + 1, 3): true, estimated, right pairs.
+
+    person (K,): row of the true person of each membership of `est`, -1 none. An estimated pair is right if both are in
+    one true group; a pair inside several estimated groups counts once.
+    """
+    group = group_of_person(true, int(max(true.member.max(initial=-1), person.max(initial=-1))) + 1)
+    order = np.argsort(est.of, kind="stable")
+    mapped = person[order]
+    inside = FrameRows(est.of[order], order)  # the group takes the place of the frame
+
+    def ordered(a: Ints, b: Ints) -> tuple[Ints, Array]:
+        kept = np.flatnonzero((mapped[a] >= 0) & (mapped[a] < mapped[b]))
+        return kept, np.ones(len(kept))
+
+    both = compare(inside, inside, ordered)
+    frame = est.rows.frame[est.of[order][both.i]]
+    pairs = np.stack([mapped[both.i], mapped[both.j]])
+    (p, q), first = np.unique(pairs, axis=1, return_index=True)  # hulls may overlap: a pair inside two of them is one
+    size = 1 + int(max(true.rows.frame.max(initial=-1), est.rows.frame.max(initial=-1)))
+    distinct = np.bincount(frame[first], minlength=size)
+    repeated = np.bincount(frame, minlength=size) - distinct
+    right = np.bincount(frame[first][(group[p] >= 0) & (group[p] == group[q])], minlength=size)
+    return np.column_stack([_pairs_in(true, size), _pairs_in(est, size) - repeated, right])
+
+
+def _pairs_in(groups: GroupRows, size: int) -> Ints:
+    pairs = np.zeros(size, np.int64)
+    np.add.at(pairs, groups.rows.frame, groups.count * (groups.count - 1) // 2)
+    return pairs
 
 
 def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> WeightedScores:

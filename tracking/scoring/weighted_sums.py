@@ -11,8 +11,8 @@ import numpy as np
 
 from sim.types import Array, Ints
 
+# Takes weights (D, size) by frame number; returns scores (D,) by key.
 WeightedScores = Callable[[Array], dict[str, Array]]
-"""Takes weights (D, size) by frame number; returns scores (D,) by key."""
 
 
 def unweighted(scores: WeightedScores, size: int) -> dict[str, float]:

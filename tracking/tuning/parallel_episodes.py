@@ -18,8 +18,7 @@ from tracking.environment.episodes import Episode, Source, SourceCache
 from tracking.scoring.people_comparison import Similarity
 from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
-CACHE_BYTES = 512 * 2**20
-"""Bytes of sequences that each process keeps for later episodes."""
+CACHE_BYTES = 512 * 2**20  # Bytes of sequences that each process keeps for later episodes.
 
 
 @dataclass(frozen=True)
@@ -37,8 +36,8 @@ class EpisodeTask:
 
 
 EpisodeOrError = Episode | FlockscopeError
+# play(sources, values, every_score) yields one result per source: the episode, or the error of these parameters.
 PlayEpisodes = Callable[[Sequence[Source], dict[str, Any], bool], Generator[EpisodeOrError, None, None]]
-"""play(sources, values, every_score) yields one result per source: the episode, or the error of these parameters."""
 
 
 @contextmanager

@@ -1,33 +1,157 @@
 """The study: Optuna's record of all trials in a storage, which a search can resume and several processes can share.
 
 `open_study` opens it as a `SearchStudy`, which gives the next trial to play, stores values, and lists finished trials.
+
+The file that holds a study, for several processes at once, any of which may be killed at any time.
+
+Optuna's journal with three differences:
+
+- Locks are system locks (fcntl) on bytes of FILE.locks: byte 0 while a trial is chosen, byte 1 while lines are written,
+  byte 2 + n while trial n is played. The system releases the locks of a process that dies, so other processes see that
+  its trial was abandoned.
+- An incomplete last line is removed before the next line is written.
+- Lines are not flushed to the disk one by one. They survive a killed process but not a power cut.
+
+The loop of a search: one trial (set of parameters) after the other, each played on the training scenes until it
+surely loses.
+
+It surely loses if the p-value of a paired test against the best trial, after any scene, is below a limit. It then gets
+an estimate of its value.
 """
 
 from __future__ import annotations
 
+import json
+import os
+import time
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext, suppress
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlparse
 
+import numpy as np
 import optuna
+from optuna.exceptions import UpdateFinishedTrialError
 from optuna.storages import BaseStorage
+from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
-from scenarios.errors import InputError
-from tracking.tuning.comparison import TrialRecord
-from tracking.tuning.goals import Goal
-from tracking.tuning.journal import SUFFIX, LockedJournal, TrialLocks
-from tracking.tuning.pruner import SignedRankPruner
-from tracking.tuning.sampler import AGAIN, ERROR, PRUNED, HillClimbingSampler, distribution, place_in_search
+from scenarios.errors import FlockscopeError, InputError
+from tracking.environment.episodes import Episode
+from tracking.tuning.comparison import Goal, TrialRecord, finite_mean
+from tracking.tuning.options import Progress
+from tracking.tuning.parallel_episodes import PlayEpisodes
+from tracking.tuning.sampler import (
+    AGAIN,
+    ERROR,
+    PRUNED,
+    HillClimbingSampler,
+    SignedRankPruner,
+    distribution,
+    place_in_search,
+)
 from tracking.tuning.search_plan import SearchPlan
 
-SETTINGS = "settings"
-"""Attribute of a study that holds the identity of its plan."""
+SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
+CHOOSING, WRITING, FIRST_TRIAL = 0, 1, 2  # Bytes of the lock file.
+HEAD = b'{"op_code":'  # How every journal begins.
 
+
+class TrialLocks:
+    """Locks on single bytes of the file `path`, shared by the processes of a search; the file is created if missing.
+
+    State: the open file; closing it, or the end of the process, releases every lock.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+
+    @contextmanager
+    def locked(self, byte: int) -> Iterator[None]:
+        """Holds the lock on a byte (offset in the file) for the time of the context; waits until it is free."""
+        import fcntl
+
+        fcntl.lockf(self._file, fcntl.LOCK_EX, 1, byte)
+        try:
+            yield
+        finally:
+            fcntl.lockf(self._file, fcntl.LOCK_UN, 1, byte)
+
+    @contextmanager
+    def choosing(self) -> Iterator[None]:
+        """Holds the lock under which a trial is chosen for the time of the context; waits until it is free."""
+        with self.locked(CHOOSING):
+            yield
+
+    def hold_trial(self, number: int) -> None:
+        """Locks trial `number` (from 0) for this process until `release_trial` or `close`."""
+        import fcntl
+
+        fcntl.lockf(self._file, fcntl.LOCK_EX, 1, FIRST_TRIAL + number)
+
+    def release_trial(self, number: int) -> None:
+        """Releases this process's lock on trial `number` (from 0); does nothing if it holds none."""
+        import fcntl
+
+        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
+
+    def is_abandoned(self, number: int) -> bool:
+        """Returns True if no other process holds the lock on trial `number` (from 0)."""
+        import fcntl
+
+        try:
+            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, FIRST_TRIAL + number)
+        except OSError:
+            return False
+        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
+        return True
+
+    def close(self) -> None:
+        """Closes the file and so releases every lock."""
+        os.close(self._file)
+
+
+class LockedJournal(JournalFileBackend):
+    """Optuna's journal file at `path`, written under `locks`, without incomplete last lines."""
+
+    def __init__(self, path: Path, locks: TrialLocks) -> None:
+        self._path, self._locks = path, locks
+        super().__init__(str(path))
+        with locks.locked(WRITING):
+            self._check_head()
+            self._remove_incomplete_line()
+
+    def append_logs(self, logs: list[dict[str, Any]]) -> None:
+        """Appends one JSON line per log (a dict); removes an incomplete last line first. No logs append nothing."""
+        text = "".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs)
+        with self._locks.locked(WRITING):
+            self._remove_incomplete_line()
+            with open(self._path, "ab") as file:
+                file.write(text.encode())
+
+    def _check_head(self) -> None:
+        with open(self._path, "rb") as file:
+            head = file.read(len(HEAD))
+        if not HEAD.startswith(head):
+            raise ValueError("no journal of Optuna")
+
+    def _remove_incomplete_line(self) -> None:
+        with open(self._path, "r+b") as file:
+            size = file.seek(0, os.SEEK_END)
+            if size == 0:
+                return
+            file.seek(size - 1)
+            if file.read(1) != b"\n":
+                file.seek(0)
+                file.truncate(file.read().rfind(b"\n") + 1)
+
+
+SETTINGS = "settings"  # Attribute of a study that holds the identity of its plan.
+
+# States of a finished trial. PRUNED means impossible parameters; one stopped early is COMPLETE with an estimate.
 FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
-"""States of a finished trial. PRUNED means impossible parameters; one stopped early is COMPLETE with an estimate."""
 
 
 class SearchStudy:
@@ -224,3 +348,79 @@ def _quiet_optuna() -> Iterator[None]:
             yield
     finally:
         optuna.logging.set_verbosity(level)
+
+
+PAUSE = 0.5  # Seconds between two looks at whether other processes have finished.
+
+LEAST_LOSS = 1e-12  # Least difference between the best value and the estimate of a pruned trial.
+
+
+def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> None:
+    """Plays trials until the study has as many finished ones as planned, by this process or by others."""
+    retry_unfinished, planned = False, study.plan.options.trials
+    while True:
+        progress(len(study.finished()), planned, _best_so_far(study))
+        trial = study.ask(retry_unfinished)
+        if trial is not None:
+            _play_trial(study, trial, play)
+        elif len(study.finished()) >= planned:
+            return
+        elif study.knows_running_trials:
+            time.sleep(PAUSE)
+        else:
+            retry_unfinished = True
+
+
+def _best_so_far(study: SearchStudy) -> str:
+    known = len(study.plan.goals) == 1 and any(t.value is not None for t in study.finished())
+    return f"(best in training {study.optuna.best_value:.4f})" if known else ""
+
+
+def _play_trial(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> None:
+    with suppress(UpdateFinishedTrialError):
+        values = _trial_values(study, trial, play)
+        if isinstance(values, FlockscopeError):
+            if study.place(trial) == 0:
+                raise values
+            trial.set_user_attr(ERROR, values.line())
+        study.tell(trial, None if isinstance(values, FlockscopeError) else values)
+
+
+def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> list[float] | FlockscopeError:
+    plan, played = study.plan, dict[int, Episode]()
+    try:
+        config = plan.config(trial.params).as_dict()
+    except FlockscopeError as error:
+        return error
+    # Each trial has an order of its own, so that no few scenes decide about all trials.
+    order = np.random.default_rng([plan.options.seed, study.place(trial)]).permutation(len(plan.training)).tolist()
+    with closing(play([plan.training[k] for k in order], config, plan.needs_every_score)) as results:
+        for k, result in zip(order, results, strict=True):
+            if isinstance(result, FlockscopeError):
+                return result
+            played[k] = result
+            if _should_prune(trial, k, result, plan) and len(played) < len(order):
+                trial.set_user_attr(PRUNED, len(played))
+                return [_estimate(study.optuna.best_trial, plan.goals[0], played)]
+    values = [goal.mean([played[k] for k in sorted(played)]) for goal in plan.goals]
+    unknown = [goal.key for goal, value in zip(plan.goals, values, strict=True) if value != value]
+    if unknown:
+        got, remedy = f"{unknown[0]} unknown in every training scene", "choose another score, suite or tracker"
+        return InputError(place="--objective", got=got, expected="scenes that have this score", remedy=remedy)
+    return values
+
+
+def _should_prune(trial: optuna.Trial, scene: int, episode: Episode, plan: SearchPlan) -> bool:
+    value = plan.goals[0].of(episode)
+    if len(plan.goals) > 1 or value != value:
+        return False
+    trial.report(value, scene)
+    return trial.should_prune()
+
+
+def _estimate(best: optuna.trial.FrozenTrial, goal: Goal, played: dict[int, Episode]) -> float:
+    assert best.value is not None
+    pairs = [(goal.of(e), best.intermediate_values[k]) for k, e in played.items() if k in best.intermediate_values]
+    gain = finite_mean(goal.gain(theirs, own) for own, theirs in pairs)
+    gain = min(gain, -LEAST_LOSS) if gain == gain else -LEAST_LOSS
+    return best.value + gain if goal.higher else best.value - gain

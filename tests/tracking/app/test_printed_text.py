@@ -16,8 +16,8 @@ from sim.io.store.seal import read_manifest, with_hash
 from tests.short_scene import SCENE
 from tracking.app import progress
 from tracking.app.cli import run
+from tracking.app.command_line import _print_warnings_once
 from tracking.app.command_result import CommandResult, print_error, print_result
-from tracking.app.command_runner import _print_warnings_once
 from tracking.app.progress import ProgressMeter
 
 NAMES = ("[/red]", "x[door]y", ":smile:", "\x1b[31mred", "a\u202eb", "[link=http://x]y[/link]")

@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.errors import InputError
 from tests import reference_background as reference
-from tracking.detect import brightness_gain
+from tracking.detect import background_training as brightness_gain
 from tracking.detect.background import (
     BACKGROUND,
     DARK,
@@ -210,7 +210,7 @@ def test_training_equals_its_twin(follow):
     sample[::3, 5:20, 5:20] = rng.integers(0, 255, 3)
     sample[:, :4, :4] = rng.integers(0, 255, (30, 4, 4, 3))
     made = train(sample, 0.999, follow)
-    from tracking.detect.brightness_gain import frame_gains
+    from tracking.detect.background_training import frame_gains
 
     gains = frame_gains(sample) if follow else np.ones((30, 3))
     values = (sample / gains[:, None, None, :]).astype(np.float32).astype(float)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracking.detect import blobs
-from tracking.detect.divided_blobs import divided
+from tracking.detect.point_detections import divided
 
 TALL, WIDE = 40, 16
 

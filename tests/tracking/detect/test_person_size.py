@@ -7,7 +7,7 @@ import pytest
 
 from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Context
-from tracking.detect import typical_person
+from tracking.detect import person_size as typical_person
 from tracking.detect.person_size import ENOUGH, PersonSize
 from tracking.detect.person_size_kernels import look_up
 

@@ -8,8 +8,8 @@ import pytest
 from sim.scene.camera import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect import blobs
-from tracking.detect.stereo_people import PersonLimits, person_mask, sizes
 from tracking.detect.subtraction_stereo import SubtractionStereo, sampled
+from tracking.papers.stereo.points import PersonLimits, person_mask, sizes
 
 HIGH, WIDE = 120, 200
 

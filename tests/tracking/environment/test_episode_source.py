@@ -9,7 +9,7 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from tracking.environment.episode_source import sources
+from tracking.environment.episode_cache import sources
 
 
 def test_a_suite_with_seeds_in_order():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracking.filters.ellipse_overlap_kernels import overlap
-from tracking.filters.ellipsoid_overlap import separation
+from tracking.papers.stereo.group_life import separation
 
 
 def random_matrix(r: np.random.Generator, size: int) -> np.ndarray:

@@ -7,11 +7,10 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tests import reference_belief as slow
-from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
-from tracking.grouping.belief_partition import groups_of_steps
+from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs, pair_probabilities
+from tracking.grouping.grouping_choice import groups_of_steps
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.pair_evidence import NAMES, evidence
-from tracking.grouping.pair_probabilities import pair_probabilities
 
 
 def walk(seed: int, frames: int, people: int):

@@ -9,10 +9,9 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Detections, Sequence, Tracks
-from tracking.running.detection_mode import check_detections, choose_mode
+from tracking.running.detection_mode import check_detections, choose_mode, from_truth
 from tracking.running.prepare import prepare
 from tracking.running.run import track
-from tracking.running.truth_detections import from_truth
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from tracking.objective import ObjectiveScorer
 from tracking.scoring import evaluate, score_arrays
 from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.frame_weights import weighted_scorers
+from tracking.scoring.evaluation import weighted_scorers
 
 LENGTH = 600
 

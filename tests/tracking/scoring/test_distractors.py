@@ -11,8 +11,7 @@ from sim.io.source import open_source
 from sim.io.store.track_files import read_tracks
 from sim.types import Truth
 from tests.reference_trackeval import CLEAR, HOTA, IDENTITY, KEYS
-from tracking.scoring.evaluation import Scores, evaluate
-from tracking.scoring.frame_weights import weighted_scorers
+from tracking.scoring.evaluation import Scores, evaluate, weighted_scorers
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 QUIET = {"PRINT_CONFIG": False}

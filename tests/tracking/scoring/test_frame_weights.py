@@ -16,7 +16,7 @@ from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.frame_weights import weighted_scorers
+from tracking.scoring.evaluation import weighted_scorers
 from tracking.scoring.weighted_sums import FrameSums
 
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}

@@ -9,7 +9,7 @@ import optuna
 import pytest
 from scipy.stats import rankdata, wilcoxon
 
-from tracking.tuning.pruner import SignedRankPruner, signed_rank_p_value
+from tracking.tuning.sampler import SignedRankPruner, signed_rank_p_value
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -6,7 +6,7 @@ import pytest
 
 from scenarios.errors import InputError
 from tests.tuning_toys import toy_plan, write_scenes
-from tracking.tuning import scenes
+from tracking.tuning import search_plan
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,7 @@ from tracking.tuning import scenes
     ],
 )  # fmt: skip
 def test_default_seeds_make_enough_episodes(split, count, expected):
-    assert scenes.chosen_seeds(None, split, count) == expected
+    assert search_plan.chosen_seeds(None, split, count) == expected
 
 
 @pytest.mark.parametrize(
@@ -66,18 +66,18 @@ def test_unknown_scenes_are_named(tmp_path):
     ],
 )
 def test_the_usual_check_shares_nothing(names, expected):
-    assert scenes.default_check_suite(names) == expected
+    assert search_plan.default_check_suite(names) == expected
 
 
 def test_a_check_that_shares_a_scenario_is_refused(tmp_path):
-    shared = scenes.shared_scenarios(["standard"], ["crossing"])
+    shared = search_plan.shared_scenarios(["standard"], ["crossing"])
     assert shared == ["cross", "cross-same-speed", "pass-by", "side-by-side"]
     one, _ = write_scenes(tmp_path)
     (tmp_path / "all.toml").write_text('about = "all"\nentry = [{ scenario = "one.toml" }, { scenario = "two.toml" }]')
     with pytest.raises(InputError, match=r"all\.toml, which has one of"):
         toy_plan(tmp_path, check=str(tmp_path / "all.toml"))
     assert toy_plan(tmp_path, check=None).check is None
-    assert scenes.shared_scenarios([one], [one]) == ["one"]
+    assert search_plan.shared_scenarios([one], [one]) == ["one"]
 
 
 def test_settings_reach_the_scenes(tmp_path):

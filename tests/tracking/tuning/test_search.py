@@ -17,8 +17,7 @@ from tests.tuning_toys import TOY, toy_plan, tune_arguments
 from tracking.tuning import tune
 from tracking.tuning.parallel_episodes import episode_player
 from tracking.tuning.sampler import AGAIN
-from tracking.tuning.study import FINISHED, open_study
-from tracking.tuning.trials import run_trials
+from tracking.tuning.study import FINISHED, open_study, run_trials
 
 ROOT = Path(__file__).resolve().parents[3]
 KILLED_AT = """

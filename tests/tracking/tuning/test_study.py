@@ -17,9 +17,8 @@ from tests.tuning_toys import toy_plan
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.tuning.journal import LockedJournal, TrialLocks
 from tracking.tuning.sampler import distribution
-from tracking.tuning.study import FINISHED, open_study
+from tracking.tuning.study import FINISHED, LockedJournal, TrialLocks, open_study
 
 
 def test_distributions_are_the_declarations(tmp_path):

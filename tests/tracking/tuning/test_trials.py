@@ -10,8 +10,7 @@ from scenarios.errors import InputError, WorkError
 from tests.tuning_toys import TOY, toy_plan, write_scenes
 from tracking.environment.episodes import Episode, sources
 from tracking.tuning.parallel_episodes import EpisodeTask, play_task
-from tracking.tuning.study import open_study
-from tracking.tuning.trials import run_trials
+from tracking.tuning.study import open_study, run_trials
 from tracking.tuning.tuned_tracker import tuned_tracker
 
 

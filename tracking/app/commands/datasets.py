@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from scenarios.errors import InputError, counted
 from tracking.app import option_parsing
-from tracking.app.command_options import CocoOptions, GenerateOptions, ReplayCommandOptions, WebdatasetOptions
+from tracking.app.command_options import (
+    CocoOptions,
+    GenerateOptions,
+    KittiOptions,
+    ReplayCommandOptions,
+    ValidateOptions,
+    WebdatasetOptions,
+)  # fmt: skip
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 
@@ -33,11 +38,12 @@ def generate(options: GenerateOptions) -> CommandResult:
     return CommandResult(data, "\n".join(lines))
 
 
-def validate(folder: Path) -> CommandResult:
-    """Checks a generated sequence or dataset, or stored tracks, at the path `folder`; changes nothing."""
+def validate(options: ValidateOptions) -> CommandResult:
+    """Checks a generated sequence or dataset, or stored tracks; changes nothing."""
     from sim.io.store.validate import content_hash, holds_sequences
     from sim.io.store.validate import validate as check
 
+    folder = options.folder
     problems = check(folder)
     if not problems:
         content = content_hash(folder) if holds_sequences(folder) else None
@@ -58,11 +64,11 @@ def export_coco(options: CocoOptions) -> CommandResult:
     return CommandResult({"file": paths[0] if len(paths) == 1 else None, "files": paths, "root": root}, text)
 
 
-def export_kitti(source: Path, out: Path) -> CommandResult:
-    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder `out`."""
+def export_kitti(options: KittiOptions) -> CommandResult:
+    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder --out."""
     from sim.io.export.kitti import kitti
 
-    folders = kitti(source, option_parsing.output_folder(out))
+    folders = kitti(options.folder, option_parsing.output_folder(options.out))
     return CommandResult({"folders": folders}, "\n".join(map(str, folders)))
 
 

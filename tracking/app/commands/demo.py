@@ -1,48 +1,203 @@
-"""`flockscope demo`: generates scenes, tracks them with every tracker, scores the tracks and writes pages to open."""
+"""`flockscope demo`: generates scenes, tracks them with every tracker, scores the tracks and writes pages to open.
+
+The HTML page that `flockscope demo` writes: videos of one scene, and tables of scores whose rows link to replays.
+"""
 
 from __future__ import annotations
 
 import math
 import os
+import re
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 
 from scenarios.errors import printable
-from sim.io.files.own_files import output_path
+from sim.io.files.own_files import GENERATOR, output_path
 from sim.types import Sequence
 from tracking.app import option_parsing
+from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.demo_page import PixelScene, RankingTable, ResultSection, demo_page
 from tracking.app.commands.score import summary
-from tracking.app.commands.score_ranking import usual_key
-from tracking.app.commands.score_tables import SHOWN, SequenceScores, number
+from tracking.app.commands.score_ranking import rank_words, shown_columns, usual_key, verdict
+from tracking.app.commands.score_tables import SHOWN, SIMILARITY, SequenceScores, arrow, number
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.replay_page.video import PageVideo
-from tracking.comparison import compare
+from tracking.comparison import ComparedRuns, compare
 from tracking.running import tracker_registry
 from tracking.running.run import TrackingRun
+from tracking.scoring.catalogue import CATALOGUE
+
+EXTREMES = """<p>Best and worst scene of <code>{run}</code>: <a href="{best}">{best_name}</a> ({key} {most}) and
+<a href="{worst}">{worst_name}</a> ({least}).</p>
+"""
+VIDEO = """<figure><video src="{address}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
+<figcaption>{caption}</figcaption></figure>"""
+PEOPLE_CAPTION = "<code>{tracker}</code>: boxes of people with ids, hulls of their groups"
+GROUPS_CAPTION = (
+    "<code>{tracker}</code>: groups with hull, extent (dotted), arrow to where it is in 1 s, number of people (~)"
+)
+# The note on a tracker that reports groups only.
+WITHOUT_PEOPLE = "<p>This tracker reports groups without people, so people cannot be scored.</p>"
+
+
+@dataclass(frozen=True)
+class ResultSection:
+    """The scores under one heading; three lists of equal length that `add` extends."""
+
+    title: str
+    rows: list[SequenceScores] = field(default_factory=list)  # of one sequence each
+    pages: list[Path] = field(default_factory=list)  # the replay page of each row
+    names: list[str] = field(default_factory=list)  # texts that link to the pages
+
+    def add(self, row: SequenceScores, page: Path, name: str) -> None:
+        """Appends one row of scores with its page and name."""
+        self.rows.append(row)
+        self.pages.append(page)
+        self.names.append(name)
+
+
+@dataclass(frozen=True)
+class PixelScene:
+    """The scene that was tracked from its pictures."""
+
+    section: ResultSection  # one row for each tracker and input; its names begin with the tracker's name
+    videos: dict[str, Path]  # overlay videos by the tracker's name
+    frames: int
+    seconds: float  # duration of the scene
+
+
+@dataclass(frozen=True)
+class RankingTable:
+    """A ranking of trackers that got the same input. key: the score that ranks."""
+
+    title: str
+    compared: ComparedRuns
+    key: str
+
+
+def demo_page(root: Path, scene: PixelScene, tables: list[RankingTable], sections: list[ResultSection]) -> str:
+    """Returns the page as HTML: rankings, videos and scores of the scene with pictures, then, folded, each section."""
+    parts = {
+        "GENERATOR": GENERATOR, "FRAMES": str(scene.frames),
+        "RANKINGS": "\n".join(_ranking(table, sections, root) for table in tables),
+        "PIXELS": _videos(root, scene) + _score_table(scene.section, root),
+        "SECTIONS": "\n".join(_section_html(section, root) for section in sections),
+    }  # fmt: skip
+    page = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
+    return re.sub("@@([A-Z]+)@@", lambda found: parts[found[1]], page)
+
+
+def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> str:
+    entries = table.compared.to_arrow(table.key).to_pylist()
+    keys = shown_columns(entries, table.key)
+    rows = []
+    for e in entries:
+        own = {"mean": e["mean"], "low": e["low"], "high": e["high"]}
+        name = escape(e["run"])
+        cells = [name if e["first"] else f"<em>{name}</em>", rank_words(e), _interval(table.key, own)]
+        rows.append(_cells("td", [*cells, *(number(k, e[k], mean=True) for k in keys)]))
+    head = "<tr><th>tracker</th><th>rank</th>" + "".join(map(_heading, [table.key, *keys])) + "</tr>"
+    body = f'<div class="wide"><table><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'
+    compared = table.compared
+    note = (
+        f"{len(compared.sequences)} scenes, people compared by {SIMILARITY[compared.similarity]}; small: 95 % interval"
+    )
+    best = entries[len(compared.oracles)]["run"]
+    words = "; ".join(verdict(compared, table.key))
+    sure = f"<p><strong>Result:</strong> {escape(words)}.</p>" if words else ""
+    return f"<h2>{escape(table.title)}</h2><p>{note}.</p>{sure}{body}{_extremes(table, best, sections, root)}"
+
+
+def _extremes(table: RankingTable, run: str, sections: list[ResultSection], root: Path) -> str:
+    section = next(s for s in sections if s.title.startswith(f"{run},"))
+    known = [k for k, row in enumerate(section.rows) if math.isfinite(row.scores[table.key])]
+    if len(known) < 2:
+        return ""
+    best, worst = (pick(known, key=lambda k: section.rows[k].scores[table.key]) for pick in (max, min))
+    most, least = (number(table.key, section.rows[k].scores[table.key]) for k in (best, worst))
+    links = {
+        f"{name}{part}": escape(text)
+        for name, k in (("best", best), ("worst", worst))
+        for part, text in (("", _link(section.pages[k], root)), ("_name", section.names[k]))
+    }
+    return EXTREMES.format(run=escape(run), key=escape(table.key), most=most, least=least, **links)
+
+
+def _videos(root: Path, scene: PixelScene) -> str:
+    section = scene.section
+    with_people = {name.split()[0] for name, row in zip(section.names, section.rows, strict=True) if _has_people(row)}
+    shown = []
+    for tracker, path in scene.videos.items():
+        caption = (PEOPLE_CAPTION if tracker in with_people else GROUPS_CAPTION).format(tracker=escape(tracker))
+        shown.append(VIDEO.format(address=escape(_link(path, root)), start=0.4 * scene.seconds, caption=caption))
+    return f'<div class="films">{"".join(shown)}</div>'
+
+
+def _section_html(section: ResultSection, root: Path) -> str:
+    note = "" if any(map(_has_people, section.rows)) else WITHOUT_PEOPLE
+    return f"<details><summary>{escape(section.title)}</summary>{note}{_score_table(section, root)}</details>"
+
+
+def _has_people(row: SequenceScores) -> bool:
+    return math.isfinite(row.scores["HOTA"])
+
+
+def _link(path: Path, root: Path) -> str:
+    return path.relative_to(root).as_posix()
+
+
+def _score_table(section: ResultSection, root: Path) -> str:
+    keys = [key for key in SHOWN if any(math.isfinite(row.scores[key]) for row in section.rows)]
+    rows = []
+    for row, page, name in zip(section.rows, section.pages, section.names, strict=True):
+        link = f'<a href="{escape(_link(page, root))}">{escape(name)}</a>'
+        rows.append(_cells("td", [link, *(number(key, row.scores[key]) for key in keys)]))
+    head = "<tr><th>sequence</th>" + "".join(map(_heading, keys)) + "</tr>"
+    foot = ""
+    if len({row.sequence for row in section.rows}) > 1:
+        means = summary(section.rows)
+        ends = [_interval(key, means[key]) for key in keys]
+        foot = f"<tfoot>{_cells('td', ['mean<br><small>95 % interval</small>', *ends])}</tfoot>"
+    table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody>{foot}</table>"
+    return f'<div class="wide">{table}</div>'
+
+
+def _heading(key: str) -> str:
+    score = CATALOGUE[key]
+    unit = f" [{score.unit}]" if score.unit not in ("1", "count") else ""
+    return f'<th title="{escape(score.meaning)}">{escape(arrow(key))}{unit}</th>'
+
+
+def _interval(key: str, mean: dict[str, float]) -> str:
+    low, high = number(key, mean["low"], mean=True), number(key, mean["high"], mean=True)
+    return f"{number(key, mean['mean'], mean=True)}<br><small>{low} to {high}</small>"
+
+
+def _cells(tag: str, cells: list[str]) -> str:
+    return "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in cells) + "</tr>"
+
 
 SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
 SEEDS = range(40_000, 40_003)
 QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
-PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)
-"""The scene that is rendered and tracked from its pictures."""
+PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is rendered and tracked from its pictures.
 
-QUICK_PIXEL_SETTINGS = ("camera.fps=5",)
-"""What --quick changes in that scene."""
+QUICK_PIXEL_SETTINGS = ("camera.fps=5",)  # What --quick changes in that scene.
 
 
-def demo(out: Path, *, quick: bool) -> CommandResult:
-    """Writes simulated scenes, tracks and pages into the folder `out`; scenes that are already there are kept."""
+def demo(options: DemoOptions) -> CommandResult:
+    """Writes simulated scenes, tracks and pages into the folder --out; scenes that are already there are kept."""
     from sim.dataset.generate import generate
     from sim.io.files.atomic import write_file
     from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
     from sim.workers.start import WorkerOptions
 
-    start = time.monotonic()
+    start, out, quick = time.monotonic(), options.out, options.quick
     refuse_foreign_file(option_parsing.output_folder(out) / "index.html")
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     with ProgressMeter("generate") as meter:

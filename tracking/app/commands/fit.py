@@ -16,14 +16,14 @@ from tracking.app import option_parsing
 from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.command_result import CommandResult
 
+# Seeds of the simulated detections whose statistics are shown beside the measured ones.
 CHECK_SEEDS = range(30_000, 30_008)
-"""Seeds of the simulated detections whose statistics are shown beside the measured ones."""
 
+# The statistics that the text shows; --json has all of them.
 SHOWN = (
     "missed", "misses: mean run, s", "false alarms per frame", "false alarms: at people", "false alarms: mean stay, s",
     "overlap, 10% quantile", "overlap, 50% quantile", "overlap, 90% quantile", "error correlation after 0.2 s",
 )  # fmt: skip
-"""The statistics that the text shows; --json has all of them."""
 
 
 def fit_sensor(options: FitSensorOptions) -> CommandResult:
@@ -67,8 +67,7 @@ def _mean(values: list[float]) -> float:
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments."""
     from sim.io.files.atomic import write_file
-    from tracking.fitting.belief import fit_belief, sample_of
-    from tracking.fitting.belief_scores import belief_scores
+    from tracking.fitting.belief import belief_scores, fit_belief, sample_of
     from tracking.fitting.grouping_scenes import pair_scenes
 
     out = option_parsing.output_file(options.out, ".toml")

@@ -15,8 +15,7 @@ from tracking.app.command_options import ScenariosOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.option_parsing import output_file, scenario_settings
 
-Node = dict[str, Any]
-"""A part of a JSON schema."""
+Node = dict[str, Any]  # A part of a JSON schema.
 
 
 def scenarios(options: ScenariosOptions) -> CommandResult:

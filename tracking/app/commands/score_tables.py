@@ -12,8 +12,8 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scores
 from tracking.stats import LEVEL
 
+# The keys that are shown where there is room for one line only.
 SHOWN = ("HOTA", "MOTA", "IDF1", "group_F1", "group_GDSR2", "group_MOTA", "pairwise_F1", "event_F1", "event_latency")
-"""The keys that are shown where there is room for one line only."""
 
 PEOPLE = ("objective", "HOTA", "DetA", "AssA", "MOTA", "MOTP", "IDF1", "FP", "FN", "IDSW", "GOSPA")
 GROUPS = tuple(
@@ -21,6 +21,7 @@ GROUPS = tuple(
 )
 MEMBERS = ("pairwise_F1", "GMITRE_F1", "right_groups_F1", "exact_groups_F1")
 EVENTS = ("event_F1", "event_latency", "merge_F1", "split_F1", "cross_F1", "queue_F1", "lineage_accuracy")
+# Title and keys of each table. Only keys of groups have a core score. --json holds every key of the catalogue.
 TABLES = {
     "people": PEOPLE,
     "groups, strict": GROUPS,
@@ -28,12 +29,11 @@ TABLES = {
     "members": MEMBERS,
     "events": EVENTS,
 }
-"""Title and keys of each table. Only keys of groups have a core score. --json holds every key of the catalogue."""
 
+# The tables for a tracker that reports groups without people: the objective moves to the groups' table.
 GROUP_TRACKER_TABLES = {
     title: PEOPLE[:1] * (keys is GROUPS) + keys for title, keys in TABLES.items() if keys is not PEOPLE
 }
-"""The tables for a tracker that reports groups without people: the objective moves to the groups' table."""
 
 SIMILARITY = {
     "boxes": "overlap (IoU) of boxes",
@@ -43,11 +43,9 @@ SIMILARITY = {
 GROUP_MATCH = {"hull": "overlap (IoU) of hulls (group_F1: common members)", "members": "common members (Jaccard index)"}
 SURFACE = {"ground": "on the ground, m", "image": "in the image, px"}
 
-LOWER = "↓ lower is better"
-"""The meaning of the arrow in headings."""
+LOWER = "↓ lower is better"  # The meaning of the arrow in headings.
 
-Means = dict[str, dict[str, float]]
-"""By key: "mean", and "low" and "high" of its 95 % interval; nan where unknown."""
+Means = dict[str, dict[str, float]]  # By key: "mean", and "low" and "high" of its 95 % interval; nan where unknown.
 
 
 @dataclass(frozen=True)

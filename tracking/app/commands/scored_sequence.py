@@ -15,8 +15,7 @@ from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import StoredTracks
 from tracking.comparison import ComparedSequence, compare_one
-from tracking.running.run import TrackingRun
-from tracking.running.run_info import input_summary
+from tracking.running.run import TrackingRun, input_summary
 from tracking.scoring.evaluation import Scores
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.misreading import likely_misreading

@@ -20,15 +20,14 @@ from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
-from tracking.running.run import TrackingRun
-from tracking.running.run_info import input_summary
+from tracking.running.run import TrackingRun, input_summary
 from tracking.running.time_limit import TimeLimited
 
+# What --json repeats of each run.json.
 ROW_KEYS = (
     "sequence", "detections", "input", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames",
     "frames_per_second", "whole_frames_per_second",
 )  # fmt: skip
-"""What --json repeats of each run.json."""
 
 
 @dataclass(frozen=True)

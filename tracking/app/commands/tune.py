@@ -2,66 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, Field, field, fields, make_dataclass
+from dataclasses import MISSING, fields, make_dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-import typer
-
+from tracking.app import command_options as shared
 from tracking.app import option_parsing
-from tracking.app.command_options import Cluster, Detector, Set, StepTimeout, Workers
 from tracking.app.command_result import CommandResult
-from tracking.app.options_from_dataclass import options_from
 from tracking.app.progress import ProgressMeter
+from tracking.keyword_options import option
 from tracking.tuning.options import TuneOptions
 
-SHARED = {"set": Set, "workers": Workers, "cluster": Cluster, "step_timeout": StepTimeout}
-"""Options that other commands have, too."""
+# Options that other commands have, too, and types on the command line that do not follow from the default.
+SHARED = {
+    "set": shared.SET, "workers": shared.WORKERS, "cluster": shared.CLUSTER, "step_timeout": shared.STEP_TIMEOUT
+}  # fmt: skip
 TYPES = {
-    "tracker": str,
-    "suite": list[str],
-    "out": Path,
-    "detections": Literal["image", "truth", "file"] | None,
-    "similarity": Literal["boxes", "ground", "image"] | None,
-}
-"""Types on the command line that do not follow from the default."""
-REQUIRED = ("out", "trials")
-"""Options that `tracking.tune` has defaults for and the command has not."""
+    "tracker": str, "suite": list[str], "set": list[str], "out": Path, "step_timeout": float | None,
+    "detections": Literal["image", "truth", "file"] | None, "similarity": Literal["boxes", "ground", "image"] | None,
+}  # fmt: skip
+REQUIRED = ("out", "trials")  # Options that `tracking.tune` has defaults for and the command has not.
 COMMA_SEPARATED = ("only",)
 SEEDS = ("seeds", "validation", "test")
 NO_CHECK = "none"
 
 
-def _command_field(option: Field[Any]) -> tuple[str, Any, Any]:
-    default = MISSING if option.name in REQUIRED else option.default
-    text = default is None or default == "" or option.name in COMMA_SEPARATED
-    several = isinstance(default, tuple) and not text
-    if option.name in SHARED:
-        annotation = SHARED[option.name]
-    else:
-        kind: Any = str | None if text else list[str] if several else type(option.default)
-        parameter: Any = typer.Argument if option.name == "tracker" else typer.Option
-        flag = () if option.name == "tracker" else (f"--{option.name}",)
-        shown = parameter(*flag, metavar=option.metadata["metavar"], help=option.metadata["help"])
-        annotation = Annotated[TYPES.get(option.name, kind), shown]
-    if default is MISSING:
-        return option.name, annotation, field()
-    return option.name, annotation, field(default_factory=list) if several else field(default=None if text else default)
-
-
 def _command_fields() -> list[tuple[str, Any, Any]]:
-    """Returns (name, annotation, dataclass field) of each option of the command line, for `make_dataclass`."""
-    found = [_command_field(option) for option in fields(TuneOptions) if option.name != "progress"]
-    after = [name for name, *_ in found].index("set") + 1
-    return [*found[:after], ("sensor", Detector, field(default=None)), *found[after:]]
+    """Returns (name, type, dataclass field) of each option of the command line, for `make_dataclass`."""
+    found: list[tuple[str, Any, Any]] = []
+    for f in fields(TuneOptions):
+        default = MISSING if f.name in REQUIRED else f.default
+        text = default is None or default == "" or f.name in COMMA_SEPARATED
+        several = isinstance(default, tuple) and not text
+        kind: Any = str | None if text else list[str] if several else type(f.default)
+        flag = "" if f.name == "tracker" else f"--{f.name}"
+        given = option(
+            f.metadata["help"], [] if several else None if text else default, metavar=f.metadata["metavar"], flag=flag
+        )
+        found.append((f.name, TYPES.get(f.name, kind), SHARED[f.name]() if f.name in SHARED else given))
+        if f.name == "set":
+            found.append(("sensor", Path | None, shared.SENSOR()))
+    return [row for row in found if row[0] != "progress"]
 
 
 CommandLine: Any = make_dataclass("CommandLine", _command_fields(), frozen=True, kw_only=True)
+CommandLine.__doc__ = "Search a tracker's parameters on simulated scenes; measure the gain on others."
 
 
-@options_from(CommandLine)
 def tune(options: Any) -> CommandResult:
-    """Search a tracker's parameters on simulated scenes; measure the gain on others."""
+    """Searches parameters as `tracking.tune` does, and returns what was gained."""
     from tracking.tuning import tune as search
 
     given = {f.name: getattr(options, f.name) for f in fields(options)}

@@ -16,24 +16,25 @@ from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.running.run import TrackingRun
 
-Step = Callable[[str], None]
-"""Reports that one picture of the named sequence is done."""
+Step = Callable[[str], None]  # Reports that one picture of the named sequence is done.
 
-Write = Callable[[Sequence, Path, Step], None]
-"""Writes the file of one sequence."""
+Write = Callable[[Sequence, Path, Step], None]  # Writes the file of one sequence.
 
 
 def view(options: ViewOptions) -> CommandResult:
     """Writes a replay page for each sequence, with its tracks if they are given."""
     from tracking.app.replay_page.page import write_page
     from tracking.app.replay_page.video import page_video
+    from tracking.errors.found import errors_of_run
 
     sequences = _open(options)
     tracks_of = _tracks_reader(sequences, options.tracks)
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         tracks = tracks_of(sequence)
-        write_page(sequence, tracks, path, video=page_video(sequence, path, options.video, step))
+        found = None if tracks is None else errors_of_run(sequence, tracks, costs=False)
+        errors = [] if found is None else found.errors
+        write_page(sequence, tracks, path, video=page_video(sequence, path, options.video, step), errors=errors)
 
     pictures = _picture_count(sequences) if options.video != "none" else 0
     return _write_each("view", sequences, options.out, ".html", write, pictures)

@@ -17,23 +17,14 @@ from sim.io.pictures.video_files import write_video
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even_size, refuse_source
 from tracking.drawing.canvas import Canvas
-from tracking.drawing.layer_painting import (
-    LayerStyle,
-    draw_banner,
-    draw_captions,
-    draw_label,
-    letter_size,
-    paint_layer,
-)
+from tracking.drawing.layer_painting import LayerStyle, draw_banner, draw_captions, draw_label, letter_size, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.running.run import grouped
 
 TruthPlacement = Literal["beside", "over", "only"]
-Panel = list[tuple[Layer, LayerStyle]]
-"""The layers that are drawn over one copy of the picture, the lowest first."""
+Panel = list[tuple[Layer, LayerStyle]]  # The layers that are drawn over one copy of the picture, the lowest first.
 
-LOW = 400
-"""px: pictures less high than this are shown at twice their size."""
+LOW = 400  # px: pictures less high than this are shown at twice their size.
 
 BANNER_HEIGHT = 32
 GREY = (128, 128, 128)

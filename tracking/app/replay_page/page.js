@@ -16,8 +16,9 @@ const KEYS = [
   ["n p", "next, previous event"], ["+ −", "faster, slower"], ["c", "colour by person or group"],
   ...TOGGLES.filter(toggle => toggle[3]).map(([, word, key]) => [key, word.toLowerCase()]), ["?", "this list"],
 ];
+if (data.errors.length) KEYS.push(["x z", "next, previous error"]);
 const events = sides.flatMap(side => side.events).sort((a, b) => a.start - b.start);
-let line = null, eventButtons = [];
+let line = null, eventButtons = [], errorButtons = [];
 
 function seekTo(frame) {
   state.frame = Math.min(Math.max(Math.round(frame), 1), data.length);
@@ -77,6 +78,10 @@ function showFacts(frame) {
   rows.push(["now", now.map(event => `${WORDS[event.side]} ${event.kind}`).join(", ") || "–"]);
   $("facts").replaceChildren(...rows.flatMap(([key, value]) => [tag("dt", key), tag("dd", value)]));
   eventButtons.forEach((button, k) => button.setAttribute("aria-current", now.includes(events[k])));
+  errorButtons.forEach((button, k) => {
+    const error = data.errors[k];
+    button.setAttribute("aria-current", error.start <= frame && frame <= error.end);
+  });
 }
 
 function tag(name, text) {
@@ -116,8 +121,8 @@ function step(count) {
   seekTo(state.frame + count);
 }
 
-function toEvent(direction) {
-  const starts = events.map(event => event.start).filter(start => (start - state.frame) * direction > 0);
+function toNext(items, direction) {
+  const starts = items.map(item => item.start).filter(start => (start - state.frame) * direction > 0);
   if (starts.length) jump(direction > 0 ? Math.min(...starts) : Math.max(...starts));
 }
 
@@ -158,7 +163,8 @@ function onKey(event) {
   const actions = {
     " ": onButton ? null : () => play(!state.playing),
     ArrowRight: () => step(one), ArrowLeft: () => step(-one), Home: () => jump(1), End: () => jump(data.length),
-    n: () => toEvent(1), p: () => toEvent(-1), "+": () => speed(1), "=": () => speed(1), "-": () => speed(-1),
+    n: () => toNext(events, 1), p: () => toNext(events, -1),
+    x: () => toNext(data.errors, 1), z: () => toNext(data.errors, -1), "+": () => speed(1), "=": () => speed(1), "-": () => speed(-1),
     c: () => colourBy(options.by === "person" ? "group" : "person"), "?": () => $("help").showModal(),
   };
   for (const [name, , key, there] of TOGGLES) if (there) actions[key] = () => toggle(name);
@@ -227,17 +233,25 @@ function buildControls() {
     name.append(tag("kbd", key));
     return [name, tag("dd", word)];
   }));
-  eventButtons = events.map(event => {
-    const button = tag("button", `${seconds(event.start).toFixed(1)} s  ${WORDS[event.side]} ${eventWords(event)}`);
-    button.addEventListener("click", () => jump(event.start));
+  eventButtons = list("events", events, event => `${seconds(event.start).toFixed(1)} s  ${WORDS[event.side]} ${eventWords(event)}`);
+  $("errors-box").hidden = !data.errors.length;
+  errorButtons = list("errors", data.errors, errorWords);
+}
+
+// Fills a list with a button for each item, which goes to its first frame; returns the buttons.
+function list(id, items, words) {
+  const buttons = items.map(item => {
+    const button = tag("button", words(item));
+    button.addEventListener("click", () => jump(item.start));
     return button;
   });
-  $("events").replaceChildren(...eventButtons.map(button => {
+  $(id).replaceChildren(...buttons.map(button => {
     const item = document.createElement("li");
     item.append(button);
     return item;
   }));
-  if (!events.length) $("events").append(tag("li", "none"));
+  if (!items.length) $(id).append(tag("li", "none"));
+  return buttons;
 }
 
 function layOut() {

@@ -18,26 +18,19 @@ import numpy as np
 
 from sim.io.files.atomic import write_file
 from sim.types import Array, Camera, Scene, Sequence, Tracks, Truth
-from tracking.app.replay_page.page_rows import (
-    SCALE,
-    Json,
-    PageRows,
-    deltas,
-    encode_rows,
-    rows_of_tracks,
-    rows_of_truth,
-)
+from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
 from tracking.app.replay_page.video import PageVideo
-from tracking.drawing.plan_area import plan_area
+from tracking.drawing.plan_view import plan_area
+from tracking.errors.found import FoundError
 from tracking.running.run import grouped
 
 HERE = Path(__file__).parent
 
+# The scripts of the page, in the order in which they run.
 SCRIPTS = (
     "decode.js", "draw.js", "whole_groups.js", "plan.js", "camera_view.js", "image.js", "timeline.js", "video.js",
     "page.js",
 )  # fmt: skip
-"""The scripts of the page, in the order in which they run."""
 
 
 def write_page(
@@ -47,9 +40,10 @@ def write_page(
     scores: Mapping[str, float] | None = None,
     title: str | None = None,
     video: PageVideo | None = None,
+    errors: SequenceOf[FoundError] = (),
 ) -> Path:
     """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all."""
-    shown = page_data(sequence, tracks, scores) | {"video": None if video is None else video.facts()}
+    shown = page_data(sequence, tracks, scores, errors) | {"video": None if video is None else video.facts()}
     data = json.dumps(shown, separators=(",", ":"), allow_nan=False)
     page = (HERE / "page.html").read_text(encoding="utf-8")
     parts = {
@@ -66,7 +60,12 @@ def write_page(
     return path
 
 
-def page_data(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Mapping[str, float] | None = None) -> Json:
+def page_data(
+    sequence: Sequence,
+    tracks: SequenceOf[Tracks] | None,
+    scores: Mapping[str, float] | None = None,
+    errors: SequenceOf[FoundError] = (),
+) -> Json:
     """Returns all that the page shows except the video, as a JSON object."""
     truth = sequence.truth
     complete = None if tracks is None else grouped(tracks, sequence)
@@ -91,6 +90,7 @@ def page_data(sequence: Sequence, tracks: SequenceOf[Tracks] | None, scores: Map
         "unlabelled": _unlabelled(truth),
         "near": _near_strangers(truth),
         "scores": _scores(scores or {}),
+        "errors": [one.facts(sequence.fps) for one in errors],
     }
 
 

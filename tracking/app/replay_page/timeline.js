@@ -45,6 +45,7 @@ function timeline(box, width, seekTo) {
   let y = drawAxis(svg, x, width);
   for (const [a, b] of data.unlabelled) drawUnlabelled(svg, x(a), x(b + 1));
   for (const side of sides) y = drawEvents(svg, side, x, y, seekTo);
+  if (data.errors.length) y = drawErrors(svg, x, y, seekTo);
   for (const side of sides) y = drawGroupBars(svg, side, x, y, seekTo);
   svg.setAttribute("viewBox", `0 0 ${width} ${y + 4}`);
   svg.setAttribute("height", y + 4);
@@ -101,6 +102,27 @@ function drawEvents(svg, side, x, y, seekTo) {
     mark.addEventListener("pointerdown", e => { e.stopPropagation(); seekTo(event.start); });
   }
   return y + Math.max(ends.length, 1) * LANE + 5;
+}
+
+// Errors that would overlap are put in different lanes; errors of groups are hollow.
+function drawErrors(svg, x, y, seekTo) {
+  drawHeading(svg, y, "errors");
+  const ends = [];
+  for (const error of data.errors) {
+    const u = x(error.start), end = Math.max(x(error.end), u + 6);
+    let lane = ends.findIndex(e => e < u - 2);
+    if (lane < 0) lane = ends.length < 8 ? ends.length : 7;
+    ends[lane] = end;
+    const mark = element("rect", { x: u, y: y + 3 + lane * 10, width: end - u, height: 7, rx: 2, class: `error ${error.of}` }, svg);
+    element("title", {}, mark, errorWords(error));
+    mark.addEventListener("pointerdown", e => { e.stopPropagation(); seekTo(error.start); });
+  }
+  return y + Math.max(ends.length, 1) * 10 + 8;
+}
+
+function errorWords(error) {
+  const time = `${seconds(error.start).toFixed(1)}–${seconds(error.end).toFixed(1)} s`;
+  return `${time}  ${error.kind}: ${error.who} (${error.detail || error.cause})`;
 }
 
 function drawGroupBars(svg, side, x, y, seekTo) {

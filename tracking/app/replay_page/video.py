@@ -19,11 +19,9 @@ from sim.io.pictures.video_files import rate_of, write_video
 from sim.types import Image, Sequence
 
 VideoPlacement = Literal["auto", "inside", "beside", "none"]
-LARGE = 12_000_000
-"""bytes: with "auto", a video of this size or more is written beside the page."""
+LARGE = 12_000_000  # bytes: with "auto", a video of this size or more is written beside the page.
 
-QUALITY = 23
-"""x264's constant rate factor."""
+QUALITY = 23  # x264's constant rate factor.
 
 GREY = 128
 

@@ -11,10 +11,8 @@ from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.filters.track_uncertainty import Dynamics, check_birth
 
-SIZE_RATE_PRIOR = 0.2
-"""m/s: standard deviation of the rate of a new track's height and width."""
-CONFIRM_GATE = 0.99
-"""Share of a track's own measurements that the gate of the confirming measurement holds."""
+SIZE_RATE_PRIOR = 0.2  # m/s: standard deviation of the rate of a new track's height and width.
+CONFIRM_GATE = 0.99  # Share of a track's own measurements that the gate of the confirming measurement holds.
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from sim.types import Array, Ints
 from tracking.detect import blobs
 from tracking.detect.person_size import SLIM, SMALLEST, PersonSize
 from tracking.papers.blob import new_people_kernels as kernels
-from tracking.papers.blob.person_template import ELLIPSE, ExplainedForeground
+from tracking.papers.blob.person_template import ExplainedForeground
+from tracking.papers.blob.person_template_kernels import ELLIPSE
 
 LEAST = 0.3  # a region smaller than this share of a person's area is ignored
 MOST = 6  # most people found in one region in a frame

@@ -18,7 +18,6 @@ from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob import person_template_search_kernels as search
-from tracking.papers.blob.person_template_kernels import ELLIPSE as ELLIPSE
 
 
 class ExplainedForeground:

@@ -3,6 +3,17 @@
 Track management of Gonzalez et al. (2006), secs. 4.5 and 5, by rho = sqrt|S| / its asymptote, S the covariance of the
 innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty). Association
 by cost, explained misses, the rules of reporting and the field of view are ours.
+
+The tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each track.
+
+The state's h, w are the axes of the person's ellipse, the longer one first as measured, and theta is the direction of h
+from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, sec. 4.1). The box of a track is the
+bounding box of its ellipse.
+
+The paper's rho is sqrt|S| over its asymptote, S the covariance of the innovation (measurement less prediction). It
+counts measurements by the covariance (sec. 4.5). Here the covariance also knows that a partly hidden person
+is measured with more noise, and that axes return to expected ones (both ours). So rho is computed from a second,
+nominal covariance, which is updated with the nominal R (variance of a measurement) only.
 """
 
 from __future__ import annotations
@@ -13,6 +24,7 @@ import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Context, Ints
+from tracking.detect.person_size import upright
 from tracking.filters import assignment, kalman, track_uncertainty
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
@@ -25,12 +37,10 @@ SAME = 0.5  # IoU of a box with the hull of several predicted boxes from which o
 SLACK = 0.02
 LARGEST_SCALE = 2.0  # largest scale of a track relative to the sequence's; the least is its inverse
 
-SCALE, RHO, BORN, SCORE, HITS, MISSES = range(6)
-"""Rows of `numbers`."""
-CONFIRMED, MEASURED, MISS_EXPLAINED = range(3)
-"""Rows of `flags`."""
+SCALE, RHO, BORN, SCORE, HITS, MISSES = range(6)  # Rows of `numbers`.
+CONFIRMED, MEASURED, MISS_EXPLAINED = range(3)  # Rows of `flags`.
+# Attributes that are views of the rows of `numbers` and `flags`.
 NUMBERS, FLAGS = ("scale", "rho", "born", "score", "hits", "misses"), ("confirmed", "measured", "miss_explained")
-"""Attributes that are views of the rows of `numbers` and `flags`."""
 
 
 class TrackedPeople:
@@ -234,3 +244,95 @@ class TrackedPeople:
         centre, half = place[:, :2], place[:, :1:-1] / 2
         out = ((centre - half < self.view_low) & (rate < 0)) | ((centre + half > self.view_high) & (rate > 0))
         return np.asarray(out.any(1))
+
+
+ANGLE_RATE = 15.0  # deg/s^0.5, random walk of the direction: its standard deviation after one second
+RELAXATION = 0.5  # s, time constant with which axes return to the expected ones
+HEADING = 6.0  # seen from straight above, the direction turns with the heading: so many times faster than a body leans
+
+
+class TrackedEllipses(TrackedPeople):
+    """The table of N tracks from pixels: filters of ellipses, with a direction and a nominal covariance for each track.
+
+    Made from config, its nominal filter and context, as TrackedPeople. State, beside that of TrackedPeople: angle (2,
+    N), rows: direction of the first axis h (rad, from the abscissa, v down) and its variance (rad^2);
+    nominal (5, N, 4), a bank of filters as `bank`, updated with the nominal noise, from which the uncertainty rho
+    follows; angle_var_per_step, growth of the direction's variance in a frame. In `bank` the coordinates are x, y, h,
+    w: centre and full axes of the ellipse.
+    """
+
+    def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
+        self.angle, self.nominal = np.zeros((2, 0)), np.zeros((5, 0, 4))
+        super().__init__(config, dynamics, context)
+
+    def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
+        """Replace the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
+        they are."""
+        super().follow(config, dynamics)
+        self.largest_log_det += 2 * dynamics.noise.size * np.log(LARGEST_SCALE)
+        rate = ANGLE_RATE * (HEADING if self.top else 1.0)
+        self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
+
+    def predict(self) -> None:
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), and compute their uncertainty rho; directions stay,
+        their variances grow."""
+        kalman.predict(self.nominal, self.dynamics.dt, self.q)
+        self.angle[kalman.DIRECTION_VAR] += self.angle_var_per_step
+        super().predict()
+
+    def compute_rho(self) -> Array:
+        """Returns rho (N,) of all tracks: sqrt|S| over its asymptote, S the innovation covariance by the nominal
+        covariance of x, y, h, w; 1 in the steady state."""
+        return track_uncertainty.rho(self.nominal, self.noise, self.asymptote)
+
+    def upright_boxes(self) -> Array:
+        """Returns the bounding boxes (N, 4) of the tracks' ellipses: centre x, y, height, width, px."""
+        return upright(self.bank[kalman.PLACE], self.angle[kalman.DIRECTION])
+
+    def keep_only(self, rows: Ints) -> None:
+        """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
+        self.angle, self.nominal = self.angle.take(rows, 1), self.nominal.take(rows, 1)
+        super().keep_only(rows)
+
+    def start_tracks(self, z: Array, score: Array, t: float) -> None:
+        """Append a tentative track at rest for each ellipse z (K, 5): centre x, y, full axes h, w (px), direction theta
+        (rad)."""
+        super().start_tracks(z[:, :4], score, t)
+        new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
+        self.angle = np.concatenate([self.angle, new], 1)
+        self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
+
+    def direction_distances(self, z: Array, angle_var: Array) -> Array:
+        """Returns the direction's part y^2 / S of the squared distance d^2 (eq. 9) of N tracks and M ellipses, (N,
+        M)."""
+        s = self.angle[kalman.DIRECTION_VAR][:, None] + angle_var
+        turn = kalman.angle_innovation(z, self.angle[kalman.DIRECTION][:, None])
+        return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
+
+    def innovations(self, z: Array, angle_var: Array) -> tuple[Array, Array]:
+        """Returns d^2 (eq. 9) and ln |S| but for a constant, (N, M) each, of N tracks and M ellipses."""
+        d2 = kalman.distances(self.bank, z[:, :4], self.noise, self.scale) + self.direction_distances(
+            z[:, 4], angle_var
+        )
+        angle_s = self.angle[kalman.DIRECTION_VAR][:, None] + np.where(kalman.directed(angle_var), angle_var, np.inf)
+        known = np.log((self.bank[kalman.VAR] + self.noise) / self.asymptote).sum(1)
+        known += 2 * self.noise.size * np.log(self.scale / self.context.px_per_m)
+        return d2, known[:, None] + np.log(np.minimum(2 / np.pi * angle_s, 1.0))
+
+    def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
+        """Update the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3
+        to 7)."""
+        terms = kalman.update(self.bank, rows, z[:, :4], noise)
+        turn = self.direction_distances(z[:, 4], angle_var)[rows, np.arange(len(rows))]
+        kalman.update(self.nominal, rows, z[:, :4], self.noise)
+        kalman.angle_update(self.angle, rows, z[:, 4], angle_var)
+        return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]) + turn)
+
+    def relax_axes(self, rows: Ints, axes: Array, var: float) -> None:
+        """Move the axes of the tracks at positions `rows` (K,) towards expected axes (K, 2), px, in place (ours)."""
+        stay = np.exp(-self.dynamics.dt / RELAXATION)
+        bank = self.bank[:, rows, 2:]
+        bank[kalman.PLACE] += (1 - stay) * (axes - bank[kalman.PLACE])
+        bank[kalman.VAR] = stay**2 * bank[kalman.VAR] + (1 - stay**2) * var
+        bank[kalman.COV] *= stay
+        self.bank[:, rows, 2:] = bank

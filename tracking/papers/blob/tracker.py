@@ -67,8 +67,7 @@ from sim.types import Array, Bools, Camera, Context, Detections, Frame, Plane, T
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.ellipse_tracks import TrackedEllipses
-from tracking.papers.blob.track_management import TrackedPeople
+from tracking.papers.blob.track_management import TrackedEllipses, TrackedPeople
 from tracking.papers.blob.update_from_boxes import BoxUpdater
 from tracking.papers.blob.update_from_pixels import PixelUpdater
 

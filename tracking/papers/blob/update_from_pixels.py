@@ -14,6 +14,13 @@ A blob that is associated with no track starts a track. With `split` it also doe
 nearer blob updates, since pieces of one person have been found by templates. Without `split` neither a blob inside any
 gate starts a track nor pieces of a person whose union is inside (blob_pieces; the paper's frame 367). Blobs do not use
 `orphan_gate`.
+
+Blobs that are pieces of one person: several measurements of one track from pixels.
+
+At frame 367 of Gonzalez et al. (2006, sec. 5) a person is segmented into several pieces, which "still lie within the
+gate" and "are assigned to the existing tracker". The paper does not say how several measurements update one filter.
+Here they are one measurement, their union: the ellipse of all their pixels. The gate holds for the union, as half a
+person alone is far from the prediction in height and centre.
 """
 
 from __future__ import annotations
@@ -23,15 +30,47 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Ints
+from tracking.detect import blobs
 from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground
 from tracking.detect.person_size import PersonSize
 from tracking.filters import kalman
-from tracking.papers.blob import blob_pieces, box_geometry, new_people
+from tracking.papers.blob import box_geometry, new_people
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
-from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
+from tracking.papers.blob.track_management import TrackedEllipses
 from tracking.running import image_scale
+
+
+def owners(centre: Array, predicted: Array, d2: Array, free: Bools) -> Ints:
+    """Returns the row (M,) of the track of which each blob may be a piece, -1 for none."""
+    found = np.full(len(centre), -1)
+    if not len(predicted):
+        return found
+    inside = box_geometry.points_inside(centre, predicted).T & free
+    held = inside.any(0)
+    found[held] = np.where(inside, d2, np.inf).argmin(0)[held]
+    return found
+
+
+def hull(box: Array) -> Array:
+    """Returns the box (1, 4) round boxes (K, 4), K at least 1; left, top, width, height, px."""
+    low, high = box[:, :2].min(0), (box[:, :2] + box[:, 2:]).max(0)
+    return np.concatenate([low, high - low])[None]
+
+
+def union(area: Array, ellipse: Array) -> tuple[Array, float]:
+    """Returns the ellipse (5,) of all pixels of several blobs, and the variance of its direction, rad^2."""
+    share, c, s = area / area.sum(), np.cos(ellipse[:, 4]), np.sin(ellipse[:, 4])
+    axes = np.square(ellipse[:, 2:4] / 4)
+    turn = np.stack([np.stack([c, -s], 1), np.stack([s, c], 1)], 1)
+    cov = turn @ (axes[:, :, None] * turn.transpose(0, 2, 1))
+    centre = share @ ellipse[:, :2]
+    away = ellipse[:, :2] - centre
+    whole = np.tensordot(share, cov + away[:, :, None] * away[:, None], 1)
+    made, angle_var = blobs.ellipses(np.array([area.sum()]), centre[None], whole[None])
+    return made[0], float(angle_var[0])
+
 
 EVIDENCE = 10.0  # nats, log-likelihood of a template with full support; d^2 / 2 of its place is subtracted
 TRACK_SUPPORT = 0.3  # least foreground share in the part of a confirmed track's template that no other covers
@@ -209,13 +248,13 @@ class PixelUpdater:
 
     def _with_pieces(self, made: Measured, taken: Ints, found: Blobs, d2: Array) -> tuple[Measured, Bools]:
         used = np.isin(np.arange(len(found)), taken)
-        owner = blob_pieces.owners(found.ellipse, self.people.upright_boxes(), d2, ~used)
+        owner = owners(found.ellipse, self.people.upright_boxes(), d2, ~used)
         own = dict(zip(made.rows.tolist(), taken.tolist(), strict=True))
         for row in np.unique(owner[owner >= 0]).tolist():
             mine = (owner == row) | (np.arange(len(found)) == own.get(row, -1))
-            whole, var = blob_pieces.union(found.area[mine], found.ellipse[mine])
+            whole, var = union(found.area[mine], found.ellipse[mine])
             z, angle_var = whole[None], np.array([var + ANGLE_NOISE])
-            if self.size.reliable and not self.size.one_person(blob_pieces.hull(found.box[mine]), z)[0]:
+            if self.size.reliable and not self.size.one_person(hull(found.box[mine]), z)[0]:
                 continue
             away = self._gated(self.people.innovations(z, self._gated_direction(angle_var))[0], angle_var)[row, 0]
             if away < (d2[row, own[row]] if row in own else np.inf):

@@ -20,8 +20,8 @@ from tracking.papers.group_pda.association import walking_reach
 from tracking.papers.group_pda.group_bank import GroupBank, alike_velocities, newborn
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
+# Squared Mahalanobis radius of a recapture: 99 % quantile of chi-square with 4 degrees of freedom.
 RECAPTURE_GATE = 13.28
-"""Squared Mahalanobis radius of a recapture: 99 % quantile of chi-square with 4 degrees of freedom."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,15 @@
 """From a picture to the points of `group-pda`: foreground pixels on a grid, each a share of a person (ours).
 
 The foreground comes from tracking.detect.foreground.
+
+Colours as a further mass of `group-pda`'s associations, from pixels only (future work of sec. 6; the form is ours).
+
+The mass of an association is the relative weight of a set of points as the measurement of a group.
+
+Each group has a histogram of the colours of its unshared points. A shared point of colour c adds
+log p(c | g) - log p(c | the other groups that may have the point) to the log mass of group g's associations, where
+p(c | g), the probability of colour c in group g, comes from the smoothed histograms. It counts as the share of a person
+that the point stands for, because neighbouring pixels have like colours.
 """
 
 from __future__ import annotations
@@ -8,19 +17,17 @@ from __future__ import annotations
 import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
-from sim.types import Array, Bools, Camera, Context, Image
+from sim.types import Array, Bools, Camera, Context, Image, Ints
 from tracking.detect.foreground import Foreground, convex_areas
-from tracking.detect.person_size import PersonSize
-from tracking.detect.typical_person import DEPTH, SHOULDERS
+from tracking.detect.person_size import DEPTH, SHOULDERS, PersonSize
 from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.papers.group_pda.group_bank import GroupBank
+from tracking.papers.group_pda.scaled_parameters import COLOUR_BINS, ScaledParameters
 from tracking.running.image_scale import required
 
-WIDTH_PER_HEIGHT = 0.3
-"""Width over height of a person in the image if there is no camera."""
-GRID = 0.1
-"""m: distance of the points of the grid."""
-LEAST_SINE_TILT = 0.2
-"""Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured."""
+WIDTH_PER_HEIGHT = 0.3  # Width over height of a person in the image if there is no camera.
+GRID = 0.1  # m: distance of the points of the grid.
+LEAST_SINE_TILT = 0.2  # Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured.
 
 
 class ForegroundPoints:
@@ -99,3 +106,43 @@ def _person(camera: Camera | None, scale: float) -> Array:
     place = np.column_stack([np.repeat(middle, len(turns), 0), np.zeros(len(turns))])
     tall, wide, deep = (np.full(len(turns), size) for size in (PERSON_HEIGHT, SHOULDERS, DEPTH))
     return np.asarray(person_boxes(camera, place, turns, tall, wide, deep)[:, 2:].mean(0))
+
+
+LEVELS = 4  # Levels of each of the three channels: LEVELS cubed is COLOUR_BINS.
+SMOOTHING = 0.05  # People, spread evenly over all bins, that are added to a histogram.
+
+
+def colour_bins(image: Image, points: Array) -> Ints:
+    """Returns the colour histogram bin (M,), 0 to 63, of the pixel at each point (M, 2) u, v in px: blue + 4 green + 16
+    red, 4 levels each."""
+    u, v = points.astype(np.int64).T
+    level = image[v, u].astype(np.int64) * LEVELS // 256
+    return np.asarray(level @ np.array([1, LEVELS, LEVELS**2]))
+
+
+def colour_log_ratio(bank: GroupBank, d2: Array, bins: Ints) -> Array:
+    """Returns log p(c | g) - log p(c | other groups) (G, M) of each point's colour c for each group g."""
+    ratio, may = np.zeros(d2.shape), np.isfinite(d2)
+    count = may.sum(0)
+    shared = np.flatnonzero(count > 1)
+    if not len(shared):
+        return ratio
+    smooth = (bank.colour_hist + SMOOTHING / COLOUR_BINS) / (bank.colour_hist.sum(1, keepdims=True) + SMOOTHING)
+    may = may[:, shared]
+    p = np.where(may, smooth[:, bins[shared]], 0.0)
+    others = np.where(may, (p.sum(0) - p) / (count[shared] - 1), 1.0)
+    ratio[:, shared] = np.log(np.where(may, p, 1.0)) - np.log(others)
+    return ratio
+
+
+def update_histograms(
+    bank: GroupBank, chosen: Bools, claimants: Ints, bins: Ints, weights: Array, scaled: ScaledParameters
+) -> None:
+    """Update the groups' colour histograms (in the bank) in place by their points that no other group may have."""
+    keep = np.exp(-scaled.dt / scaled.config.extent_time)
+    for row in np.flatnonzero(chosen.any(1)).tolist():
+        mine = chosen[row] & (claimants < 2)
+        if mine.any():
+            new = np.bincount(bins[mine], weights[mine], COLOUR_BINS)
+            old = bank.colour_hist[row]
+            bank.colour_hist[row] = keep * old + (1 - keep) * new if old.any() else new

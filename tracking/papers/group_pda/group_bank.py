@@ -17,8 +17,7 @@ from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.scaled_parameters import SPEED_PRIOR, ScaledParameters
 
-LISTS = ("members", "recent_points")
-"""Fields of GroupBank that are lists, not arrays."""
+LISTS = ("members", "recent_points")  # Fields of GroupBank that are lists, not arrays.
 
 
 class MemberPlaces(NamedTuple):

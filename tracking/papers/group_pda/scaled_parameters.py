@@ -12,25 +12,21 @@ from tracking.filters.components import Constraint
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.config import GroupPdaConfig
 
-SPEED_PRIOR = 1.3
-"""m/s: standard deviation of a newborn group's velocity, per axis, that of walking people."""
+SPEED_PRIOR = 1.3  # m/s: standard deviation of a newborn group's velocity, per axis, that of walking people.
+# m/s: standard deviation of a child's velocity about its parent's, and speed at which a group's region widens while it
+# has no feasible association (ours).
 SPLIT_SPEED = 0.5
-"""m/s: standard deviation of a child's velocity about its parent's, and speed at which a group's region widens while it
-has no feasible association (ours)."""
+# sigma_n of m_N: the part that grows with N, per N; ours and, for next to none, with corrections off.
 COUNT_SHARE, PAPER_COUNT_SHARE = 0.15, 0.01
-"""sigma_n of m_N: the part that grows with N, per N; ours and, for next to none, with corrections off."""
-MISS_PROB = 0.02
-"""Prior probability of the miss hypothesis (ours)."""
+MISS_PROB = 0.02  # Prior probability of the miss hypothesis (ours).
+# People among a group's points who are another group's, per group size, above which extent and size rest (ours).
 FREEZE_SHARE = 0.1
-"""People among a group's points who are another group's, per group size, above which extent and size rest (ours)."""
-LEAST_PEOPLE = 0.25
-"""From pixels: components with less foreground, in people, are noise (ours)."""
-COLOUR_BINS = 64
-"""Bins of a group's colour histogram (tracking.papers.group_pda.colour)."""
+LEAST_PEOPLE = 0.25  # From pixels: components with less foreground, in people, are noise (ours).
+COLOUR_BINS = 64  # Bins of a group's colour histogram (tracking.papers.group_pda.from_pixels).
+# Slot ASSOCIATION of the kernels' rules by value of the config's `association`.
 ASSOCIATIONS = {
     "pda": kernels.PREFIXES, "nearest": kernels.NEAREST, "all": kernels.ALL, "none": kernels.UNCONSTRAINED
 }  # fmt: skip
-"""Slot ASSOCIATION of the kernels' rules by value of the config's `association`."""
 
 
 @dataclass(frozen=True)

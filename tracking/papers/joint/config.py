@@ -20,14 +20,11 @@ from tracking.detect.background_settings import BackgroundSettings
 FITTED: dict[str, list[float]] = tomllib.loads(
     Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8")
 )["params"]
-SPEED_PRIOR = 1.3
-"""m/s: standard deviation of a new person's velocity, per axis, that of walking people (ours)."""
-GATE = 0.999
-"""Probability that a detection of a person is in the gate (ours)."""
+SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axis, that of walking people (ours).
+GATE = 0.999  # Probability that a detection of a person is in the gate (ours).
+# m: s_0, prior scatter of a cluster, as of one person more, and D_0, distance of a virtual other cluster (ours).
 SCATTER, APART = 0.5, 2.0
-"""m: s_0, prior scatter of a cluster, as of one person more, and D_0, distance of a virtual other cluster (ours)."""
-SIZE_MEAN = 1.0
-"""mu of the prior over group sizes, people."""
+SIZE_MEAN = 1.0  # mu of the prior over group sizes, people.
 
 
 def _weights(event: str) -> Any:
@@ -102,7 +99,6 @@ class JointConfig(BackgroundSettings):
         return np.array([dt / lag, self.validity_rate * lag, every, SIZE_MEAN, self.size_std])
 
 
+# Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom.
 LARGEST_DISTANCE = float(-2 * np.log1p(-GATE))
-"""Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom."""
-SCALES = np.array([SCATTER, APART])
-"""The scales (2,) of the validity, as partition_kernels has them."""
+SCALES = np.array([SCATTER, APART])  # The scales (2,) of the validity, as partition_kernels has them.

@@ -17,8 +17,7 @@ from tracking.filters import kalman
 from tracking.filters.assignment import optimal
 from tracking.filters.person_streams import Keys, birth_keys
 
-NEWCOMER_NOISE = 1.0
-"""Standard deviation of the acceleration of a person who is not confirmed, m/s^2."""
+NEWCOMER_NOISE = 1.0  # Standard deviation of the acceleration of a person who is not confirmed, m/s^2.
 
 
 @dataclass

@@ -70,21 +70,27 @@ import numpy as np
 
 from sim.truth.identity import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
-from tracking.detect.foreground_blobs import ForegroundBlobs
-from tracking.detect.point_detections import boxes_at, ordered_points
+from tracking.detect.point_detections import ForegroundBlobs, boxes_at, ordered_points
 from tracking.filters.person_streams import NOBODY, PersonStreams
-from tracking.grouping import reported_groups
 from tracking.grouping.belief import default_belief
 from tracking.grouping.pair_belief import PairBelief
-from tracking.papers.joint import decentralised_filter, estimate, partition_kernels
+from tracking.papers.joint import decentralised_filter, partition_kernels, report
 from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SPEED_PRIOR, JointConfig
-from tracking.papers.joint.decentralised_filter import Nested
-from tracking.papers.joint.distributions import BIRTHS, PARTITIONS, PLACING, RESAMPLING, STATE, FrameModel, newest
+from tracking.papers.joint.decentralised_filter import Nested, ParticleHealth
+from tracking.papers.joint.distributions import (
+    BIRTHS,
+    PARTITIONS,
+    PLACING,
+    RESAMPLING,
+    STATE,
+    FrameModel,
+    moved,
+    newest,
+    process_noise,
+)
 from tracking.papers.joint.division_kernels import place_newcomers
-from tracking.papers.joint.individuals import moved, process_noise
-from tracking.papers.joint.particle_health import ParticleHealth
 from tracking.papers.joint.people import Newcomers, People, associate
-from tracking.papers.joint.reported_events import OWN_EVENTS, ReportedEvents
+from tracking.papers.joint.report import OWN_EVENTS, ReportedEvents
 from tracking.running.image_scale import required
 
 
@@ -192,7 +198,7 @@ class Joint:
     def _associate(self, points: Array) -> tuple[Ints, Ints]:
         c, ahead = self.config, moved(self.nested.x[..., :STATE], self.dt)
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
-        mean, cov = estimate.moments(ahead, weights)
+        mean, cov = report.moments(ahead, weights)
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
         return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, LARGEST_DISTANCE)
 
@@ -207,7 +213,7 @@ class Joint:
     def _before(self) -> tuple[Ints, Array]:
         id = self.people.id
         known = np.isin(id, np.array(sorted(self.identities.people), np.int64)).astype(float)
-        return reported_groups.known_groups(self.identities, id), known
+        return report.known_groups(self.identities, id), known
 
     def _resample(self) -> None:
         nested, people = self.nested, len(self.people.id)
@@ -274,7 +280,7 @@ class Joint:
         n, c, id = self.nested, self.config, self.people.id
         joint = n.weights()
         weights = n.component_weights() if c.own_weights else np.repeat(joint[:, None], len(id), axis=1)
-        mean, cov = estimate.moments(n.x[..., :STATE], weights)
+        mean, cov = report.moments(n.x[..., :STATE], weights)
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
         box = boxes_at(pos, self.people.size) if self.plane == "image" else None
         self.shown = np.zeros((0, 4)) if box is None else box
@@ -284,8 +290,8 @@ class Joint:
         self.belief.see(mean[:, :2])
         self.events.add(id, mean[:, :2])
         events = self.events.events(changes, old, self.identities.groups, self.unit)
-        group = reported_groups.known_groups(self.identities, id)
-        groups = reported_groups.no_groups(group)
+        group = report.known_groups(self.identities, id)
+        groups = report.no_groups(group)
         score, cov = np.ones(len(id)), cov * self.unit**2
         return Tracks(
             frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov, box, score, groups, events,
@@ -301,11 +307,11 @@ class Joint:
         weights = particle[:, None] * np.exp(n.log_q)
         now = np.empty((len(id), len(id)))
         partition_kernels.co_membership(n.z, weights, now)
-        self.together = estimate.kept_while_missed(now, id, seen, self.together, self.paired)
+        self.together = report.kept_while_missed(now, id, seen, self.together, self.paired)
         self.paired = id.copy()
         if c.estimate == "histogram":
-            return estimate.histogram_partition(n.z, weights)
-        return estimate.binder_partition(self.together, n.z, self._before()[0])
+            return report.histogram_partition(n.z, weights)
+        return report.binder_partition(self.together, n.z, self._before()[0])
 
 
 def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:

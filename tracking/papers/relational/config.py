@@ -16,18 +16,16 @@ from sim.types import Array
 from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
 
+# Resampled particles are drawn apart by a kernel of so many optimal widths, if people have own weights (ours).
 KERNEL_WIDTH = 1.0
-"""Resampled particles are drawn apart by a kernel of so many optimal widths, if people have own weights (ours)."""
+# People with own weights are resampled if their effective number is at most this share of the particles (ours).
 RESAMPLE_SHARE = 0.5
-"""People with own weights are resampled if their effective number is at most this share of the particles (ours)."""
+# Least probability that a detection is nobody's for it to start a person; the paper does not say which starts one.
 BIRTH_DOUBT = 0.5
-"""Least probability that a detection is nobody's for it to start a person; the paper does not say which starts one."""
-NEWCOMER_SHARE = 0.5
-"""Probability that a new person near a group belongs to it (sec. 3.2)."""
+NEWCOMER_SHARE = 0.5  # Probability that a new person near a group belongs to it (sec. 3.2).
+# m: half the width of a body that hides others from a known camera (ours); not with the paper's sensor.
 BODY_RADIUS = 0.25
-"""m: half the width of a body that hides others from a known camera (ours); not with the paper's sensor."""
-SPEED_PRIOR = 1.3
-"""m/s: standard deviation of a new person's velocity, per axis, that of walking people."""
+SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axis, that of walking people.
 
 
 @dataclass(frozen=True)
@@ -109,29 +107,15 @@ class RelationalConfig(ParticleConfig):
 
     tracker: ClassVar[str] = "relational"
 
-    coupling_time: float = param(
-        0.15,
-        (0.0, 10.0),
-        "s",
-        "time in which people who walk together approach their mean velocity (ours); 0: they have it (sec. 3.2)",
-    )
-    common_noise: float = param(
-        0.8,
-        (0.0, 1.0),
-        "share",
-        "of the velocity noise's variance, common to people who walk together (ours); 0: none (sec. 3.2)",
-    )
-    relation_evidence: str = param(
-        "belief",
-        ("belief", "state"),
-        "",
-        "who walks together in the long run, by the belief or the particle's state (ours)",
-        "categorical",
-        online=False,
-    )
-    relation_rate: float = param(
-        1.6, (0.01, 20.0), "1/s", "rate at which the relation of a pair approaches its equilibrium (ours)", "log"
-    )
+    # fmt: off
+    coupling_time: float = param(0.15, (0.0, 10.0), "s",
+        "time in which people who walk together approach their mean velocity (ours); 0: they have it (sec. 3.2)")
+    common_noise: float = param(0.8, (0.0, 1.0), "share",
+        "of the velocity noise's variance, common to people who walk together (ours); 0: none (sec. 3.2)")
+    relation_evidence: str = param("belief", ("belief", "state"), "",
+        "who walks together in the long run, by the belief or the particle's state (ours)", "categorical", online=False)
+    relation_rate: float = param(1.6, (0.01, 20.0), "1/s",
+        "rate at which the relation of a pair approaches its equilibrium (ours)", "log")
     relation_bias: float = param(5.9, (-40.0, 40.0), "", "log odds of walking together at the same place (ours)")
     relation_distance: float = param(3.3, (0.0, 40.0), "1/m", "loss of log odds per metre of distance (ours)")
     relation_velocity: float = param(5.9, (0.0, 40.0), "s/m", "loss of log odds per m/s of velocity difference (ours)")

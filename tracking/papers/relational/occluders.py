@@ -13,8 +13,7 @@ from sim.types import Array, Bools, Camera, Scene
 from tracking.papers.relational import occluder_kernels, particle_set_kernels
 from tracking.papers.relational.particle_set import ParticleSet
 
-MIDDLE = 0.85
-"""Height of the middle of a body, m."""
+MIDDLE = 0.85  # Height of the middle of a body, m.
 
 
 def hidden_share(pos: Array, weights: Array, camera: Camera | None, scene: Scene | None) -> Array:
@@ -51,10 +50,8 @@ def _height(along: Array, eye: Array) -> Array:
     return np.asarray(eye[2] + along * (MIDDLE - eye[2]))
 
 
-HEIGHT = 1.7
-"""Height of a body, m."""
-LEAST_VISIBLE = 0.2
-"""A person is hidden if a smaller share of the body is visible."""
+HEIGHT = 1.7  # Height of a body, m.
+LEAST_VISIBLE = 0.2  # A person is hidden if a smaller share of the body is visible.
 
 
 def covered_by_people(particles: ParticleSet, camera: Camera | None, radius: float) -> tuple[Array, Array]:

@@ -15,10 +15,9 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.particles import residual_resample
 from tracking.papers.relational import particle_set_kernels
 
+# Returns uniforms (R, P) in [0, 1) and standard normals (R, 4, P) of the people (R,).
 Draws = Callable[[Ints], tuple[Array, Array]]
-"""Returns uniforms (R, P) in [0, 1) and standard normals (R, 4, P) of the people (R,)."""
-LARGEST = 2**31
-"""Numbers of slots are below this."""
+LARGEST = 2**31  # Numbers of slots are below this.
 
 
 @dataclass
@@ -163,8 +162,7 @@ def _order_key(pairs: Ints) -> Ints:
     return np.asarray(pairs[:, 1] * LARGEST + pairs[:, 0])
 
 
-SPAN = 1.0
-"""Time over which ancestors are counted, s."""
+SPAN = 1.0  # Time over which ancestors are counted, s.
 
 
 class ParticleDiversity:

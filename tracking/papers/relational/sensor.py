@@ -16,16 +16,14 @@ from tracking.papers.relational import particle_set_kernels, sensor_kernels
 from tracking.papers.relational.config import ParticleConfig
 from tracking.papers.relational.particle_set import ParticleSet
 
+# Distance, in standard deviations of a point and of a displaced point, above both of which a person and a detection are
+# no pair (ours).
 REACH, WIDE_REACH = 6.0, 3.0
-"""Distance, in standard deviations of a point and of a displaced point, above both of which a person and a detection
-are no pair (ours)."""
+# A person and a detection are no pair if it is, among all detections and none, the person's with less than this
+# probability (ours).
 UNLIKELY = 1e-3
-"""A person and a detection are no pair if it is, among all detections and none, the person's with less than this
-probability (ours)."""
-ALMOST = 1 - 1e-9
-"""Largest probability of a detection, but with the paper's sensor (ours)."""
-LEAST_LOG = -745.0
-"""Log of the smallest float: the paper's weights are 0 below it."""
+ALMOST = 1 - 1e-9  # Largest probability of a detection, but with the paper's sensor (ours).
+LEAST_LOG = -745.0  # Log of the smallest float: the paper's weights are 0 below it.
 
 
 @dataclass(frozen=True)

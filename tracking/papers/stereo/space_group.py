@@ -7,28 +7,122 @@
 The filter is filterpy's. The paper's Phi has a step of 1 frame; here times are seconds. The paper has one covariance of
 a group; here P is that of the centroid, by the filter, and Sigma that of the members. Departures: C_y is without the
 points' own covariances and is shrunk to a prior, as the covariance of few points in six dimensions is singular.
+
+The measurement of a group by the extended Kalman filter: Z = f(X) + noise (eqs 4 to 6), and its Jacobian.
+
+The state is X = (x, x', y, y', z, z') (eq. 1). From pictures Z = (u, v, d): the projection of the mean of the group's
+points in space. Departure: the mean of their (u, v, d) would be biased, as the depth b f / d is no linear function of d
+(the bias is -var(z) / z). From detections Z = (x, y, z), so that the filter is a linear Kalman filter.
+
+Data association of `stereo`: which group each point belongs to (sec. 3.3).
+
+    (y_i - xi_j)' S^-1 (y_i - xi_j) < gamma                  search region of group j (eq. 8)
+    m_total = p(y_i | xi_j, P_xi)^k_p p(lambda_i | v_j, P_v)^k_v            (eqs 9 to 11)
+Each point belongs to the group with the largest m_total among those in whose region it lies.
+
+Departures. k_p = 1 and k_v are exponents: as factors they cancel. S is the sum of the group's spread Sigma, the
+covariance P of its centroid and that of the point, C_i; the same for velocities.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from sim.types import Array
+from sim.scene.camera import pair_jacobian, project_pair
+from sim.types import Array, Camera, Ints
 from tracking.detect.features import SpacePoints
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.measurement import POS, VEL, Measurement, measured_state, state_jacobian
 
 if TYPE_CHECKING:
     from filterpy.kalman import ExtendedKalmanFilter
 
-VELOCITY_SPREAD = 0.25
-"""m/s: standard deviation of velocities that a group's spread is shrunk to (ours)."""
-LEAST_VARIANCE = 1e-6
-"""m^2, m^2/s^2: least eigenvalue of a spread."""
+
+POS, VEL = [0, 2, 4], [1, 3, 5]  # Entries of the state that are the position and the velocity.
+LEAST_DENSITY = 0.25  # Least density of features that counts, relative to the highest of the group (ours).
+
+
+class Measurement(Protocol):
+    """What a filter measures of a position: the functions of eq. 6."""
+
+    def z(self, xyz: Array) -> Array:
+        """Returns the measurement (3, 1) of a position (3,), m."""
+        ...
+
+    def jacobian(self, xyz: Array) -> Array:
+        """Returns dZ/d(x, y, z) (3, 3) at a position (3,), m."""
+        ...
+
+    def weights(self, points: SpacePoints, width: float) -> Array:
+        """Returns the weights (M,) of M points in their group's mean position; width: of the kernel of density, m."""
+        ...
+
+
+class PairMeasurement:
+    """Z = (u, v, d) in px, by a stereo camera (eqs 4, 6 with the camera's pose)."""
+
+    def __init__(self, camera: Camera) -> None:
+        self.camera = camera
+
+    def z(self, xyz: Array) -> Array:
+        """Returns u, v, d (3, 1) in px of a position (3,), m."""
+        return project_pair(self.camera, xyz[None]).T
+
+    def jacobian(self, xyz: Array) -> Array:
+        """Returns d(u, v, d)/d(x, y, z) (3, 3) in px/m."""
+        return np.asarray(pair_jacobian(self.camera, xyz[None])[0])
+
+    def weights(self, points: SpacePoints, width: float) -> Array:
+        """Returns `inverse_densities` (M,): a person may have any number of features."""
+        return inverse_densities(points, width)
+
+
+class PlaceMeasurement:
+    """Z = (x, y, z) in m: points whose places are measured directly."""
+
+    def z(self, xyz: Array) -> Array:
+        """Returns the position (3,) as a column (3, 1), m."""
+        return xyz[:, None]
+
+    def jacobian(self, xyz: Array) -> Array:
+        """Returns the unit matrix (3, 3)."""
+        del xyz
+        return np.eye(3)
+
+    def weights(self, points: SpacePoints, width: float) -> Array:
+        """Returns ones (M,): each point is a person."""
+        del width
+        return np.ones(len(points))
+
+
+def inverse_densities(points: SpacePoints, width: float) -> Array:
+    """Returns the inverse of the density of M points on the ground at each of them, (M,), up to a factor (ours)."""
+    d = points.pos[:, None, :2] - points.pos[:, :2]
+    S = points.cov[:, None, :2, :2] + points.cov[:, :2, :2]
+    a, b, c = S[..., 0, 0] + width**2, S[..., 0, 1], S[..., 1, 1] + width**2
+    d2 = (c * d[..., 0] ** 2 - 2 * b * d[..., 0] * d[..., 1] + a * d[..., 1] ** 2) / (a * c - b**2)
+    density = np.exp(-d2 / 2).sum(1)
+    return np.asarray(1 / np.maximum(density, LEAST_DENSITY * density.max()))
+
+
+def measured_state(x: Array, measurement: Measurement) -> Array:
+    """Returns f(X) (3, 1) of a state x (6, 1): eq. 6."""
+    return measurement.z(x[POS, 0])
+
+
+def state_jacobian(x: Array, measurement: Measurement) -> Array:
+    """Returns df/dX (3, 6) at a state x (6, 1); the columns of velocities are 0."""
+    H = np.zeros((3, 6))
+    H[:, POS] = measurement.jacobian(x[POS, 0])
+    return H
+
+
+VELOCITY_SPREAD = 0.25  # m/s: standard deviation of velocities that a group's spread is shrunk to (ours).
+LEAST_VARIANCE = 1e-6  # m^2, m^2/s^2: least eigenvalue of a spread.
 
 
 @dataclass
@@ -166,3 +260,39 @@ def expected_places(offset: Array, cov: Array, spread: Array) -> Array:
     """Returns the expected offsets (M, 3), m, of a group's points from its centroid: Sigma (Sigma + C_i)^-1 (y_i - xi)
     (ours)."""
     return np.asarray((spread @ np.linalg.solve(spread + cov, offset[..., None]))[..., 0])
+
+
+def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: StereoConfig) -> Ints:
+    """Returns for each of M points the number of its group in `groups`, (M,), -1 for none (eqs 8 to 11)."""
+    if not groups or not len(points):
+        return np.full(len(points), -1)
+    x = np.stack([g.ekf.x[:, 0] for g in groups])
+    own = np.stack([g.spread + g.ekf.P if config.point_covariance else g.spread for g in groups])
+    total = np.full((len(groups), len(points)), -np.inf)
+    g, m = _in_reach(x, own, points, config)
+    d2, position = _log_density(points.pos[m] - x[g][:, POS], own[g], points.cov[m], POS, config)
+    near = d2 < config.gate
+    g, m, position = g[near], m[near], position[near]
+    _, velocity = _log_density(points.vel[m] - x[g][:, VEL], own[g], points.vel_cov[m], VEL, config)
+    total[g, m] = position + config.velocity_weight * velocity
+    inside = np.zeros(total.shape, bool)
+    inside[g, m] = True
+    return np.where(inside.any(0), total.argmax(0), -1)
+
+
+def _in_reach(x: Array, own: Array, points: SpacePoints, config: StereoConfig) -> tuple[Ints, Ints]:
+    trace, square = np.einsum("gii->g", own[:, POS][:, :, POS]), np.zeros((len(x), len(points)))
+    spread = np.einsum("mii->m", points.cov) if config.point_covariance else np.zeros(len(points))
+    for d, k in enumerate(POS):
+        square += np.square(points.pos[:, d] - x[:, k, None])
+    rows, columns = np.nonzero(square <= config.gate * (1 + 1e-9) * (trace[:, None] + spread))
+    return np.asarray(rows, np.int64), np.asarray(columns, np.int64)
+
+
+def _log_density(away: Array, own: Array, cov: Array, part: list[int], config: StereoConfig) -> tuple[Array, Array]:
+    S = own[:, part][:, :, part]
+    if config.point_covariance:
+        S = S + cov
+    inverse = np.linalg.inv(S)
+    d2 = np.einsum("ri,rij,rj->r", away, inverse, away)
+    return d2, (np.linalg.slogdet(inverse)[1] - d2) / 2

@@ -58,32 +58,79 @@ Departures:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
+from sim.geometry.hull_kernels import convex_hulls
 from sim.geometry.polygons import FOOTPRINT
-from sim.types import Context, Detections, Frame, Plane, Tracks
+from sim.types import Array, Context, Detections, Frame, Groups, Plane, Tracks
 from tracking.detect.features import SpacePoints
-from tracking.grouping.whole_groups import GroupIds
-from tracking.papers.stereo.association import associated
-from tracking.papers.stereo.births_and_losses import born, confirm, remove_lost, sphere_groups
+from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, reported_event
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.measurement import Measurement, PairMeasurement, PlaceMeasurement
-from tracking.papers.stereo.merging import merge
-from tracking.papers.stereo.picture_points import PicturePoints
-from tracking.papers.stereo.point_links import PointLinks
-from tracking.papers.stereo.report import ShownFrame, space_tracks
-from tracking.papers.stereo.space_group import SpaceGroup, measure, motion_model, predict
-from tracking.papers.stereo.splitting import split
+from tracking.papers.stereo.group_life import born, confirm, merge, remove_lost, sphere_groups, split
+from tracking.papers.stereo.points import PicturePoints, PointLinks
+from tracking.papers.stereo.space_group import (
+    POS,
+    VEL,
+    Measurement,
+    PairMeasurement,
+    PlaceMeasurement,
+    SpaceGroup,
+    associated,
+    measure,
+    motion_model,
+    predict,
+)
 from tracking.running.image_scale import required
 
-LEAST_GROUP = 5
-"""From pixels: least number of linked features that form a group."""
-LEAST_FEATURES = 3
-"""From pixels: least number of features that update a group (sec. 3.3)."""
-FEATURE_OUTLINE = 0.5
-"""Share of a person's footprint that a feature covers, as features lie all over the body."""
+
+@dataclass(frozen=True)
+class ShownFrame:
+    """The frame that is reported.
+
+    index: from 1; t: s; fps: frames per second. plane: of the tracks; scale: units of the plane per m. outline (V, 2):
+    what a point covers round its place, seen from above, m. size_known: True if each point is a person.
+    """
+
+    index: int
+    t: float
+    fps: float
+    plane: Plane
+    scale: float
+    outline: Array
+    size_known: bool
+
+
+def space_tracks(
+    groups: Sequence[SpaceGroup], events: Sequence[WholeGroupEvent], report_coast: float, shown: ShownFrame
+) -> Tracks:
+    """Returns the Tracks, with unit "group", of the confirmed groups measured within the last `report_coast` s."""
+    rows = [g for g in groups if g.confirmed and shown.t - g.last_seen <= report_coast + 1e-9]
+    rows = sorted(rows, key=lambda g: g.id)
+    axes = 3 if shown.plane == "space" else 2
+    order = POS[:axes] + VEL[:axes]
+    s = shown.scale
+    id = np.array([g.id for g in rows], np.int64)
+    x = np.stack([g.ekf.x[order, 0] for g in rows]) if rows else np.zeros((0, 2 * axes))
+    P = np.stack([g.ekf.P[np.ix_(order, order)] for g in rows]) if rows else np.zeros((0, 2 * axes, 2 * axes))
+    flat = np.ix_(POS[:2], POS[:2])
+    extent = np.stack([g.spread[flat] for g in rows]) if rows else np.zeros((0, 2, 2))
+    size = np.array([g.count if shown.size_known else np.nan for g in rows])
+    hulls = convex_hulls([((g.members + g.pos)[:, None, :2] + shown.outline).reshape(-1, 2) * s for g in rows])
+    pos, vel = s * x[:, :axes], s * x[:, axes:]
+    found = Groups(id, tuple(np.zeros(0, np.int64) for _ in rows), pos, vel, s**2 * extent, size, hulls)
+    return Tracks(
+        shown.index, shown.t, shown.plane, "group", id, id.copy(), pos.copy(), vel.copy(), s**2 * P,
+        None, np.ones(len(rows)), found, tuple(reported_event(e, shown.index, shown.t, shown.fps, s) for e in events),
+    )  # fmt: skip
+
+
+LEAST_GROUP = 5  # From pixels: least number of linked features that form a group.
+LEAST_FEATURES = 3  # From pixels: least number of features that update a group (sec. 3.3).
+FEATURE_OUTLINE = 0.5  # Share of a person's footprint that a feature covers, as features lie all over the body.
 
 
 class Stereo:

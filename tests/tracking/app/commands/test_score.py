@@ -17,7 +17,7 @@ from tracking import track
 from tracking.app.cli import run
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.one_plane import in_one_plane
+from tracking.scoring.people_comparison import in_one_plane
 from tracking.stats import mean_interval
 
 

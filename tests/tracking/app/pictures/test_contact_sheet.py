@@ -15,13 +15,16 @@ from sim.types import GroupEvent, PixelTruth, Sequence, Truth
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.pictures.contact_sheet import (
     HEAD,
+    OBJECTS,
     TITLE,
     WIDTH,
+    PanelPictures,
     choose_frames,
+    coloured_disparity,
+    coloured_ids,
     empty_truth,
     write_sheet,
 )
-from tracking.app.pictures.panel_pictures import OBJECTS, PanelPictures, coloured_disparity, coloured_ids
 from tracking.drawing.canvas import FLOOR, GRID, colour
 
 

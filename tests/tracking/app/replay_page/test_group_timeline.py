@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.types import GroupEvent
-from tracking.app.replay_page.group_timeline import Bar, Link, bars, links
+from tracking.app.replay_page.page_rows import Bar, Link, bars, links
 
 
 def rows(*lives: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:

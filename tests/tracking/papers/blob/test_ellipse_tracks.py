@@ -9,9 +9,9 @@ from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context
 from tracking.detect import blobs
 from tracking.filters import kalman
-from tracking.papers.blob import blob_pieces
+from tracking.papers.blob import update_from_pixels as blob_pieces
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.ellipse_tracks import TrackedEllipses
+from tracking.papers.blob.track_management import TrackedEllipses
 
 FPS, SCALE = 10.0, 40.0
 UP, LEVEL = np.pi / 2, 0.0

@@ -15,7 +15,7 @@ from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
-from tracking.papers.group_pda.merging import merged
+from tracking.papers.group_pda.merging_and_splitting import merged
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 
 STATES = ["nothing", "null", "measured"]

@@ -8,8 +8,7 @@ import pytest
 from sim.types import Array, Context, Detections, Frame, Tracks
 from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.duplicate_groups import DuplicateGroups
-from tracking.papers.group_pda.merging import merged
+from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, merged
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.tracker import GroupPda
 

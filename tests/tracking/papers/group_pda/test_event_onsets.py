@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY
-from tracking.papers.group_pda.event_onsets import PairHistory, PairMoment, split_onset
+from tracking.papers.group_pda.merging_and_splitting import PairHistory, PairMoment, split_onset
 
 FPS, SLOWS, LASTS = 10.0, 2.0, 1.0
 """Frames per second; when the difference of the velocities begins to fall from 2 m/s to nothing, and for how long."""

@@ -8,7 +8,7 @@ import pytest
 from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import MemberPlaces
-from tracking.papers.group_pda.merging import GroupMerging, _gap
+from tracking.papers.group_pda.merging_and_splitting import GroupMerging, _gap
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 
 FPS = 10.0

@@ -10,7 +10,7 @@ from tests.reference_joint import all_partitions, label_of, validity
 from tracking.papers.joint import division_kernels
 from tracking.papers.joint import group_events_kernels as events
 from tracking.papers.joint.config import JointConfig
-from tracking.papers.joint.reported_events import ReportedEvents
+from tracking.papers.joint.report import ReportedEvents
 
 SCALES = np.array([0.5, 2.0])
 BIAS = -1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, label_of, log_group_dynamics
-from tracking.papers.joint.individuals import Proposal, moved, precision_of, process_noise
+from tracking.papers.joint.distributions import Proposal, moved, precision_of, process_noise
 from tracking.papers.joint.individuals_kernels import group_dynamics, own_dynamics
 
 DT, NOISE = 0.1, 0.1

@@ -8,7 +8,7 @@ import pytest
 from tests.reference_joint import all_partitions, binder_gain, label_of, validity
 from tracking.papers.joint import partition_kernels
 from tracking.papers.joint.distributions import stam_cumulated
-from tracking.papers.joint.estimate import binder_partition, histogram_partition
+from tracking.papers.joint.report import binder_partition, histogram_partition
 
 SCALES = np.array([0.5, 2.0])
 PAIRS = np.array([[0, 0], [0.7, 0], [10, 0], [10.7, 0]])

@@ -7,7 +7,7 @@ import pytest
 
 from sim.types import Context, Detections, Frame
 from tracking.papers.joint.config import LARGEST_DISTANCE, JointConfig
-from tracking.papers.joint.individuals import process_noise
+from tracking.papers.joint.distributions import process_noise
 from tracking.papers.joint.tracker import Joint
 from tracking.stats import paired
 

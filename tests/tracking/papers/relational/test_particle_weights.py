@@ -11,8 +11,7 @@ from tracking.papers.relational import sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.relations import Relational
-from tracking.papers.relational.tracker import Particle
+from tracking.papers.relational.tracker import Particle, Relational
 
 
 def sight(detect, missed=None, cut=None, eye=(np.nan, np.nan)):

@@ -16,8 +16,7 @@ from tracking.grouping.belief import UNSEEN
 from tracking.papers.relational import sensor, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.relations import Relational
-from tracking.papers.relational.tracker import Particle
+from tracking.papers.relational.tracker import Particle, Relational
 from tracking.running.prepare import prepare
 
 ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])

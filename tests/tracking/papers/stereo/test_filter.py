@@ -10,20 +10,18 @@ from sim.scene.camera import back_project, point_covariances, project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.measurement import (
+from tracking.papers.stereo.space_group import (
     POS,
     VEL,
     PairMeasurement,
     PlaceMeasurement,
-    measured_state,
-    state_jacobian,
-)
-from tracking.papers.stereo.space_group import (
     measure,
+    measured_state,
     motion_model,
     newborn,
     predict,
     spread_of,
+    state_jacobian,
 )
 
 DT = 1 / 30

@@ -14,14 +14,18 @@ from sim.scene.camera import project
 from sim.types import Context, Frame, Groups, Tracks
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
-from tracking.filters.ellipsoid_overlap import separation
-from tracking.papers.stereo.association import associated
-from tracking.papers.stereo.births_and_losses import sphere_groups
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.measurement import VEL, PairMeasurement, PlaceMeasurement
-from tracking.papers.stereo.merging import merge, overlap, pooled
-from tracking.papers.stereo.picture_points import stereo_camera
-from tracking.papers.stereo.space_group import SpaceGroup, motion_model, newborn
+from tracking.papers.stereo.group_life import merge, overlap, pooled, separation, sphere_groups
+from tracking.papers.stereo.points import stereo_camera
+from tracking.papers.stereo.space_group import (
+    VEL,
+    PairMeasurement,
+    PlaceMeasurement,
+    SpaceGroup,
+    associated,
+    motion_model,
+    newborn,
+)
 from tracking.papers.stereo.tracker import Stereo
 
 FPS = 30.0

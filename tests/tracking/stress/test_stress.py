@@ -1,0 +1,138 @@
+"""Sweeps over an axis: breaking points that are known by construction, placing of values, the store."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from scenarios.loading.resolve import load
+from tracking.stress.axes import AXES, parse_axis
+from tracking.stress.curves import NEVER, breaking_point, crossing, overtaking
+from tracking.stress.episodes import Contender, EpisodeJob, Outcome, Store
+from tracking.stress.sweep import Plan, Sweep
+
+WAY = np.linspace(0, 1, 9)
+
+
+def scenes(truth: float, count: int, seed: int) -> np.ndarray:
+    """Scores (P, 9) of scenes whose mean curve is 1 up to 0.2 and falls to 0.5 at `truth`."""
+    rng = np.random.default_rng(seed)
+    mean = np.interp(WAY, [0, 0.2, truth, 1], [1, 1, 0.5, 0.3])
+    return mean * (1 + 0.1 * rng.standard_normal((count, 1))) + 0.05 * rng.standard_normal((count, len(WAY)))
+
+
+@pytest.mark.parametrize(
+    ("height", "where"),
+    [([1.0, 0.5, -0.5], 0.75), ([1.0, 0.5, 0.2], NEVER), ([0.0, 1, 1], 0.0), ([1.0, np.nan, -1], 0.5)],
+)
+def test_crossing(height: list[float], where: float) -> None:
+    assert crossing(np.array([0.0, 0.5, 1.0]), np.array(height)) == pytest.approx(where)
+
+
+def test_intervals_hold_the_breaking_point() -> None:
+    inside = 0
+    for seed in range(100):
+        point = breaking_point(WAY, scenes(0.625, 24, seed), 0.5, np.random.default_rng(seed))
+        inside += point.low <= 0.625 <= point.high
+    assert inside >= 90
+
+
+def test_no_break() -> None:
+    point = breaking_point(WAY, np.ones((8, 9)), 0.5, np.random.default_rng(0))
+    assert point.at == point.low == point.high == NEVER
+    assert breaking_point(WAY, np.zeros((8, 9)), 0.5, np.random.default_rng(0)).at == NEVER
+
+
+def test_overtaking() -> None:
+    first, second = scenes(0.4, 30, 1), np.full((30, 9), 0.7)
+    point = overtaking(WAY, first, second, np.random.default_rng(0))
+    assert point.low < point.at < point.high
+    assert point.at == pytest.approx(np.interp(0.3, [0, 0.5], [0.2, 0.4]), abs=0.05)
+
+
+@pytest.mark.parametrize("text", ["nothing", "detection=1", "detection=a:b", "detection=1:1", "sensor.x=1:2:3"])
+def test_wrong_axes(text: str) -> None:
+    with pytest.raises(InputError, match="--vary"):
+        parse_axis(text)
+
+
+@pytest.mark.parametrize("name", AXES)
+def test_every_axis_sets_keys_of_a_scenario(name: str) -> None:
+    axis = AXES[name]
+    easy, hard = (load("merge", set=axis.settings(value)) for value in (axis.easy, axis.hard))
+    assert easy.model_dump() != hard.model_dump()
+
+
+def test_values_of_an_axis() -> None:
+    assert parse_axis("detection=1:0.6").spread(5) == pytest.approx([1, 0.9, 0.8, 0.7, 0.6])
+    people = parse_axis("people=1:4")
+    assert people.spread(5) == [1, 2, 3, 4]
+    assert people.between(1, 2) is None
+    assert parse_axis("sensor.clutter_rate=0.0:4.0").settings(2.5) == ["sensor.clutter_rate=2.5"]
+
+
+def sweep(tmp_path: Path, seen: list[EpisodeJob], breaks: float = 0.62, **changes) -> Sweep:
+    """A sweep whose tracker falls from 1 at detection 0.8 to 0.5 at `breaks`; it simulates nothing but one scene."""
+
+    def play(jobs: Sequence[EpisodeJob]):
+        for job in jobs:
+            assert job.source.entry is not None
+            x = job.source.entry.scenario.sensor.detect_prob
+            rng = np.random.default_rng(job.source.seed)
+            score = np.interp(x, [0.4, breaks, 0.8, 1], [0.3, 0.5, 1, 1]) * (1 + 0.1 * rng.standard_normal())
+            seen.append(job)
+            yield Outcome({"HOTA": float(score)})
+
+    given = {"episodes": 400, **changes}
+    settings = ("duration=4", "group.a.size=2")
+    plan = Plan(("cross",), parse_axis("detection"), tuple(range(64)), 8, "HOTA", 0.5, "file", settings, **given)
+    return Sweep(plan, {"t": Contender("t", "t", ("points",), "")}, play, Store(tmp_path / "e.jsonl"))
+
+
+def test_values_are_placed_where_the_curve_breaks(tmp_path: Path) -> None:
+    made = sweep(tmp_path, [])
+    made.run()
+    point = made.breaks()["t"]
+    at, low, high = (1 - 0.6 * share for share in (point.at, point.low, point.high))
+    assert high <= 0.62 <= low
+    assert at == pytest.approx(0.62, abs=0.02)
+    near = [value for value in made.values if abs(value - 0.62) < 0.1]
+    assert len(near) > len(made.values) / 3
+    assert made.played <= 400
+
+
+def test_a_sweep_goes_on_where_it_was_killed(tmp_path: Path) -> None:
+    whole, first, rest = [], [], []
+    complete = sweep(tmp_path / "a.jsonl", whole)
+    complete.store = Store(tmp_path / "whole.jsonl")
+    complete.run()
+    stopped = sweep(tmp_path, first, episodes=40)
+    stopped.run()
+    with (tmp_path / "e.jsonl").open("a", encoding="utf-8") as file:
+        file.write('{"key": "cut off')
+    resumed = sweep(tmp_path, rest)
+    resumed.run()
+    assert len(first) + len(rest) == len(whole)
+    assert resumed.rows() == complete.rows()
+
+
+def test_an_axis_without_effect_is_refused(tmp_path: Path) -> None:
+    made = sweep(tmp_path, [])
+    made.plan = Plan(("cross",), parse_axis("light"), (0, 1), 2, "HOTA", 0.5, "file", ("duration=4",))
+    with pytest.raises(InputError, match="an axis that changes the scenes"):
+        made.run()
+
+
+def test_a_failed_episode_counts_as_zero_and_one_without_script_not(tmp_path: Path) -> None:
+    made = sweep(tmp_path, [])
+    made.play = lambda jobs: (
+        Outcome({}, failed="it hangs") if j.source.seed == 0 else Outcome({}, left_out="x") if j.source.seed == 1
+        else Outcome({"HOTA": 1.0}) for j in jobs
+    )  # fmt: skip
+    made.values, made.seeds = [1.0], 3
+    made._play()
+    assert np.array_equal(made.scores("t")[:, 0], [0, np.nan, 1], equal_nan=True)

@@ -1,0 +1,139 @@
+"""`flockscope compare`: a gate. Are the scores of a run worse than those of a baseline, beyond a tolerance?
+
+Both are stored scores of the same sequences. Of each score, d is the mean difference over sequences, in the direction
+that is better, with its 95 % interval (Student's, paired). The verdict follows from the interval and the tolerance:
+
+    regression     the interval lies below 0, and d below -tolerance
+    improvement    the interval lies above 0, and d above the tolerance
+    no difference  the interval lies within +- tolerance
+    too noisy      none of these: more sequences are needed to tell
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError, counted, shortened
+from sim.io.files.atomic import write_file
+from sim.io.files.tables import json_document, read_json
+from tracking.app.command_options import CompareOptions
+from tracking.app.command_result import CommandResult
+from tracking.app.commands.score_tables import empty_table, with_title
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.stats import paired
+
+FEWEST = 2  # sequences without which there is no interval
+HOW = ("similarity", "given")  # what must be equal for scores to be compared
+EXPECTED = "a file of `flockscope score --json`, or of `compare --save`"
+
+Stored = dict[str, dict[str, Any]]  # by name of the sequence
+
+
+def compare(options: CompareOptions) -> CommandResult:
+    """Compares stored scores with those of a baseline; exit code 1 if one of them is surely worse."""
+    for key in options.by:
+        if key not in CATALOGUE:
+            known = "docs/reference/metrics.md lists them"
+            raise InputError(place="--by", got=repr(key), expected="the key of a score", remedy=known)
+    before, now = _read(options.baseline), _read(options.now)
+    _require_same(options, before, now)
+    rows = [_row(key, before, now, options.tolerance) for key in options.by or ["objective"]]
+    if options.save is not None:
+        keys = (*HOW, *(row["score"] for row in rows))
+        kept = [{"name": name, **{k: row[k] for k in keys if k in row}} for name, row in now.items()]
+        write_file(options.save, json_document({"sequences": kept}))
+    worse = [row["score"] for row in rows if row["verdict"] == "regression"]
+    data = {"sequences": len(before), "tolerance": options.tolerance, "scores": rows}
+    return CommandResult(data, _table(rows, len(before)), int(bool(worse)))
+
+
+def _read(path: Path) -> Stored:
+    document = read_json(path)
+    rows = document.get("sequences") if isinstance(document, dict) else None
+    if not isinstance(rows, list) or not rows or not all(map(_is_named, rows)):
+        raise InputError(file=path, got="no scores of sequences", expected=EXPECTED, remedy="make it again")
+    found = {row["name"]: row for row in rows}
+    if len(found) < len(rows):
+        raise InputError(
+            file=path, got="a sequence twice", expected="one entry for each", remedy="score each split alone"
+        )  # fmt: skip
+    return found
+
+
+def _is_named(row: object) -> bool:
+    return isinstance(row, dict) and isinstance(row.get("name"), str)
+
+
+def _require_same(options: CompareOptions, before: Stored, now: Stored) -> None:
+    missing, new = sorted(before.keys() - now.keys()), sorted(now.keys() - before.keys())
+    if missing or new:
+        names = shortened(", ".join(missing or new), 80)
+        got = f"no {names}" if missing else f"{names}, not in {options.baseline}"
+        raise InputError(
+            file=options.now, place="incomplete", got=got, expected="the sequences of the baseline",
+            remedy="score the same sequences, or save a new baseline with --save",
+        )  # fmt: skip
+    if len(before) < FEWEST:
+        raise InputError(
+            file=options.now, place="too few", got="1 sequence", expected=f"at least {FEWEST}",
+            remedy="generate more seeds",
+        )  # fmt: skip
+    for name, row in before.items():
+        for key in HOW:
+            if key in row and key in now[name] and row[key] != now[name][key]:
+                raise InputError(
+                    file=options.now, place=f"{name}: {key}", got=repr(now[name][key]),
+                    expected=f"{row[key]!r}, as in {options.baseline}", remedy="score both alike",
+                )  # fmt: skip
+
+
+def _row(key: str, before: Stored, now: Stored, tolerance: float) -> dict[str, Any]:
+    pairs = np.array([[_value(row, key), _value(now[name], key)] for name, row in before.items()])
+    known = np.isfinite(pairs).all(axis=1)
+    if known.sum() < FEWEST:
+        raise InputError(
+            place=key, got=f"known in {counted(int(known.sum()), 'sequence')} on both sides",
+            expected=f"at least {FEWEST}", remedy="choose another score with --by",
+        )  # fmt: skip
+    first, second = pairs[known].T
+    mean, low, high = (float(end[0]) for end in paired(first[:, None], second[:, None]))
+    upwards = CATALOGUE[key].better != "lower"
+    verdict = _verdict(*((mean, low, high) if upwards else (-mean, -high, -low)), tolerance)
+    values = {
+        "baseline": float(first.mean()),
+        "now": float(second.mean()),
+        "difference": mean,
+        "low": low,
+        "high": high,
+    }
+    return {"score": key, "sequences": int(known.sum()), **values, "verdict": verdict}
+
+
+def _value(row: Mapping[str, Any], key: str) -> float:
+    value = row.get(key)
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else float("nan")
+
+
+def _verdict(mean: float, low: float, high: float, tolerance: float) -> str:
+    if high < 0 and mean < -tolerance:
+        return "regression"
+    if low > 0 and mean > tolerance:
+        return "improvement"
+    return "no difference" if -tolerance <= low and high <= tolerance else "too noisy"
+
+
+def _table(rows: list[dict[str, Any]], sequences: int) -> Any:
+    table = empty_table()
+    table.add_column("score")
+    for name in ("baseline", "now", "difference", "95 % interval"):
+        table.add_column(name, justify="right")
+    table.add_column("verdict")
+    for row in rows:
+        ends = f"{row['low']:+.4f} to {row['high']:+.4f}"
+        numbers = f"{row['baseline']:.4f}", f"{row['now']:.4f}", f"{row['difference']:+.4f}", ends
+        table.add_row(row["score"], *numbers, row["verdict"])
+    return with_title(f"{counted(sequences, 'sequence')}, paired", table)

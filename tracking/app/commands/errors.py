@@ -1,0 +1,120 @@
+"""`flockscope errors`: each error of a run with its frames, people, cause and cost, and a sum by cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as SequenceOf
+from typing import Any
+
+from scenarios.errors import InputError, printable
+from sim.io.formats.options import parse_box_scale
+from sim.types import Sequence
+from tracking.app.command_options import ErrorsOptions
+from tracking.app.command_result import CommandResult
+from tracking.app.commands.score_tables import empty_table, with_title
+from tracking.app.progress import ProgressMeter
+from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
+from tracking.errors.found import RunErrors, errors_of_run
+from tracking.errors.repairs import SHOWN
+
+Job = tuple[StoredTracks, Any, Any]  # stored tracks, similarity, factor of boxes of texts
+
+
+def errors(options: ErrorsOptions) -> CommandResult:
+    """Lists the errors of every sequence of the truth."""
+    source = OpenedAs(
+        options.truth, options.fps, options.px_per_m, images=False, person_class=options.person_class
+    )  # fmt: skip
+    sequences = source.open()
+    matched = match_tracks(sequences, find_tracks(options.tracks))
+    box_scale = None if options.box_scale is None else parse_box_scale(options.box_scale)
+    jobs: list[Job] = [(stored, options.similarity, box_scale) for _, stored in matched]
+    found: list[RunErrors] = []
+    with ProgressMeter("errors", len(sequences)) as meter:
+        for one in over_sequences(errors_of, sequences, jobs, source, options.workers):
+            meter.step(sequences[len(found)].name)
+            found.append(one)
+    names = [sequence.name for sequence in sequences]
+    fps = [sequence.fps for sequence in sequences]
+    data = {
+        "sequences": [
+            {
+                "name": name,
+                "scores": one.scores,
+                "left": one.left,
+                "errors": [error.facts(rate) for error in one.errors],
+            }
+            for name, rate, one in zip(names, fps, found, strict=True)
+        ],
+        "causes": _causes(found),
+    }
+    return CommandResult(data, _tables(names, fps, found, options.limit))
+
+
+def errors_of(sequence: Sequence, job: Job) -> RunErrors:
+    """Returns the errors of one stored run."""
+    stored, similarity, box_scale = job
+    if sequence.truth is None:
+        raise InputError(
+            file=sequence.source.get("path"), got="no labels", expected="a labelled sequence",
+            remedy="errors are found by comparison with a truth",
+        )  # fmt: skip
+    run = stored.read(sequence, box_scale)
+    if any(t.unit == "group" for t in run):
+        raise InputError(
+            file=stored.path, got="a tracker of whole groups", expected="tracks of people",
+            remedy="score it with `flockscope score`",
+        )  # fmt: skip
+    found = errors_of_run(sequence, run, similarity)
+    assert found is not None, "labels and people are there"
+    return found
+
+
+def _causes(found: SequenceOf[RunErrors]) -> list[dict[str, Any]]:
+    """Returns the gains by kind and cause, mean over sequences, the largest first."""
+    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    for run in found:
+        for part in run.causes:
+            empty = {"kind": part.kind, "cause": part.cause, "errors": 0, "seconds": 0.0, **dict.fromkeys(SHOWN, 0.0)}
+            row = rows.setdefault((part.kind, part.cause), empty)
+            row["errors"] += part.errors
+            row["seconds"] += part.seconds
+            for key in SHOWN:
+                gain = part.gains[key]
+                row[key] += 0.0 if gain != gain else gain / len(found)
+    return sorted(rows.values(), key=lambda row: -(row["HOTA"] + row["group_F1"]))
+
+
+def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: int) -> Any:
+    from rich.console import Group
+
+    lost = empty_table()
+    for name in ("kind", "cause"):
+        lost.add_column(name)
+    for name in ("errors", "seconds", *SHOWN):
+        lost.add_column(name, justify="right")
+    for row in _causes(found):
+        lost.add_row(
+            row["kind"], row["cause"], str(row["errors"]), f"{row['seconds']:.1f}", *(f"{row[k]:+.3f}" for k in SHOWN)
+        )
+    lost.add_row("position", "", "", "", *(f"{_mean([run.left[k] for run in found]):+.3f}" for k in SHOWN))
+    now = "  ".join(f"{k} {_mean([run.scores[k] for run in found]):.3f}" for k in SHOWN)
+    every = [(name, rate, error) for name, rate, run in zip(names, fps, found, strict=True) for error in run.errors]
+    dearest = sorted(every, key=lambda item: -(item[2].cost or 0.0))[:limit]
+    listed = empty_table()
+    for name in ("sequence", "frames", "kind", "who", "cause"):
+        listed.add_column(name, overflow="fold")
+    listed.add_column("cost", justify="right")
+    for name, rate, error in dearest:
+        facts = error.facts(rate)
+        span = f"{facts['start']}–{facts['end']}"
+        listed.add_row(
+            printable(name), span, facts["kind"], error.who, facts["detail"] or facts["cause"], f"{error.cost:.4f}"
+        )
+    title = f"the {len(dearest)} dearest of {len(every)} errors; cost: HOTA, of groups group_F1"
+    return Group(with_title(f"where the score is lost; now {now}", lost), with_title(title, listed))
+
+
+def _mean(values: list[float]) -> float:
+    known = [value for value in values if value == value]
+    return sum(known) / len(known) if known else float("nan")

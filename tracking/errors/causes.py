@@ -1,0 +1,201 @@
+"""Causes of errors, read from the truth: what was hard about the scene where the tracker went wrong.
+
+A cause is a fact of the truth, not a proof. The first that holds is named:
+
+    edge        the person is cut by the edge of the picture
+    hidden      most of the body is hidden, for most of the gap
+    undetected  the detector has no detection of the person, for most of the gap
+    near        another person is nearer than 0.8 m
+    turned      the person's direction turns by more than 60 degrees within a second
+    left        a ghost of somebody who is gone
+    displaced   a ghost within 2 m of somebody who is not tracked
+    double      a ghost within 1 m of somebody who is tracked
+    clutter     any other ghost
+    apart       people of one group are more than 2 m apart
+    beside      strangers walk within 1.5 m of the group
+    tracker     none of these: the tracker alone
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints, Truth
+from tracking.errors.groups import GroupError
+from tracking.errors.people import NOBODY, MatchedPeople, PersonError
+
+CUT = 0.2  # truncation from which a person is cut by the edge
+HIDDEN = 0.35  # visibility below which most of a person is hidden
+NEAR = 0.8  # m
+TURN = np.deg2rad(60)
+CONFIRMED = 0.5  # s: trackers wait so long before they report somebody
+AROUND = 1.0  # s before a switch in which causes are looked for
+DISPLACED, DOUBLE = 2.0, 1.0  # m
+APART, BESIDE = 2.0, 1.5  # m between nearest people
+
+
+@dataclass(frozen=True)
+class Cause:
+    """The cause of an error in one word, and in detail."""
+
+    name: str
+    text: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """What is known of the true people in the R rows that are compared."""
+
+    frame: Ints
+    id: Ints
+    pos: Array  # (R, 2), m on the ground; px in the image
+    metre: float  # units of pos per metre
+    vel: Array | None  # (R, 2), m/s
+    visibility: Array  # (R,)
+    truncation: Array | None  # (R,)
+    box: Array | None  # (R, 4), px
+    detected: Bools | None  # (R,): the detector has a detection of the person; None: not known
+    fps: float
+
+    def rows(self, frame: int) -> Ints:
+        """Returns the rows of a frame."""
+        low, high = np.searchsorted(self.frame, (frame, frame + 1))
+        return np.arange(low, high)
+
+    def row(self, frame: int, id: int) -> int:
+        """Returns the row of a person in a frame, -1 if not there."""
+        found = self.rows(frame)[self.id[self.rows(frame)] == id]
+        return int(found[0]) if len(found) else NOBODY
+
+
+def facts(truth: Truth, kept: Bools, pos: Array, metre: float, detected: Bools | None) -> Facts:
+    """Returns the facts of the rows `kept` of a truth; pos (R, 2): where they are compared."""
+
+    def of(values: Array | None) -> Array | None:
+        return None if values is None else values[kept]
+
+    return Facts(
+        truth.frame[kept], truth.id[kept], pos, metre, of(truth.vel), truth.visibility[kept], of(truth.truncation),
+        of(truth.box), detected, truth.fps,
+    )  # fmt: skip
+
+
+def cause_of_person(error: PersonError, of: Facts) -> Cause:
+    """Returns the cause of an error of a true person."""
+    assert error.person is not None
+    gap = np.array(error.rows, np.int64)
+    frames = len(gap) / of.fps
+    if len(gap):
+        if of.truncation is not None and np.median(of.truncation[gap]) > CUT:
+            return Cause("edge", f"cut by the edge for {frames:.1f} s")
+        hidden = of.visibility[gap] < HIDDEN
+        if 2 * hidden.sum() >= len(gap):
+            return Cause("hidden", f"hidden for {hidden.sum() / of.fps:.1f} s{_hidden_by(gap[hidden], of)}")
+        if of.detected is not None and 2 * (unseen := ~of.detected[gap]).sum() >= len(gap):
+            return Cause("undetected", f"not detected for {unseen.sum() / of.fps:.1f} s")
+    if error.kind == "late" and frames < CONFIRMED:
+        return Cause("tracker")
+    around = _around(error, of)
+    near = _nearest(around, of)
+    if near is not None and near[0] < NEAR:
+        return Cause("near", f"{near[0]:.2f} m from person {near[1]}")
+    turn = _turn(around, of)
+    return Cause("turned", f"turned by {np.rad2deg(turn):.0f}°") if turn > TURN else Cause("tracker")
+
+
+def _around(error: PersonError, of: Facts) -> Ints:
+    """Returns the person's rows in the second before the error, and in it."""
+    first = error.start - round(AROUND * of.fps)
+    rows = (of.row(frame, error.person or 0) for frame in range(max(first, 1), error.end + 1))
+    return np.array([row for row in rows if row != NOBODY], np.int64)
+
+
+def _hidden_by(rows: Ints, of: Facts) -> str:
+    """Returns " by person N", the one whose box covers most of the person's and whose feet are nearer to the camera."""
+    if of.box is None:
+        return ""
+    covered: dict[int, float] = {}
+    for row in rows.tolist():
+        others = of.rows(int(of.frame[row]))
+        others = others[(others != row) & (of.box[others, 1] + of.box[others, 3] > of.box[row, 1] + of.box[row, 3])]
+        low = np.maximum(of.box[others, :2], of.box[row, :2])
+        high = np.minimum(of.box[others, :2] + of.box[others, 2:], of.box[row, :2] + of.box[row, 2:])
+        for other, area in zip(others.tolist(), np.prod(np.maximum(high - low, 0), axis=1).tolist(), strict=True):
+            covered[int(of.id[other])] = covered.get(int(of.id[other]), 0.0) + area
+    who = max(covered, key=covered.__getitem__, default=None)
+    return f" by person {who}" if who is not None and covered[who] > 0 else ""
+
+
+def _nearest(rows: Ints, of: Facts) -> tuple[float, int] | None:
+    """Returns the least distance to another person over some rows of one person, m, and that person."""
+    best: tuple[float, int] | None = None
+    for row in rows.tolist():
+        others = of.rows(int(of.frame[row]))
+        others = others[others != row]
+        d = np.hypot(*(of.pos[others] - of.pos[row]).T) / of.metre
+        if len(d) and (best is None or d.min() < best[0]):
+            best = float(d.min()), int(of.id[others[np.argmin(d)]])
+    return best
+
+
+def _turn(rows: Ints, of: Facts) -> float:
+    """Returns the largest change of direction over the rows, rad; a person who hardly moves does not turn."""
+    if of.vel is None or len(rows) < 2:
+        return 0.0
+    v = of.vel[rows][np.hypot(*of.vel[rows].T) > 0.3]
+    if len(v) < 2:
+        return 0.0
+    angle = np.unwrap(np.arctan2(v[:, 1], v[:, 0]))
+    return float(np.ptp(angle))
+
+
+def cause_of_ghost(error: PersonError, matched: MatchedPeople, place: Array, of: Facts) -> Cause:
+    """Returns the cause of a ghost; place (S, 2): of the tracked rows, as `Facts.pos`."""
+    rows = np.array(error.rows, np.int64)
+    est, nearest = matched.pairs.est, []
+    for row in rows.tolist():
+        people = of.rows(int(est.frame[row]))
+        d = np.hypot(*(of.pos[people] - place[row]).T) / of.metre
+        if len(d):
+            k = int(np.argmin(d))
+            nearest.append((float(d[k]), int(of.id[people[k]]), bool(matched.track[people[k]] == NOBODY)))
+    owner = _owner(error, matched, of)
+    if owner is not None and of.row(error.start, owner) == NOBODY:
+        return Cause("left", f"person {owner} is gone")
+    if not nearest:
+        return Cause("clutter")
+    distance, who, free = sorted(nearest)[len(nearest) // 2]
+    if free and distance < DISPLACED:
+        return Cause("displaced", f"{distance:.2f} m from person {who}, who is not tracked")
+    if distance < DOUBLE:
+        return Cause("double", f"{distance:.2f} m from person {who}, who is tracked")
+    return Cause("clutter", f"{distance:.1f} m from anybody")
+
+
+def _owner(error: PersonError, matched: MatchedPeople, of: Facts) -> int | None:
+    """Returns the person whom the track of a ghost was matched with last before."""
+    est = matched.pairs.est
+    before = np.flatnonzero((est.id == error.after) & (est.frame < error.start) & (matched.person != NOBODY))
+    return int(of.id[matched.person[before[-1]]]) if len(before) else None
+
+
+def cause_of_group(error: GroupError, of: Facts) -> Cause:
+    """Returns the cause of an error of a group, from the middle of its time."""
+    frame = (error.start + error.end) // 2
+    rows = np.array([row for id in error.people if (row := of.row(frame, id)) != NOBODY], np.int64)
+    if len(rows) < 2:
+        return Cause("tracker")
+    gaps = np.hypot(*(of.pos[rows][:, None] - of.pos[rows][None]).transpose(2, 0, 1)) / of.metre
+    np.fill_diagonal(gaps, np.inf)
+    if error.group is not None and gaps.min(axis=1).max() > APART:
+        return Cause("apart", f"{gaps.min(axis=1).max():.1f} m from the next member")
+    others = [row for id in error.others if (row := of.row(frame, id)) != NOBODY]
+    if others:
+        d = np.hypot(*(of.pos[rows][:, None] - of.pos[others][None]).transpose(2, 0, 1)).min() / of.metre
+        if d < BESIDE:
+            return Cause("beside", f"{d:.1f} m from others")
+    if error.group is None and gaps.min() < BESIDE:
+        return Cause("beside", f"{gaps.min():.1f} m apart")
+    return Cause("tracker")

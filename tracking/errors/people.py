@@ -1,0 +1,111 @@
+"""Errors of people: switches, fragments, misses, late confirmations and ghosts, from the matches of CLEAR.
+
+A true person is matched with at most one track in a frame. A stretch of frames in which a person is present and not
+matched is a *gap*. It is named by what comes before and after:
+
+    before       after                 kind
+    –            matched               late      the track was confirmed late
+    –            –                     miss      the person was never tracked
+    matched      –                     miss      the track ended early
+    matched      the same track        fragment
+    matched      another track         switch    a switch without a gap has no frames without a match
+
+A stretch of frames in which a track is reported and not matched is a *ghost*. So the numbers of switches and fragments
+are IDSW and (with the switches after a gap) Frag, and the gaps together are FN, the ghosts FP.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from sim.types import Ints
+from tracking.scoring.candidate_pairs import Pairs
+from tracking.scoring.track_scores import clear_matches
+
+PersonKind = Literal["switch", "fragment", "miss", "late", "ghost"]
+NOBODY = -1
+
+
+@dataclass(frozen=True, eq=False)
+class MatchedPeople:
+    """R true and S tracked people in frames, matched as CLEAR does."""
+
+    pairs: Pairs  # candidate pairs of both sides
+    track: Ints  # (R,): row of the track that each true person is matched with, -1 none
+    person: Ints  # (S,): row of the true person that each track is matched with, -1 none
+
+
+@dataclass(frozen=True)
+class PersonError:
+    """One error of a true person, or a ghost."""
+
+    kind: PersonKind
+    start: int  # first frame without a match; of a switch without a gap, the frame of the new track
+    end: int  # last frame without a match; of a switch, the frame of the new track
+    rows: tuple[int, ...]  # true rows of the gap, or tracked rows of the ghost
+    person: int | None  # id of the true person; None for a ghost
+    before: int | None = None  # id of the track that the person had before
+    after: int | None = None  # id of the track that the person has afterwards; of a ghost, its own id
+
+
+def matched_people(pairs: Pairs) -> MatchedPeople:
+    """Returns the people of both sides with the matches of CLEAR."""
+    found = clear_matches(pairs).found
+    track, person = np.full(len(pairs.true), NOBODY, np.int64), np.full(len(pairs.est), NOBODY, np.int64)
+    track[found.i], person[found.j] = found.j, found.i
+    return MatchedPeople(pairs, track, person)
+
+
+def person_errors(matched: MatchedPeople) -> list[PersonError]:
+    """Returns all errors of people, by start."""
+    every = [*_errors_of_people(matched), *_ghosts(matched)]
+    return sorted(every, key=lambda error: (error.start, error.end, error.kind))
+
+
+def _errors_of_people(matched: MatchedPeople) -> Iterator[PersonError]:
+    true, est = matched.pairs.true, matched.pairs.est
+    for person, rows in _by_id(true.id):
+        before: int | None = None
+        gap: list[int] = []
+        for row in rows:
+            j = matched.track[row]
+            if j == NOBODY:
+                gap.append(row)
+                continue
+            after, frame = int(est.id[j]), int(true.frame[row])
+            if before is not None and after != before:
+                start = int(true.frame[gap[0]]) if gap else frame
+                yield PersonError("switch", start, frame, tuple(gap), person, before, after)
+            elif gap:
+                kind: PersonKind = "late" if before is None else "fragment"
+                span = int(true.frame[gap[0]]), int(true.frame[gap[-1]])
+                yield PersonError(kind, *span, tuple(gap), person, before, after)
+            before, gap = after, []
+        if gap:
+            yield PersonError("miss", int(true.frame[gap[0]]), int(true.frame[gap[-1]]), tuple(gap), person, before)
+
+
+def _ghosts(matched: MatchedPeople) -> Iterator[PersonError]:
+    est = matched.pairs.est
+    for track, rows in _by_id(est.id):
+        alone = [row for row in rows if matched.person[row] == NOBODY]
+        place = {row: k for k, row in enumerate(rows)}
+        cuts = [k for k, row in enumerate(alone) if k == 0 or place[row] != place[alone[k - 1]] + 1]
+        for a, b in pairwise([*cuts, len(alone)]):
+            stretch = tuple(alone[a:b])
+            yield PersonError(
+                "ghost", int(est.frame[stretch[0]]), int(est.frame[stretch[-1]]), stretch, None, None, track
+            )
+
+
+def _by_id(id: Ints) -> Iterator[tuple[int, list[int]]]:
+    """Yields each id with its rows, by frame; rows are sorted by frame."""
+    order = np.argsort(id, kind="stable")
+    cuts = np.flatnonzero(np.diff(id[order], prepend=-1)) if len(id) else np.zeros(0, np.int64)
+    for rows in np.split(order, cuts[1:]) if len(id) else ():
+        yield int(id[rows[0]]), rows.tolist()

@@ -1,0 +1,140 @@
+"""Events of the reported groups, with onsets dated back by the rules of the truth (ours).
+
+A merge or split is reported when the partition changes. Its start is the frame in which the parts came together, or
+parted, in the past that is known then.
+
+The state estimate (sec. 4): means of the individuals, and one partition for all particles.
+
+Group ids of a tracker that finds groups of people itself, frame by frame, by the identity rule of the truth.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from sim.truth.identity import GroupChange, Identities, Members
+from sim.truth.merge_split_rules import frames_of
+from sim.types import Array, Bools, GroupEvent, Groups, Ints
+from tracking.grouping.group_labels import part_sets
+from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, event_of_change
+from tracking.papers.joint import partition_kernels
+
+
+def moments(state: Array, weights: Array) -> tuple[Array, Array]:
+    """Returns means (K, 4) and covariances (K, 4, 4) of states (N_x, K, 4); weights (N_x, K): sum 1 for each person."""
+    mean = np.einsum("ik,ikd->kd", weights, state)
+    away = state - mean
+    return mean, np.einsum("ik,ikd,ike->kde", weights, away, away)
+
+
+def kept_while_missed(now: Array, id: Ints, seen: Bools, before: Array, before_id: Ints) -> Array:
+    """Returns the probability that each pair is in one group, (K, K), which stays while one of the two is not measured
+    (ours)."""
+    out = now.copy()
+    _, new, old = np.intersect1d(id, before_id, assume_unique=True, return_indices=True)
+    rows, both = np.ix_(new, new), seen[new][:, None] & seen[new]
+    out[rows] = np.where(both, now[rows], before[np.ix_(old, old)])
+    return out
+
+
+def binder_partition(together: Array, label: Ints, before: Ints) -> list[Ints]:
+    """Returns the groups of two or more people, as arrays of rows: the partition of least expected Binder loss
+    (ours)."""
+    gain = together - 0.5
+    sampled = np.empty(len(together), np.int64)
+    partition_kernels.best_sampled(gain, label, sampled)
+    starts = [sampled, _numbered(before)]
+    gains = [partition_kernels.binder_moves(gain, start) for start in starts]
+    return groups_of(starts[int(np.argmax(gains))])
+
+
+def histogram_partition(label: Ints, weights: Array) -> list[Ints]:
+    """Returns the groups of two or more people by the histogram of Fig. 3: each person has the label of most weight."""
+    votes = np.empty((label.shape[2], label.shape[2]))
+    partition_kernels.head_votes(label, weights, votes)
+    return groups_of(votes.argmax(axis=1))
+
+
+def groups_of(label: Ints) -> list[Ints]:
+    """Returns the rows of each label (K,) that two or more people carry."""
+    found = (np.flatnonzero(label == g) for g in np.unique(label))
+    return [rows for rows in found if len(rows) > 1]
+
+
+def _numbered(group: Ints) -> Ints:
+    alone = group < 0
+    named = np.where(alone, group.max(initial=0) + 1 + np.arange(len(group)), group)
+    return np.asarray(np.unique(named, return_inverse=True)[1] + 1)
+
+
+# Kinds of events that the tracker reports itself.
+OWN_EVENTS = ("merge", "split", "form", "dissolve", "enter", "leave")
+CHORD = 0.5  # Time over which velocities are measured, s.
+ARRIVAL = 1.0  # s: people who were together so soon after they were first seen arrived together.
+
+
+class ReportedEvents:
+    """State: recent, the ids (K,) and places (K, 2), m, of the frames of the last SEARCHED s; first: frame from 0 in
+    which each person was seen first; frames: their number so far; fps."""
+
+    def __init__(self, fps: float) -> None:
+        self.fps, self.frames = fps, 0
+        self.recent: deque[tuple[Ints, Array]] = deque(maxlen=frames_of(SEARCHED, fps) + frames_of(CHORD, fps))
+        self.first: dict[int, int] = {}
+
+    def add(self, id: Ints, pos: Array) -> None:
+        """Add a frame: ids (K,) and places (K, 2), m, of the people reported."""
+        self.recent.append((id.copy(), pos.copy()))
+        for person in id.tolist():
+            self.first.setdefault(person, self.frames)
+        self.frames += 1
+
+    def events(
+        self, changes: Iterable[GroupChange], old: Members, new: Members, scale: float
+    ) -> tuple[GroupEvent, ...]:
+        """Returns the events of the changes of groups in the last frame added; their members are ids of people."""
+        changes = list(changes)
+        if not changes:
+            return ()
+        ids, motion = self._motion()
+        column = {person: k for k, person in enumerate(ids)}
+        begin, now = self.frames - len(self.recent), set(self.recent[-1][0].tolist())
+        out = []
+        for change in changes:
+            there = frozenset(change.members) & now
+            sets = part_sets(change, old, new, there)
+            since = max((min(self.first[p] for p in part) for part in sets), default=0) - begin
+            parts = Parts([frozenset(column[p] for p in part) for part in sets], since)
+            own = replace(change, members=tuple(sorted(column[p] for p in change.members if p in column)))
+            event = event_of_change(own, len(self.recent) - 1, parts, motion, frames_of(ARRIVAL, self.fps))
+            if event is not None:
+                x, y = event.pos
+                out.append(replace(
+                    event, start=event.start + begin, end=event.end + begin, emitted=self.frames,
+                    members=tuple(sorted(ids[p - 1] for p in event.members)), pos=(x * scale, y * scale),
+                ))  # fmt: skip
+        return tuple(out)
+
+    def _motion(self) -> tuple[list[int], TrackedMotion]:
+        ids = sorted({person for id, _ in self.recent for person in id.tolist()})
+        pos = np.full((len(self.recent), len(ids), 2), np.nan)
+        for t, (id, place) in enumerate(self.recent):
+            pos[t, np.searchsorted(ids, id)] = place
+        chord, vel = frames_of(CHORD, self.fps), np.full_like(pos, np.nan)
+        vel[chord:] = (pos[chord:] - pos[:-chord]) * self.fps / chord
+        return ids, TrackedMotion(pos, vel, self.fps)
+
+
+def known_groups(identities: Identities, ids: Ints) -> Ints:
+    """Returns the id of each person's group, (N,), as `identities` has it, -1 for a person alone; ids (N,)."""
+    group_of = {person: group for group, people in identities.groups.items() for person in people}
+    return np.array([group_of.get(person, -1) for person in ids.tolist()], np.int64)
+
+
+def no_groups(group: Ints) -> Groups | None:
+    """Returns empty Groups if nobody is in a group, which says so; else None: hulls are derived from the group ids."""
+    return Groups.none() if (group < 0).all() else None

@@ -1,0 +1,270 @@
+"""HOTA: detection and association accuracy at 19 similarity thresholds, equal to TrackEval.
+
+Luiten et al. (2021), "HOTA: A Higher Order Metric for Evaluating Multi-object Tracking". One matching serves all
+thresholds alpha. In each frame it maximises the sum of A(i, j) s(i, j), where s is the similarity of two rows and A the
+alignment of their two ids over the sequence. Matches with s >= alpha count as true positives (TP). Other true rows are
+false negatives (FN), other estimated rows false positives (FP). For a match c of true id i and estimated id j, TPA(c)
+is the number of matches of these two ids, n_i and m_j their numbers of frames:
+
+    DetA = TP / (TP + FN + FP),  AssA = mean over c of TPA(c) / (n_i + m_j - TPA(c)),  HOTA = sqrt(DetA AssA)
+
+CLEAR MOT scores (MOTA, MOTP, switches, fragments) at similarity 0.5, equal to TrackEval.
+
+Bernardin & Stiefelhagen (2008), "Evaluating Multiple Object Tracking Performance: The CLEAR MOT Metrics". Matches of
+the previous frame are kept. The previous frame is the last one with people on both sides.
+
+TrackEval adds a bonus of 1000 to pairs that were matched in the previous frame and takes the matching with the greatest
+total. Such kept pairs share no row and no column, and each outweighs any two rivals of at most 1. They are therefore in
+every best matching (tracking.scoring.matching), and only pairs that share nothing with them remain to be matched. Pairs
+without rivals are matched whatever happened before. Frames are processed in order, but few need a solver.
+
+Identity scores IDF1, IDP, IDR and IDTP: ids are assigned one to one for the whole sequence.
+
+Ristani et al. (2016), "Performance Measures and a Data Set for Multi-Target, Multi-Camera Tracking". IDTP is the number
+of frames that assigned true and estimated ids share with a similarity of 0.5 or more; IDP is its share in the estimated
+rows (one row per person and frame), IDR its share in the true rows, IDF1 the harmonic mean of both. Equal to TrackEval.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sim.types import Array, Bools, Ints
+from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
+from tracking.scoring.matching import match, match_as_table, solve_frame
+from tracking.scoring.weighted_sums import BinSums, FrameSums, WeightedScores, ratio
+
+ALPHAS = np.arange(0.05, 0.99, 0.05)
+CELLS = 2_000_000  # numbers of matches held at once
+LEAST = 1e-10  # keeps LocA at 1 where nothing is matched
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HotaMatches:
+    """The K matches of HOTA, and the U links, a link being a combination of a true and an estimated id."""
+
+    # true_id, est_id (U,): the ids of each link, as indices into `Pairs.true_ids[0]` and `Pairs.est_ids[0]`.
+    true_id: Ints
+    est_id: Ints
+    link: Ints  # (K,): link of each match
+    frame: Ints  # (K,): its frame number
+    s: Array  # (K,): its similarity
+    level: Ints  # (K,): number of thresholds at which the match counts, 0 to 19; these are the lowest ones
+
+
+def hota_matches(pairs: Pairs) -> HotaMatches:
+    """Returns the matches that serve all thresholds: in each frame the greatest sum of A(i, j) s(i, j)."""
+    true_id, est_id, link = pairs.links
+    n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
+    m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
+    chosen = match_as_table(pairs, alignment(pairs, n + m)[link] * pairs.s)
+    s = pairs.s[chosen]
+    level = np.searchsorted(ALPHAS - EPS, s, side="right")
+    return HotaMatches(true_id, est_id, link[chosen], pairs.frame[chosen], s, level)
+
+
+def hota(pairs: Pairs) -> dict[str, float]:
+    """Returns HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA by key, each the mean over `ALPHAS`."""
+    matches, bins = hota_matches(pairs), len(ALPHAS) + 1
+    frames_of = (pairs.true_ids[1], matches.true_id), (pairs.est_ids[1], matches.est_id)
+    n, m = (np.bincount(ids).astype(float)[of] for ids, of in frames_of)
+    together = (
+        np.bincount(matches.link * bins + matches.level, minlength=len(n) * bins).astype(float).reshape(1, -1, bins)
+    )
+    near: Array = np.bincount(matches.level, weights=matches.s, minlength=bins).astype(float)[None]
+    rows = np.array([float(len(pairs.true))]), np.array([float(len(pairs.est))])
+    return {key: float(value[0]) for key, value in _scores(_reached(together), _reached(near), n, m, *rows).items()}
+
+
+def weighted_hota(pairs: Pairs, size: int) -> WeightedScores:
+    """Returns the eight weighted scores of `hota`, with its matches kept."""
+    matches, bins = hota_matches(pairs), len(ALPHAS) + 1
+    used, link = np.unique(matches.link, return_inverse=True)
+    true_id, est_id = matches.true_id[used], matches.est_id[used]
+    true_rows = BinSums(pairs.true.frame, pairs.true_ids[1], len(pairs.true_ids[0]), size)
+    est_rows = BinSums(pairs.est.frame, pairs.est_ids[1], len(pairs.est_ids[0]), size)
+    met = BinSums(matches.frame, link * bins + matches.level, len(used) * bins, size)
+    near = FrameSums(size)
+    for k in range(1, bins):  # the sums of similarity at each threshold
+        near.add(str(k), matches.frame, np.where(matches.level >= k, matches.s, 0.0))
+
+    def score(weights: Array) -> dict[str, Array]:
+        rows = max(1, CELLS // max(1, len(used) * bins))
+        parts = [of_part(weights[k : k + rows]) for k in range(0, len(weights), rows)]
+        return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]} if parts else {}
+
+    def of_part(weights: Array) -> dict[str, Array]:
+        n, m = true_rows.of(weights), est_rows.of(weights)
+        together = _reached(met.of(weights).reshape(len(weights), len(used), bins))
+        similar = np.column_stack(list(near.of(weights).values()))
+        return _scores(together, similar, n[:, true_id], m[:, est_id], n.sum(axis=1), m.sum(axis=1))
+
+    return score
+
+
+def _reached(by_level: Array) -> Array:
+    """Returns sums at each threshold (…, 19) from those of the items that reach just so many (…, 20)."""
+    return np.cumsum(by_level[..., :0:-1], axis=-1)[..., ::-1]
+
+
+def _scores(together: Array, near: Array, n: Array, m: Array, true: Array, est: Array) -> dict[str, Array]:
+    """Returns the eight scores, (D,) by key.
+
+    At each threshold: together (D, U, 19), matches of each link; near (D, 19), sum of similarities. n, m (D, U) or
+    (U,): frames of the two ids of each link. true, est (D,): rows of both sides.
+    """
+    found = together.sum(axis=1)
+    n, m, true, est = n[..., None], m[..., None], true[:, None], est[:, None]
+
+    def share(part: Array, whole: Array) -> Array:
+        return ratio(part, np.broadcast_to(whole, part.shape), 0.0)
+
+    def mean_share(of: Array) -> Array:
+        return share(share(together * together, of).sum(axis=1), found)
+
+    det, ass = share(found, true + est - found), mean_share(n + m - together)
+    curves = {
+        "HOTA": np.sqrt(det * ass), "DetA": det, "AssA": ass, "DetRe": share(found, true), "DetPr": share(found, est),
+        "AssRe": mean_share(n), "AssPr": mean_share(m),
+        "LocA": np.maximum(LEAST, near) / np.maximum(LEAST, found),
+    }  # fmt: skip
+    return {key: curve.mean(axis=1) for key, curve in curves.items()}
+
+
+def alignment(pairs: Pairs, frames: Ints) -> Array:
+    """Returns the alignment A in [0, 1] of each of U links (U,); frames (U,): rows of its two ids together."""
+    i, j, s = pairs.i, pairs.j, pairs.s
+    of_i = np.bincount(i, weights=s, minlength=len(pairs.true))
+    of_j = np.bincount(j, weights=s, minlength=len(pairs.est))
+    common = np.bincount(pairs.links[2], weights=s / (of_i[i] + of_j[j] - s), minlength=len(frames))
+    return np.asarray(common / (frames - common))
+
+
+BONUS = 1000.0  # added to the weight of a pair that was matched in the previous frame
+# A person matched in more than 80 % of its frames is mostly tracked, in less than 20 % mostly lost.
+MOSTLY, LOST = 0.8, 0.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClearMatches:
+    """The matches of CLEAR: `found`, the matched pairs of similarity 0.5 or more."""
+
+    found: Pairs
+    switched: Ints  # frame number of each identity switch, the frame of the later match
+    resumed: Ints  # frame number of each match that follows a pause of its true id
+    share: Array  # (N,): matched frames / frames of each of the N true ids, in the order of `Pairs.true_ids[0]`.
+
+
+def clear_matches(pairs: Pairs) -> ClearMatches:
+    """Returns the matches of CLEAR; pairs: candidate pairs of any similarity above 0, no id twice in a frame."""
+    near = pairs.keep(pairs.s >= FOUND - EPS)
+    turn = turns(pairs)
+    near = near.keep(follow(near, turn))
+    frame = near.frame
+    who, by, when = near.true_ids[1][near.i], near.est_ids[1][near.j], turn[frame]
+    share = np.bincount(who, minlength=len(pairs.true_ids[0])) / np.bincount(pairs.true_ids[1])
+    order = np.argsort(who, kind="stable")
+    who, by, when, frame = who[order], by[order], when[order], frame[order]
+    same = who[1:] == who[:-1]
+    switched, resumed = same & (by[1:] != by[:-1]), same & (when[1:] > when[:-1] + 1)
+    return ClearMatches(near, frame[1:][switched], frame[1:][resumed], share)
+
+
+def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
+    """Returns the weighted MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag, with the matches kept.
+
+    A switch and a resumed match have the weight of the later match. MT, PT and ML sum up the mean weights of their
+    people's frames.
+    """
+    matches, sums = clear_matches(pairs), FrameSums(size)
+    sums.add("true", pairs.true.frame)
+    sums.add("est", pairs.est.frame)
+    sums.add("TP", matches.found.frame)
+    sums.add("similarity", matches.found.frame, matches.found.s, float(matches.found.s.sum()))
+    sums.add("IDSW", matches.switched)
+    sums.add("Frag", matches.resumed)
+    who, share = pairs.true_ids[1], matches.share
+    part = 1 / np.bincount(who)[who]
+    kinds = {"MT": share > MOSTLY, "PT": (share >= LOST) & (share <= MOSTLY), "ML": share < LOST}
+    for key, inside in kinds.items():
+        sums.add(key, pairs.true.frame, part * inside[who], float(inside.sum()))
+
+    def score(weights: Array) -> dict[str, Array]:
+        s = sums.of(weights)
+        n, m, hits = s["true"], s["est"], s["TP"]
+        quality = ratio(hits - (m - hits) - s["IDSW"], n, 0.0)
+        return {
+            "MOTA": np.where(m > 0, quality, 0.0), "MOTP": ratio(s["similarity"], hits, 0.0),
+            "TP": hits, "FN": n - hits, "FP": m - hits,
+            **{key: s[key] for key in ("IDSW", "MT", "PT", "ML", "Frag")},
+        }  # fmt: skip
+
+    return score
+
+
+def turns(pairs: Pairs) -> Ints:
+    """Returns for each frame number 0 … last how many frames up to it have rows on both sides, (last + 1,)."""
+    end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
+    true, est = (np.bincount(rows.frame, minlength=end) > 0 for rows in (pairs.true, pairs.est))
+    return np.cumsum(true & est)
+
+
+def follow(near: Pairs, turn: Ints) -> Bools:
+    """Returns which of the K pairs of `near` are matched, (K,) bool, where matches of the previous frame are kept."""
+    i, j, frame = near.i, near.j, near.frame
+    before = _before(near.links[2], turn[frame])
+    chosen = np.zeros(len(i) + 1, bool)  # the last element stands for "no previous pair"
+    chosen[:-1] = (np.bincount(i)[i] == 1) & (np.bincount(j)[j] == 1)
+    taken_i, taken_j = np.zeros(len(near.true), bool), np.zeros(len(near.est), bool)
+    rivals = np.flatnonzero(~chosen[:-1])
+    cuts = np.flatnonzero(np.diff(frame[rivals], prepend=-1, append=-1))
+    for a, b in pairwise(cuts.tolist()):
+        places = rivals[a:b]
+        kept = places[chosen[before[places]]]
+        if len(kept):
+            chosen[kept] = taken_i[i[kept]] = taken_j[j[kept]] = True
+            places = places[~(taken_i[i[places]] | taken_j[j[places]])]
+        if len(places) > 1:
+            start, end = np.searchsorted(frame, (frame[places[0]], frame[places[0]] + 1)).tolist()
+            weight = near.s[start:end] + BONUS * chosen[before[start:end]]
+            chosen[start:end] = solve_frame(near, start, end, weight)
+        else:
+            chosen[places] = True
+    return chosen[:-1]
+
+
+def _before(link: Ints, turn: Ints) -> Ints:
+    """Returns for each of K pairs the index of the pair of the same two ids one turn earlier, K if there is none."""
+    order = np.argsort(link, kind="stable")
+    follows = (np.diff(link[order]) == 0) & (np.diff(turn[order]) == 1)
+    before = np.full(len(link), len(link))
+    before[order[1:][follows]] = order[:-1][follows]
+    return before
+
+
+def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
+    """Returns the weighted IDF1, IDP, IDR and IDTP; ids are assigned anew for each draw of weights."""
+    near = pairs.s >= FOUND
+    true_id, est_id, link = pairs.links
+    common = BinSums(pairs.frame[near], link[near], len(true_id), size)
+    sums = FrameSums(size)
+    sums.add("true", pairs.true.frame)
+    sums.add("est", pairs.est.frame)
+
+    def assigned(frames: Array) -> float:
+        some = frames > 0
+        i, j, weight = true_id[some], est_id[some], frames[some]
+        return float(weight[match(np.zeros_like(i), i, j, weight)].sum())
+
+    def score(weights: Array) -> dict[str, Array]:
+        s, found = sums.of(weights), np.array([assigned(frames) for frames in common.of(weights)])
+        n, m = s["true"], s["est"]
+        return {
+            "IDF1": ratio(2 * found, n + m, 0.0), "IDP": ratio(found, m, 0.0), "IDR": ratio(found, n, 0.0),
+            "IDTP": found,
+        }  # fmt: skip
+
+    return score

@@ -1,0 +1,1 @@
+"""Stress: a tracker's scores as a scene gets harder, and where they break (`tracking.stress.sweep`)."""
