@@ -12,7 +12,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from importlib import import_module
-from itertools import pairwise
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -87,9 +87,9 @@ def catalogue() -> str:
 
 def suites() -> str:
     """Returns the table of the suites that come with flockscope."""
-    resolve, files = import_module("scenarios.loading.resolve"), import_module("scenarios.loading.suites")
+    resolve = import_module("scenarios.loading.resolve")
     rows = [
-        f"| `{name}` | {len(resolve.resolve(f'suite:{name}'))} | {files.about(files.find_suite(name))} |"
+        f"| `{name}` | {len(resolve.resolve(f'suite:{name}'))} | {resolve.read_suite(resolve.find_suite(name)).about} |"
         for name in resolve.suite_names()
     ]
     return table("suite", "entries", "what it is", rows=rows)
@@ -112,24 +112,32 @@ def parameters(config: str) -> str:
 
 
 def constants(package: str) -> str:
-    """Returns the constants of a tracker's package: numbers with an upper-case name and a text after them."""
+    """Returns the constants of a tracker's package: numbers with an upper-case name and a comment behind or above."""
     rows = []
     for path in sorted((ROOT / "tracking" / "papers" / package).glob("*.py")):
-        found = _constants(ast.parse(path.read_text(encoding="utf-8")).body)
+        source = path.read_text(encoding="utf-8")
+        found = _constants(ast.parse(source).body, source.splitlines())
         rows += [f"| {name} | {value:g} | `{path.stem}` | {_cell(meaning)} |" for name, value, meaning in found]
     return table("constant", "value", "module", "meaning", rows=rows)
 
 
-def _constants(body: list[ast.stmt]) -> Iterator[tuple[str, float, str]]:
-    for statement, after in pairwise(body):
-        match statement, after:
-            case ast.Assign([target], value), ast.Expr(ast.Constant(str(text))):
-                targets = target.elts if isinstance(target, ast.Tuple) else [target]
-                values = value.elts if isinstance(value, ast.Tuple) else [value]
-                for one, number in zip(targets, values, strict=False):
-                    match one, number:
-                        case ast.Name(name), ast.Constant(int() | float() as size) if name.isupper():
-                            yield name, size, text
+def _constants(body: list[ast.stmt], lines: list[str]) -> Iterator[tuple[str, float, str]]:
+    for statement in body:
+        if isinstance(statement, ast.Assign) and (meaning := _comment(statement.lineno - 1, lines)):
+            target, value = statement.targets[0], statement.value
+            targets = target.elts if isinstance(target, ast.Tuple) else [target]
+            values = value.elts if isinstance(value, ast.Tuple) else [value]
+            for one, number in zip(targets, values, strict=False):
+                match one, number:
+                    case ast.Name(name), ast.Constant(int() | float() as size) if name.isupper():
+                        yield name, size, meaning
+
+
+def _comment(place: int, lines: list[str]) -> str:
+    """Returns the comment behind a line, else the one in the lines above it, else ""."""
+    _, mark, behind = lines[place].partition("  # ")
+    above = list(takewhile(lambda line: line.startswith("# "), reversed(lines[:place])))
+    return behind if mark else " ".join(line[2:] for line in reversed(above))
 
 
 def method(module: str) -> str:

@@ -57,8 +57,8 @@ def _declare() -> None:
     for name, group in groups.items():
         app.add_typer(group, name=name)
     for words, (kind, target) in COMMANDS.items():
-        group, _, name = words.rpartition(" ")
-        add_command(groups.get(group, app), name, kind, _called(target))
+        family, _, name = words.rpartition(" ")
+        add_command(groups.get(family, app), name, kind, _called(target))
 
 
 def _called(target: str) -> Any:

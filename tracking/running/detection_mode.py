@@ -169,7 +169,7 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
     try:
         spec = SensorFile.model_validate(table).sensor
     except ValidationError as error:
-        raise input_error(error, table, "", {}, SensorFile) from None
+        raise input_error(error, table, "", {}) from None
     if spec.box == "visible" or spec.by_visibility or spec.occlusion_power or spec.min_visibility:
         truth = with_visibility(truth, sequence.image_size)
     hides_groups, load_people = any(hide.group is not None for hide in spec.hide), sequence.load_people

@@ -100,7 +100,9 @@ def _files(name: str) -> list[str]:
     bare = name.removeprefix("suite:")
     if bare != name or (bare in toml_files.suite_names() and bare not in toml_files.names()) or _is_suite(bare):
         path = resolve.find_suite(bare)
-        return [str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in resolve.read_suite(path).entry]
+        return [
+            str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in resolve.read_suite(path).entry
+        ]
     return [str(toml_files.find(bare).resolve())]
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.matrix_pairs import matrix_pairs
 
+from tests.matrix_pairs import matrix_pairs
 from tests.reference_trackeval import trackeval_scores
 from tracking.scoring.evaluation import people_scores
 
