@@ -45,20 +45,20 @@ from sim.workers.start import WorkerOptions
 if __name__ == "__main__":
     out, workers, kill_after = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     count = 0
-    fsync = os.fsync
+    write = atomic.write_inside
 
-    def die(descriptor):
+    def die(path, body):
         global count
         count += 1
         if count == kill_after:
             os.kill(os.getpid(), signal.SIGKILL)
-        fsync(descriptor)
+        write(path, body)
 
     def parent_dies(done, total, name):
         if kill_after == -1:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    atomic.os.fsync = die
+    atomic.write_inside = die
     scenario = Scenario.model_validate({"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}]})
     entries = [Entry("x", scenario, 0), Entry("y-1", scenario, 1)]
     generate(entries, range(3), out, workers=WorkerOptions(workers), progress=parent_dies, streams=())

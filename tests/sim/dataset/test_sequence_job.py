@@ -12,7 +12,13 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
 from sim.dataset import generate as jobs
-from sim.dataset.generate import JobOutcome, SequenceJob, is_stored, run_job, stored_manifest
+from sim.dataset.generate import (
+    JobOutcome,
+    SequenceJob,
+    is_stored,
+    run_job,
+    stored_manifest,
+)
 from sim.io.files import atomic
 from tests.fake_simulator import FakeSimulator, scenario
 
@@ -48,7 +54,7 @@ def test_of_two_who_make_it_at_once_the_first_counts(
     job: SequenceJob, made: FakeSimulator, monkeypatch: pytest.MonkeyPatch, late: bool
 ) -> None:
     """A worker that was thought dead ends first: before ours looks, or between looking and renaming."""
-    real, name = (os.rename, "rename") if late else (atomic._sync_tree, "_sync_tree")
+    real, name = (os.rename, "rename") if late else (atomic.write_inside, "write_inside")
 
     def first_the_other(*args: Any) -> None:
         monkeypatch.setattr(os if late else atomic, name, real)
@@ -62,7 +68,7 @@ def test_of_two_who_make_it_at_once_the_first_counts(
     assert made.made == [1, 1]
     whole = {k: v for k, v in others.items() if not k.startswith(atomic.PARTIAL)}
     assert content(job) == whole
-    assert len(others) == 2 * len(whole)
+    assert len(others) == (1 + late) * len(whole)
 
 
 def test_who_does_not_see_the_mark_writes_nothing(

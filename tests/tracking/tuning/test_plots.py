@@ -1,4 +1,4 @@
-"""Pictures of a search: well-formed, every trial where it belongs, round numbers beside them."""
+"""Plots of a search: well-formed, the same bytes again, every trial and candidate is drawn."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import pytest
 
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import toy_plan
-from tracking.tuning.comparison import Candidate, TrialRecord
+from tracking.tuning.comparison import Candidate, Goal, TrialRecord
 from tracking.tuning.result import TuningResult
 
-SVG = "{http://www.w3.org/2000/svg}"
 DEFAULTS = {"reach": 0.1, "skip": 0, "colour": "red", "forbidden": 0.0}
 
 
@@ -29,27 +28,35 @@ def found(tmp_path) -> TuningResult:
     )
 
 
-def dots(text: str, radius: str = "3.5") -> list[tuple[float, float, str]]:
-    """Of the picture itself: those of the key stand above it."""
-    found = [c.attrib for c in ElementTree.fromstring(text).iter(f"{SVG}circle") if c.attrib["r"] == radius]
-    return [(float(a["cx"]), float(a["cy"]), a["fill"]) for a in found if float(a["cy"]) > 50]
+def words(svg: str) -> list[str]:
+    return ["".join(e.itertext()) for e in ElementTree.fromstring(svg).iter() if e.tag.endswith("}text")]
 
 
-def test_history_shows_what_was_played(found):
-    """Six trials; one far below is a tick at the edge, as it would flatten the rest."""
-    text = found.plots()[".history.svg"]
-    shown = dots(text)
-    assert len(shown) == 5
-    assert "1 far below: ticks" in text
-    assert text.count("v8") == 1
-    heights = [y for _, y, _ in shown]
-    assert sorted(range(5), key=lambda k: -heights[k]) == [1, 0, 3, 2, 4], "higher is further up"
-    assert [x for x, _, _ in shown] == sorted(x for x, _, _ in shown)
-    steps = ElementTree.fromstring(text).find(f"{SVG}polyline").attrib["points"].split()
-    assert [float(p.split(",")[1]) for p in steps][-1] == min(heights)
+def test_plots_repeat_to_the_byte(found):
+    assert found.plots() == found.plots()
 
 
-def test_trials_given_up_are_hollow(found):
+def test_history_marks_a_trial_that_loses_by_far(found):
+    shown = words(found.plots()[".history.svg"])
+    assert {"played to the end", "pruned, estimated", "best so far", "defaults", "far worse"} <= set(shown)
     near = tuple(replace(t, values=(0.45,)) if t.pruned else t for t in found.trials)
-    shown = dots(replace(found, trials=near).plots()[".history.svg"])
-    assert [fill for _, _, fill in shown].count("#fff") == 1
+    assert "far worse" not in words(replace(found, trials=near).plots()[".history.svg"])
+
+
+def test_importance_names_each_parameter_with_its_change(found):
+    shown = words(found.plots()[".importance.svg"])
+    assert {*DEFAULTS, "0.1 → 1 m", "changed by the winner"} <= set(shown)
+
+
+def test_nothing_to_show_is_not_drawn(found):
+    assert set(replace(found, importance=dict.fromkeys(DEFAULTS, 0.0)).plots()) == {".history.svg"}
+    assert "trial" in words(replace(found, trials=found.trials[:1]).plots()[".history.svg"])
+
+
+def test_front_is_drawn_for_two_goals(found):
+    made = replace(found.plan, goals=(Goal("HOTA"), Goal("GOSPA", False)))
+    configs = [found.default, ToyConfig(skip=1), ToyConfig(skip=2)]
+    points = [(0.5, 2.0), (0.7, 3.0), (0.4, 4.0)]
+    three = [Candidate(k, config, (), p) for k, (config, p) in enumerate(zip(configs, points, strict=True))]
+    two = replace(found, plan=made, candidates=tuple(three), front=tuple(three[:2]))
+    assert {"defaults", "trial 1", "trial 2", "Pareto front", "dominated"} <= set(words(two.plots()[".front.svg"]))

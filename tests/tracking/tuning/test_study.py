@@ -115,7 +115,7 @@ def test_another_file_is_left_as_it_is(tmp_path, content):
 def test_a_lock_lives_as_long_as_its_process(tmp_path):
     path = tmp_path / "locks"
     hold = (
-        "import sys; from pathlib import Path; from tracking.tuning.journal import TrialLocks\n"
+        "import sys; from pathlib import Path; from tracking.tuning.study import TrialLocks\n"
         "locks = TrialLocks(Path(sys.argv[1])); locks.hold_trial(7); print('held', flush=True); sys.stdin.read()"
     )
     other = subprocess.Popen(

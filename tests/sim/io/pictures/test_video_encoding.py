@@ -11,7 +11,7 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from sim.io.pictures import video_files as video_encoding
-from sim.io.pictures.video_files import BT601, NARROW, write_video
+from sim.io.pictures.video_files import WRITTEN_COLOURS, WRITTEN_RANGE, write_video
 from tests.small_videos import SIZE, picture
 
 
@@ -29,10 +29,10 @@ def test_form_and_colours_are_told(tmp_path):
         context = container.streams.video[0].codec_context
         frames = list(container.decode(video=0))
         assert (context.name, context.pix_fmt, context.color_range, context.colorspace) == (
-            "h264", "yuv420p", NARROW, BT601,
+            "h264", "yuv420p", WRITTEN_RANGE, WRITTEN_COLOURS,
         )  # fmt: skip
         assert [k for k, frame in enumerate(frames) if frame.key_frame] == [0, 10, 20]
-        assert {(frame.color_range, frame.colorspace) for frame in frames} == {(NARROW, BT601)}
+        assert {(frame.color_range, frame.colorspace) for frame in frames} == {(WRITTEN_RANGE, WRITTEN_COLOURS)}
     body = path.read_bytes()
     assert body.index(b"moov") < body.index(b"mdat")
 

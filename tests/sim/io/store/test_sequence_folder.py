@@ -158,15 +158,15 @@ def test_validate_reports_strangers_files_and_leftovers(tmp_path, make_sequence)
 @pytest.mark.parametrize(("number", "kind"), [(errno.ENOSPC, WorkError), (errno.EACCES, InputError)])
 @pytest.mark.parametrize("after", [0, 3, 8])
 def test_a_failing_write_leaves_nothing(tmp_path, make_sequence, monkeypatch, number, kind, after):
-    done = []
+    done, write = [], atomic.write_inside
 
-    def fsync(descriptor):
-        done.append(descriptor)
+    def fail(path, body):
+        done.append(path)
         if len(done) > after:
             raise OSError(number, os.strerror(number))
+        write(path, body)
 
-    monkeypatch.setattr(atomic.os, "fsync", fsync)
-    monkeypatch.setattr(atomic, "_sync_folder", lambda path: None)
+    monkeypatch.setattr(atomic, "write_inside", fail)
     with pytest.raises(kind) as error:
         sequence_folder.write_sequence(tmp_path / "new" / "a", make_sequence(1), scenario=SCENARIO, seed=1)
     assert os.strerror(number) in str(error.value)
@@ -180,7 +180,7 @@ def test_a_failing_write_keeps_what_was_there(tmp_path, make_sequence, monkeypat
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(atomic.os, "fsync", full)
+    monkeypatch.setattr(atomic, "write_inside", full)
     with pytest.raises(WorkError):
         sequence_folder.write_sequence(tmp_path / "a", make_sequence(2), scenario=SCENARIO, seed=2)
     assert before == {n: (tmp_path / "a" / n).read_bytes() for n in files_of(tmp_path / "a")}
