@@ -17,6 +17,7 @@ from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
 from sim.io.files.numeric_text import read_number, read_text
+from sim.io.files.own_files import is_hidden
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.mot_table import read_table, size_doubt
@@ -73,16 +74,37 @@ def read_seqinfo(path: Path) -> SeqInfo:
     )
 
 
-def frame_rate(given: float | None, found: float | None) -> float:
+def frame_rate(given: float | None, found: float | None, path: Path | None = None) -> float:
     """Returns the frames per second: `given` (--fps), else `found` in the recording, else 25 with a warning."""
     if given is not None:
         return given
     if found is None:
         # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
+        if path is not None and (video := _video_beside(path)) is not None and video[1] != DEFAULT_FPS:
+            text = f"{path}: without a frame rate; taken at {DEFAULT_FPS:g} fps, but {video[0].name} beside it has "
+            text += f"{video[1]:g}: give --fps {video[1]:g}"
         warnings.warn(text, stacklevel=3)
         return DEFAULT_FPS
     return found
+
+
+def _video_beside(path: Path) -> tuple[Path, float] | None:
+    """Returns the video of the same name beside a text or folder, or the only one there, and its frames per second."""
+    from sim.io.formats import video
+
+    around = [path.parent, path] if path.is_dir() else [path.parent]
+    files = [p for folder in around for p in sorted(folder.iterdir()) if p.suffix.lower() in video.SUFFIXES]
+    found = [p for p in files if not is_hidden(p) and p.is_file()]
+    own = [p for p in found if p.stem == path.stem or p.parent == path] or (found if not path.is_dir() else [])
+    if len(own) != 1:
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return own[0], float(f"{video.open_video(own[0]).fps:.5g}")
+    except InputError:
+        return None
 
 
 def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
@@ -93,7 +115,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """
     info, images, background = _info(path), options.images, options.background
     person_class, box_scale = options.person_class, options.box_scale
-    rate = frame_rate(options.fps, info.fps)
+    rate = frame_rate(options.fps, info.fps, path)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found = mot_text.read_detections(det, info.length, person_class, box_scale) if is_present(det) else None
     if found is None:
@@ -186,7 +208,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     The camera is not scaled.
     """
-    rate, person_class, box_scale = frame_rate(options.fps, None), options.person_class, options.box_scale
+    rate, person_class, box_scale = frame_rate(options.fps, None, path), options.person_class, options.box_scale
     table = read_table(path, boxless=True)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")

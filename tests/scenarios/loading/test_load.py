@@ -128,7 +128,7 @@ def test_set(path: Path, setting: str, value) -> None:  # type: ignore[no-untype
         ("group.a.start=[1]", "", "[1]", "at least 2", ""), ("group.a.start=5", "", "5", "a list", ""),
         ("group.a.size={normal=[1,2], uniform=[1,2]}", "", "uniform", "exactly one of normal", ""),
         ("duration='20'", "", "'20'", "number", ""), ("duration=nan", "", "nan", "finite", ""),
-        ("duration=2020-01-01", "", "2020-01-01", "number", ""), ("camera.fps=-1", "", "-1", "greater than 0", ""),
+        ("duration=2020-01-01", "", "2020-01-01", "number", ""), ("camera.fps=-1", "", "-1", "from 0.01 to 1000", ""),
         ("event.m1.type=mrge", "", "'mrge'", "'merge'", ""), ("event.m1.goal=mete", "", "'mete'", "'meet'", ""),
         ("event.m1.when={time=1, after='x'}", "", "after", "exactly one of time", ""),
         ("event.m1.groups=['a']", "", "['a']", "at least 2", ""), ("group.a.id='1 2'", "", "'1 2'", "a name", ""),

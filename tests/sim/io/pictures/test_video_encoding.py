@@ -1,7 +1,5 @@
 """What browsers need of a video, and what they are told of it."""
 
-import errno
-import io
 from collections.abc import Callable
 from pathlib import Path
 
@@ -50,47 +48,6 @@ def test_a_picture_of_another_size_is_refused(tmp_path, shape):
         film.add(picture(0))
         with pytest.raises(InputError, match=r"picture 2: got .* px; expected 96×64 px"):
             film.add(np.zeros(shape, np.uint8))
-
-
-class Disk:
-    """A file system with `room` bytes left that writes at most `most` bytes at a time, as a full one may do."""
-
-    def __init__(self, monkeypatch, room: int, most: int = 1 << 30, error: BaseException | None = None):
-        disk, self.room = self, room
-
-        class File(io.FileIO):
-            def write(self, data):
-                part = bytes(data)[: min(most, disk.room)]
-                if data and not part:
-                    raise error or OSError(errno.ENOSPC, "No space left on device")
-                disk.room -= len(part)
-                return super().write(part)
-
-        monkeypatch.setattr(Path, "open", lambda path, mode, buffering: File(path, mode))
-
-
-def test_short_writes_are_continued(tmp_path, monkeypatch):
-    """A write may take less than it is given; what was left over was lost, and the video broken."""
-    whole = made(tmp_path / "a.mp4").read_bytes()
-    with monkeypatch.context() as patch:
-        Disk(patch, 1 << 30, most=1000)
-        made(tmp_path / "b.mp4")
-    assert (tmp_path / "b.mp4").read_bytes() == whole
-
-
-def test_a_full_disk_at_any_byte_is_an_error(tmp_path, monkeypatch):
-    size = made(tmp_path / "a.mp4").stat().st_size
-    for room in np.linspace(0, size - 1, 40).astype(int):
-        with monkeypatch.context() as patch:
-            Disk(patch, int(room))
-            with pytest.raises(OSError, match="No space left"):
-                made(tmp_path / "b.mp4")
-
-
-def test_ctrl_c_while_libav_writes_is_not_lost(tmp_path, monkeypatch):
-    Disk(monkeypatch, 1000, error=KeyboardInterrupt())
-    with pytest.raises(KeyboardInterrupt):
-        made(tmp_path / "b.mp4")
 
 
 def test_a_video_that_lacks_pictures_is_an_error(tmp_path, monkeypatch):
