@@ -237,10 +237,3 @@ def test_validate_counts_and_measures(tmp_path, make_pictured, images):
         (folder / name).unlink()
         relisted(folder, lambda m: m["files"].pop(name))
         assert [p.file for p in validate(folder)] == [str(folder / name)]
-        extra = f"img1/000013.{images}"
-        body = (folder / f"img1/000011.{images}").read_bytes()
-        facts = {"sha256": file_hash(body), "bytes": len(body)}
-        for here in (name, extra):
-            (folder / here).write_bytes(body)
-        relisted(folder, lambda m: m["files"].update({name: facts, extra: facts}))
-        assert any(p.file == str(folder / extra) for p in validate(folder))
