@@ -44,6 +44,11 @@ class Pairs:
         """Frame number of each of the K pairs, (K,)."""
         return self.true.frame[self.i]
 
+    @property
+    def size(self) -> int:
+        """Number of frame numbers, 0 … last of both sides."""
+        return 1 + max((int(rows.frame[-1]) for rows in (self.true, self.est) if len(rows)), default=0)
+
     def keep(self, mask: Bools) -> Pairs:
         """Returns the pairs where the bool mask (K,) is true."""
         return Pairs(self.true, self.est, self.i[mask], self.j[mask], self.s[mask])

@@ -48,9 +48,11 @@ from tracking.scoring.people_comparison import (
 )
 from tracking.scoring.position_errors import weighted_positions
 from tracking.scoring.rows import FrameRows
-from tracking.scoring.track_scores import hota, weighted_clear, weighted_hota, weighted_identity
+from tracking.scoring.track_scores import weighted_clear, weighted_hota, weighted_identity
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
 from tracking.scoring.weighted_sums import WeightedScores, mean_of_known, unweighted
+
+OF_PEOPLE = (weighted_hota, weighted_clear, weighted_identity)
 
 
 def without_distractors(truth: Truth, unscored: Unscored, tracked: PersonRows) -> PersonRows:
@@ -283,9 +285,8 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
 def people_scores(pairs: Pairs) -> dict[str, float]:
     """Returns the scores of HOTA, CLEAR and Identity by key. Raises ValueError if an id is twice in a frame."""
     pairs.require_unique_ids()
-    size = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
-    counted = (unweighted(scores(pairs, size), size) for scores in (weighted_clear, weighted_identity))
-    return hota(pairs) | {key: value for part in counted for key, value in part.items()}
+    found = (unweighted(scores(pairs, pairs.size), pairs.size) for scores in OF_PEOPLE)
+    return {key: value for part in found for key, value in part.items()}
 
 
 def objective_of(found: Mapping[str, float]) -> float:
@@ -317,7 +318,7 @@ def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Cal
     parts: list[WeightedScores] = []
     if compared.people is not None:
         compared.people.require_unique_ids()
-        parts += [scores(compared.people, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]
+        parts += [scores(compared.people, size) for scores in OF_PEOPLE]
         parts.append(weighted_positions(compared.sides))
     if compared.groups is not None:
         parts.append(weighted_groups_and_events(compared.sides, compared.groups, group_match))

@@ -239,7 +239,7 @@ def _kept(frame: Ints, frames: Bools) -> Ints:
 def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
     """Returns the weighted scores of groups over the frames f where frames[f] is true, by key without "group_"."""
     true, est, sums = compared.true, compared.est, _sums_of_groups(compared, frames)
-    hota = weighted_hota(compared.pairs.in_frames(frames), len(frames))
+    hota = weighted_hota(compared.pairs.in_frames(frames), len(frames), by_level=False)
     groups = bool(frames[true.rows.frame].any() or frames[est.rows.frame].any())
 
     def score(weights: Array) -> dict[str, Array]:
