@@ -93,17 +93,6 @@ def scale_of(score: Score) -> Scale:
 SCALES = tuple(map(scale_of, ALL))  # The scale of every score, in the order of the catalogue.
 
 
-def recording_differences(
-    truth: Truth, first: Callable[[Array], Array], second: Callable[[Array], Array], draws: int = DRAWS
-) -> tuple[Array, Array, Array]:
-    """Returns the differences (K,) of two runs of one recording, first - second, and their 95 % intervals."""
-
-    def difference(weights: Array) -> Array:
-        return first(weights) - second(weights)
-
-    return block_intervals(difference, truth.length, truth.fps, _presence(truth), draws)
-
-
 def recording_rankings(
     truth: Truth, scores: Sequence[Callable[[Array], Array]], draws: int = DRAWS
 ) -> dict[str, Ranking]:
@@ -118,7 +107,7 @@ def recording_rankings(
     plain: Scale = "plain"
     scales = [*SCALES * runs, *[plain] * (len(pairs) * keys)]
     levels = np.repeat([*[LEVEL] * runs, *[joint_level(len(pairs))] * len(pairs)], keys)
-    ends = block_intervals(columns, truth.length, truth.fps, _presence(truth), draws, scales, levels)
+    ends = block_intervals(columns, truth.length, truth.fps, presence_in(truth), draws, scales, levels)
     own, less = (np.array(ends).reshape(3, -1, keys)[:, part] for part in (slice(runs), slice(runs, None)))
     found = {}
     for k, (key, entry) in enumerate(CATALOGUE.items()):
@@ -131,7 +120,8 @@ def recording_rankings(
     return found
 
 
-def _presence(truth: Truth) -> float:
+def presence_in(truth: Truth) -> float:
+    """Returns the mean time for which a person is present, as a number of frames of the recording."""
     return presence(truth.id) * truth.length / max(annotated_frames(truth).count, 1)
 
 

@@ -27,7 +27,7 @@ from benchmarks.group_pda.runs import Variant, tracked, trained_once
 from benchmarks.support.chart import Panel, lines
 from benchmarks.support.in_memory import in_memory
 from benchmarks.support.options import seeds_text
-from benchmarks.support.tables import share, table
+from benchmarks.support.tables import share, table, wilson
 from scenarios.schema.scenario import CameraSpec, Scenario
 from sim.crowd.world import run as walk
 from sim.scene.camera_placement import place_camera
@@ -36,7 +36,6 @@ from sim.types import DetectionMode, Motion, Truth
 from sim.workers.pool import process_pool
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.running import tracker_registry
-from tracking.stats import wilson
 
 DIFFERENCES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.6, 2.0)  # m/s
 PACE = 1.2  # m/s

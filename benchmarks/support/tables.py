@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import sqrt
 
 import numpy as np
 
-from tracking.stats import LEVEL, wilson
+from tracking.stats import LEVEL
 
 EXACT = 1e-12  # a difference nearer to 0 is due to rounding
+NORMAL = 1.959963984540054  # a standard normal variable lies within +- NORMAL with probability LEVEL
+
+
+def wilson(hits: int, count: int) -> tuple[float, float, float]:
+    """Returns the share of `hits` out of `count` and its 95 % interval (Wilson 1927): nan, 0 and 1 if count is 0.
+
+    The interval holds all p with (share - p)² <= z² p (1 - p) / count, where z = 1.96 is the normal quantile.
+    """
+    if count == 0:
+        return float("nan"), 0.0, 1.0
+    share, z2 = hits / count, NORMAL**2 / count
+    middle = (share + z2 / 2) / (1 + z2)
+    half = sqrt(z2 * (share * (1 - share) + z2 / 4)) / (1 + z2)
+    return share, max(0.0, middle - half), min(1.0, middle + half)
 
 
 def head(columns: Sequence[str]) -> None:

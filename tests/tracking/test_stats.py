@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.stats import block_intervals, block_length, block_weights, mean_interval, paired, wilson
+from benchmarks.support.tables import wilson
+from tracking.stats import block_intervals, block_length, block_weights, mean_interval, paired
 
 
 def test_interval_of_what_does_not_vary() -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.matrix_pairs import matrix_pairs
 from tests.reference_trackeval import box_similarity
 from tracking.scoring import candidate_pairs as module
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, matrix_pairs, point_pairs
+from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.rows import FrameRows, numbered
 
 

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from tracking.scoring.candidate_pairs import Pairs, matrix_pairs, point_pairs
+from tests.matrix_pairs import matrix_pairs
+from tracking.scoring.candidate_pairs import Pairs, point_pairs
 from tracking.scoring.matching import mapped_people, match, match_as_table
 from tracking.scoring.rows import FrameRows
 

@@ -9,9 +9,10 @@ from scenarios.loading.resolve import load
 from sim.io.formats.mot_text import read_table
 from sim.sequence import simulate
 from sim.types import Tracks
+from tests.matrix_pairs import matrix_pairs
 from tests.reference_trackeval import box_similarity, trackeval_scores
 from tracking.scoring import evaluate
-from tracking.scoring.candidate_pairs import box_pairs, matrix_pairs
+from tracking.scoring.candidate_pairs import box_pairs
 from tracking.scoring.evaluation import people_scores
 from tracking.scoring.rows import FrameRows
 
