@@ -54,8 +54,8 @@ def _declare() -> None:
     for name, group in groups.items():
         app.add_typer(group, name=name)
     for words, (kind, target) in COMMANDS.items():
-        group, _, name = words.rpartition(" ")
-        add_command(groups.get(group, app), name, kind, _called(target))
+        prefix, _, name = words.rpartition(" ")
+        add_command(groups.get(prefix, app), name, kind, _called(target))
 
 
 def _called(target: str) -> Any:
