@@ -48,7 +48,9 @@ def _read() -> tuple[Score, ...]:
     """Returns the scores of catalogue.tsv, the core scores behind those of groups."""
     text = Path(__file__).with_name("catalogue.tsv").read_text(encoding="utf-8")
     rows: list[list[Any]] = [line.split("\t") for line in text.splitlines()[1:]]
-    scores = [Score(*r[:3], float(r[3]), float(r[4]), *r[5:]) for r in rows]
+    scores = []
+    for key, family, unit, low, high, better, meaning, source in rows:
+        scores.append(Score(key, family, unit, float(low), float(high), better, meaning, source))
     end = 1 + max(k for k, score in enumerate(scores) if score.family == "groups")
     return (*scores[:end], *(_core(score) for score in scores if score.family == "groups"), *scores[end:])
 
