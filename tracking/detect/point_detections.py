@@ -128,9 +128,7 @@ class ForegroundBlobs:
             size = PersonSize(context)
             self.foreground.learn_person_size(size, context.background)
             self.size = size if divide else None
-            if np.isnan(context.px_per_m):
-                self.foreground.px_per_m = size.px_per_m
-        self.scale = self.foreground.px_per_m = required(self.foreground.px_per_m)
+        self.scale = required(self.foreground.px_per_m)
 
     def follow(self, settings: BackgroundSettings) -> None:
         """Replace the settings of the background model; what the model learned and the scale stay."""

@@ -220,7 +220,7 @@ def test_windows_follow_the_image_while_nobody_was_seen():
         sample = np.stack([painted.picture([], np.random.default_rng(0))] * 12).repeat(k, 1).repeat(k, 2)
         tracker = painted.Blob()
         tracker.reset(painted.Context(painted.FPS, float("nan"), background=sample), 0)
-        scales.append(tracker.people.context.px_per_m)
+        scales.append(tracker.updater.foreground.scale)
     assert scales[1] == pytest.approx(3 * scales[0])
 
 
