@@ -117,7 +117,7 @@ class Foreground:
         return blobs.find(mask, self.least_area)
 
     def learn_person_size(self, size: PersonSize, sample: Image) -> None:
-        """Let `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8; then take its scale.
+        """Let `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8.
 
         All frames of fewer than 50 are used, else 25 to 37 evenly spaced ones. Blobs that the image's edge cuts are
         left out; `size` itself chooses those that may be one person. The model's estimate of brightness changes. Raises

@@ -27,12 +27,13 @@ import numpy as np
 from sim.truth.identity import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PointTracker, boxes_at
+from tracking.filters.particles import ParticleHealth, effective_number
 from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping.belief import default_belief
 from tracking.grouping.pair_belief import PairBelief
 from tracking.papers.joint import decentralised_filter, partition_kernels, report
 from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SPEED_PRIOR, JointConfig
-from tracking.papers.joint.decentralised_filter import Nested, ParticleHealth
+from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import (
     BIRTHS,
     PARTITIONS,
@@ -53,10 +54,9 @@ class Joint(PointTracker):
     """The tracker `joint`: people and the groups they form, from points or from pixels.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
-    particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; together (K, K):
-    probability that each pair is in one group, nan for new people; events: those of the reported groups; belief: of
-    pairs; health: how many particles the weights are worth; streams, the random numbers; shown (K, 4): boxes of the
-    people reported last, px, or None.
+    particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; events: those of
+    the reported groups; belief: of pairs; health: how many particles the weights are worth; streams, the random
+    numbers; shown (K, 4): boxes of the people reported last, px, or None.
     """
 
     config_class: ClassVar[type[JointConfig]] = JointConfig
@@ -74,10 +74,9 @@ class Joint(PointTracker):
         self.frames = max(1, round(c.lag * context.fps))
         self.nested = Nested.empty((c.particles, c.partitions), STATE * self.frames)
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
-        self.together = np.zeros((0, 0))
         self.events = ReportedEvents(context.fps)
         self.belief = PairBelief(context.fps)
-        self.health = ParticleHealth(c.particles, context.fps)
+        self.health = ParticleHealth(context.fps, "effective_particles", "effective_particles_of_a_person")
         self.streams = PersonStreams(seed)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
@@ -135,7 +134,11 @@ class Joint(PointTracker):
         if not people:
             return
         uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
-        self.health.weigh(nested, not self.config.own_weights)
+        own_weights = nested.component_weights()
+        whole = nested.rest_weights() if self.config.own_weights else nested.weights()
+        self.health.add("effective_particles", effective_number(whole) / len(whole))
+        least = min(effective_number(own_weights[:, k]) / len(whole) for k in range(people))
+        self.health.add("effective_particles_of_a_person", least)
         if not self.config.own_weights:
             chosen = decentralised_filter.joint_indices(nested, float(uniforms[-1]))
             own = np.repeat(chosen[:, None], people, axis=1)
@@ -143,20 +146,17 @@ class Joint(PointTracker):
             single, chosen = decentralised_filter.component_indices(nested, uniforms)
             own = single[chosen]
         columns = np.arange(people)
-        self.health.resample(own)
         x, z, log_q = nested.x[own, columns], nested.z[chosen], nested.log_q[chosen]
-        self.nested = Nested(x, z, log_q, np.zeros_like(nested.log_w), np.zeros_like(nested.log_rest))
+        ancestor = nested.ancestor[own, columns]
+        self.nested = Nested(x, z, log_q, np.zeros_like(nested.log_w), np.zeros_like(nested.log_rest), ancestor)
+        self.health.resampled(ancestor)
 
     def _keep(self, rows: Bools) -> None:
         if rows.all():
             return
-        n = self.nested
-        kept = np.ascontiguousarray(n.z[..., rows])
-        partition_kernels.relabel(kept)
-        self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest)
-        self.together = self.together[np.ix_(rows, rows)]
-        for each in (self.people, self.belief, self.health):
-            each.keep(rows)
+        self.nested = self.nested.kept(rows)
+        self.people.keep(rows)
+        self.belief.keep(rows)
 
     def _newcomers(self, points: Array, sizes: Array) -> None:
         c, new, frame = self.config, self.newcomers, self.streams.frame
@@ -169,23 +169,16 @@ class Joint(PointTracker):
         new.keep(~sure & (new.missed <= c.confirm_time + 1e-9))
 
     def _add(self, rows: Bools) -> None:
-        n, c, key = self.nested, self.config, self.newcomers.key[rows]
+        c, key = self.config, self.newcomers.key[rows]
         normals = self.streams.normals(BIRTHS, key, c.particles, STATE)
         if c.individuals == "measured":
             normals[:] = 0.0
         state = self.newcomers.draw(rows, normals)
         past = np.concatenate([moved(state, -k * self.dt) for k in range(self.frames)], axis=-1)
-        alone = np.zeros((*n.z.shape[:2], past.shape[1]), np.int64)
-        self.nested = Nested(
-            np.concatenate([n.x, past], axis=1), np.concatenate([n.z, alone], axis=2), n.log_q,
-            np.concatenate([n.log_w, np.zeros(past.shape[:2])], axis=1), n.log_rest,
-        )  # fmt: skip
+        self.nested = n = self.nested.joined(past)
         self.people.add(self.newcomers.size[rows], key)
-        self.belief.add(self.nested.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
-        self.health.add(past.shape[1])
-        self.together = np.pad(self.together, (0, past.shape[1]), constant_values=np.nan)
+        self.belief.add(n.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
         if c.newcomers == "validity":
-            n = self.nested
             drawn = self.streams.uniforms(PLACING, key, n.log_q.size, 2).reshape(*n.log_q.shape, len(key), 2)
             uniforms = np.ascontiguousarray(drawn[..., 0])
             place_newcomers(newest(n.x), n.z, uniforms, c.validity_rate * self.frames * self.dt, SCALES)
@@ -220,10 +213,10 @@ class Joint(PointTracker):
         weights = particle[:, None] * np.exp(n.log_q)
         now = np.empty((len(id), len(id)))
         partition_kernels.co_membership(n.z, weights, now)
-        self.together = report.kept_while_missed(now, seen, self.together)
+        together = self.people.together = report.kept_while_missed(now, seen, self.people.together)
         if c.estimate == "histogram":
             return report.histogram_partition(n.z, weights)
-        return report.binder_partition(self.together, n.z, self._before()[0])
+        return report.binder_partition(together, n.z, self._before()[0])
 
 
 def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:

@@ -26,6 +26,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PersonTable, PointTracker, boxes_at, followed_sizes
+from tracking.filters.particles import ParticleHealth
 from tracking.filters.person_streams import PersonStreams, birth_keys
 from tracking.grouping.belief import UNSEEN
 from tracking.grouping.pair_belief import PairBelief
@@ -41,7 +42,7 @@ from tracking.papers.relational.config import (
     RelationalConfig,
 )
 from tracking.papers.relational.occluders import covered_by_people, hidden_share
-from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
+from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.transition_kernels import DISTANCE, VELOCITY
 
 # What random numbers are drawn for. Relations have streams of their own, so that they change no other draw.
@@ -82,8 +83,8 @@ class Particle(PointTracker):
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
     the people; streams, the random numbers of each person; hidden (K,): probability that each person is behind a known
     pillar or wall, or behind another person; cut (K,): that the feet are behind another person; shown: the tracks
-    reported last, None before; vanished: number of frames in which all weights were 0; diversity: how many particles
-    the weights are worth.
+    reported last, None before; vanished: number of frames in which all weights were 0; health: how many particles the
+    weights are worth.
     """
 
     config_class: ClassVar[type[ParticleConfig]] = ParticleConfig
@@ -100,7 +101,7 @@ class Particle(PointTracker):
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
         self.streams = PersonStreams(seed)
         self.hidden = np.zeros(0)
-        self.vanished, self.diversity = 0, ParticleDiversity(context.fps)
+        self.vanished, self.health = 0, ParticleHealth(context.fps, "effective_particles_of_a_person")
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the people of the frame as Tracks; updates all particles.
@@ -119,13 +120,13 @@ class Particle(PointTracker):
         if detections is not None:
             one = self.particles.one_weight
             self.particles.resample(1.0 if one else RESAMPLE_SHARE, 0.0 if one else KERNEL_WIDTH, self._own_draws)
-            self.diversity.resample(self.particles)
+            self.health.resampled(self.particles.ancestor)
         return tracks
 
     @property
     def diagnostics(self) -> dict[str, float | None]:
         """What run.json tells of the particles: means of the shares of effective particles and of ancestors."""
-        return self.diversity.summary()
+        return self.health.summary()
 
     def _forecast(self) -> None:
         p, c = self.particles, self.config
@@ -158,7 +159,9 @@ class Particle(PointTracker):
         sight = sensor.Sight(self._detection_probability(), missed, self.cut, self.eye)
         said = sensor.weigh(self.particles, points, sight, self.noise, self.config)
         self.vanished += said.vanished
-        self.diversity.weigh(self.particles)
+        if self.particles.people:
+            least = float(self.particles.effective().min())
+            self.health.add("effective_particles_of_a_person", least / self.particles.count)
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
         new = said.nobody >= BIRTH_DOUBT

@@ -7,7 +7,8 @@ import pytest
 
 from sim.types import Context, Detections, Frame
 from tests.reference_relational import drawn
-from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
+from tracking.filters.particles import ParticleHealth
+from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.tracker import Relational
 
 
@@ -21,13 +22,13 @@ def two(count):
 
 def test_shares_of_effective_particles_and_of_ancestors():
     """Person 1 has a tenth of the particles left, person 2 all of them."""
-    particles, found = two(100), ParticleDiversity(2.0)
+    particles, found = two(100), ParticleHealth(2.0)
     particles.weights[:, 0] = np.repeat([0.1, 0.0], [10, 90])
-    found.weigh(particles)
+    assert particles.effective().min() / 100 == pytest.approx(0.1)
     particles.resample(0.5, 0.0, drawn(particles, np.random.default_rng(0)))
-    found.resample(particles)
-    assert found.summary() == {"effective_particles_of_a_person": pytest.approx(0.1), "distinct_ancestors": None}
-    found.resample(particles)
+    found.resampled(particles.ancestor)
+    assert found.summary() == {"distinct_ancestors": None}
+    found.resampled(particles.ancestor)
     assert found.summary()["distinct_ancestors"] == pytest.approx((0.1 + 1.0) / 2)
     assert np.array_equal(particles.ancestor, np.arange(100)[:, None] * [1, 1])
 
@@ -43,9 +44,8 @@ def test_ancestors_of_people_who_come_and_go():
 
 
 def test_nobody_has_no_diversity():
-    found = ParticleDiversity(1.0)
-    found.weigh(ParticleSet.empty(10))
-    found.resample(ParticleSet.empty(10))
+    found = ParticleHealth(1.0)
+    found.resampled(ParticleSet.empty(10).ancestor)
     assert set(found.summary().values()) == {None}
 
 
