@@ -138,19 +138,6 @@ PATIENCE = 1.5  # s for which the history of a pair is kept while one of the gro
 Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 
 
-class NearPair(NamedTuple):
-    """Two groups whose search regions (ellipses about the centroids) overlap or whose points are linked in this frame.
-
-    ids: of the two groups, the smaller first. alike: True if their velocities are alike and, from pixels, their people
-    are at most 2.5 m apart. moment: the pair in this frame: time (s), difference of centroids (m), place half-way, gap
-    between nearest people (m).
-    """
-
-    ids: Pair
-    alike: bool
-    moment: PairMoment
-
-
 class GroupMerging:
     """Merges groups that stay near with like velocities.
 
@@ -165,7 +152,7 @@ class GroupMerging:
         """Merge the groups for which R_x (near, with like velocities) has held for `merge_time`; yield their events. t:
         s."""
         able = np.flatnonzero(bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0))
-        near = {pair.ids: self._extended(pair) for pair in _near_pairs(bank, able, scaled, t)}
+        near = {ids: self._extended(ids, alike, now) for ids, alike, now in _near_pairs(bank, able, scaled, t)}
         unable = {int(g) for g in bank.id[bank.confirmed]} - set(bank.id[able].tolist())
         kept = {p: h for p, h in self.histories.items() if unable & set(p) and t - h.moments[-1].t <= PATIENCE}
         self.histories = near | kept
@@ -187,10 +174,10 @@ class GroupMerging:
             kind = "merge" if len(present) > 1 else "enter"
             yield WholeGroupEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
 
-    def _extended(self, pair: NearPair) -> PairHistory:
-        before, now = self.histories.get(pair.ids, PairHistory(np.inf, [])), pair.moment
+    def _extended(self, pair: Pair, alike: bool, now: PairMoment) -> PairHistory:
+        before = self.histories.get(pair, PairHistory(np.inf, []))
         moments = [m for m in before.moments if m.t > now.t - HISTORY_TIME]
-        return PairHistory(min(before.alike_since, now.t) if pair.alike else np.inf, [*moments, now])
+        return PairHistory(min(before.alike_since, now.t) if alike else np.inf, [*moments, now])
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
@@ -214,7 +201,12 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     )  # fmt: skip
 
 
-def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[NearPair]:
+def _near_pairs(
+    bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float
+) -> Iterator[tuple[Pair, bool, PairMoment]]:
+    """Yields the pairs of groups whose search regions overlap or whose points are linked: ids, the smaller first;
+    whether their velocities are alike and, from pixels, their people are at most 2.5 m apart; the pair in this frame.
+    """
     close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
     close |= _linked(bank, rows, scaled)
     v, cov = bank.x[rows, 2:], bank.P[rows, 2:, 2:]
@@ -226,7 +218,7 @@ def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float)
         gap = _gap(bank, rows[i], rows[j], d, scaled)
         far = scaled.from_pixels and gap > SPLIT_DISTANCE  # regions overlap, as bodies cover the ground behind them
         ids = (int(bank.id[rows[i]]), int(bank.id[rows[j]]))
-        yield NearPair(ids, bool(alike[i, j]) and not far, PairMoment(t, d, (a + b) / 2, gap))
+        yield ids, bool(alike[i, j]) and not far, PairMoment(t, d, (a + b) / 2, gap)
 
 
 def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:
