@@ -6,7 +6,7 @@ a single recording the intervals come from weights of its frames (tracking.ranki
 from 1 + the number of runs that are surely better, to the number of runs that are not surely worse. Runs that nothing
 parts share their ranks.
 
-95 % intervals of all scores of a single recording, by weights of blocks of its frames.
+Also here: 95 % intervals of all scores of a single recording, by weights of blocks of its frames.
 
 `tracking.scoring.evaluation` gives the scores under weights, `tracking.stats` draws weights and makes intervals.
 This module says how long a block is, and on which scale the error of each score is nearly symmetric.

@@ -1,9 +1,7 @@
-"""From a picture to the detections of trackers of points: each foreground blob, or piece of one, is one detection.
+"""What trackers of people from points share: detections from points or pictures, and the table of their people.
 
-The foreground comes from tracking.detect.foreground. A blob that holds several people is one detection, so people who
-share a blob are missed but for one, unless blobs are divided (tracking.detect.point_detections).
-
-Blobs that hold several people, divided into pieces of a person's size (ours).
+From a picture each foreground blob (tracking.detect.foreground) is one detection, so people who share a blob are missed
+but for one, unless blobs are divided into pieces of a person's size (ours).
 
 How many people a blob may hold follows from its area: with r times a person's area, from r + 1/4 to r + 3/4, rounded
 down, and at least one. Within these limits it is the number of tracked people whose boxes are centred in the blob. A
@@ -12,10 +10,8 @@ blob of less than LEAST of a person's area is left out.
 The pixels go to the nearest of as many centres, distances being in a person's width and height. The centres start at
 the tracked people, and in places far from these, and become the means of their pixels (k-means).
 
-Detections as places in metres, and boxes of people who are tracked as points.
-
-For trackers of points that report people with boxes: in the image a person keeps the size of the boxes that were
-measured, which follows them slowly.
+People are reported with boxes in the image: a person keeps the size of the boxes that were measured, which follows them
+slowly.
 """
 
 from __future__ import annotations

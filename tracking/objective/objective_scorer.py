@@ -4,7 +4,7 @@ The scores equal those of `tracking.scoring.evaluate`, by the same functions of 
 prepared once. Only one step is replaced: of groups that must be derived from tracks, only the members are computed
 (`derived_members`), without hulls, ids and events.
 
-Members of the groups that the default grouping derives from tracked people, without shapes, ids and events.
+Also here: members of the groups that the default grouping derives from tracked people, without shapes, ids and events.
 
 The groups are those of `tracking.grouping.grouped_tracks.derive`, in the same frames and with the same members. Links
 come from `links_of`; connected components are compiled.

@@ -2,7 +2,7 @@
 
 Input: a tracker (name, class or instance) and a sequence. Output: a `TrackingRun`.
 
-The content of run.json: which tracker ran, with which config and seed, on which detections, how fast.
+Also here: the content of run.json: which tracker ran, with which config and seed, on which detections, how fast.
 
 `run_info` makes the dict, `input_summary` makes one line of it. Speeds are in frames per second.
 """

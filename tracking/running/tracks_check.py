@@ -1,6 +1,6 @@
 """Checks the Tracks that a tracker's `step` returns: types, shapes, ids, groups, events; the first fault in words.
 
-`check_tracks` is the entry. The private functions each check one part and return a `Fault`, or None if there is none.
+`check_tracks` is the entry. The private functions each check one part and yield its faults.
 """
 
 from __future__ import annotations

@@ -3,13 +3,13 @@
 This module decides what is compared (which frames, which similarity of people, which surface for groups). It calls the
 modules of the single scores and returns their results under the keys of the catalogue.
 
-Leaves tracked people on distractors out of the scores, as MOTChallenge does.
+Tracked people on distractors are left out of the scores, as MOTChallenge does.
 
 In each frame the boxes of tracks are matched with those of all labelled rows, people or not. The matching is one to
 one, at an IoU of 0.5 or more and with the greatest total IoU. A tracked box that is matched to a distractor is left
 out. So a track is kept where it fits a person better, and a second track on one distractor counts as false.
 
-Scores of one recording as functions of weights of its frames, for intervals by resampling.
+Also here: scores of one recording as functions of weights of its frames, for intervals by resampling.
 
 Identities and matchings are those of the whole recording. The weight w(t) of frame t enters every sum: a match, a miss,
 a switch or an event of frame t counts w(t) times. So no frames are joined, and no switch or event is made by a join.

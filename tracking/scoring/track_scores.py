@@ -8,7 +8,7 @@ is the number of matches of these two ids, n_i and m_j their numbers of frames:
 
     DetA = TP / (TP + FN + FP),  AssA = mean over c of TPA(c) / (n_i + m_j - TPA(c)),  HOTA = sqrt(DetA AssA)
 
-CLEAR MOT scores (MOTA, MOTP, switches, fragments) at similarity 0.5, equal to TrackEval.
+Also here: CLEAR MOT scores (MOTA, MOTP, switches, fragments) at similarity 0.5, equal to TrackEval.
 
 Bernardin & Stiefelhagen (2008), "Evaluating Multiple Object Tracking Performance: The CLEAR MOT Metrics". Matches of
 the previous frame are kept. The previous frame is the last one with people on both sides.
@@ -18,7 +18,7 @@ total. Such kept pairs share no row and no column, and each outweighs any two ri
 every best matching (tracking.scoring.matching), and only pairs that share nothing with them remain to be matched. Pairs
 without rivals are matched whatever happened before. Frames are processed in order, but few need a solver.
 
-Identity scores IDF1, IDP, IDR and IDTP: ids are assigned one to one for the whole sequence.
+Also here: identity scores IDF1, IDP, IDR and IDTP: ids are assigned one to one for the whole sequence.
 
 Ristani et al. (2016), "Performance Measures and a Data Set for Multi-Target, Multi-Camera Tracking". IDTP is the number
 of frames that assigned true and estimated ids share with a similarity of 0.5 or more; IDP is its share in the estimated

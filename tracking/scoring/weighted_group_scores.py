@@ -1,9 +1,9 @@
 """Scores of groups, pairwise membership, events and lineage, from their matchings, under weights of the frames.
 
 `evaluate` gives every frame the weight 1, intervals by resampling give it others. A score whose denominator is 0 is
-nan. `group_scores.py`, `group_detection.py` and `events.py` match both sides and count.
+nan. `group_scores.py` and `events.py` match both sides and count.
 
-Who is in one group: pairwise membership, G-MITRE, and the groups that are right up to a tolerance T.
+Also here: who is in one group: pairwise membership, G-MITRE, and the groups that are right up to a tolerance T.
 
 Pairwise membership: F1 over pairs of people who are in one group, independent of ids and shapes. Estimated pairs are
 pairs of tracked people, mapped to true people; a pair is right if the two are in one true group.

@@ -1,6 +1,6 @@
 """`flockscope score TRUTH TRACKS TRACKS…`: a ranking of any number of runs, below the oracles of their inputs.
 
-What differs between the runs of a ranking: tracker, parameters, input, scale and further facts of run.json.
+Also here: what differs between the runs of a ranking: tracker, parameters, input, scale and further facts of run.json.
 """
 
 from __future__ import annotations

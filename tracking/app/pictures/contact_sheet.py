@@ -1,6 +1,7 @@
 """Writes a contact sheet: pictures and plans of chosen frames of a sequence, and a timeline of events, as one PNG.
 
-The pictures in a contact sheet's panels: the left view with the truth drawn over it, right view, ids, disparity.
+Also here: the pictures in a contact sheet's panels: the left view with the truth drawn over it, right view, ids,
+disparity.
 
 Ids are a picture of who is seen at each pixel; disparity is the shift in px between left and right view.
 """

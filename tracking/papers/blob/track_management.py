@@ -4,7 +4,8 @@ Track management of Gonzalez et al. (2006), secs. 4.5 and 5, by rho = sqrt|S| / 
 innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty). Association
 by cost, explained misses, the rules of reporting and the field of view are ours.
 
-The tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each track.
+Also here: the tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each
+track.
 
 The state's h, w are the axes of the person's ellipse, the longer one first as measured, and theta is the direction of h
 from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, sec. 4.1). The box of a track is the

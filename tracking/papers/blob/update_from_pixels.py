@@ -15,7 +15,7 @@ nearer blob updates, since pieces of one person have been found by templates. Wi
 gate starts a track nor pieces of a person whose union is inside (blob_pieces; the paper's frame 367). Blobs do not use
 `orphan_gate`.
 
-Blobs that are pieces of one person: several measurements of one track from pixels.
+Also here: blobs that are pieces of one person: several measurements of one track from pixels.
 
 At frame 367 of Gonzalez et al. (2006, sec. 5) a person is segmented into several pieces, which "still lie within the
 gate" and "are assigned to the existing tracker". The paper does not say how several measurements update one filter.

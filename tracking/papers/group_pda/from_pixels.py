@@ -2,7 +2,8 @@
 
 The foreground comes from tracking.detect.foreground.
 
-Colours as a further mass of `group-pda`'s associations, from pixels only (future work of sec. 6; the form is ours).
+Also here: colours as a further mass of `group-pda`'s associations, from pixels only (future work of sec. 6; the form is
+ours).
 
 The mass of an association is the relative weight of a set of points as the measurement of a group.
 

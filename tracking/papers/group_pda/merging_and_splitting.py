@@ -1,30 +1,27 @@
-"""Merging of `group-pda`'s groups (sec. 3.1, 3.2): which are near with like velocities, for how long, and their union.
+"""Merging and splitting of `group-pda`'s groups, the onsets of both, and groups that follow the same people.
 
-Input: the bank of groups after the update of a frame; output: the bank with merged groups, and the events. The relation
-R_x holds for two groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x
-are the connected components of groups under R_x; each becomes one group. Departures: the velocity test is a physical
-difference (`merge_velocity`), R_x must hold for `merge_time`, and only groups that are measured well take part
-(see `GroupMerging.step`).
+Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
+groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
+groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
+components of groups under R_x; each becomes one group. Departures: the velocity test is a physical difference
+(`merge_velocity`), R_x must hold for `merge_time`, and only groups that are measured well take part (see
+`GroupMerging.step`).
 
-Onsets of merges and splits of `group-pda`: when an event that is known now began (ours).
+Onsets (ours): when an event that is known now began. A split is known when its parts have long been apart, a merge when
+the filters' velocities have settled. Afterwards the onset can be measured better: from chords through earlier and later
+centroids, which do not lag, and from the group's earlier points, divided among the parts. Distances are metres on the
+ground (in an image depth is stretched to it). The distances and velocities of the truth's rules come from
+sim.truth.merge_split_rules.
 
-A split is known when its parts have long been apart, a merge when the filters' velocities have settled. Afterwards the
-onset can be measured better: from chords through earlier and later centroids, which do not lag, and from the group's
-earlier points, divided among the parts. Distances are metres on the ground (in an image depth is stretched to it).
-The distances and velocities of the truth's rules come from sim.truth.merge_split_rules.
+Splitting (sec. 3.3): a group without feasible associations falls apart. An association (a set of points that may be a
+group's) is feasible if its points form one group under the group constraint G_y (tracking.filters.components). `split`
+partitions the points (M, 2) of a group without feasible associations by G_y and replaces its row of the bank by one row
+per part. A group of one part stays, one of noise only is removed. `children` makes the rows of the parts. Lengths are
+in the unit of the points (m on the ground or px), times in s.
 
-Splitting of `group-pda`'s groups (sec. 3.3): a group without feasible associations falls apart.
-
-An association (a set of points that may be a group's) is feasible if its points form one group under the group
-constraint G_y (tracking.filters.components). `split` partitions the points (M, 2) of a group without feasible
-associations by G_y and replaces its row of the bank by one row per part. A group of one part stays, one of noise only
-is removed. `children` makes the rows of the parts. Lengths are in the unit of the points (m on the ground or px), times
-in s.
-
-Two groups of `group-pda` that follow the same people: the one with fewer people of its own becomes lost (ours).
-
-Groups that share points are each measured by all of them. Without this rule a group that is hidden or has left would
-follow another one for ever. For `coast_time` that is allowed, as hidden people come out again.
+Of two groups that follow the same people the one with fewer people of its own becomes lost (ours). Groups that share
+points are each measured by all of them. Without this rule a group that is hidden or has left would follow another one
+for ever. For `coast_time` that is allowed, as hidden people come out again.
 """
 
 from __future__ import annotations

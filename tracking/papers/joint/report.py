@@ -1,11 +1,9 @@
-"""Events of the reported groups, with onsets dated back by the rules of the truth (ours).
+"""What `joint` reports: the state estimate (sec. 4), groups and their ids, and events.
 
-A merge or split is reported when the partition changes. Its start is the frame in which the parts came together, or
-parted, in the past that is known then.
-
-The state estimate (sec. 4): means of the individuals, and one partition for all particles.
-
-Group ids of a tracker that finds groups of people itself, frame by frame, by the identity rule of the truth.
+The estimate has means of the individuals and one partition for all particles. Group ids follow the identity rule of the
+truth, frame by frame. Onsets of events are dated back by the rules of the truth (ours): a merge or split is reported
+when the partition changes. Its start is the frame in which the parts came together, or parted, in the past that is
+known then.
 """
 
 from __future__ import annotations

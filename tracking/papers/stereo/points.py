@@ -1,6 +1,7 @@
 """Points of `stereo` from pairs of pictures: foreground, subtraction stereo, people, features (secs. 2, 3.1).
 
-Person or not: the height and width of foreground regions from their points in space (Hoshikawa et al. 2011, sec. 2).
+Also here: person or not: the height and width of foreground regions from their points in space (Hoshikawa et al. 2011,
+sec. 2).
 
 A region is a blob of the foreground. Its height is the range of its points' world z, its width their range across the
 line of sight: that between the 10 % and 90 % quantiles over 0.8. The points' own errors widen a range. A region is too
@@ -8,7 +9,7 @@ low or too narrow if even the measured range is, and too high only if the range 
 neither its measure nor limits. Ours: a region that the edge of the image cuts is not too small for a person, and a
 region of several people may be of any width.
 
-Points of `stereo` from detections: each detection is one point in space, linked from frame to frame (ours).
+Also here: points of `stereo` from detections: each detection is one point in space, linked from frame to frame (ours).
 
 The links stand in for KLT: they give points ids and velocities. A detection continues the point whose predicted place
 is near; pairs have the least total distance. A point on the ground has z = 0; a point in the image is u, v over the

@@ -7,19 +7,18 @@ State of a group: an extended Kalman filter of position and velocity, X = (x, x'
 covariance of its points' positions and velocities; N, the number of its points.
 
     X_k+1 = Phi X_k + noise                                eqs 2, 3            space_group
-    Z = (u, v, d) = f(X) + noise                           eqs 4 to 6          measurement, sim.scene.stereo
+    Z = (u, v, d) = f(X) + noise                           eqs 4 to 6          space_group, sim.scene.stereo
     Sigma <- alpha Sigma + (1 - alpha) C_y                 eq. 7               space_group
-    (y - xi)' S^-1 (y - xi) < gamma                        eq. 8               association
-    m_total = p(y)^k_p p(lambda)^k_v, the largest wins     eqs 9 to 11         association
-    new groups: points whose spheres overlap               eq. 12              births_and_losses
-    merging by the full state, weighted by N               eqs 13 to 15        merging
+    (y - xi)' S^-1 (y - xi) < gamma                        eq. 8               space_group
+    m_total = p(y)^k_p p(lambda)^k_v, the largest wins     eqs 9 to 11         space_group
+    new groups: points whose spheres overlap               eq. 12              group_life
+    merging by the full state, weighted by N               eqs 13 to 15        group_life
 
 The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in tracking.detect. Departures:
 docs/reference/trackers/stereo.md.
 
-What `stereo` reports in a frame: the confirmed groups with their hulls, and the events.
-
-Hulls go round the expected places of a group's points (space_group.expected_places), seen from above.
+Reported are the confirmed groups, with hulls round the expected places of their points (space_group.expected_places)
+seen from above, and the events.
 """
 
 from __future__ import annotations
