@@ -122,7 +122,7 @@ def recording_rankings(
 
 def presence_in(truth: Truth) -> float:
     """Returns the mean time for which a person is present, as a number of frames of the recording."""
-    return presence(truth.id) * truth.length / max(annotated_frames(truth).count, 1)
+    return presence(truth.id) * truth.length / max(int(annotated_frames(truth).frames.sum()), 1)
 
 
 def presence(id: Ints) -> float:
