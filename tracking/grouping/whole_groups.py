@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.types import Array, Frame, GroupEvent, Groups, Ints, Plane, Tracks
+from sim.types import Array, Frame, GroupEvent, Groups, Plane, Tracks
 
 NO_ID = -1  # Id of a tentative group.
 
@@ -45,13 +45,14 @@ def reported_event(event: WholeGroupEvent, index: int, t: float, fps: float, sca
 
 
 def whole_group_tracks(
-    frame: Frame, plane: Plane, fps: float, id: Ints, pos: Array, vel: Array, cov: Array, extent: Array, size: Array,
-    hull: tuple[Array, ...], events: Iterable[WholeGroupEvent], scale: float = 1.0,
+    frame: Frame, plane: Plane, fps: float, groups: Groups, cov: Array, events: Iterable[WholeGroupEvent],
+    scale: float = 1.0,
 ) -> Tracks:  # fmt: skip
-    """Returns the Tracks of G groups without named members, and their events; scale: units of the plane per m."""
+    """Returns the Tracks of G groups of unknown members, and their events; cov (G, 4, 4) or (G, 6, 6); scale: units of
+    the plane per m."""
     told = tuple(reported_event(e, frame.index, frame.t, fps, scale) for e in events)
-    groups = Groups(id, (np.zeros(0, np.int64),) * len(id), pos, vel, extent, size, hull)
+    id = groups.id
     return Tracks(
-        frame.index, frame.t, plane, "group", id, id.copy(), pos.copy(), vel.copy(), cov, None, np.ones(len(id)),
-        groups, told,
+        frame.index, frame.t, plane, "group", id, id.copy(), groups.pos.copy(), groups.vel.copy(), cov, None,
+        np.ones(len(id)), groups, told,
     )  # fmt: skip

@@ -31,9 +31,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from sim.arrays import no_ids
 from sim.geometry.footprints import FOOTPRINT
 from sim.geometry.hull_kernels import convex_hulls
-from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
+from sim.types import Array, Bools, Context, Detections, Frame, Groups, Plane, Tracks
 from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_group_tracks
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.association import (
@@ -146,10 +147,8 @@ class GroupPda:
         corners = convex_hulls([bank.positions(r) for r in rows.tolist()])
         hulls = convex_hulls([(c[:, None] + outline).reshape(-1, 2) for c in corners])
         x, size = bank.x[rows], bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB]
-        return whole_group_tracks(
-            frame, self.plane, self.context.fps, bank.id[rows], x[:, :2], x[:, 2:], bank.P[rows], bank.extent[rows],
-            size, hulls, events,
-        )  # fmt: skip
+        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], bank.extent[rows], size, hulls)
+        return whole_group_tracks(frame, self.plane, self.context.fps, groups, bank.P[rows], events)
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
         if self.pixels is not None:

@@ -27,9 +27,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from sim.arrays import no_ids
 from sim.geometry.footprints import FOOTPRINT
 from sim.geometry.hull_kernels import convex_hulls
-from sim.types import Context, Detections, Frame, Plane, Tracks
+from sim.types import Context, Detections, Frame, Groups, Plane, Tracks
 from tracking.detect.features import SpacePoints
 from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_group_tracks
 from tracking.papers.stereo.config import StereoConfig
@@ -124,10 +125,9 @@ class Stereo:
         outline = FOOTPRINT * (1.0 if from_points else FEATURE_OUTLINE)  # what a point covers, seen from above, m
         hulls = convex_hulls([((g.members + g.pos)[:, None, :2] + outline).reshape(-1, 2) * s for g in shown])
         id, size = np.array([g.id for g in shown], np.int64), np.array([g.count for g in shown], float)
-        return whole_group_tracks(
-            frame, self.plane, self.context.fps, id, x[:, :axes], x[:, axes:], P, extent,
-            size if from_points else size * np.nan, hulls, events, s,
-        )  # fmt: skip
+        size = size if from_points else size * np.nan
+        groups = Groups(id, (no_ids(),) * len(id), x[:, :axes], x[:, axes:], extent, size, hulls)
+        return whole_group_tracks(frame, self.plane, self.context.fps, groups, P, events, s)
 
     def _points(self, frame: Frame, detections: Detections | None) -> SpacePoints:
         if self.pictures is not None:
