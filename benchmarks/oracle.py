@@ -40,9 +40,8 @@ from sim.sequence import observe
 from sim.types import Sequence as Recording
 from tracking.oracle import oracle
 from tracking.running.run import track
-from tracking.scoring.evaluation import Scorer
+from tracking.scoring.evaluation import Scorer, people_scores
 from tracking.scoring.people_comparison import Similarity
-from tracking.scoring.track_scores import hota
 
 RECORDINGS = "recordings"
 REAL = (PETS, CAMPUS, TOWN_CENTRE)
@@ -61,7 +60,7 @@ def oracle_hota(sequence: Recording, similarity: Similarity) -> float:
     assert truth is not None
     (compared,) = Scorer(truth).compare([oracle(sequence, {}, similarity).tracks], similarity, None)
     assert compared.people is not None
-    return hota(compared.people)["HOTA"]
+    return people_scores(compared.people)["HOTA"]
 
 
 def figures(entry: Entry, seed: int) -> np.ndarray:

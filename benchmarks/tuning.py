@@ -23,6 +23,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,17 +34,18 @@ from scenarios import sensor_settings
 from scenarios.loading.resolve import read_suite
 from sim.io.files.atomic import write_file
 from sim.io.source import open_source
-from sim.types import Sequence, Tracks
+from sim.types import Array, Sequence, Tracks
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
-from tracking.ranking import recording_differences
+from tracking.ranking import presence_in
 from tracking.running.run import track
 from tracking.running.tracker_registry import find
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import weighted_scorers
+from tracking.stats import block_intervals
 from tracking.tuning import tune
 from tracking.tuning.options import TuneOptions
 from tracking.tuning.search_plan import search_plan
@@ -83,6 +85,10 @@ KEYS = {
     "group-pda": ("group_F1_hull", "group_1-FP", "group_1-FN", "group_GDSR", "group_MOTP"),
     "grouping": ("pairwise_F1", "pairwise_precision", "pairwise_recall"),
 }
+
+
+def _difference(first: Callable[[Array], Array], second: Callable[[Array], Array], weights: Array) -> Array:
+    return first(weights) - second(weights)
 
 
 def search(given: argparse.Namespace) -> None:
@@ -158,7 +164,9 @@ def print_comparison(name: str, sequence: Sequence, mode: str, chosen: dict[str,
     )
     for which, scorer in scorers.items():
         whole = scorer(np.ones((1, truth.length)))[0]
-        less, low, high = recording_differences(truth, scorer, scorers["present"], DRAWS)
+        less, low, high = block_intervals(
+            partial(_difference, scorer, scorers["present"]), truth.length, truth.fps, presence_in(truth), DRAWS
+        )
         cells = []
         for k, key in zip(at, KEYS[name], strict=True):
             ends = "" if which == "present" else f" ({less[k]:+.3f} [{low[k]:+.3f}, {high[k]:+.3f}])"

@@ -6,7 +6,7 @@ a single recording the intervals come from weights of its frames (tracking.ranki
 from 1 + the number of runs that are surely better, to the number of runs that are not surely worse. Runs that nothing
 parts share their ranks.
 
-95 % intervals of all scores of a single recording, by weights of blocks of its frames.
+Also here: 95 % intervals of all scores of a single recording, by weights of blocks of its frames.
 
 `tracking.scoring.evaluation` gives the scores under weights, `tracking.stats` draws weights and makes intervals.
 This module says how long a block is, and on which scale the error of each score is nearly symmetric.
@@ -93,17 +93,6 @@ def scale_of(score: Score) -> Scale:
 SCALES = tuple(map(scale_of, ALL))  # The scale of every score, in the order of the catalogue.
 
 
-def recording_differences(
-    truth: Truth, first: Callable[[Array], Array], second: Callable[[Array], Array], draws: int = DRAWS
-) -> tuple[Array, Array, Array]:
-    """Returns the differences (K,) of two runs of one recording, first - second, and their 95 % intervals."""
-
-    def difference(weights: Array) -> Array:
-        return first(weights) - second(weights)
-
-    return block_intervals(difference, truth.length, truth.fps, _presence(truth), draws)
-
-
 def recording_rankings(
     truth: Truth, scores: Sequence[Callable[[Array], Array]], draws: int = DRAWS
 ) -> dict[str, Ranking]:
@@ -118,7 +107,7 @@ def recording_rankings(
     plain: Scale = "plain"
     scales = [*SCALES * runs, *[plain] * (len(pairs) * keys)]
     levels = np.repeat([*[LEVEL] * runs, *[joint_level(len(pairs))] * len(pairs)], keys)
-    ends = block_intervals(columns, truth.length, truth.fps, _presence(truth), draws, scales, levels)
+    ends = block_intervals(columns, truth.length, truth.fps, presence_in(truth), draws, scales, levels)
     own, less = (np.array(ends).reshape(3, -1, keys)[:, part] for part in (slice(runs), slice(runs, None)))
     found = {}
     for k, (key, entry) in enumerate(CATALOGUE.items()):
@@ -131,8 +120,9 @@ def recording_rankings(
     return found
 
 
-def _presence(truth: Truth) -> float:
-    return presence(truth.id) * truth.length / max(annotated_frames(truth).count, 1)
+def presence_in(truth: Truth) -> float:
+    """Returns the mean time for which a person is present, as a number of frames of the recording."""
+    return presence(truth.id) * truth.length / max(int(annotated_frames(truth).frames.sum()), 1)
 
 
 def presence(id: Ints) -> float:

@@ -17,7 +17,6 @@ from sim.types import Array
 
 DRAWS = 2000  # Draws of weights, or bootstrap samples.
 LEVEL = 0.95  # Confidence level of all intervals.
-NORMAL = 1.959963984540054  # A standard normal variable lies within +- NORMAL with probability LEVEL.
 FEWEST = 6  # A difference over fewer sequences is never called sure.
 SHORTEST_BLOCK = 1.0  # s: least length of a block of frames.
 BLOCKS = (5, 20)  # Least and greatest number of blocks of a recording.
@@ -56,19 +55,6 @@ def joint_level(count: int) -> float:
 def paired(first: Array, second: Array) -> tuple[Array, Array, Array]:
     """Returns mean, low end and high end, (K,) each, of second - first over the same S sequences; both (S, K)."""
     return mean_interval(second - first)
-
-
-def wilson(hits: int, count: int) -> tuple[float, float, float]:
-    """Returns the share of `hits` out of `count` and its 95 % interval (Wilson 1927): nan, 0 and 1 if count is 0.
-
-    The interval holds all p with (share - p)² <= z² p (1 - p) / count, where z = 1.96 is the normal quantile.
-    """
-    if count == 0:
-        return float("nan"), 0.0, 1.0
-    share, z2 = hits / count, NORMAL**2 / count
-    middle = (share + z2 / 2) / (1 + z2)
-    half = sqrt(z2 * (share * (1 - share) + z2 / 4)) / (1 + z2)
-    return share, max(0.0, middle - half), min(1.0, middle + half)
 
 
 def block_intervals(

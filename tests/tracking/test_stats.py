@@ -9,6 +9,11 @@ from benchmarks.support.tables import wilson
 from tracking.stats import block_intervals, block_length, mean_interval, paired
 
 
+def test_interval_of_what_does_not_vary() -> None:
+    mean, low, high = mean_interval(np.tile([0.25, -3.0], (5, 1)))
+    assert mean.tolist() == low.tolist() == high.tolist() == [0.25, -3.0]
+
+
 def test_interval_of_two_numbers_is_students() -> None:
     """12.706 is the quantile for one degree of freedom."""
     mean, low, high = mean_interval(np.array([[0.0], [1.0]]))

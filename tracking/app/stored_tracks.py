@@ -72,7 +72,7 @@ def find_tracks(path: Path) -> list[StoredTracks]:
     """Returns all stored tracks at or below a path, not read yet, in the order of their paths."""
     if not path.exists():
         raise InputError(file=path, got="no such file or folder", expected=EXPECTED, remedy="check the path")
-    refuse_other_things(path, EXPECTED)
+    _refuse_other_things(path)
     folder = run_folder(path)
     info = read_run(folder) if folder is not None and path.name in WHOLE else {}
     found = [StoredTracks(None, path, info)] if path.is_file() else list(_below(path, DEPTH))
@@ -162,16 +162,15 @@ def _method_words(stored: StoredTracks, other: StoredTracks) -> str:
     return f"{tracker} ({', '.join(changed)})" if changed else tracker
 
 
-def refuse_other_things(path: Path, expected: str) -> None:
-    """Raises InputError if the path is a generated sequence or dataset, or a file that cannot hold tracks."""
+def _refuse_other_things(path: Path) -> None:
     if path.is_file() and path.suffix.lower() in OTHER_FILES:
         raise InputError(
-            file=path, got=f"a {path.suffix.lower()} file, no tracks", expected=expected, remedy="check the path"
+            file=path, got=f"a {path.suffix.lower()} file, no tracks", expected=EXPECTED, remedy="check the path"
         )
     folders = (folder for pattern in DATASET for folder in ([path] if not pattern else path.glob(pattern)))
     if path.is_dir() and any(is_sequence(folder) for folder in folders):
         raise InputError(
-            file=path, got="a generated dataset, no tracks", expected=expected,
+            file=path, got="a generated dataset, no tracks", expected=EXPECTED,
             remedy="give the --out of `flockscope track`",
         )  # fmt: skip
 

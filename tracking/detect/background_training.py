@@ -12,7 +12,7 @@ distortion, its colour's distance from the line through E in sigmas.
 3. Thresholds: quantiles of the normalised distortions at the detection rate (Gonzalez et al. 2006, Fig. 2), over
    pixels that were background in all frames of the sample; over all inliers if these pixels are too few.
 
-The brightness of a frame relative to the background model: one factor per colour channel (ours).
+Also here: the brightness of a frame relative to the background model: one factor per colour channel (ours).
 
 The factor of a channel is the median of I / E over background pixels, I the frame's grey level and E the model's
 mean grey level. It has no unit and is 1 for a frame as bright as the model.

@@ -32,6 +32,8 @@ BORDER = 1  # px: new corners keep away from the edge of their region by so much
 SAMPLE = 1  # px: a feature's disparity is the median in a square of 2 SAMPLE + 1 px.
 # A disparity below so many standard deviations of its error is not used: the error of its depth is not normal.
 FAINT = 4.0
+BACK_CHECK = 0.7  # px: a feature ends if u or v is so far off after following it forwards and backwards (ours).
+MOST_FEATURES = 400  # Largest number of features.
 CENTRE = np.float32(0.5)  # px: OpenCV counts places from the centre of the first pixel, the camera from its corner.
 
 
@@ -68,22 +70,6 @@ class SpacePoints:
         return cls(no_ids(), two, three, two, three, np.zeros(0))
 
 
-@dataclass(frozen=True)
-class FeatureRules:
-    """How features are found and measured.
-
-    window_time: s that a feature must have lived; spacing: least distance of a new feature from others, px; back:
-    largest error in u or v after following it forwards and backwards, px; deviations (3,): standard deviations of u, v
-    and d, px; most: largest number of features.
-    """
-
-    window_time: float
-    spacing: float
-    back: float
-    deviations: tuple[float, float, float]
-    most: int
-
-
 class Features:
     """The features of a left camera, followed from frame to frame.
 
@@ -98,19 +84,26 @@ class Features:
         self.id, self.next_id = no_ids(), 1
         self.uv, self.world, self.age = np.zeros((0, 2), np.float32), np.zeros((0, 2, 3)), np.zeros(0, np.int64)
 
-    def step(self, grey: Image, mask: Bools, disparity: Disparities, rules: FeatureRules) -> SpacePoints:
-        """Follow the features into the next picture, find new ones, and return those that lived through the window."""
-        self._resize(max(round(rules.window_time * self.fps), 1) + 1)
+    def step(
+        self, grey: Image, mask: Bools, disparity: Disparities, window_time: float, spacing: float,
+        deviations: tuple[float, float, float],
+    ) -> SpacePoints:  # fmt: skip
+        """Follow the features into the next picture, find new ones, and return those that lived through the window.
+
+        window_time: s that a feature must have lived; spacing: least distance of a new feature from others, px;
+        deviations (3,): standard deviations of u, v and d, px.
+        """
+        self._resize(max(round(window_time * self.fps), 1) + 1)
         if self.grey is not None and len(self.uv):
-            self._follow(self.grey, grey, mask, rules)
-        self._thin(rules.spacing)
-        self._find(grey, mask, rules)
+            self._follow(self.grey, grey, mask)
+        self._thin(spacing)
+        self._find(grey, mask, spacing)
         self.grey, self.age = grey, self.age + 1
         d = sampled(disparity, self.uv, SAMPLE)
-        d[d < FAINT * rules.deviations[2]] = np.nan
+        d[d < FAINT * deviations[2]] = np.nan
         here = back_project(self.camera, np.column_stack([self.uv, d]))
         self.world = np.concatenate([self.world[:, 1:], here[:, None]], 1)
-        return self._measured(rules)
+        return self._measured(np.square(deviations))
 
     def forget(self) -> None:
         """Drop all features, after a lost picture for instance; returns nothing."""
@@ -129,7 +122,7 @@ class Features:
         self.id, self.uv = self.id[kept], self.uv[kept]
         self.world, self.age = self.world[kept], self.age[kept]
 
-    def _follow(self, before: Image, now: Image, mask: Bools, rules: FeatureRules) -> None:
+    def _follow(self, before: Image, now: Image, mask: Bools) -> None:
         start: Any = (self.uv - CENTRE)[:, None]
         follow: Any = partial(cv2.calcOpticalFlowPyrLK, winSize=WINDOW, maxLevel=LEVELS)
         found, there, _ = follow(before, now, start, None)
@@ -138,7 +131,7 @@ class Features:
         self.uv = found[:, 0] + CENTRE
         high, wide = mask.shape
         inside = (self.uv >= 0).all(1) & (self.uv < [wide, high]).all(1)
-        good = inside & (there[:, 0] == 1) & (back[:, 0] == 1) & (off <= rules.back)
+        good = inside & (there[:, 0] == 1) & (back[:, 0] == 1) & (off <= BACK_CHECK)
         cell = np.floor(np.where(good[:, None], self.uv, 0)).astype(int)
         self._keep(good & mask[cell[:, 1], cell[:, 0]])
 
@@ -150,8 +143,8 @@ class Features:
         kept[order[first]] = True
         self._keep(kept)
 
-    def _find(self, grey: Image, mask: Bools, rules: FeatureRules) -> None:
-        room = rules.most - len(self.uv)
+    def _find(self, grey: Image, mask: Bools, spacing: float) -> None:
+        room = MOST_FEATURES - len(self.uv)
         if room <= 0:
             return
         size = 2 * BORDER + 1
@@ -159,11 +152,11 @@ class Features:
         taken = np.ones(mask.shape, np.uint8)
         cell = np.floor(self.uv).astype(int)
         taken[cell[:, 1], cell[:, 0]] = 0
-        reach = 2 * int(np.ceil(rules.spacing)) - 1
+        reach = 2 * int(np.ceil(spacing)) - 1
         free = free & cv2.erode(taken, np.ones((reach, reach), np.uint8))
         if not free.any():
             return
-        found = cv2.goodFeaturesToTrack(grey, room, QUALITY, max(rules.spacing, 1.0), mask=free, blockSize=3)
+        found = cv2.goodFeaturesToTrack(grey, room, QUALITY, max(spacing, 1.0), mask=free, blockSize=3)
         new = np.zeros((0, 2), np.float32) if found is None else found[:, 0] + CENTRE
         self.id = np.concatenate([self.id, np.arange(self.next_id, self.next_id + len(new))])
         self.next_id += len(new)
@@ -171,13 +164,13 @@ class Features:
         self.world = np.concatenate([self.world, np.full((len(new), *self.world.shape[1:]), np.nan)])
         self.age = np.concatenate([self.age, np.zeros(len(new), np.int64)])
 
-    def _measured(self, rules: FeatureRules) -> SpacePoints:
+    def _measured(self, var: Array) -> SpacePoints:
         frames = self.world.shape[1]
         known = np.isfinite(self.world[..., 0])
         old = (self.age >= frames) & known[:, -1] & (known.sum(1) > frames / 2)
         world, known = self.world[old], known[old]
         pos = world[:, -1]
-        cov = point_covariances(self.camera, pos, np.square(rules.deviations))
+        cov = point_covariances(self.camera, pos, var)
         vel, spread, lag = slopes(world, known, np.arange(frames) / self.fps)
         return SpacePoints(self.id[old], pos, cov, vel, cov / spread[:, None, None], lag)
 

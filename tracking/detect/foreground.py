@@ -47,9 +47,8 @@ class Segmented:
 class Foreground:
     """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
 
-    State: model, the background model; px_per_m, the scale of the image, nan or 0 while it is unknown (first the
-    context's; the tracker may set it later). Raises InputError for an unusable background sample, AssertionError for
-    none.
+    State: model, the background model; px_per_m, the scale of the image: the context's, or, if that is nan, learned
+    from lone people, nan until then. Raises InputError for an unusable background sample, AssertionError for none.
     """
 
     def __init__(self, context: Context, settings: BackgroundSettings) -> None:
@@ -58,7 +57,7 @@ class Foreground:
         Raises InputError if the sample has a wrong shape or dtype, fewer than 10 frames or shows too little background.
         """
         assert context.background is not None
-        self.px_per_m = context.px_per_m
+        self.px_per_m, self._learns = context.px_per_m, bool(np.isnan(context.px_per_m))
         self.model = Background(context.background, context.fps, settings)
         self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.adaptive else None
 
@@ -127,6 +126,12 @@ class Foreground:
         for image in sample[:: max(len(sample) // SAMPLED, 1)]:
             found = self.person_blobs(self.segment(image).mask)
             size.learn(found.box, found.ellipse, ~found.cut())
+        self.take_scale(size)
+
+    def take_scale(self, size: PersonSize) -> None:
+        """Take the scale that `size` has learned, if the context has none."""
+        if self._learns:
+            self.px_per_m = size.px_per_m
 
 
 def convex_areas(shape: tuple[int, ...], outlines: list[Array]) -> Bools:

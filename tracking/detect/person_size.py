@@ -10,7 +10,7 @@ Three sources:
   outliers. Votes prefer the slope SLOPE, as blobs at one row contain no information about it.
 In all three cases height and width are then multiplied by factors on which most lone blobs agree.
 
-The person whom trackers expect before they have seen anybody: a prior in metres for any camera (ours).
+Also here: the person whom trackers expect before they have seen anybody: a prior in metres for any camera (ours).
 
 Its width and depth are the trackers' own belief about real people, not the body that the simulator draws. Its height is
 PERSON_HEIGHT, which defines the scale of an image. A real person with arms is some

@@ -1,9 +1,7 @@
-"""From a picture to the detections of trackers of points: each foreground blob, or piece of one, is one detection.
+"""What trackers of people from points share: detections from points or pictures, and the table of their people.
 
-The foreground comes from tracking.detect.foreground. A blob that holds several people is one detection, so people who
-share a blob are missed but for one, unless blobs are divided (tracking.detect.point_detections).
-
-Blobs that hold several people, divided into pieces of a person's size (ours).
+From a picture each foreground blob (tracking.detect.foreground) is one detection, so people who share a blob are missed
+but for one, unless blobs are divided into pieces of a person's size (ours).
 
 How many people a blob may hold follows from its area: with r times a person's area, from r + 1/4 to r + 3/4, rounded
 down, and at least one. Within these limits it is the number of tracked people whose boxes are centred in the blob. A
@@ -12,23 +10,24 @@ blob of less than LEAST of a person's area is left out.
 The pixels go to the nearest of as many centres, distances being in a person's width and height. The centres start at
 the tracked people, and in places far from these, and become the means of their pixels (k-means).
 
-Detections as places in metres, and boxes of people who are tracked as points.
-
-For trackers of points that report people with boxes: in the image a person keeps the size of the boxes that were
-measured, which follows them slowly.
+People are reported with boxes in the image: a person keeps the size of the boxes that were measured, which follows them
+slowly.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 
-from sim.types import Array, Context, Detections, Frame
+from sim.types import Array, Bools, Context, Detections, Frame, Plane
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground, convex_areas
 from tracking.detect.person_size import PersonSize
+from tracking.filters.person_streams import Keys
 from tracking.running.image_scale import required
 
 FILLED = math.pi / 4  # Share of a person's box that the person fills.
@@ -85,18 +84,18 @@ def _nearest(points: Array, centres: Array) -> tuple[Array, Array]:
 BOX_TIME = 0.5  # Time constant with which the size of a person's box follows measured boxes, s.
 
 
-def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array | None]:
-    """Returns places (M, 2), m, and sizes of boxes (M, 2): width, height, px, None on the ground or without boxes."""
+def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array]:
+    """Returns places (M, 2), m, and width and height of the boxes (M, 2), px, nan on the ground or without boxes."""
     order = np.lexsort(detections.pos[:, 1::-1].T)
-    sizes = None
-    if detections.plane == "image" and detections.box is not None:
-        sizes = detections.box[order, 2:]
+    box = detections.box if detections.plane == "image" else None
+    sizes = np.full((len(order), 2), np.nan) if box is None else box[order, 2:]
     return np.ascontiguousarray(detections.pos[order, :2] / unit), sizes
 
 
 def followed_sizes(old: Array, new: Array, dt: Array | float) -> Array:
-    """Returns the sizes of boxes (N, 2), px, after boxes of sizes `new` (N, 2) were measured."""
-    return np.asarray(np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt / BOX_TIME)))
+    """Returns the sizes of boxes (N, 2), px, after boxes of sizes `new` (N, 2), nan if unknown, were measured."""
+    followed = np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt / BOX_TIME))
+    return np.where(np.isnan(new), old, followed)
 
 
 def boxes_at(pos: Array, size: Array) -> Array | None:
@@ -125,9 +124,7 @@ class ForegroundBlobs:
             size = PersonSize(context)
             self.foreground.learn_person_size(size, context.background)
             self.size = size if divide else None
-            if np.isnan(context.px_per_m):
-                self.foreground.px_per_m = size.px_per_m
-        self.scale = self.foreground.px_per_m = required(self.foreground.px_per_m)
+        self.scale = required(self.foreground.px_per_m)
 
     def follow(self, settings: BackgroundSettings) -> None:
         """Replace the settings of the background model; what the model learned and the scale stay."""
@@ -148,3 +145,79 @@ class ForegroundBlobs:
         box = found.box if self.size is None else divided(found, people, self.size)
         centre = box[:, :2] + box[:, 2:] / 2
         return Detections(frame.index, frame.t, "image", centre, None, box, np.ones(len(box)))
+
+
+class PointTracker:
+    """What trackers of people from points, or from pixels through blobs, share.
+
+    State: config, which may be replaced between two frames; context; pixels: detector of blobs, None from points;
+    plane, "ground" or "image". All but config exist after `begin` only.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
+    config: Any
+
+    def begin(self, context: Context, divide: bool) -> None:
+        """Starts a sequence: from pixels if the context has a background sample, else from points.
+
+        divide: blobs of several people are divided. Until the first detections `plane` is "image" from pixels, or with
+        a scale but no camera, else "ground". If pixels are tracked, raises InputError if the scale px_per_m is zero or
+        negative, or neither known nor learned from the sample, or if the sample cannot be used."""
+        self.pixels = None if context.background is None else ForegroundBlobs(self.config, context, divide)
+        self.context = context if self.pixels is None else context.replace(px_per_m=self.pixels.scale)
+        flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
+        self.plane: Plane = "image" if flat else "ground"
+        self.dt = 1.0 / context.fps
+
+    def detected(self, frame: Frame, detections: Detections | None, boxes: Array | None) -> Detections | None:
+        """Returns the detections, or from pixels the blobs; boxes (K, 4): of the people reported last."""
+        if self.pixels is None:
+            return detections
+        if self.pixels.settings is not self.config:
+            self.pixels.follow(self.config)
+        return self.pixels.detections(frame, np.zeros((0, 4)) if boxes is None else boxes)
+
+    def points(self, detections: Detections) -> tuple[Array, Array]:
+        """Returns places (M, 2), m, and sizes of boxes (M, 2), px, nan if unknown; notes the plane of detections."""
+        self.plane = "image" if detections.plane == "image" else "ground"
+        return ordered_points(detections, self.unit)
+
+    @property
+    def px_per_m(self) -> float:
+        """Scale of the image in px per metre: the context's, or, from pixels, learned from its background sample; nan
+        if unknown."""
+        return self.context.px_per_m
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a measured position, per axis, m."""
+        return float(self.config.point_noise if self.pixels is None else self.config.pixel_noise)
+
+    @property
+    def unit(self) -> float:
+        """Length of a metre in the unit of the points: 1 on the ground, px per m in the image."""
+        return required(self.context.px_per_m) if self.plane == "image" else 1.0
+
+
+@dataclass
+class PersonTable:
+    """The people of such a tracker, one row each; a subclass adds columns.
+
+    missed (K,): s since the last measurement. size (K, 2): width, height of the box, px, nan if unknown. key (K,): of
+    the random streams, made of the first measurement."""
+
+    missed: Array = field(default_factory=lambda: np.zeros(0))
+    size: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
+
+    def keep(self, rows: Bools) -> None:
+        """Remove all people but those where `rows` (K,) is True."""
+        for name, column in vars(self).items():
+            if isinstance(column, np.ndarray):
+                setattr(self, name, column[:, rows] if column.ndim == 3 else column[rows])
+
+    def extend(self, **columns: Any) -> None:
+        """Add people who were measured just now, with their values in all columns but `missed`."""
+        for name, new in {"missed": np.zeros(len(columns["key"])), **columns}.items():
+            old = getattr(self, name)
+            setattr(self, name, np.concatenate([old, new], axis=1 if old.ndim == 3 else 0))

@@ -10,15 +10,12 @@ Ours: the background is subtracted from the left picture only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.types import Array, Bools, Image
 from tracking.detect.blobs_kernels import runs
-from tracking.detect.subtraction_stereo_kernels import STEPS, block_match, filtered_pair, left_right, reach
+from tracking.detect.subtraction_stereo_kernels import block_match, filtered_pair, left_right, reach
 
 MULTIPLE = 16  # Numbers of disparities are multiples of it, as those of OpenCV's matcher.
 LEAST_BLOCK = 5  # px: least width of the compared block that OpenCV allows.
@@ -26,18 +23,6 @@ LEAST_UNIQUE = 5  # Percent by which the best match must be better than the seco
 SHORT_BLOCK = 22  # px: widest block whose sums of differences, and 5 % more, are below 32768.
 
 Disparities = NDArray[np.float32]
-
-
-@dataclass(frozen=True, eq=False)
-class Matched:
-    """The disparities of one pair, H x W px.
-
-    disparity (H, W) float32: px, nan where nothing was matched. evaluated: number of row sums of differences, at all
-    disparities, that were needed.
-    """
-
-    disparity: Disparities
-    evaluated: int
 
 
 class SubtractionStereo:
@@ -52,8 +37,9 @@ class SubtractionStereo:
         self.disparities = MULTIPLE * int(np.ceil((largest + 1) / MULTIPLE))
         self.block = max(block, LEAST_BLOCK)
 
-    def match(self, left: Image, right: Image, mask: Bools) -> Matched:
-        """Returns the disparities inside `mask` (H, W), the foreground of the left picture."""
+    def match(self, left: Image, right: Image, mask: Bools) -> Disparities:
+        """Returns the disparities (H, W), px, inside `mask` (H, W), the foreground of the left picture; nan without a
+        match."""
         half, D = self.block // 2, self.disparities
         found = np.full(mask.shape, np.nan, np.float32)
         high, wide = mask.shape
@@ -68,16 +54,7 @@ class SubtractionStereo:
         cost = np.empty(mask.shape, np.int32)
         block_match(own, needed, half, LEAST_UNIQUE, filters, sad, found, cost)
         left_right(own, found, cost)
-        return Matched(found, D * int((needed[:, 2] - needed[:, 1]).sum()))
-
-    def dense(self, left: Image, right: Image) -> Disparities:
-        """Returns the disparities of the whole pictures (H, W), px, nan where there is none, by OpenCV's matcher."""
-        matcher = cv2.StereoBM.create(self.disparities, self.block)
-        matcher.setUniquenessRatio(LEAST_UNIQUE)
-        matcher.setTextureThreshold(0)
-        matcher.setDisp12MaxDiff(1)
-        raw = matcher.compute(left, right)
-        return np.where(raw > 0, raw.astype(np.float32) / STEPS, np.float32(np.nan))
+        return found
 
 
 def sampled(disparity: Disparities, uv: Array | Disparities, half: int) -> Array:

@@ -2,7 +2,7 @@
 
 The canvas is a plan in m, or the image plane in px where only boxes are labelled.
 
-The rectangle of the ground that a plan shows: all people and objects of the scene, with a margin.
+Also here: the rectangle of the ground that a plan shows: all people and objects of the scene, with a margin.
 """
 
 from __future__ import annotations

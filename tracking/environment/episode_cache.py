@@ -3,7 +3,8 @@ once.
 
 The memory is bounded by the bytes of the arrays that they hold.
 
-The sequences that episodes are played on: scenarios with seeds, stored or real recordings, sequences in memory.
+Also here: the sequences that episodes are played on: scenarios with seeds, stored or real recordings, sequences in
+memory.
 
 `sources` turns the names, files or sequences that a user gives into `Source`s; `Source.open` makes or reads one.
 """

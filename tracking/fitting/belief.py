@@ -3,7 +3,7 @@
 Every scene weighs the same. The penalty is on the squared log-odds, on their differences between the situations
 (walking or standing, among few or many), and on the curvature of the tables.
 
-How well beliefs tell who belongs together: log loss, calibration error and F1 of rows of pairs.
+Also here: how well beliefs tell who belongs together: log loss, calibration error and F1 of rows of pairs.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ people who walk and who stand, among few others and among many, mixed by the pai
 `flockscope fit grouping` fits the tables to simulated scenes and writes them as a text file; belief.toml beside this
 module is the default.
 
-How probable it is that two tracked people belong together, for every pair and frame: a table of pairs.
+Also here: how probable it is that two tracked people belong together, for every pair and frame: a table of pairs.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 `grouping_of` reads what a user names: "rule", "belief", or a TOML file of either.
 
-Consistent groups from beliefs of pairs, by average linkage with a memory, and the links these groups stand for.
+Also here: consistent groups from beliefs of pairs, by average linkage with a memory, and the links these groups stand
+for.
 
 In each step the two groups (or people) with the highest mean log-odds over their pairs are joined, as long as it is
 above 0. So a chain of strangers is no group, and a group whose ends are far apart is one.

@@ -175,11 +175,11 @@ def _portions(step: Ints) -> Iterator[slice]:
 
 
 class ExponentialMeans:
-    """Means of the values of pairs over their rows so far, weighted by exp(-age / time), for each of T times."""
+    """Means of the values of pairs over their rows so far, weighted by exp(-age / time), for each of the T `TIMES`."""
 
-    def __init__(self, pairs: int, values: int, seconds: float, times: tuple[float, ...] = TIMES) -> None:
-        self.seconds, self.times = seconds, np.array(times)
-        self.total = np.zeros((pairs, values, len(times)))
+    def __init__(self, pairs: int, values: int, seconds: float) -> None:
+        self.seconds, self.times = seconds, np.array(TIMES)
+        self.total = np.zeros((pairs, values, len(TIMES)))
         self.weight, self.last = np.zeros_like(self.total), np.zeros(pairs, np.int64)
 
     def add(self, step: Ints, pair: Ints, values: Array) -> Array:

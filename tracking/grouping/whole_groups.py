@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from sim.types import GroupEvent
+import numpy as np
+
+from sim.types import Array, Frame, GroupEvent, Groups, Plane, Tracks
 
 NO_ID = -1  # Id of a tentative group.
 
@@ -39,3 +42,17 @@ def reported_event(event: WholeGroupEvent, index: int, t: float, fps: float, sca
     start = min(max(index - round((t - event.onset) * fps), 1), index)
     x, y = event.pos
     return GroupEvent(event.kind, start, index, index, event.before, event.after, (), (x * scale, y * scale))
+
+
+def whole_group_tracks(
+    frame: Frame, plane: Plane, fps: float, groups: Groups, cov: Array, events: Iterable[WholeGroupEvent],
+    scale: float = 1.0,
+) -> Tracks:  # fmt: skip
+    """Returns the Tracks of G groups of unknown members, and their events; cov (G, 4, 4) or (G, 6, 6); scale: units of
+    the plane per m."""
+    told = tuple(reported_event(e, frame.index, frame.t, fps, scale) for e in events)
+    id = groups.id
+    return Tracks(
+        frame.index, frame.t, plane, "group", id, id.copy(), groups.pos.copy(), groups.vel.copy(), cov, None,
+        np.ones(len(id)), groups, told,
+    )  # fmt: skip

@@ -4,7 +4,7 @@ The scores equal those of `tracking.scoring.evaluate`, by the same functions of 
 prepared once. Only one step is replaced: of groups that must be derived from tracks, only the members are computed
 (`derived_members`), without hulls, ids and events.
 
-Members of the groups that the default grouping derives from tracked people, without shapes, ids and events.
+Also here: members of the groups that the default grouping derives from tracked people, without shapes, ids and events.
 
 The groups are those of `tracking.grouping.grouped_tracks.derive`, in the same frames and with the same members. Links
 come from `links_of`; connected components are compiled.
@@ -29,7 +29,8 @@ from tracking.scoring.matching import mapped_people
 from tracking.scoring.people_and_groups import GroupRows, bare_groups
 from tracking.scoring.people_comparison import Similarity, in_one_plane, people_pairs
 from tracking.scoring.rows import FrameRows, find_rows
-from tracking.scoring.track_scores import hota
+from tracking.scoring.track_scores import weighted_hota
+from tracking.scoring.weighted_sums import unweighted
 
 
 def derived_members(tracks: Sequence[Tracks], fps: float, px_per_m: float, labelled: Bools) -> tuple[FrameRows, Ints]:
@@ -88,7 +89,7 @@ class ObjectiveScorer:
         found = {"HOTA": float("nan"), "group_F1": float("nan")}
         if not sides.groups_only:
             pairs = people_pairs(sides, similarity)
-            found["HOTA"] = hota(pairs)["HOTA"]
+            found["HOTA"] = unweighted(weighted_hota(pairs, pairs.size), pairs.size)["HOTA"]
         if sides.frames.any():
             mapping = sides.mapping if sides.groups_only else mapped_people(pairs)
             found["group_F1"] = _group_f1(scorer, replace(sides, mapping=mapping), moved, px_per_m)

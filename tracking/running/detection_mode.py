@@ -6,7 +6,7 @@
 
 A tracker lists in `needs` what it can work with: pixels, stereo, boxes, points. It works with any one of them.
 
-Detections made from the labels, for `--detections truth`: perfect, or degraded by sensor settings.
+Also here: detections made from the labels, for `--detections truth`: perfect, or degraded by sensor settings.
 
 Input: the labels of a sequence (positions in m on the ground, or boxes in px). Output: one `Detections` per frame, in
 order from frame 1. Without settings these are the labels with score 1. The settings have the keys of a scenario's

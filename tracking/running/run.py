@@ -2,7 +2,7 @@
 
 Input: a tracker (name, class or instance) and a sequence. Output: a `TrackingRun`.
 
-The content of run.json: which tracker ran, with which config and seed, on which detections, how fast.
+Also here: the content of run.json: which tracker ran, with which config and seed, on which detections, how fast.
 
 `run_info` makes the dict, `input_summary` makes one line of it. Speeds are in frames per second.
 """
@@ -39,23 +39,19 @@ PACKAGES = ("flockscope", "numpy", "scipy")  # Packages whose versions run.json 
 SENSOR_SETTINGS_SHOWN = 6  # Most sensor settings that `input_summary` shows; run.json holds all of them.
 
 
-@dataclass(frozen=True)
-class Speed:
-    """Speed of a run in frames per second, 0 if nothing was run."""
-
-    tracker: float = 0.0  # of the tracker's steps alone, with their checks
-    whole: float = 0.0  # with the reading of frames, without the derivation of groups
-
-
 def run_info(
     prepared: PreparedTracker,
     tracks: SequenceOf[Tracks],
     seed: int,
     sensor: Mapping[str, Any],
     scale: ImageScale,
-    speed: Speed,
+    speeds: tuple[float, float],
 ) -> dict[str, Any]:
-    """Returns what run.json tells of a run, as a dictionary. Two equal runs differ only in their speeds."""
+    """Returns what run.json tells of a run, as a dictionary. Two equal runs differ only in their speeds.
+
+    speeds: frames per second of the tracker's steps alone, with their checks; and with the reading of frames, without
+    the derivation of groups.
+    """
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
     diagnostics = getattr(prepared.tracker, "diagnostics", None)
@@ -68,8 +64,8 @@ def run_info(
         "sensor": dict(sensor),
         "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
         **_facts(prepared.sequence, tracks, scale, begins),
-        "frames_per_second": speed.tracker,
-        "whole_frames_per_second": speed.whole,
+        "frames_per_second": speeds[0],
+        "whole_frames_per_second": speeds[1],
         **({} if diagnostics is None else {"diagnostics": diagnostics}),
     }
 
@@ -247,8 +243,8 @@ def track(
         fault = velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule)
         if fault is not None and not can_stand(reported, camera, pixels):  # on the ground no velocity is reported
             warnings.warn(fault, UserWarning, stacklevel=2)
-    speed = Speed(len(reported) / spent, len(reported) / whole) if reported else Speed()
-    info = run_info(prepared, tracks, seed, sensor or {}, scale, speed)
+    speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
+    info = run_info(prepared, tracks, seed, sensor or {}, scale, speeds)
     return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
 
 

@@ -29,15 +29,10 @@ MOST = 0.5  # Least share of the steps between labelled frames that people outla
 
 @dataclass(frozen=True, eq=False)
 class AnnotatedFrames:
-    """"""
+    """Which frames of a truth are annotated."""
 
     frames: Bools  # (length + 1,): bool by frame number, which are annotated; frame 0 never is
     step: int | None = 1  # from one annotated frame to the next, 1 if all are, None if they are not evenly spaced
-
-    @property
-    def count(self) -> int:
-        """The number of annotated frames."""
-        return int(self.frames.sum())
 
 
 def annotated_frames(truth: Truth) -> AnnotatedFrames:

@@ -1,21 +1,19 @@
 """Candidate pairs: which true and estimated rows of the same frame are similar at all, and how similar.
 
 All matching in scoring starts from `Pairs`. Inputs are two `FrameRows` (frame number and id of each person or group)
-and a similarity: IoU, intersection over union, of boxes (`box_pairs`), distance of positions (`point_pairs`), given
-matrices (`matrix_pairs`) or any function (`compare`). All frames are processed at once. A pair of similarity 0 is not
-stored, unless the function given to `compare` keeps it.
+and a similarity: IoU, intersection over union, of boxes (`box_pairs`), distance of positions (`point_pairs`), or
+any function (`compare`). All frames are processed at once. A pair of similarity 0 is not stored, unless the function
+given to `compare` keeps it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.types import Array, Bools, Ints
 from tracking.scoring.rows import FrameRows, numbered
@@ -43,6 +41,11 @@ class Pairs:
     def frame(self) -> Ints:
         """Frame number of each of the K pairs, (K,)."""
         return self.true.frame[self.i]
+
+    @property
+    def size(self) -> int:
+        """Number of frame numbers, 0 … last of both sides."""
+        return 1 + max((int(rows.frame[-1]) for rows in (self.true, self.est) if len(rows)), default=0)
 
     def keep(self, mask: Bools) -> Pairs:
         """Returns the pairs where the bool mask (K,) is true."""
@@ -173,28 +176,3 @@ def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array
         return some, s[some]
 
     return compare(true, est, similarity, (ax - reach, ax + reach, bx))
-
-
-def matrix_pairs(
-    true_ids: Sequence[NDArray[Any]], est_ids: Sequence[NDArray[Any]], similarity: Sequence[NDArray[Any]]
-) -> Pairs:
-    """Returns the pairs of similarity above 0 from ids (N,), (M,) and a matrix (N, M) of each frame, from frame 0."""
-    true, est = _stack_ids(true_ids), _stack_ids(est_ids)
-    flat = np.concatenate([np.zeros(0), *(np.asarray(m, float).ravel() for m in similarity)])
-    n, m = (np.array([len(a) for a in ids], np.int64) for ids in (true_ids, est_ids))
-    width = np.repeat(m, n)  # matrix columns of each true row
-    start = np.cumsum(width) - width
-    possible = flat > EPS
-    count = np.zeros(len(width), np.int64)
-    some = width > 0
-    if some.any():
-        count[some] = np.add.reduceat(possible, start[some], dtype=np.int64)
-    i = np.repeat(np.arange(len(width)), count)
-    j = np.flatnonzero(possible) + np.repeat(np.repeat(np.cumsum(m) - m, n) - start, count)
-    return Pairs(true, est, i, j, flat[possible])
-
-
-def _stack_ids(ids: Sequence[NDArray[Any]]) -> FrameRows:
-    count = np.array([len(a) for a in ids], np.int64)
-    stacked = np.concatenate([np.zeros(0, np.int64), *(np.asarray(a, np.int64) for a in ids)])
-    return FrameRows(np.repeat(np.arange(len(ids)), count), stacked)

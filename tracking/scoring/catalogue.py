@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 CORE = "groups, core"
 
@@ -47,8 +47,10 @@ def _core(score: Score) -> Score:
 def _read() -> tuple[Score, ...]:
     """Returns the scores of catalogue.tsv, the core scores behind those of groups."""
     text = Path(__file__).with_name("catalogue.tsv").read_text(encoding="utf-8")
-    rows = [line.split("\t") for line in text.splitlines()[1:]]
-    scores = [Score(*r[:3], float(r[3]), float(r[4]), *r[5:]) for r in rows]  # type: ignore[arg-type,call-arg]
+    rows: list[list[Any]] = [line.split("\t") for line in text.splitlines()[1:]]
+    scores = []
+    for key, family, unit, low, high, better, meaning, source in rows:
+        scores.append(Score(key, family, unit, float(low), float(high), better, meaning, source))
     end = 1 + max(k for k, score in enumerate(scores) if score.family == "groups")
     return (*scores[:end], *(_core(score) for score in scores if score.family == "groups"), *scores[end:])
 

@@ -3,13 +3,13 @@
 This module decides what is compared (which frames, which similarity of people, which surface for groups). It calls the
 modules of the single scores and returns their results under the keys of the catalogue.
 
-Leaves tracked people on distractors out of the scores, as MOTChallenge does.
+Tracked people on distractors are left out of the scores, as MOTChallenge does.
 
 In each frame the boxes of tracks are matched with those of all labelled rows, people or not. The matching is one to
 one, at an IoU of 0.5 or more and with the greatest total IoU. A tracked box that is matched to a distractor is left
 out. So a track is kept where it fits a person better, and a second track on one distractor counts as false.
 
-Scores of one recording as functions of weights of its frames, for intervals by resampling.
+Also here: scores of one recording as functions of weights of its frames, for intervals by resampling.
 
 Identities and matchings are those of the whole recording. The weight w(t) of frame t enters every sum: a match, a miss,
 a switch or an event of frame t counts w(t) times. So no frames are joined, and no switch or event is made by a join.
@@ -48,9 +48,11 @@ from tracking.scoring.people_comparison import (
 )
 from tracking.scoring.position_errors import weighted_positions
 from tracking.scoring.rows import FrameRows
-from tracking.scoring.track_scores import hota, weighted_clear, weighted_hota, weighted_identity
+from tracking.scoring.track_scores import weighted_clear, weighted_hota, weighted_identity
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
 from tracking.scoring.weighted_sums import WeightedScores, mean_of_known, unweighted
+
+OF_PEOPLE = (weighted_hota, weighted_clear, weighted_identity)
 
 
 def without_distractors(truth: Truth, unscored: Unscored, tracked: PersonRows) -> PersonRows:
@@ -283,9 +285,8 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
 def people_scores(pairs: Pairs) -> dict[str, float]:
     """Returns the scores of HOTA, CLEAR and Identity by key. Raises ValueError if an id is twice in a frame."""
     pairs.require_unique_ids()
-    size = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
-    counted = (unweighted(scores(pairs, size), size) for scores in (weighted_clear, weighted_identity))
-    return hota(pairs) | {key: value for part in counted for key, value in part.items()}
+    found = (unweighted(scores(pairs, pairs.size), pairs.size) for scores in OF_PEOPLE)
+    return {key: value for part in found for key, value in part.items()}
 
 
 def objective_of(found: Mapping[str, float]) -> float:
@@ -317,7 +318,7 @@ def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Cal
     parts: list[WeightedScores] = []
     if compared.people is not None:
         compared.people.require_unique_ids()
-        parts += [scores(compared.people, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]
+        parts += [scores(compared.people, size) for scores in OF_PEOPLE]
         parts.append(weighted_positions(compared.sides))
     if compared.groups is not None:
         parts.append(weighted_groups_and_events(compared.sides, compared.groups, group_match))

@@ -1,6 +1,6 @@
 """How the people of a truth and of a tracker are compared: by boxes, or by positions on the ground or in the image.
 
-What is compared: a property of the data, so that the scores of any number of runs can be laid side by side.
+Also here: what is compared: a property of the data, so that the scores of any number of runs can be laid side by side.
 
 Calibrated data (positions on the ground, or boxes and a camera) are compared on the ground, boxes by the foot points of
 both sides.

@@ -8,7 +8,7 @@ is the number of matches of these two ids, n_i and m_j their numbers of frames:
 
     DetA = TP / (TP + FN + FP),  AssA = mean over c of TPA(c) / (n_i + m_j - TPA(c)),  HOTA = sqrt(DetA AssA)
 
-CLEAR MOT scores (MOTA, MOTP, switches, fragments) at similarity 0.5, equal to TrackEval.
+Also here: CLEAR MOT scores (MOTA, MOTP, switches, fragments) at similarity 0.5, equal to TrackEval.
 
 Bernardin & Stiefelhagen (2008), "Evaluating Multiple Object Tracking Performance: The CLEAR MOT Metrics". Matches of
 the previous frame are kept. The previous frame is the last one with people on both sides.
@@ -18,7 +18,7 @@ total. Such kept pairs share no row and no column, and each outweighs any two ri
 every best matching (tracking.scoring.matching), and only pairs that share nothing with them remain to be matched. Pairs
 without rivals are matched whatever happened before. Frames are processed in order, but few need a solver.
 
-Identity scores IDF1, IDP, IDR and IDTP: ids are assigned one to one for the whole sequence.
+Also here: identity scores IDF1, IDP, IDR and IDTP: ids are assigned one to one for the whole sequence.
 
 Ristani et al. (2016), "Performance Measures and a Data Set for Multi-Target, Multi-Camera Tracking". IDTP is the number
 of frames that assigned true and estimated ids share with a similarity of 0.5 or more; IDP is its share in the estimated
@@ -27,7 +27,6 @@ rows (one row per person and frame), IDR its share in the true rows, IDF1 the ha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -42,54 +41,25 @@ CELLS = 2_000_000  # numbers of matches held at once
 LEAST = 1e-10  # keeps LocA at 1 where nothing is matched
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class HotaMatches:
-    """The K matches of HOTA, and the U links, a link being a combination of a true and an estimated id."""
+def weighted_hota(pairs: Pairs, size: int, by_level: bool = True) -> WeightedScores:
+    """Returns the weighted HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each the mean over `ALPHAS`.
 
-    # true_id, est_id (U,): the ids of each link, as indices into `Pairs.true_ids[0]` and `Pairs.est_ids[0]`.
-    true_id: Ints
-    est_id: Ints
-    link: Ints  # (K,): link of each match
-    frame: Ints  # (K,): its frame number
-    s: Array  # (K,): its similarity
-    level: Ints  # (K,): number of thresholds at which the match counts, 0 to 19; these are the lowest ones
-
-
-def hota_matches(pairs: Pairs) -> HotaMatches:
-    """Returns the matches that serve all thresholds: in each frame the greatest sum of A(i, j) s(i, j)."""
+    One matching serves all thresholds: in each frame the greatest sum of A(i, j) s(i, j). It is kept. by_level: at
+    weights of 1 similarities are added up by level, not by frame; the last bit of LocA depends on it."""
     true_id, est_id, link = pairs.links
     n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
     m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
     chosen = match_as_table(pairs, alignment(pairs, n + m)[link] * pairs.s)
-    s = pairs.s[chosen]
-    level = np.searchsorted(ALPHAS - EPS, s, side="right")
-    return HotaMatches(true_id, est_id, link[chosen], pairs.frame[chosen], s, level)
-
-
-def hota(pairs: Pairs) -> dict[str, float]:
-    """Returns HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA by key, each the mean over `ALPHAS`."""
-    matches, bins = hota_matches(pairs), len(ALPHAS) + 1
-    frames_of = (pairs.true_ids[1], matches.true_id), (pairs.est_ids[1], matches.est_id)
-    n, m = (np.bincount(ids).astype(float)[of] for ids, of in frames_of)
-    together = (
-        np.bincount(matches.link * bins + matches.level, minlength=len(n) * bins).astype(float).reshape(1, -1, bins)
-    )
-    near: Array = np.bincount(matches.level, weights=matches.s, minlength=bins).astype(float)[None]
-    rows = np.array([float(len(pairs.true))]), np.array([float(len(pairs.est))])
-    return {key: float(value[0]) for key, value in _scores(_reached(together), _reached(near), n, m, *rows).items()}
-
-
-def weighted_hota(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns the eight weighted scores of `hota`, with its matches kept."""
-    matches, bins = hota_matches(pairs), len(ALPHAS) + 1
-    used, link = np.unique(matches.link, return_inverse=True)
-    true_id, est_id = matches.true_id[used], matches.est_id[used]
+    frame, s, bins = pairs.frame[chosen], pairs.s[chosen], len(ALPHAS) + 1
+    level = np.searchsorted(ALPHAS - EPS, s, side="right")  # number of thresholds, the lowest, at which a match counts
+    used, link = np.unique(link[chosen], return_inverse=True)
+    true_id, est_id = true_id[used], est_id[used]
     true_rows = BinSums(pairs.true.frame, pairs.true_ids[1], len(pairs.true_ids[0]), size)
     est_rows = BinSums(pairs.est.frame, pairs.est_ids[1], len(pairs.est_ids[0]), size)
-    met = BinSums(matches.frame, link * bins + matches.level, len(used) * bins, size)
-    near = FrameSums(size)
-    for k in range(1, bins):  # the sums of similarity at each threshold
-        near.add(str(k), matches.frame, np.where(matches.level >= k, matches.s, 0.0))
+    met, near = BinSums(frame, link * bins + level, len(used) * bins, size), FrameSums(size)
+    totals = _reached(np.bincount(level, weights=s, minlength=bins).astype(float)).tolist()
+    for k, total in enumerate(totals, 1):  # the sums of similarity at each threshold
+        near.add(str(k), frame, np.where(level >= k, s, 0.0), total if by_level else None)
 
     def score(weights: Array) -> dict[str, Array]:
         rows = max(1, CELLS // max(1, len(used) * bins))
@@ -113,8 +83,8 @@ def _reached(by_level: Array) -> Array:
 def _scores(together: Array, near: Array, n: Array, m: Array, true: Array, est: Array) -> dict[str, Array]:
     """Returns the eight scores, (D,) by key.
 
-    At each threshold: together (D, U, 19), matches of each link; near (D, 19), sum of similarities. n, m (D, U) or
-    (U,): frames of the two ids of each link. true, est (D,): rows of both sides.
+    At each threshold: together (D, U, 19), matches of each link; near (D, 19), sum of similarities. n, m (D, U):
+    frames of the two ids of each link. true, est (D,): rows of both sides.
     """
     found = together.sum(axis=1)
     n, m, true, est = n[..., None], m[..., None], true[:, None], est[:, None]
@@ -148,45 +118,26 @@ BONUS = 1000.0  # added to the weight of a pair that was matched in the previous
 MOSTLY, LOST = 0.8, 0.2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ClearMatches:
-    """The matches of CLEAR: `found`, the matched pairs of similarity 0.5 or more."""
-
-    found: Pairs
-    switched: Ints  # frame number of each identity switch, the frame of the later match
-    resumed: Ints  # frame number of each match that follows a pause of its true id
-    share: Array  # (N,): matched frames / frames of each of the N true ids, in the order of `Pairs.true_ids[0]`.
-
-
-def clear_matches(pairs: Pairs) -> ClearMatches:
-    """Returns the matches of CLEAR; pairs: candidate pairs of any similarity above 0, no id twice in a frame."""
-    near = pairs.keep(pairs.s >= FOUND - EPS)
-    turn = turns(pairs)
-    near = near.keep(follow(near, turn))
-    frame = near.frame
-    who, by, when = near.true_ids[1][near.i], near.est_ids[1][near.j], turn[frame]
-    share = np.bincount(who, minlength=len(pairs.true_ids[0])) / np.bincount(pairs.true_ids[1])
-    order = np.argsort(who, kind="stable")
-    who, by, when, frame = who[order], by[order], when[order], frame[order]
-    same = who[1:] == who[:-1]
-    switched, resumed = same & (by[1:] != by[:-1]), same & (when[1:] > when[:-1] + 1)
-    return ClearMatches(near, frame[1:][switched], frame[1:][resumed], share)
-
-
 def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
     """Returns the weighted MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag, with the matches kept.
 
-    A switch and a resumed match have the weight of the later match. MT, PT and ML sum up the mean weights of their
-    people's frames.
+    MT, PT and ML are shares of the people of the whole recording: each person counts in its frames with equal parts.
     """
-    matches, sums = clear_matches(pairs), FrameSums(size)
+    near, turn = pairs.keep(pairs.s >= FOUND - EPS), turns(pairs)
+    near = near.keep(follow(near, turn))
+    who = near.true_ids[1][near.i]
+    share = np.bincount(who, minlength=len(pairs.true_ids[0])) / np.bincount(pairs.true_ids[1])
+    order = np.argsort(who, kind="stable")
+    who, by, frame = who[order], near.est_ids[1][near.j][order], near.frame[order]
+    same, when = who[1:] == who[:-1], turn[frame]
+    sums = FrameSums(size)
     sums.add("true", pairs.true.frame)
     sums.add("est", pairs.est.frame)
-    sums.add("TP", matches.found.frame)
-    sums.add("similarity", matches.found.frame, matches.found.s, float(matches.found.s.sum()))
-    sums.add("IDSW", matches.switched)
-    sums.add("Frag", matches.resumed)
-    who, share = pairs.true_ids[1], matches.share
+    sums.add("TP", near.frame)
+    sums.add("similarity", near.frame, near.s, float(near.s.sum()))
+    sums.add("IDSW", frame[1:][same & (by[1:] != by[:-1])])
+    sums.add("Frag", frame[1:][same & (when[1:] > when[:-1] + 1)])  # matched again after a pause
+    who = pairs.true_ids[1]
     part = 1 / np.bincount(who)[who]
     kinds = {"MT": share > MOSTLY, "PT": (share >= LOST) & (share <= MOSTLY), "ML": share < LOST}
     for key, inside in kinds.items():
@@ -207,8 +158,7 @@ def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
 
 def turns(pairs: Pairs) -> Ints:
     """Returns for each frame number 0 … last how many frames up to it have rows on both sides, (last + 1,)."""
-    end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=0)
-    true, est = (np.bincount(rows.frame, minlength=end) > 0 for rows in (pairs.true, pairs.est))
+    true, est = (np.bincount(rows.frame, minlength=pairs.size) > 0 for rows in (pairs.true, pairs.est))
     return np.cumsum(true & est)
 
 

@@ -1,9 +1,9 @@
 """Scores of groups, pairwise membership, events and lineage, from their matchings, under weights of the frames.
 
 `evaluate` gives every frame the weight 1, intervals by resampling give it others. A score whose denominator is 0 is
-nan. `group_scores.py`, `group_detection.py` and `events.py` match both sides and count.
+nan. `group_scores.py` and `events.py` match both sides and count.
 
-Who is in one group: pairwise membership, G-MITRE, and the groups that are right up to a tolerance T.
+Also here: who is in one group: pairwise membership, G-MITRE, and the groups that are right up to a tolerance T.
 
 Pairwise membership: F1 over pairs of people who are in one group, independent of ids and shapes. Estimated pairs are
 pairs of tracked people, mapped to true people; a pair is right if the two are in one true group.
@@ -239,7 +239,7 @@ def _kept(frame: Ints, frames: Bools) -> Ints:
 def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
     """Returns the weighted scores of groups over the frames f where frames[f] is true, by key without "group_"."""
     true, est, sums = compared.true, compared.est, _sums_of_groups(compared, frames)
-    hota = weighted_hota(compared.pairs.in_frames(frames), len(frames))
+    hota = weighted_hota(compared.pairs.in_frames(frames), len(frames), by_level=False)
     groups = bool(frames[true.rows.frame].any() or frames[est.rows.frame].any())
 
     def score(weights: Array) -> dict[str, Array]:

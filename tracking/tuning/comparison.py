@@ -1,8 +1,7 @@
 """Finished trials, the candidates among them, and paired comparisons of their scores with those of the defaults.
 
-The goals of a search: scores of the catalogue, each with the direction that is better, and speed.
-
-A goal turns one episode into one number, and many episodes into one mean.
+The goals of a search are scores of the catalogue, each with the direction that is better, and speed. A goal turns one
+episode into one number, and many episodes into one mean.
 """
 
 from __future__ import annotations

@@ -2,8 +2,7 @@
 
 No file holds a time, a host or a folder: the same search writes the same bytes.
 
-Plots of a search as SVG text: history of the trials, importance of the parameters, Pareto front.
-
+The plots, by matplotlib, are the history of the trials, the importance of the parameters, and the Pareto front.
 Optuna's own plots show pruned estimates and training values as if they were results.
 """
 

@@ -9,13 +9,11 @@ TPE sampler, which looks at all trials.
 The parameters of trial n depend only on the seed, on n and on the trials finished before. A search that was killed and
 is resumed therefore finds what it would have found.
 
-Stops a trial early when it surely loses to the best trial on the scenes that both were played on: the p-value of a
-paired test lies below a limit.
-
-Wilcoxon's signed-rank test (1945), one-sided, as in Optuna's WilcoxonPruner. *Ours*: p-values are exact with ties and
-zeros, too. Parameters that change nothing in most scenes give zeros and ties; scipy then draws permutations, which
-takes longer than an episode (figures: CONTRIBUTING.md). The test is repeated after each scene, so p is not the error
-rate of a whole trial.
+The pruner stops a trial early when it surely loses to the best trial on the scenes that both were played on: the
+p-value of a paired test lies below a limit. The test is Wilcoxon's signed-rank test (1945), one-sided, as in Optuna's
+WilcoxonPruner. *Ours*: p-values are exact with ties and zeros, too. Parameters that change nothing in most scenes give
+zeros and ties; scipy then draws permutations, which takes longer than an episode (figures: CONTRIBUTING.md). The test
+is repeated after each scene, so p is not the error rate of a whole trial.
 """
 
 from __future__ import annotations

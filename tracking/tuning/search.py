@@ -7,8 +7,7 @@
 
 docs/reference/tuning.md describes the method and what may be concluded from its results.
 
-Plays candidates on held-out scenes, which the search did not use: validation scenes first, then test scenes.
-
+Candidates are then played on held-out scenes, which the search did not use: validation scenes first, then test scenes.
 `HeldOutEvaluator.validated` plays the best trials on the validation scenes. `simplified` resets the parameters of the
 winner that bring nothing there. `compared` measures the gain on the test scenes. `stored_in_study` keeps the episodes
 in the study, so that a search that was killed after its last trial does not play them again.

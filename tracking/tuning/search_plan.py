@@ -3,8 +3,6 @@
 Training scenes guide the search. Validation scenes choose among its best trials. Test scenes, and a second suite that
 was not tuned on, measure the gain.
 
-Which scenes a search may use for what.
-
 Training, validation and test seeds come from ranges that do not overlap: 0:10000, 10000:20000 and 20000:30000. The
 second test suite shares no scenario with the suite that is tuned on. Recordings are refused.
 """

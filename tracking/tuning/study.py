@@ -2,9 +2,8 @@
 
 `open_study` opens it as a `SearchStudy`, which gives the next trial to play, stores values, and lists finished trials.
 
-The file that holds a study, for several processes at once, any of which may be killed at any time.
-
-Optuna's journal with three differences:
+The file of a study serves several processes at once, any of which may be killed at any time. It is Optuna's journal
+with three differences:
 
 - Locks are system locks (fcntl) on bytes of FILE.locks: byte 0 while a trial is chosen, byte 1 while lines are written,
   byte 2 + n while trial n is played. The system releases the locks of a process that dies, so other processes see that
@@ -12,11 +11,9 @@ Optuna's journal with three differences:
 - An incomplete last line is removed before the next line is written.
 - Lines are not flushed to the disk one by one. They survive a killed process but not a power cut.
 
-The loop of a search: one trial (set of parameters) after the other, each played on the training scenes until it
-surely loses.
-
-It surely loses if the p-value of a paired test against the best trial, after any scene, is below a limit. It then gets
-an estimate of its value.
+`run_trials` is the loop of a search: one trial (set of parameters) after the other, each played on the training scenes
+until it surely loses. It surely loses if the p-value of a paired test against the best trial, after any scene, is below
+a limit. It then gets an estimate of its value.
 """
 
 from __future__ import annotations

@@ -8,10 +8,11 @@ import pytest
 
 from sim.scene.camera import project_pair
 from tests.sim.scene.test_stereo import rig
-from tracking.detect.features import FeatureRules, Features, slopes
+from tracking.detect.features import Features, slopes
 
 FPS, D = 30.0, 6.0
-RULES = FeatureRules(0.2, 4.0, 0.7, (0.3, 0.3, 0.15), 200)
+SPACING, DEVIATIONS = 4.0, (0.3, 0.3, 0.15)
+RULES = 0.2, SPACING, DEVIATIONS
 TEXTURE = np.random.default_rng(0).uniform(0, 255, (240, 420)).astype(np.float32)
 
 
@@ -24,7 +25,7 @@ def picture(shift: float) -> np.ndarray:
     return np.clip(128 + 3 * (moved - moved.mean()), 0, 255).astype(np.uint8)
 
 
-def followed(frames: int, rules: FeatureRules = RULES, lost: int | None = None):
+def followed(frames: int, lost: int | None = None):
     camera = rig(0.0, baseline=0.5)
     features, found = Features(camera, FPS), []
     disparity = np.full((240, 320), D, np.float32)
@@ -34,7 +35,7 @@ def followed(frames: int, rules: FeatureRules = RULES, lost: int | None = None):
         if k == lost:
             features.forget()
             continue
-        found.append(features.step(picture(float(k)), mask, disparity, rules))
+        found.append(features.step(picture(float(k)), mask, disparity, *RULES))
     return camera, features, found
 
 
@@ -69,7 +70,7 @@ def test_they_keep_their_distance_and_stay_in_the_mask() -> None:
     assert (uv[:, 0] >= 60 + 11).all()
     assert (uv[:, 0] < 160 + 11).all()
     apart = np.linalg.norm(uv[:, None] - uv, axis=2)[np.triu_indices(len(uv), 1)]
-    assert (apart < RULES.spacing - 1.5).mean() < 0.01
+    assert (apart < SPACING - 1.5).mean() < 0.01
 
 
 def test_a_point_without_disparity_is_not_returned() -> None:
@@ -79,7 +80,7 @@ def test_a_point_without_disparity_is_not_returned() -> None:
     disparity = np.full((240, 320), D, np.float32)
     disparity[:, :110] = np.nan
     for _ in range(9):
-        found = features.step(picture(0.0), mask, disparity, RULES)
+        found = features.step(picture(0.0), mask, disparity, *RULES)
     assert (features.uv[:, 0] < 105).any()
     u = (found.pos - camera.position) @ camera.rotation.T
     assert (160 + 246 * u[:, 0] / u[:, 2] > 108).all()
@@ -111,6 +112,20 @@ def test_a_feature_lies_in_space_where_the_camera_sees_it() -> None:
     mask, features = np.zeros((240, 320), bool), Features(camera, FPS)
     mask[100:140, 130:170] = True
     for _ in range(8):
-        found = features.step(image, mask, np.full((240, 320), D, np.float32), RULES)
+        found = features.step(image, mask, np.full((240, 320), D, np.float32), *RULES)
     nearest = np.linalg.norm(project_pair(camera, found.pos) - spot, axis=1).min()
     assert nearest < 0.1
+
+
+def test_a_disparity_that_is_mostly_noise_is_not_used() -> None:
+    camera = rig(0.0, baseline=0.5)
+    features, mask = Features(camera, FPS), np.zeros((240, 320), bool)
+    mask[60:180, 60:160] = True
+    sd = DEVIATIONS[2]
+    disparity = np.full((240, 320), 3.9 * sd, np.float32)
+    disparity[:, :110] = 4.1 * sd
+    for _ in range(10):
+        found = features.step(picture(0.0), mask, disparity, *RULES)
+    assert len(found) > 10
+    uv, _ = project(camera, found.pos)
+    assert uv[:, 0].max() < 112

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from sim.scene.camera import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect import blobs
-from tracking.detect.subtraction_stereo import SubtractionStereo, sampled
-from tracking.papers.stereo.points import PersonLimits, person_mask, sizes
+from tracking.detect.subtraction_stereo import LEAST_UNIQUE, SubtractionStereo, sampled
+from tracking.detect.subtraction_stereo_kernels import STEPS
+from tracking.papers.stereo.points import LEAST_HEIGHT, person_mask, sizes
 
 HIGH, WIDE = 120, 200
 
@@ -44,9 +46,9 @@ def same(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("shift", [3.0, 6.4, 11.7])
 def test_it_finds_the_shift_to_a_part_of_a_pixel(shift: float) -> None:
     found = SubtractionStereo(14.0, 9).match(*pair(shift), three_regions())
-    assert np.isfinite(found.disparity[three_regions()]).mean() > 0.95
-    assert np.isnan(found.disparity[~three_regions()]).all()
-    assert np.nanmedian(np.abs(found.disparity - shift)) < 0.1
+    assert np.isfinite(found[three_regions()]).mean() > 0.95
+    assert np.isnan(found[~three_regions()]).all()
+    assert np.nanmedian(np.abs(found - shift)) < 0.1
 
 
 @pytest.mark.parametrize(("largest", "block"), [(14.0, 9), (14.0, 5), (40.0, 15), (14.0, 35)])
@@ -55,10 +57,15 @@ def test_inside_the_mask_it_is_bit_equal_to_opencv(largest: float, block: int) -
     left, right = pair(5.3)
     left[:, 150:] = 90  # without texture
     stereo = SubtractionStereo(largest, block)
-    dense = stereo.dense(left, right)
+    matcher = cv2.StereoBM.create(stereo.disparities, stereo.block)
+    matcher.setUniquenessRatio(LEAST_UNIQUE)
+    matcher.setTextureThreshold(0)
+    matcher.setDisp12MaxDiff(1)
+    raw = matcher.compute(left, right)
+    dense = np.where(raw > 0, raw.astype(np.float32) / STEPS, np.float32(np.nan))
     specks = np.random.default_rng(0).uniform(size=left.shape) < 0.02
     for mask in (three_regions(), specks, np.ones(left.shape, bool)):
-        found = stereo.match(left, right, mask).disparity
+        found = stereo.match(left, right, mask)
         both = np.isfinite(found) & np.isfinite(dense)
         assert both.any()
         assert (found == dense)[both].all()
@@ -73,10 +80,17 @@ def test_what_another_hides_from_the_right_camera_has_no_disparity() -> None:
     right[:, : 100 - 11] = far[1][:, : 100 - 11]  # the near part covers columns 92 to 100 of the far one
     mask = np.zeros(left.shape, bool)
     mask[20:100, 60:140] = True
-    found = SubtractionStereo(14.0, 9).match(left, right, mask).disparity
+    found = SubtractionStereo(14.0, 9).match(left, right, mask)
     assert np.nanmedian(found[20:100, 60:85]) == pytest.approx(3.0, abs=0.2)
     assert np.nanmedian(found[20:100, 110:140]) == pytest.approx(11.0, abs=0.2)
     assert np.isfinite(found[30:90, 93:96]).mean() < 0.2
+
+
+@pytest.mark.parametrize("size", [(3, 200), (120, 20), (9, 24)])
+def test_pictures_without_room_for_a_block_have_no_disparities(size: tuple[int, int]) -> None:
+    left, right = (image[: size[0], : size[1]].copy() for image in pair(5.3))
+    found = SubtractionStereo(14.0, 9).match(left, right, np.ones(size, bool))
+    assert np.isfinite(found).sum() <= (1 if size == (9, 24) else 0)
 
 
 def test_the_disparity_at_a_point_is_the_median_of_what_is_known() -> None:
@@ -88,7 +102,7 @@ def test_the_disparity_at_a_point_is_the_median_of_what_is_known() -> None:
     assert sampled(d, np.zeros((0, 2)), 1).shape == (0,)
 
 
-LIMITS = PersonLimits(0.5, 3.0, 0.1, (0.3, 0.3, 0.02))
+DEVIATIONS = 0.3, 0.3, 0.02
 
 
 def region(camera, foot, width: float, height: float, noise: float = 0.02, mask=None, d=None):
@@ -125,12 +139,12 @@ def test_persons_are_told_by_size_and_truncated_ones_are_kept() -> None:
     found = blobs.find(mask, 4)
     assert len(found) == 4
     assert not found.cut().any()
-    kept = person_mask(found, d, camera, LIMITS)
+    kept = person_mask(found, d, camera, DEVIATIONS)
     u, v = project_pair(camera, np.array([[0.0, 6.0, 1.0]]))[0, :2].astype(int)
     assert kept[v, u]
     assert len(blobs.find(kept, 4)) == 1
     low, d = region(camera, (1.0, 2.05), 0.45, 0.4)
-    height, _, _ = sizes(blobs.find(low, 4), d, camera, LIMITS.deviations)
-    assert height[0] < LIMITS.least_height
+    height, _, _ = sizes(blobs.find(low, 4), d, camera, DEVIATIONS)
+    assert height[0] < LEAST_HEIGHT
     assert blobs.find(low, 4).cut().all()
-    assert person_mask(blobs.find(low, 4), d, camera, LIMITS).any()
+    assert person_mask(blobs.find(low, 4), d, camera, DEVIATIONS).any()

@@ -1,6 +1,6 @@
 """`flockscope demo`: generates scenes, tracks them with every tracker, scores the tracks and writes pages to open.
 
-The HTML page that `flockscope demo` writes: videos of one scene, and tables of scores whose rows link to replays.
+The first page has videos of one scene, and tables of scores whose rows link to replays.
 """
 
 from __future__ import annotations

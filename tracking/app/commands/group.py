@@ -1,6 +1,7 @@
 """`flockscope group`: groups and events of people whose ids are known, stored as a run.
 
-Tables for the terminal of what `flockscope group` found: groups, their sizes and durations, and events by kind.
+Also here: tables for the terminal of what `flockscope group` found: groups, their sizes and durations, and events by
+kind.
 """
 
 from __future__ import annotations

@@ -39,7 +39,8 @@ def score(options: ScoreOptions) -> CommandResult:
     notes = [*sparse_notes([row.scores for row in rows]), *dict.fromkeys(one.note for one in scored if one.note)]
     if options.blocks:
         return _result([(rows, _block_means(scored[0]))], [*notes, *short_notes(sequences[0], rows[0].scores)])
-    return _result([(part, summary(part)) for part in _by_detections(rows)], notes)
+    parts = [[row for row in rows if row.given == given] for given in dict.fromkeys(row.given for row in rows)]
+    return _result([(part, summary(part)) for part in parts], notes)
 
 
 def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) -> list[ScoredSequence]:
@@ -61,14 +62,6 @@ def _block_means(scored: ScoredSequence) -> Means:
         key: {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
         for key, r in scored.compared.blocks.items()
     }
-
-
-def _by_detections(rows: list[SequenceScores]) -> list[list[SequenceScores]]:
-    return [[row for row in rows if row.given == given] for given in _givens(rows)]
-
-
-def _givens(rows: list[SequenceScores]) -> list[str]:
-    return list(dict.fromkeys(row.given for row in rows))
 
 
 def _result(parts: list[tuple[list[SequenceScores], Means]], notes: list[str] | None = None) -> CommandResult:

@@ -1,6 +1,6 @@
 """`flockscope score TRUTH TRACKS TRACKS…`: a ranking of any number of runs, below the oracles of their inputs.
 
-What differs between the runs of a ranking: tracker, parameters, input, scale and further facts of run.json.
+Also here: what differs between the runs of a ranking: tracker, parameters, input, scale and further facts of run.json.
 """
 
 from __future__ import annotations
@@ -338,7 +338,7 @@ def _scenario_table(every: RankedRuns) -> Any:
         alone = c.runs[found.order[0]] if found.last[0] == 1 and len(c.runs) > 1 else None
         cells = [number(every.key, means[name], mean=True) + ("*" if name == alone else "") for name in shown]
         table.add_row(printable(scenario), str(len(rows)), *cells)
-    foot = f"* surely better than every other run; {chance(len(every.scenarios), 'row')}"
+    foot = f"* surely better than every other run; {chance(len(every.scenarios))}"
     return with_title(f"{arrow(every.key)} by scenario", table, foot)
 
 
@@ -359,7 +359,7 @@ def _score_differences(every: RankedRuns) -> Any:
     keys = [key for key in known if key != "objective" or usual_key(every.comparison) == key]
     rows = {arrow(key): (key, pair["scores"][key]) for key in keys}
     title = printable(f"{pair['run']} minus {pair['minus']}")
-    sure = [chance(len(rows), "row")] if _can_be_sure(every.comparison, every.ranking) else []
+    sure = [chance(len(rows))] if _can_be_sure(every.comparison, every.ranking) else []
     return with_title(title, _difference_table("score", rows), "; ".join([LOWER, *sure]))
 
 

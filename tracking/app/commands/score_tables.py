@@ -129,9 +129,9 @@ def arrow(key: str) -> str:
     return f"{key} ↓" if CATALOGUE[key].better == "lower" else key
 
 
-def chance(count: int, what: str) -> str:
-    """Returns in words how many of so many rows would be called sure by chance. what: a row's name, in the singular."""
-    return f"of {counted(count, what)} about {(1 - LEVEL) * count:.2g} would be called sure by chance"
+def chance(rows: int) -> str:
+    """Returns in words how many of so many rows would be called sure by chance."""
+    return f"of {counted(rows, 'row')} about {(1 - LEVEL) * rows:.2g} would be called sure by chance"
 
 
 def number(key: str, value: float, *, mean: bool = False) -> str:

@@ -1,6 +1,7 @@
 """Writes a contact sheet: pictures and plans of chosen frames of a sequence, and a timeline of events, as one PNG.
 
-The pictures in a contact sheet's panels: the left view with the truth drawn over it, right view, ids, disparity.
+Also here: the pictures in a contact sheet's panels: the left view with the truth drawn over it, right view, ids,
+disparity.
 
 Ids are a picture of who is seen at each pixel; disparity is the shift in px between left and right view.
 """
@@ -8,7 +9,6 @@ Ids are a picture of who is seen at each pixel; disparity is the shift in px bet
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -160,20 +160,6 @@ def empty_truth(sequence: Sequence) -> Truth:
     return Truth(sequence.name, sequence.fps, length, nan, none, none, none, None, None, np.zeros((0, 4)), np.zeros(0))
 
 
-@dataclass(frozen=True)
-class PanelLayout:
-    """Heights in px of what a panel has below its title; 0 for what is absent."""
-
-    picture: int
-    small: int  # row of small pictures
-    plan: int
-
-    @property
-    def height(self) -> int:
-        """Height in px of the whole panel with its title, which has 40 px."""
-        return TITLE + self.picture + self.small + self.plan
-
-
 def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
     """Returns the contact sheet as an (H, W, 3) BGR uint8 picture; its size follows from the panels."""
     chosen = choose_frames(truth, frames)
@@ -181,22 +167,24 @@ def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
         raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
     pictures = PanelPictures(sequence, truth, chosen)
     low, high = sheet_area(sequence, truth)
+    large, small = pictures.heights(WIDTH)  # Of the parts of a panel below its title; 0: absent.
     plan = round(WIDTH * float(np.clip((high - low)[1] / (high - low)[0], 0.4, 1.2)))
-    layout = PanelLayout(*pictures.heights(WIDTH), plan if truth.pos is not None or not pictures.frames else 0)
+    plan = plan if truth.pos is not None or not pictures.frames else 0
+    height = TITLE + large + small + plan
     columns = min(4, len(chosen))
     rows = -(-len(chosen) // columns)
-    total = (HEAD + rows * (layout.height + GAP) + FOOT, GAP + columns * (WIDTH + GAP))
+    total = (HEAD + rows * (height + GAP) + FOOT, GAP + columns * (WIDTH + GAP))
     sheet = np.full((*total, 3), 255, np.uint8)
     for k, index in enumerate(chosen):
-        top, left = HEAD + k // columns * (layout.height + GAP), GAP + k % columns * (WIDTH + GAP)
-        area = sheet[top : top + layout.height, left : left + WIDTH]
-        y = TITLE + layout.picture
-        if layout.picture:
+        top, left = HEAD + k // columns * (height + GAP), GAP + k % columns * (WIDTH + GAP)
+        area = sheet[top : top + height, left : left + WIDTH]
+        y = TITLE + large
+        if large:
             pictures.draw_large(area[TITLE:y], index)
-        if layout.small:
-            pictures.draw_small(area[y : y + layout.small], index)
-        if layout.plan:
-            _draw_plan(Canvas.fit(area[y + layout.small :], low, high, truth.pos is not None), sequence, truth, index)
+        if small:
+            pictures.draw_small(area[y : y + small], index)
+        if plan:
+            _draw_plan(Canvas.fit(area[y + small :], low, high, truth.pos is not None), sequence, truth, index)
         _draw_title(area, truth, index)
     _draw_head(sheet, sequence, truth)
     _draw_foot(sheet[-FOOT:], truth, chosen)

@@ -3,7 +3,7 @@
 Encoded rows are sorted by id and frame. Numbers are whole: cm on the ground, half px in the image, degrees; each column
 holds differences from row to row. Groups and visibility are run lengths.
 
-The group timeline of the replay page: the life of each group id as a bar in a lane, and links between bars.
+Also here: the group timeline of the replay page: the life of each group id as a bar in a lane, and links between bars.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ Track management of Gonzalez et al. (2006), secs. 4.5 and 5, by rho = sqrt|S| / 
 innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty). Association
 by cost, explained misses, the rules of reporting and the field of view are ours.
 
-The tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each track.
+Also here: the tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each
+track.
 
 The state's h, w are the axes of the person's ellipse, the longer one first as measured, and theta is the direction of h
 from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, sec. 4.1). The box of a track is the
@@ -61,12 +62,12 @@ class TrackedPeople:
         measured (N,)       True if measured in this frame
         miss_explained (N,) True if another track or a merged box explained a miss since the last measurement
         view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
-    Also config, context, dynamics (the nominal filter), top (True from straight above), and thresholds of rho by
-    `follow`.
+    px_per_m: the image's scale; from pixels that of the frame. Also config, context, dynamics (the nominal filter), top
+    (True from straight above), and thresholds of rho by `follow`.
     """
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
-        self.context = context
+        self.context, self.px_per_m = context, context.px_per_m
         self.top = context.camera is not None and context.camera.kind == "top"
         self.view_low, self.view_high = np.full(2, np.inf), np.full(2, -np.inf)
         self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
@@ -133,7 +134,7 @@ class TrackedPeople:
         self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
 
     def _scale_of(self, place: Array) -> Array:
-        whole = self.context.px_per_m
+        whole = self.px_per_m
         if self.top:
             return np.full(len(place), whole)
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT

@@ -46,7 +46,7 @@ class BoxUpdater:
         z, score = self._measurements(detections)
         people = self.people
         if len(z):
-            image_scale.required(people.context.px_per_m)
+            image_scale.required(people.px_per_m)
         people.predict()
         people.widen_view(z)
         rows, columns, free, d2 = self._associate(z, score)

@@ -15,7 +15,7 @@ nearer blob updates, since pieces of one person have been found by templates. Wi
 gate starts a track nor pieces of a person whose union is inside (blob_pieces; the paper's frame 367). Blobs do not use
 `orphan_gate`.
 
-Blobs that are pieces of one person: several measurements of one track from pixels.
+Also here: blobs that are pieces of one person: several measurements of one track from pixels.
 
 At frame 367 of Gonzalez et al. (2006, sec. 5) a person is segmented into several pieces, which "still lie within the
 gate" and "are assigned to the existing tracker". The paper does not say how several measurements update one filter.
@@ -108,7 +108,7 @@ class PixelUpdater:
     """Updates the tracks of `people` from the picture of each frame.
 
     State: foreground, the pipeline with its background model; size, the size of a person at each place; people, the
-    table of tracks; config; context, of the sequence; gates, confirm_gates (2,): largest squared Mahalanobis distance
+    table of tracks; config; gates, confirm_gates (2,): largest squared Mahalanobis distance
     d^2, without and with direction, of an association and of a measurement that may confirm a track; upright_var:
     variance of the direction of an upright template, rad^2, inf from straight above.
     """
@@ -119,60 +119,45 @@ class PixelUpdater:
         assert context.background is not None
         if not np.isnan(context.px_per_m):
             image_scale.required(context.px_per_m)
-        self.people, self.context = people, context
+        self.people = people
         self.size = PersonSize(context)
         self.foreground = Foreground(context, config)
         self.foreground.learn_person_size(self.size, context.background)
-        self._take_scale()
         self.upright_var = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
-        self._set(config)
+        self.follow(config)
 
     def follow(self, config: BlobConfig) -> None:
         """Replace the config, which `people` must follow already; background and person size stay as learned."""
-        self.foreground.follow(config)
-        self._set(config)
-
-    def _set(self, config: BlobConfig) -> None:
         from scipy.special import chdtri
 
         self.config = config
+        self.foreground.follow(config)
         # largest d^2 at these shares, for 4 degrees of freedom (no direction) and 5 (eq. 10)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - CONFIRM_GATE)
 
-    def _take_scale(self) -> None:
-        if np.isnan(self.context.px_per_m):
-            self.foreground.px_per_m = self.size.px_per_m
-            self.people.context = self.context.replace(px_per_m=self.foreground.scale)
-
     def step(self, frame: Frame, detections: Detections | None) -> None:
         """Update the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used."""
-        people = self.people
+        people, foreground = self.people, self.foreground
+        people.px_per_m = foreground.scale
         people.predict()
         people.widen_view(np.zeros((0, 4)))
-        if frame.image is None:
-            return self._measure_nobody(frame.t)
-        seen = self.foreground.segment(frame.image)
-        if not seen.plausible:
-            self.foreground.adapt(seen, self._protected())
-            return self._measure_nobody(frame.t)
-        found = self.foreground.person_blobs(seen.mask)
+        seen = None if frame.image is None else foreground.segment(frame.image)
+        if seen is None or not seen.plausible:
+            if seen is not None:
+                foreground.adapt(seen, self._protected())
+            people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
+            people.delete_tracks(frame.t)
+            return
+        found = foreground.person_blobs(seen.mask)
         self._measure(frame.t, seen.mask, found)
-        self.foreground.adapt(seen, self._protected())
+        foreground.adapt(seen, self._protected())
         if len(found):
-            expected = people.upright_boxes()
+            alone = ~self._several_expected(found.box, people.upright_boxes())
             if self.size.reliable:
-                alone = self._lone_people(found, expected)
-            else:
-                alone = ~self._several_expected(found.box, expected)
+                alone &= self.size.one_person(found.box, found.ellipse)
             self.size.learn(found.box, found.ellipse, alone & ~found.cut())
-            self._take_scale()
-        return None
-
-    def _measure_nobody(self, t: float) -> None:
-        people = self.people
-        people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
-        people.delete_tracks(t)
+            foreground.take_scale(self.size)
 
     def _protected(self) -> Bools:
         boxes = self._person_boxes(self.people.upright_boxes()[self.people.confirmed])

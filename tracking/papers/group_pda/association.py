@@ -49,19 +49,6 @@ class PointClaims:
     claimants: Ints
 
 
-@dataclass(frozen=True)
-class Associated:
-    """The result of `associate` for G groups and M points.
-
-    exclusive (G, M) bool: points of each group's likeliest association; a point that several groups have is the most
-    probable one's. innovation: (id, y (2,), S (2, 2)) of each confirmed group that was measured: the innovation of its
-    likeliest association, in the unit of the points, and its covariance.
-    """
-
-    exclusive: Bools
-    innovation: list[tuple[int, Array, Array]]
-
-
 def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:
     """Returns the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2)."""
     wider = np.square(scaled.scale * (SPLIT_SPEED if scaled.config.corrections else 0.0) * bank.null_time)
@@ -120,12 +107,12 @@ def claimed(points: Array, weights: Array, d2: Array, owner: Ints, t: float) -> 
 
 def associate(
     bank: GroupBank, claims: PointClaims, region: Array, log_ratio: Array, scaled: ScaledParameters, t: float
-) -> Associated:
+) -> Bools:
     """Update the groups of the bank in place by their associations (sec. 4.1 to 4.3) and return the points that they
-    have."""
+    have, (G, M); a point is one group's at most."""
     weighted = scaled.config.appearance * log_ratio
     log_density = point_log_density(bank.size, region, claims, weighted)
-    state, chosen, report = kernels.associate(
+    state, chosen, _ = kernels.associate(
         claims.points, claims.weights, claims.d2, weighted, claims.owner, claims.claimants,
         shares(log_density, np.isfinite(log_density)), t - claims.last_seen, region,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
@@ -136,15 +123,9 @@ def associate(
     bank.measured_time[measured] += scaled.dt
     shorter = np.maximum(bank.null_time - scaled.dt * measured, 0.0)
     bank.null_time = np.where(null, bank.null_time + scaled.dt, shorter)
-    mean = report[:, [kernels.INNOVATION_X, kernels.INNOVATION_Y]]
-    S = report[:, [kernels.S_XX, kernels.S_XY, kernels.S_XY, kernels.S_YY]].reshape(-1, 2, 2)
-    innovation = [
-        (int(bank.id[g]), mean[g].copy(), S[g].copy()) for g in np.flatnonzero(measured & bank.confirmed).tolist()
-    ]
     share = shares(log_density, chosen)
     bank.own_people = share @ claims.weights
-    exclusive = chosen & (np.arange(len(bank))[:, None] == share.argmax(0)) if len(bank) else chosen
-    return Associated(exclusive, innovation)
+    return chosen & (np.arange(len(bank))[:, None] == share.argmax(0)) if len(bank) else chosen
 
 
 def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio: Array) -> Array:

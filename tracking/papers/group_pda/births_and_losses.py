@@ -9,7 +9,6 @@ Each function changes the bank of groups in place. Events of confirmed groups ar
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,29 +22,20 @@ from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParam
 # Squared Mahalanobis radius of a recapture: 99 % quantile of chi-square with 4 degrees of freedom.
 RECAPTURE_GATE = 13.28
 
-
-@dataclass(frozen=True)
-class ExpectedMembers:
-    """Where K members of confirmed groups should be, in the unit of the points (m on the ground, px in the image).
-
-    place (K, 2): predicted x, y; reach (K,): how far from there a member may be, growing with the time since its last
-    measurement; group (K,): id of the member's group.
-    """
-
-    place: Array
-    reach: Array
-    group: Ints
+ExpectedMembers = tuple[Array, Array, Ints]
 
 
 def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> ExpectedMembers:
-    """Returns the expected members, at time t (s), of the confirmed groups that were measured lately."""
+    """Returns where the K members of the confirmed groups that were measured lately should be at time t (s).
+
+    place (K, 2), reach (K,): how far from it each may be; in the unit of the points. group (K,): its id."""
     recent = t - bank.last_seen <= max(scaled.config.carry_time, scaled.dt) + 1e-9
     rows = np.flatnonzero(bank.confirmed & recent).tolist()
     places = [bank.positions(r) for r in rows]
     last_seen = np.concatenate([np.zeros(0), *(bank.members[r].last_seen for r in rows)])
     group = np.repeat(bank.id[rows], [len(p) for p in places])
     place = np.concatenate([np.zeros((0, 2)), *places])
-    return ExpectedMembers(place, walking_reach(scaled, t - last_seen), group)
+    return place, walking_reach(scaled, t - last_seen), group
 
 
 def add_newborns(
@@ -56,11 +46,11 @@ def add_newborns(
     if not len(points):
         return
     group = partition(points, weights, scaled.constraint)
-    born = newborn(points, weights, group, scaled, t)
-    for k in range(len(born) if len(expected.place) else 0):
-        d2 = np.square(points[group == k][:, None] - expected.place).sum(2).min(0)
-        d2[d2 > expected.reach**2] = np.inf
-        row = np.flatnonzero(bank.id == expected.group[d2.argmin()])
+    born, (place, reach, of) = newborn(points, weights, group, scaled, t), expected
+    for k in range(len(born) if len(place) else 0):
+        d2 = np.square(points[group == k][:, None] - place).sum(2).min(0)
+        d2[d2 > reach**2] = np.inf
+        row = np.flatnonzero(bank.id == of[d2.argmin()])
         if len(row) and np.isfinite(d2.min()):
             _set_parent(born, k, bank, int(row[0]), scaled)
     bank.add(born)

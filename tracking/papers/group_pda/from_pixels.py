@@ -2,7 +2,8 @@
 
 The foreground comes from tracking.detect.foreground.
 
-Colours as a further mass of `group-pda`'s associations, from pixels only (future work of sec. 6; the form is ours).
+Also here: colours as a further mass of `group-pda`'s associations, from pixels only (future work of sec. 6; the form is
+ours).
 
 The mass of an association is the relative weight of a set of points as the measurement of a group.
 
@@ -45,8 +46,9 @@ class ForegroundPoints:
         assert context.background is not None
         self.config = config
         self.foreground = Foreground(context, config)
-        self.scale = required(_learned(self.foreground, context) if np.isnan(context.px_per_m) else context.px_per_m)
-        self.foreground.px_per_m = self.scale
+        if np.isnan(context.px_per_m):
+            self.foreground.learn_person_size(PersonSize(context), context.background)
+        self.scale = required(self.foreground.px_per_m)
         self.step = max(1, round(GRID * self.scale))
         self.person = _person(context.camera, self.scale)
 
@@ -84,13 +86,6 @@ def sine_tilt(camera: Camera | None) -> float:
     """Returns the sine of the camera's downward tilt, the factor by which depth on the ground is shortened in the
     image."""
     return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_SINE_TILT))
-
-
-def _learned(foreground: Foreground, context: Context) -> float:
-    assert context.background is not None
-    size = PersonSize(context)
-    foreground.learn_person_size(size, context.background)
-    return size.px_per_m
 
 
 def _person(camera: Camera | None, scale: float) -> Array:

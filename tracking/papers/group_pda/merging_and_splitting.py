@@ -1,30 +1,27 @@
-"""Merging of `group-pda`'s groups (sec. 3.1, 3.2): which are near with like velocities, for how long, and their union.
+"""Merging and splitting of `group-pda`'s groups, the onsets of both, and groups that follow the same people.
 
-Input: the bank of groups after the update of a frame; output: the bank with merged groups, and the events. The relation
-R_x holds for two groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x
-are the connected components of groups under R_x; each becomes one group. Departures: the velocity test is a physical
-difference (`merge_velocity`), R_x must hold for `merge_time`, and only groups that are measured well take part
-(see `GroupMerging.step`).
+Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
+groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
+groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
+components of groups under R_x; each becomes one group. Departures: the velocity test is a physical difference
+(`merge_velocity`), R_x must hold for `merge_time`, and only groups that are measured well take part (see
+`GroupMerging.step`).
 
-Onsets of merges and splits of `group-pda`: when an event that is known now began (ours).
+Onsets (ours): when an event that is known now began. A split is known when its parts have long been apart, a merge when
+the filters' velocities have settled. Afterwards the onset can be measured better: from chords through earlier and later
+centroids, which do not lag, and from the group's earlier points, divided among the parts. Distances are metres on the
+ground (in an image depth is stretched to it). The distances and velocities of the truth's rules come from
+sim.truth.merge_split_rules.
 
-A split is known when its parts have long been apart, a merge when the filters' velocities have settled. Afterwards the
-onset can be measured better: from chords through earlier and later centroids, which do not lag, and from the group's
-earlier points, divided among the parts. Distances are metres on the ground (in an image depth is stretched to it).
-The distances and velocities of the truth's rules come from sim.truth.merge_split_rules.
+Splitting (sec. 3.3): a group without feasible associations falls apart. An association (a set of points that may be a
+group's) is feasible if its points form one group under the group constraint G_y (tracking.filters.components). `split`
+partitions the points (M, 2) of a group without feasible associations by G_y and replaces its row of the bank by one row
+per part. A group of one part stays, one of noise only is removed. `children` makes the rows of the parts. Lengths are
+in the unit of the points (m on the ground or px), times in s.
 
-Splitting of `group-pda`'s groups (sec. 3.3): a group without feasible associations falls apart.
-
-An association (a set of points that may be a group's) is feasible if its points form one group under the group
-constraint G_y (tracking.filters.components). `split` partitions the points (M, 2) of a group without feasible
-associations by G_y and replaces its row of the bank by one row per part. A group of one part stays, one of noise only
-is removed. `children` makes the rows of the parts. Lengths are in the unit of the points (m on the ground or px), times
-in s.
-
-Two groups of `group-pda` that follow the same people: the one with fewer people of its own becomes lost (ours).
-
-Groups that share points are each measured by all of them. Without this rule a group that is hidden or has left would
-follow another one for ever. For `coast_time` that is allowed, as hidden people come out again.
+Of two groups that follow the same people the one with fewer people of its own becomes lost (ours). Groups that share
+points are each measured by all of them. Without this rule a group that is hidden or has left would follow another one
+for ever. For `coast_time` that is allowed, as hidden people come out again.
 """
 
 from __future__ import annotations
@@ -138,19 +135,6 @@ PATIENCE = 1.5  # s for which the history of a pair is kept while one of the gro
 Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 
 
-class NearPair(NamedTuple):
-    """Two groups whose search regions (ellipses about the centroids) overlap or whose points are linked in this frame.
-
-    ids: of the two groups, the smaller first. alike: True if their velocities are alike and, from pixels, their people
-    are at most 2.5 m apart. moment: the pair in this frame: time (s), difference of centroids (m), place half-way, gap
-    between nearest people (m).
-    """
-
-    ids: Pair
-    alike: bool
-    moment: PairMoment
-
-
 class GroupMerging:
     """Merges groups that stay near with like velocities.
 
@@ -165,7 +149,7 @@ class GroupMerging:
         """Merge the groups for which R_x (near, with like velocities) has held for `merge_time`; yield their events. t:
         s."""
         able = np.flatnonzero(bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0))
-        near = {pair.ids: self._extended(pair) for pair in _near_pairs(bank, able, scaled, t)}
+        near = {ids: self._extended(ids, alike, now) for ids, alike, now in _near_pairs(bank, able, scaled, t)}
         unable = {int(g) for g in bank.id[bank.confirmed]} - set(bank.id[able].tolist())
         kept = {p: h for p, h in self.histories.items() if unable & set(p) and t - h.moments[-1].t <= PATIENCE}
         self.histories = near | kept
@@ -187,10 +171,10 @@ class GroupMerging:
             kind = "merge" if len(present) > 1 else "enter"
             yield WholeGroupEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
 
-    def _extended(self, pair: NearPair) -> PairHistory:
-        before, now = self.histories.get(pair.ids, PairHistory(np.inf, [])), pair.moment
+    def _extended(self, pair: Pair, alike: bool, now: PairMoment) -> PairHistory:
+        before = self.histories.get(pair, PairHistory(np.inf, []))
         moments = [m for m in before.moments if m.t > now.t - HISTORY_TIME]
-        return PairHistory(min(before.alike_since, now.t) if pair.alike else np.inf, [*moments, now])
+        return PairHistory(min(before.alike_since, now.t) if alike else np.inf, [*moments, now])
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
@@ -214,7 +198,12 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     )  # fmt: skip
 
 
-def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[NearPair]:
+def _near_pairs(
+    bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float
+) -> Iterator[tuple[Pair, bool, PairMoment]]:
+    """Yields the pairs of groups whose search regions overlap or whose points are linked: ids, the smaller first;
+    whether their velocities are alike and, from pixels, their people are at most 2.5 m apart; the pair in this frame.
+    """
     close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
     close |= _linked(bank, rows, scaled)
     v, cov = bank.x[rows, 2:], bank.P[rows, 2:, 2:]
@@ -226,7 +215,7 @@ def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float)
         gap = _gap(bank, rows[i], rows[j], d, scaled)
         far = scaled.from_pixels and gap > SPLIT_DISTANCE  # regions overlap, as bodies cover the ground behind them
         ids = (int(bank.id[rows[i]]), int(bank.id[rows[j]]))
-        yield NearPair(ids, bool(alike[i, j]) and not far, PairMoment(t, d, (a + b) / 2, gap))
+        yield ids, bool(alike[i, j]) and not far, PairMoment(t, d, (a + b) / 2, gap)
 
 
 def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:

@@ -59,15 +59,15 @@ Departures. Those marked (c) are off with `corrections` off.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
+from sim.arrays import no_ids
 from sim.geometry.hull_kernels import convex_hulls
 from sim.geometry.polygons import FOOTPRINT
 from sim.types import Array, Bools, Context, Detections, Frame, Groups, Plane, Tracks
-from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, reported_event
+from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_group_tracks
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.association import (
     PointClaims,
@@ -93,51 +93,6 @@ from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, Gro
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.running.image_scale import required
 
-
-@dataclass(frozen=True)
-class ReportFrame:
-    """The frame that is reported.
-
-    index: its number, from 1; t: time, s; plane: "ground" (m) or "image" (px); fps: frames per second. outline (V, 2):
-    a polygon round the origin, in the plane's unit, that stands for what covers the ground or the image about one
-    member's place: a footprint, a usual box, or a cell of the pixel grid.
-    """
-
-    index: int
-    t: float
-    plane: Plane
-    fps: float
-    outline: Array
-
-
-def report_tracks(
-    bank: GroupBank, events: list[WholeGroupEvent], scaled: ScaledParameters, frame: ReportFrame
-) -> Tracks:
-    """Returns Tracks with unit "group", sorted by id, of the confirmed groups measured within the last
-    `report_coast` s."""
-    rows = np.flatnonzero(bank.confirmed & (frame.t - bank.last_seen <= scaled.config.report_coast + 1e-9))
-    rows = rows[np.argsort(bank.id[rows])]
-    id, x = bank.id[rows], bank.x[rows]
-    groups = Groups(
-        id,
-        tuple(np.zeros(0, np.int64) for _ in rows),
-        x[:, :2],
-        x[:, 2:],
-        bank.extent[rows],
-        bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB],
-        _hulls([bank.positions(r) for r in rows.tolist()], frame.outline),
-    )
-    return Tracks(
-        frame.index, frame.t, frame.plane, "group", id, id.copy(), x[:, :2].copy(), x[:, 2:].copy(), bank.P[rows],
-        None, np.ones(len(rows)), groups, tuple(reported_event(e, frame.index, frame.t, frame.fps) for e in events),
-    )  # fmt: skip
-
-
-def _hulls(places: list[Array], outline: Array) -> tuple[Array, ...]:
-    # The places on their own hull suffice, and are few.
-    return convex_hulls([(corner[:, None] + outline).reshape(-1, 2) for corner in convex_hulls(places)])
-
-
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
@@ -147,8 +102,6 @@ class GroupPda:
     State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; merging,
     the histories of pairs that may merge; duplicates, the clocks of duplicate groups; pixels: grid points and
     background model, None from points; plane: "ground" or "image"; context. All but config exist after `reset` only.
-    innovation: a list of (id, y (2,), S (2, 2)) of each confirmed group measured in the last step: innovation (measured
-    less predicted centroid) of its likeliest association and its covariance, in the unit of the points.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -175,7 +128,6 @@ class GroupPda:
         self.scaled: ScaledParameters | None = None
         flat = context.camera is None and context.px_per_m > 0
         self.plane: Plane = "image" if flat or self.pixels is not None else "ground"
-        self.innovation: list[tuple[int, Array, Array]] = []
         self.colours = np.zeros(0, np.int64)
         self.usual_box: Array | None = None
 
@@ -205,7 +157,6 @@ class GroupPda:
         bank, t = self.bank, frame.t
         if bank.colour_hist.shape[1] != scaled.colour_bins:
             bank.colour_hist = np.zeros((len(bank), scaled.colour_bins))
-        self.innovation = []
         bank.predict(scaled)
         events: list[WholeGroupEvent] = []
         if points is not None:
@@ -214,8 +165,22 @@ class GroupPda:
         events += self.merging.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
         events += remove_lost(bank, scaled, t)
-        shown = ReportFrame(frame.index, t, self.plane, self.context.fps, self._outline(detections))
-        return report_tracks(bank, events, scaled, shown)
+        return self._report(frame, events, scaled, self._outline(detections))
+
+    def _report(self, frame: Frame, events: list[WholeGroupEvent], scaled: ScaledParameters, outline: Array) -> Tracks:
+        """Returns the confirmed groups measured within the last `report_coast` s, by id.
+
+        outline (V, 2): a polygon round the origin, in the plane's unit, that stands for what covers the ground or the
+        image about one member's place: a footprint, a usual box, or a cell of the pixel grid."""
+        bank = self.bank
+        rows = np.flatnonzero(bank.confirmed & (frame.t - bank.last_seen <= self.config.report_coast + 1e-9))
+        rows = rows[np.argsort(bank.id[rows])]
+        # The places on their own hull suffice, and are few.
+        corners = convex_hulls([bank.positions(r) for r in rows.tolist()])
+        hulls = convex_hulls([(c[:, None] + outline).reshape(-1, 2) for c in corners])
+        x, size = bank.x[rows], bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB]
+        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], bank.extent[rows], size, hulls)
+        return whole_group_tracks(frame, self.plane, self.context.fps, groups, bank.P[rows], events)
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
         if self.pixels is not None:
@@ -271,12 +236,11 @@ class GroupPda:
         claims = with_missed_members(claimed(points, weights, d2, owner, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         log_ratio = colour_log_ratio(bank, claims.d2, self.colours) if scaled.colour_bins else np.zeros((len(bank), 0))
-        found = associate(bank, claims, region, log_ratio, scaled, t)
-        self.innovation = found.innovation
-        remember(bank, claims, found.exclusive, scaled, t)
+        mine = associate(bank, claims, region, log_ratio, scaled, t)
+        remember(bank, claims, mine, scaled, t)
         if scaled.colour_bins:
-            update_histograms(bank, found.exclusive, claims.claimants, self.colours, claims.weights, scaled)
-        events = self._split(claims, found.exclusive, scaled, t)
+            update_histograms(bank, mine, claims.claimants, self.colours, claims.weights, scaled)
+        events = self._split(claims, mine, scaled, t)
         free = claims.claimants[: len(points)] == 0
         add_newborns(bank, points[free], weights[free], expected, scaled, t)
         return events

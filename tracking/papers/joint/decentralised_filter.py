@@ -8,19 +8,18 @@ runs steps 4 to 7 and then 1 to 3, as the proposal of X uses the new frame. p_{N
 
 X consists of K components (people). What a component alone adds to the weight of step 1 is kept apart, so that
 components can be resampled one by one (ours).
-
-How many particles the weights of `joint` are worth: effective numbers and distinct ancestors.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.filters.particles import effective_number, systematic_resample_rows
+from tracking.filters.particles import systematic_resample_rows
+from tracking.papers.joint.partition_kernels import relabel
 
 
 class Distributions(Protocol):
@@ -45,7 +44,8 @@ class Nested:
     """The particles after steps 1 and 3 of a frame, before step 2.
 
     x (N_x, K, D): X. z (N_x, N_z, ...): Z. log_q (N_x, N_z): log of qbar (step 3), normalised over j. log_w (N_x, K):
-    what the components add to log w (step 1). log_rest (N_x,): what X as a whole adds.
+    what the components add to log w (step 1). log_rest (N_x,): what X as a whole adds. ancestor (N_x, K): the
+    particle from which each component descends since these were counted last.
     """
 
     x: Array
@@ -53,13 +53,28 @@ class Nested:
     log_q: Array
     log_w: Array
     log_rest: Array
+    ancestor: Ints = field(default_factory=lambda: np.zeros((0, 0), np.int64))
 
     @classmethod
     def empty(cls, shape: tuple[int, int], size: int) -> Nested:
         """Returns particles of no component; shape: N_x, N_z; size: D."""
         log_q = np.full(shape, -np.log(shape[1]))
         x, z, log_w = np.zeros((shape[0], 0, size)), np.zeros((*shape, 0), np.int64), np.zeros((shape[0], 0))
-        return cls(x, z, log_q, log_w, np.zeros(shape[0]))
+        return cls(x, z, log_q, log_w, np.zeros(shape[0]), np.zeros((shape[0], 0), np.int64))
+
+    def kept(self, rows: Bools) -> Nested:
+        """Returns the particles of the components where `rows` (K,) is True; parts of Z are numbered anew."""
+        z = np.ascontiguousarray(self.z[..., rows])
+        relabel(z)
+        return Nested(self.x[:, rows], z, self.log_q, self.log_w[:, rows], self.log_rest, self.ancestor[:, rows])
+
+    def joined(self, x: Array) -> Nested:
+        """Returns the particles with new components x (N_x, M, D), of label 0 in Z."""
+        z = np.concatenate([self.z, np.zeros((*self.z.shape[:2], x.shape[1]), np.int64)], axis=2)
+        log_w = np.concatenate([self.log_w, np.zeros(x.shape[:2])], axis=1)
+        own = np.repeat(np.arange(len(x))[:, None], x.shape[1], axis=1)
+        ancestor = np.concatenate([self.ancestor, own], axis=1)
+        return Nested(np.concatenate([self.x, x], axis=1), z, self.log_q, log_w, self.log_rest, ancestor)
 
     def weights(self) -> Array:
         """Returns the weights w of step 1, (N_x,), sum 1."""
@@ -84,7 +99,7 @@ def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
     log_y = model.energy(new, z)
     log_group = log_sum(log_y)
     log_rest = log_dynamics + log_group - np.log(log_y.shape[1])  # step 1
-    return Nested(new, z, log_y - log_group[:, None], log_w, log_rest)  # step 3
+    return Nested(new, z, log_y - log_group[:, None], log_w, log_rest, old.ancestor)  # step 3
 
 
 def joint_indices(nested: Nested, uniform: float) -> Ints:
@@ -99,11 +114,6 @@ def component_indices(nested: Nested, uniforms: Array) -> tuple[Ints, Ints]:
     return single, rest
 
 
-def effective_share(weights: Array) -> float:
-    """Returns the effective number of particles as a share of them; weights (N,), sum 1."""
-    return effective_number(weights) / len(weights)
-
-
 def log_sum(values: Array) -> Array:
     """Returns log(sum(exp(values))) over the last axis; -inf where all are."""
     top = values.max(axis=-1, keepdims=True)
@@ -116,60 +126,3 @@ def normalised(log_weights: Array) -> Array:
     """Returns weights that sum to 1 over the last axis."""
     weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))
     return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
-
-
-SPAN = 1.0  # Time over which ancestors are counted, s.
-
-
-class ParticleHealth:
-    """Sums over the frames of a sequence.
-
-    effective: sum of the effective shares of the weights of whole particles; frames: their number. person: the same of
-    the least effective person's own weights. distinct, spans: sum and number of the shares of distinct ancestors after
-    SPAN s, means over people. ancestor (N_x, K): of each person in each particle since the span began.
-    """
-
-    def __init__(self, particles: int, fps: float) -> None:
-        self.span = max(1, round(SPAN * fps))
-        self.effective = self.person = self.distinct = 0.0
-        self.frames = self.spans = self.age = 0
-        self.ancestor: Ints = np.zeros((particles, 0), np.int64)
-
-    def weigh(self, nested: Nested, joint: bool) -> None:
-        """Add a frame; joint: each particle has one weight."""
-        self.frames += 1
-        self.effective += effective_share(nested.weights() if joint else nested.rest_weights())
-        own = nested.component_weights()
-        self.person += min(effective_share(own[:, k]) for k in range(own.shape[1]))
-
-    def resample(self, own: Ints) -> None:
-        """Note the indices (N_x, K) with which people are resampled."""
-        self.ancestor = self.ancestor[own, np.arange(own.shape[1])]
-        self.age += 1
-        if self.age == self.span:
-            count = len(self.ancestor)
-            self.distinct += float(np.mean([len(np.unique(column)) / count for column in self.ancestor.T]))
-            self.spans += 1
-            self._restart(own.shape[1])
-
-    def add(self, people: int) -> None:
-        """Add people to the particles."""
-        rows = np.repeat(np.arange(len(self.ancestor))[:, None], people, axis=1)
-        self.ancestor = np.concatenate([self.ancestor, rows], axis=1)
-
-    def keep(self, rows: Bools) -> None:
-        """Remove all people but those where `rows` (K,) is True."""
-        self.ancestor = self.ancestor[:, rows]
-
-    def summary(self) -> dict[str, float | None]:
-        """Returns means over frames: shares of effective particles and of distinct ancestors; None without frames."""
-        frames = self.frames
-        return {
-            "effective_particles": self.effective / frames if frames else None,
-            "effective_particles_of_a_person": self.person / frames if frames else None,
-            "distinct_ancestors": self.distinct / self.spans if self.spans else None,
-        }
-
-    def _restart(self, people: int) -> None:
-        self.age = 0
-        self.ancestor = np.repeat(np.arange(len(self.ancestor))[:, None], people, axis=1)

@@ -1,6 +1,6 @@
 """The four distributions of Table 1 for a frame: individuals, dynamics, group proposal, observation (sec. 4).
 
-The individuals: their proposal pi(X_{t+1} | X_{0:t}, y), the dynamics of eq. 3 and p(y | x).
+Also here: the individuals: their proposal pi(X_{t+1} | X_{0:t}, y), the dynamics of eq. 3 and p(y | x).
 
 A state is x, y in m and vx, vy in m/s. Sigma of eq. 3 has equal, independent axes; a covariance of one axis is (3,):
 variance of the place, covariance of place and velocity, variance of the velocity.

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.detect.point_detections import followed_sizes
+from tracking.detect.point_detections import PersonTable, followed_sizes
 from tracking.filters import kalman
 from tracking.filters.assignment import optimal
 from tracking.filters.person_streams import Keys, birth_keys
@@ -21,38 +21,31 @@ NEWCOMER_NOISE = 1.0  # Standard deviation of the acceleration of a person who i
 
 
 @dataclass
-class People:
-    """The K tracked people: one row each.
+class People(PersonTable):
+    """The K tracked people. id (K,): of the track. next_id: the next new id.
 
-    id (K,): of the track. missed (K,): s since the last measurement. size (K, 2): width, height of the box, px, nan if
-    unknown. key (K,): of the person's random streams. next_id: the next new id.
-    """
+    together (K, K): probability that each pair is in one group, nan for new people."""
 
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    missed: Array = field(default_factory=lambda: np.zeros(0))
-    size: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
     next_id: int = 1
+    together: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def add(self, size: Array, key: Keys) -> None:
         """Add people; size (M, 2): of their boxes, px, nan if unknown; key (M,)."""
-        new = len(size)
-        self.id = np.append(self.id, self.next_id + np.arange(new))
-        self.missed = np.append(self.missed, np.zeros(new))
-        self.size, self.key = np.concatenate([self.size, size]), np.concatenate([self.key, key])
-        self.next_id += new
+        self.extend(id=self.next_id + np.arange(len(size)), size=size, key=key)
+        self.next_id += len(size)
+        self.together = np.pad(self.together, (0, len(size)), constant_values=np.nan)
 
     def keep(self, rows: Bools) -> None:
         """Remove all people but those where `rows` (K,) is True."""
-        self.id, self.missed, self.size = self.id[rows], self.missed[rows], self.size[rows]
-        self.key = self.key[rows]
+        super().keep(rows)
+        self.together = self.together[:, rows]
 
-    def record(self, rows: Ints, sizes: Array | None, dt: float) -> None:
-        """Note that the people `rows` (R,) were measured, with boxes of `sizes` (R, 2), px, or None; others missed."""
+    def record(self, rows: Ints, sizes: Array, dt: float) -> None:
+        """Note that the people `rows` (R,) were measured, with boxes of `sizes` (R, 2), px; others missed."""
         self.missed += dt
         self.missed[rows] = 0.0
-        if sizes is not None:
-            self.size[rows] = followed_sizes(self.size[rows], sizes, dt)
+        self.size[rows] = followed_sizes(self.size[rows], sizes, dt)
 
     def absence(self, group: Ints) -> Array:
         """Returns for how long each person has been missed, s, (K,); in a group of whom nobody was measured, the sum
@@ -63,50 +56,36 @@ class People:
 
 
 @dataclass
-class Newcomers:
-    """People who are not confirmed yet, a Kalman filter for each.
+class Newcomers(PersonTable):
+    """People who are not confirmed yet; missed: without frames that have no detector.
 
-    bank (5, M, 2): filters of x, y, m. age (M,): s since the first measurement. missed (M,): s since the last one,
-    without frames that have no detector. size (M, 2): width, height of the last box, px, nan if unknown. key (M,): of
-    the random streams, made of the first measurement.
+    bank (5, M, 2): a Kalman filter of x, y, m, for each. age (M,): s since the first measurement.
     """
 
     bank: Array = field(default_factory=lambda: np.zeros((5, 0, 2)))
     age: Array = field(default_factory=lambda: np.zeros(0))
-    missed: Array = field(default_factory=lambda: np.zeros(0))
-    size: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
 
     def predict(self, dt: float) -> None:
         """Predict to dt s later."""
         kalman.predict(self.bank, dt, kalman.white_acceleration(dt, np.full(2, NEWCOMER_NOISE)))
         self.age += dt
 
-    def measure(self, points: Array, sizes: Array | None, noise: float, gate: float) -> Bools:
+    def measure(self, points: Array, sizes: Array, noise: float, gate: float) -> Bools:
         """Update by the points (M, 2), m, that they are associated with; return flags of the points left over."""
         d2 = kalman.distances(self.bank, points, noise**2)
         rows, columns = optimal(np.where(d2 <= gate, d2, np.inf), 2 * gate)
         kalman.update(self.bank, rows, points[columns], noise**2)
         self.missed[rows] = 0.0
-        if sizes is not None:
-            self.size[rows] = sizes[columns]
+        self.size[rows] = np.where(np.isnan(sizes[columns]), self.size[rows], sizes[columns])
         free = np.ones(len(points), bool)
         free[columns] = False
         return free
 
-    def start(self, points: Array, sizes: Array | None, noise: float, speed: float, frame: int) -> None:
+    def start(self, points: Array, sizes: Array, noise: float, speed: float, frame: int) -> None:
         """Add a person at each of the points (M, 2), m; speed: standard deviation of the velocity per axis, m/s; frame:
         number of this frame."""
-        new = len(points)
-        self.bank = np.concatenate([self.bank, kalman.born(points, noise**2, speed**2)], axis=1)
-        self.age, self.missed = np.append(self.age, np.zeros(new)), np.append(self.missed, np.zeros(new))
-        self.size = np.concatenate([self.size, np.full((new, 2), np.nan) if sizes is None else sizes])
-        self.key = np.concatenate([self.key, birth_keys(points, frame)])
-
-    def keep(self, rows: Bools) -> None:
-        """Remove all but those where `rows` (M,) is True."""
-        self.bank, self.age = self.bank[:, rows], self.age[rows]
-        self.missed, self.size, self.key = self.missed[rows], self.size[rows], self.key[rows]
+        bank, age = kalman.born(points, noise**2, speed**2), np.zeros(len(points))
+        self.extend(bank=bank, age=age, size=sizes, key=birth_keys(points, frame))
 
     def draw(self, rows: Bools, normals: Array) -> Array:
         """Returns states (N, R, 4) drawn from the posteriors of the R people `rows`; normals (N, R, 4)."""

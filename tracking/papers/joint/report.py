@@ -1,11 +1,9 @@
-"""Events of the reported groups, with onsets dated back by the rules of the truth (ours).
+"""What `joint` reports: the state estimate (sec. 4), groups and their ids, and events.
 
-A merge or split is reported when the partition changes. Its start is the frame in which the parts came together, or
-parted, in the past that is known then.
-
-The state estimate (sec. 4): means of the individuals, and one partition for all particles.
-
-Group ids of a tracker that finds groups of people itself, frame by frame, by the identity rule of the truth.
+The estimate has means of the individuals and one partition for all particles. Group ids follow the identity rule of the
+truth, frame by frame. Onsets of events are dated back by the rules of the truth (ours): a merge or split is reported
+when the partition changes. Its start is the frame in which the parts came together, or parted, in the past that is
+known then.
 """
 
 from __future__ import annotations
@@ -31,14 +29,14 @@ def moments(state: Array, weights: Array) -> tuple[Array, Array]:
     return mean, np.einsum("ik,ikd,ike->kde", weights, away, away)
 
 
-def kept_while_missed(now: Array, id: Ints, seen: Bools, before: Array, before_id: Ints) -> Array:
+def kept_while_missed(now: Array, seen: Bools, before: Array) -> Array:
     """Returns the probability that each pair is in one group, (K, K), which stays while one of the two is not measured
-    (ours)."""
-    out = now.copy()
-    _, new, old = np.intersect1d(id, before_id, assume_unique=True, return_indices=True)
-    rows, both = np.ix_(new, new), seen[new][:, None] & seen[new]
-    out[rows] = np.where(both, now[rows], before[np.ix_(old, old)])
-    return out
+    (ours).
+
+    now (K, K): of this frame. seen (K,): who is measured. before (K, K): as returned in the frame before, nan for a
+    pair with a new person.
+    """
+    return np.where(seen[:, None] & seen | np.isnan(before), now, before)
 
 
 def binder_partition(together: Array, label: Ints, before: Ints) -> list[Ints]:

@@ -69,14 +69,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sim.truth.identity import Identities
-from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
-from tracking.detect.point_detections import ForegroundBlobs, boxes_at, ordered_points
+from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
+from tracking.detect.point_detections import PointTracker, boxes_at
+from tracking.filters.particles import ParticleHealth, effective_number
 from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping.belief import default_belief
 from tracking.grouping.pair_belief import PairBelief
 from tracking.papers.joint import decentralised_filter, partition_kernels, report
 from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SPEED_PRIOR, JointConfig
-from tracking.papers.joint.decentralised_filter import Nested, ParticleHealth
+from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import (
     BIRTHS,
     PARTITIONS,
@@ -91,21 +92,17 @@ from tracking.papers.joint.distributions import (
 from tracking.papers.joint.division_kernels import place_newcomers
 from tracking.papers.joint.people import Newcomers, People, associate
 from tracking.papers.joint.report import OWN_EVENTS, ReportedEvents
-from tracking.running.image_scale import required
 
 
-class Joint:
+class Joint(PointTracker):
     """The tracker `joint`: people and the groups they form, from points or from pixels.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
-    particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; together (K, K):
-    probability that each pair is in one group, and paired (K,), the ids of its rows; events: those of the reported
-    groups; belief: of pairs; health: how many particles the weights are worth; streams, the random numbers;
-    pixels: detector of blobs, None from points; shown (K, 4): boxes of the people reported last, px; plane, "ground" or
-    "image"; context. All but config exist after `reset` only.
+    particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; events: those of
+    the reported groups; belief: of pairs; health: how many particles the weights are worth; streams, the random
+    numbers; shown (K, 4): boxes of the people reported last, px, or None.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
     config_class: ClassVar[type[JointConfig]] = JointConfig
 
     def __init__(self, config: JointConfig | None = None) -> None:
@@ -114,26 +111,17 @@ class Joint:
     def reset(self, context: Context, seed: int) -> None:
         """Forget everything and start a sequence. seed: of all random numbers.
 
-        With a background sample in the context pixels are tracked, else points. Until the first detections `plane` is
-        "image" from pixels, or with a scale but no camera, else "ground". If pixels are tracked, raises InputError if
-        the scale px_per_m is zero or negative, or neither known nor learned from the sample, or if the sample cannot be
-        used.
-        """
-        c, self.pixels, self.shown = self.config, None, np.zeros((0, 4))
-        if context.background is not None:
-            self.pixels = ForegroundBlobs(c, context)
-            context = context.replace(px_per_m=self.pixels.scale)
-        self.context = context
+        With a background sample in the context pixels are tracked, else points. Raises InputError as `begin`."""
+        c = self.config
+        self.begin(context, divide=False)
+        self.shown: Array | None = None
         self.frames = max(1, round(c.lag * context.fps))
         self.nested = Nested.empty((c.particles, c.partitions), STATE * self.frames)
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
-        self.together, self.paired = np.zeros((0, 0)), np.zeros(0, np.int64)
         self.events = ReportedEvents(context.fps)
         self.belief = PairBelief(context.fps)
-        self.health = ParticleHealth(c.particles, context.fps)
+        self.health = ParticleHealth(context.fps, "effective_particles", "effective_particles_of_a_person")
         self.streams = PersonStreams(seed)
-        flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
-        self.plane: Plane = "image" if flat else "ground"
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the people of the frame and their groups as Tracks; updates all particles.
@@ -142,12 +130,9 @@ class Joint:
         and from pixels in one with too much foreground, nobody counts as missed. Raises InputError if points are in the
         image and the context has no scale above 0, or if the picture's size or dtype is not the background sample's.
         """
-        if self.pixels is not None:
-            if self.pixels.settings is not self.config:
-                self.pixels.follow(self.config)
-            detections = self.pixels.detections(frame, self.shown)
+        detections = self.detected(frame, detections, self.shown)
         self.streams.frame += 1
-        points, sizes = self._points(detections)
+        points, sizes = (np.zeros((0, 2)),) * 2 if detections is None else self.points(detections)
         rows, columns = self._associate(points)
         z = np.full((len(self.people.id), 2), np.nan)
         z[rows] = points[columns]
@@ -158,42 +143,15 @@ class Joint:
         if detections is not None:
             free = np.ones(len(points), bool)
             free[columns] = False
-            self.people.record(rows, None if sizes is None else sizes[columns], self.dt)
+            self.people.record(rows, sizes[columns], self.dt)
             self._keep(self.people.absence(tracks.group) <= self.config.coast_time + 1e-9)
-            self._newcomers(points[free], None if sizes is None else sizes[free])
+            self._newcomers(points[free], sizes[free])
         return tracks
-
-    @property
-    def dt(self) -> float:
-        """Time between frames, s."""
-        return 1.0 / self.context.fps
-
-    @property
-    def px_per_m(self) -> float:
-        """Scale of the image in px per metre: the context's, or, from pixels, learned from its background sample; nan
-        if unknown."""
-        return self.context.px_per_m
-
-    @property
-    def noise(self) -> float:
-        """Standard deviation of a measured position, per axis, m."""
-        return self.config.point_noise if self.pixels is None else self.config.pixel_noise
-
-    @property
-    def unit(self) -> float:
-        """Length of a metre in the unit of the points: 1 on the ground, px per m in the image."""
-        return required(self.context.px_per_m) if self.plane == "image" else 1.0
 
     @property
     def diagnostics(self) -> dict[str, Any]:
         """What run.json tells of the particles: means over frames of shares of effective particles and ancestors."""
         return self.health.summary()
-
-    def _points(self, detections: Detections | None) -> tuple[Array, Array | None]:
-        if detections is None:
-            return np.zeros((0, 2)), None
-        self.plane = "image" if detections.plane == "image" else "ground"
-        return ordered_points(detections, self.unit)
 
     def _associate(self, points: Array) -> tuple[Ints, Ints]:
         c, ahead = self.config, moved(self.nested.x[..., :STATE], self.dt)
@@ -220,7 +178,11 @@ class Joint:
         if not people:
             return
         uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
-        self.health.weigh(nested, not self.config.own_weights)
+        own_weights = nested.component_weights()
+        whole = nested.rest_weights() if self.config.own_weights else nested.weights()
+        self.health.add("effective_particles", effective_number(whole) / len(whole))
+        least = min(effective_number(own_weights[:, k]) / len(whole) for k in range(people))
+        self.health.add("effective_particles_of_a_person", least)
         if not self.config.own_weights:
             chosen = decentralised_filter.joint_indices(nested, float(uniforms[-1]))
             own = np.repeat(chosen[:, None], people, axis=1)
@@ -228,50 +190,39 @@ class Joint:
             single, chosen = decentralised_filter.component_indices(nested, uniforms)
             own = single[chosen]
         columns = np.arange(people)
-        self.health.resample(own)
-        self.nested = Nested(
-            nested.x[own, columns], nested.z[chosen], nested.log_q[chosen], np.zeros_like(nested.log_w),
-            np.zeros_like(nested.log_rest),
-        )  # fmt: skip
+        x, z, log_q = nested.x[own, columns], nested.z[chosen], nested.log_q[chosen]
+        ancestor = nested.ancestor[own, columns]
+        self.nested = Nested(x, z, log_q, np.zeros_like(nested.log_w), np.zeros_like(nested.log_rest), ancestor)
+        self.health.resampled(ancestor)
 
     def _keep(self, rows: Bools) -> None:
         if rows.all():
             return
-        n = self.nested
-        kept = np.ascontiguousarray(n.z[..., rows])
-        partition_kernels.relabel(kept)
-        self.nested = Nested(n.x[:, rows], kept, n.log_q, n.log_w[:, rows], n.log_rest)
+        self.nested = self.nested.kept(rows)
         self.people.keep(rows)
         self.belief.keep(rows)
-        self.health.keep(rows)
 
-    def _newcomers(self, points: Array, sizes: Array | None) -> None:
+    def _newcomers(self, points: Array, sizes: Array) -> None:
         c, new, frame = self.config, self.newcomers, self.streams.frame
         new.missed += self.dt
         free = new.measure(points, sizes, self.noise, LARGEST_DISTANCE)
-        new.start(points[free], None if sizes is None else sizes[free], self.noise, SPEED_PRIOR, frame)
+        new.start(points[free], sizes[free], self.noise, SPEED_PRIOR, frame)
         sure = (new.age >= c.confirm_time - 1e-9) & (new.missed == 0)
         if sure.any():
             self._add(sure)
         new.keep(~sure & (new.missed <= c.confirm_time + 1e-9))
 
     def _add(self, rows: Bools) -> None:
-        n, c, key = self.nested, self.config, self.newcomers.key[rows]
+        c, key = self.config, self.newcomers.key[rows]
         normals = self.streams.normals(BIRTHS, key, c.particles, STATE)
         if c.individuals == "measured":
             normals[:] = 0.0
         state = self.newcomers.draw(rows, normals)
         past = np.concatenate([moved(state, -k * self.dt) for k in range(self.frames)], axis=-1)
-        alone = np.zeros((*n.z.shape[:2], past.shape[1]), np.int64)
-        self.nested = Nested(
-            np.concatenate([n.x, past], axis=1), np.concatenate([n.z, alone], axis=2), n.log_q,
-            np.concatenate([n.log_w, np.zeros(past.shape[:2])], axis=1), n.log_rest,
-        )  # fmt: skip
+        self.nested = n = self.nested.joined(past)
         self.people.add(self.newcomers.size[rows], key)
-        self.belief.add(self.nested.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
-        self.health.add(past.shape[1])
+        self.belief.add(n.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
         if c.newcomers == "validity":
-            n = self.nested
             drawn = self.streams.uniforms(PLACING, key, n.log_q.size, 2).reshape(*n.log_q.shape, len(key), 2)
             uniforms = np.ascontiguousarray(drawn[..., 0])
             place_newcomers(newest(n.x), n.z, uniforms, c.validity_rate * self.frames * self.dt, SCALES)
@@ -283,7 +234,7 @@ class Joint:
         mean, cov = report.moments(n.x[..., :STATE], weights)
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
         box = boxes_at(pos, self.people.size) if self.plane == "image" else None
-        self.shown = np.zeros((0, 4)) if box is None else box
+        self.shown = box
         old = self.identities.groups
         parts = [frozenset(id[rows].tolist()) for rows in self._groups(joint, seen)]
         changes = self.identities.step(frame.index, frozenset(id.tolist()), parts)
@@ -301,17 +252,15 @@ class Joint:
     def _groups(self, joint: Array, seen: Bools) -> list[Ints]:
         n, c, id = self.nested, self.config, self.people.id
         if not len(id):
-            self.together, self.paired = np.zeros((0, 0)), id.copy()
             return []
         particle = n.rest_weights() if c.own_weights else joint
         weights = particle[:, None] * np.exp(n.log_q)
         now = np.empty((len(id), len(id)))
         partition_kernels.co_membership(n.z, weights, now)
-        self.together = report.kept_while_missed(now, id, seen, self.together, self.paired)
-        self.paired = id.copy()
+        together = self.people.together = report.kept_while_missed(now, seen, self.people.together)
         if c.estimate == "histogram":
             return report.histogram_partition(n.z, weights)
-        return report.binder_partition(self.together, n.z, self._before()[0])
+        return report.binder_partition(together, n.z, self._before()[0])
 
 
 def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:

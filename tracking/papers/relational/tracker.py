@@ -57,9 +57,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.types import Array, Bools, Context, Detections, Frame, Ints, Plane, Tracks
-from tracking.detect.point_detections import ForegroundBlobs, boxes_at, followed_sizes, ordered_points
-from tracking.filters.person_streams import Keys, PersonStreams, birth_keys
+from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
+from tracking.detect.point_detections import PersonTable, PointTracker, boxes_at, followed_sizes
+from tracking.filters.particles import ParticleHealth
+from tracking.filters.person_streams import PersonStreams, birth_keys
 from tracking.grouping.belief import UNSEEN
 from tracking.grouping.pair_belief import PairBelief
 from tracking.papers.relational import particle_set_kernels, sensor, transition_kernels
@@ -74,46 +75,29 @@ from tracking.papers.relational.config import (
     RelationalConfig,
 )
 from tracking.papers.relational.occluders import covered_by_people, hidden_share
-from tracking.papers.relational.particle_set import ParticleDiversity, ParticleSet
+from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.transition_kernels import DISTANCE, VELOCITY
-from tracking.running.image_scale import required
 
 # What random numbers are drawn for. Relations have streams of their own, so that they change no other draw.
 MOTION, BIRTHS, RESAMPLING, SPREAD, RELATIONS, JOINING, COUPLING = range(7)
 
 
 @dataclass
-class Slots:
+class Slots(PersonTable):
     """The people of a sequence, one row for each of K slots of the particles (all ours).
 
     id (K,): the track's id, -1 until the person is first reported. missed (K,): time without a measurement in which the
-    person could have been seen, s, 0 if measured in this frame. size (K, 2): width and height of the box, px, nan if
-    none was measured. next_id: the next new id.
+    person could have been seen, s, 0 if measured in this frame. next_id: the next new id.
     """
 
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    missed: Array = field(default_factory=lambda: np.zeros(0))
-    size: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
     next_id: int = 1
 
-    def add(self, size: Array, key: Keys) -> None:
-        """Add people who are measured in this frame; size (M, 2): width, height of the boxes, px, nan without; key
-        (M,)."""
-        self.id = np.append(self.id, np.full(len(size), -1))
-        self.missed = np.append(self.missed, np.zeros(len(size)))
-        self.size, self.key = np.concatenate([self.size, size]), np.concatenate([self.key, key])
-
-    def keep(self, rows: Bools) -> None:
-        """Remove all people but those where `rows` (K,) is True."""
-        self.id, self.missed, self.size = self.id[rows], self.missed[rows], self.size[rows]
-        self.key = self.key[rows]
-
-    def measure(self, seen: Array, pairs: Array, sizes: Array | None, dt: Array) -> None:
+    def measure(self, seen: Array, pairs: Array, sizes: Array, dt: Array) -> None:
         """Note who was measured in a frame: those with seen (K,) above 1/2; dt (K,): s by which others count as
         missed."""
         self.missed = np.where(seen > 0.5, 0.0, self.missed + dt)
-        if sizes is None or not pairs.size:
+        if not pairs.size:
             return
         best = pairs.argmax(axis=1)
         sure = pairs[np.arange(len(best)), best] > 0.5
@@ -126,18 +110,16 @@ class Slots:
         self.next_id += len(new)
 
 
-class Particle:
+class Particle(PointTracker):
     """The tracker `particle`: a particle filter of people who do not know of each other.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
     the people; streams, the random numbers of each person; hidden (K,): probability that each person is behind a known
-    pillar or wall, or behind another person; cut (K,): that the feet are behind another person; pixels: detector of
-    blobs, None from points; shown: the tracks reported last, None before; plane, "ground" or "image"; context;
-    vanished: number of frames in which all weights were 0; diversity: how many particles the weights are worth. All but
-    config exist after `reset` only.
+    pillar or wall, or behind another person; cut (K,): that the feet are behind another person; shown: the tracks
+    reported last, None before; vanished: number of frames in which all weights were 0; health: how many particles the
+    weights are worth.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
     config_class: ClassVar[type[ParticleConfig]] = ParticleConfig
 
     def __init__(self, config: ParticleConfig | None = None) -> None:
@@ -146,24 +128,13 @@ class Particle:
     def reset(self, context: Context, seed: int) -> None:
         """Forget everything and start a sequence. seed: of all random numbers.
 
-        With a background sample in the context pixels are tracked, else points. Until the first detections `plane` is
-        "image" from pixels, or with a scale but no camera, else "ground". If pixels are tracked, raises InputError if
-        the scale px_per_m is zero or negative, or neither known nor learned from the sample, or if the sample cannot be
-        used.
-        """
-        self.context = context
+        With a background sample in the context pixels are tracked, else points. Raises InputError as `begin`."""
+        self.begin(context, divide=True)
         self.shown: Tracks | None = None
-        self.pixels = None
-        if context.background is not None:
-            self.pixels = ForegroundBlobs(self.config, context, divide=True)
-        if self.pixels is not None:
-            self.context = context = context.replace(px_per_m=self.pixels.scale)
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
         self.streams = PersonStreams(seed)
-        flat = self.pixels is not None or (context.camera is None and context.px_per_m > 0)
-        self.plane: Plane = "image" if flat else "ground"
         self.hidden = np.zeros(0)
-        self.vanished, self.diversity = 0, ParticleDiversity(context.fps)
+        self.vanished, self.health = 0, ParticleHealth(context.fps, "effective_particles_of_a_person")
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the people of the frame as Tracks; updates all particles.
@@ -173,11 +144,7 @@ class Particle:
         Raises InputError if points are in the image and the context has no scale above 0, or if the picture's size or
         dtype is not the background sample's.
         """
-        if self.pixels is not None:
-            if self.pixels.settings is not self.config:
-                self.pixels.follow(self.config)
-            known = None if self.shown is None else self.shown.box
-            detections = self.pixels.detections(frame, np.zeros((0, 4)) if known is None else known)
+        detections = self.detected(frame, detections, None if self.shown is None else self.shown.box)
         self.streams.frame += 1
         self._forecast()
         if detections is not None:
@@ -186,34 +153,13 @@ class Particle:
         if detections is not None:
             one = self.particles.one_weight
             self.particles.resample(1.0 if one else RESAMPLE_SHARE, 0.0 if one else KERNEL_WIDTH, self._own_draws)
-            self.diversity.resample(self.particles)
+            self.health.resampled(self.particles.ancestor)
         return tracks
-
-    @property
-    def px_per_m(self) -> float:
-        """Scale of the image in px per metre: the context's, or, from pixels, learned from its background sample; nan
-        if unknown."""
-        return self.context.px_per_m
 
     @property
     def diagnostics(self) -> dict[str, float | None]:
         """What run.json tells of the particles: means of the shares of effective particles and of ancestors."""
-        return self.diversity.summary()
-
-    @property
-    def dt(self) -> float:
-        """Time between frames, s."""
-        return 1.0 / self.context.fps
-
-    @property
-    def noise(self) -> float:
-        """Standard deviation of a measured position, per axis, m."""
-        return self.config.point_noise if self.pixels is None else self.config.pixel_noise
-
-    @property
-    def unit(self) -> float:
-        """Length of a metre in the unit of the points: 1 on the ground, px per m in the image."""
-        return required(self.context.px_per_m) if self.plane == "image" else 1.0
+        return self.health.summary()
 
     def _forecast(self) -> None:
         p, c = self.particles, self.config
@@ -241,18 +187,19 @@ class Particle:
     def _relate(self) -> None: ...
 
     def _measure(self, detections: Detections) -> None:
-        self.plane = "image" if detections.plane == "image" else "ground"
-        points, sizes = ordered_points(detections, self.unit)
+        points, sizes = self.points(detections)
         missed = self.slots.missed > 0
         sight = sensor.Sight(self._detection_probability(), missed, self.cut, self.eye)
         said = sensor.weigh(self.particles, points, sight, self.noise, self.config)
         self.vanished += said.vanished
-        self.diversity.weigh(self.particles)
+        if self.particles.people:
+            least = float(self.particles.effective().min())
+            self.health.add("effective_particles_of_a_person", least / self.particles.count)
         self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
         new = said.nobody >= BIRTH_DOUBT
         if new.any():
-            self._start(points[new], np.full((int(new.sum()), 2), np.nan) if sizes is None else sizes[new])
+            self._start(points[new], sizes[new])
 
     def _detection_probability(self) -> Array:
         c = self.config
@@ -275,7 +222,7 @@ class Particle:
         draws = self.streams.normals(BIRTHS, key, 2 * p.count, 2).reshape(2, p.count, len(points), 2)
         exist = c.birth_rate * self.dt / (c.birth_rate * self.dt + c.clutter_density)
         p.add(points + self.noise * draws[0], SPEED_PRIOR * draws[1], exist)
-        self.slots.add(sizes, key)
+        self.slots.extend(id=np.full(len(key), -1), size=sizes, key=key)
         self._relate_newcomers(points)
 
     def _own_draws(self, people: Ints) -> tuple[Array, Array]:

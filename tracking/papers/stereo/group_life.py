@@ -1,32 +1,30 @@
-"""Merging of `stereo`'s groups: regions of the full state that overlap (eqs 13 to 15, sec. 3.5).
+"""How `stereo`'s groups begin, merge, split and end.
+
+Merging (eqs 13 to 15, sec. 3.5): regions of the full state that overlap.
 
     x_i R x_j  if MR_i and MR_j overlap; I_n: the connected components of R          (13)
     X = sum of n_i X_i,   Sigma = sum of n_i {Sigma_i + (X_i - X)(X_i - X)'}         (14), (15)
 MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
-Two ellipsoids are tested exactly (tracking.papers.stereo.group_life).
+Two ellipsoids are tested exactly, see below.
 
 Tentative groups merge, too: without an event, as nobody knows of them. The paper does not say what P of a merged group
 is: here it is that of a weighted mean, sum of n_i^2 P_i. The group with most points keeps its id, of those that have
 been there for SETTLED if there are any, else of the confirmed ones (ours).
 
-Do ellipsoids of any dimension have a common point? (Gilitschenski & Hanebeck 2012)
+The test (`separation`): Gilitschenski & Hanebeck, "A robust computational test for overlap of two arbitrary-dimensional
+ellipsoids in fault-detection of Kalman filters", 2012: the ellipsoids y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 are
+disjoint if and only if f(s) = d' (A / (1 - s) + B / s)^-1 d > 1 for some s in (0, 1). f is concave. With B = L L', A' =
+L^-1 A L^-T = U diag(l) U' and e = U' L^-1 d: f(s) = sum of s (1 - s) e_k^2 / (1 - s + s l_k), with A and B exchanged
+where s and 1 - s are. Ellipses in the plane have kernels of their own: tracking.filters.ellipse_overlap_kernels.
 
-"A robust computational test for overlap of two arbitrary-dimensional ellipsoids in fault-detection of Kalman filters",
-2012: the ellipsoids y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 are disjoint if and only if f(s) = d' (A / (1 - s) +
-B / s)^-1 d > 1 for some s in (0, 1). f is concave. With B = L L', A' = L^-1 A L^-T = U diag(l) U' and e = U' L^-1 d:
-f(s) = sum of s (1 - s) e_k^2 / (1 - s + s l_k), with A and B exchanged where s and 1 - s are. Ellipses in the plane
-have kernels of their own: tracking.filters.ellipse_overlap_kernels.
+Splitting (ours: the paper has no split). A group splits if its points are two or more groups by eq. 12 for
+`split_time`, and if these would not all merge again at once by eq. 13. All parts are newborn from their points, with
+the velocity of the group and its covariance. The part with most points (then the one nearest to the group's position)
+keeps the id; the others are its children.
 
-Splitting of `stereo`'s groups (ours: the paper has no split).
-
-A group splits if its points are two or more groups by eq. 12 for `split_time`, and if these would not all merge again
-at once by eq. 13. All parts are newborn from their points, with the velocity of the group and its covariance. The part
-with most points (then the one nearest to the group's position) keeps the id; the others are its children.
-
-Initial grouping, births, confirmation and deletion of `stereo`'s groups; ours, except for the initial grouping.
-
-Points in space whose spheres of radius r overlap are linked (eq. 12, sec. 3.4): those at most 2 r apart. The groups are
-the connected components with enough points.
+Initial grouping, births, confirmation and deletion; ours, except for the initial grouping. Points in space whose
+spheres of radius r overlap are linked (eq. 12, sec. 3.4): those at most 2 r apart. The groups are the connected
+components with enough points.
 
 A new group is tentative, without an id, until it has been measured for `confirm_time`. A group that has not been
 measured for `coast_time`, a tentative one for `confirm_time`, is deleted.

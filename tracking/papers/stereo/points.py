@@ -1,6 +1,7 @@
 """Points of `stereo` from pairs of pictures: foreground, subtraction stereo, people, features (secs. 2, 3.1).
 
-Person or not: the height and width of foreground regions from their points in space (Hoshikawa et al. 2011, sec. 2).
+Also here: person or not: the height and width of foreground regions from their points in space (Hoshikawa et al. 2011,
+sec. 2).
 
 A region is a blob of the foreground. Its height is the range of its points' world z, its width their range across the
 line of sight: that between the 10 % and 90 % quantiles over 0.8. The points' own errors widen a range. A region is too
@@ -8,7 +9,7 @@ low or too narrow if even the measured range is, and too high only if the range 
 neither its measure nor limits. Ours: a region that the edge of the image cuts is not too small for a person, and a
 region of several people may be of any width.
 
-Points of `stereo` from detections: each detection is one point in space, linked from frame to frame (ours).
+Also here: points of `stereo` from detections: each detection is one point in space, linked from frame to frame (ours).
 
 The links stand in for KLT: they give points ids and velocities. A detection continues the point whose predicted place
 is near; pairs have the least total distance. A point on the ground has z = 0; a point in the image is u, v over the
@@ -17,7 +18,7 @@ scale, m. The covariance of a point is point_noise^2 in each coordinate.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -28,7 +29,7 @@ from sim.arrays import no_ids
 from sim.scene.camera import back_project, point_covariances
 from sim.types import Array, Bools, Camera, Context, Image
 from tracking.detect.blobs import Blobs, odd
-from tracking.detect.features import FeatureRules, Features, SpacePoints, slopes
+from tracking.detect.features import Features, SpacePoints, slopes
 from tracking.detect.foreground import Foreground
 from tracking.detect.subtraction_stereo import Disparities, SubtractionStereo
 from tracking.filters.assignment import optimal
@@ -36,27 +37,16 @@ from tracking.papers.stereo.config import StereoConfig
 
 QUANTILES = 0.1, 0.9  # Ranges are those between these quantiles: matches may be wrong.
 NORMAL_RANGE = 2.563  # Range of a normal distribution between these quantiles, in standard deviations.
+LEAST_HEIGHT, MOST_HEIGHT, LEAST_WIDTH = 0.5, 3.0, 0.1  # m, of a foreground region that is a person (sec. 2).
 LEAST_POINTS = 5  # Points with a disparity that a region needs to be measured.
 
 
-@dataclass(frozen=True)
-class PersonLimits:
-    """Sizes of people, m: the least height and width of a region, and the largest height.
-
-    deviations (3,): standard deviations of a point's u, v and disparity, px.
-    """
-
-    least_height: float
-    most_height: float
-    least_width: float
-    deviations: tuple[float, float, float]
-
-
-def person_mask(blobs: Blobs, disparity: Disparities, camera: Camera, limits: PersonLimits) -> Bools:
-    """Returns the foreground (H, W) bool of the regions that may be people."""
-    height, width, error = sizes(blobs, disparity, camera, limits.deviations)
-    small = (height < limits.least_height) | (width < limits.least_width)
-    keep = np.isfinite(height) & (height**2 - error**2 <= limits.most_height**2) & (~small | blobs.cut())
+def person_mask(blobs: Blobs, disparity: Disparities, camera: Camera, deviations: tuple[float, float, float]) -> Bools:
+    """Returns the foreground (H, W) bool of the regions that may be people; deviations (3,): standard deviations of a
+    point's u, v and disparity, px."""
+    height, width, error = sizes(blobs, disparity, camera, deviations)
+    small = (height < LEAST_HEIGHT) | (width < LEAST_WIDTH)
+    keep = np.isfinite(height) & (height**2 - error**2 <= MOST_HEIGHT**2) & (~small | blobs.cut())
     return np.asarray(np.concatenate([[False], keep])[blobs.label])
 
 
@@ -79,10 +69,7 @@ def sizes(
 
 
 BLOCK = 0.27  # m: width of the block that is compared in matching.
-PERSON = 0.5, 3.0, 0.1  # m: least and largest height and least width of a foreground region that is a person (sec. 2).
 FEATURE_SPACING = 0.09  # m: least distance of a new feature from the others in the image.
-BACK_CHECK = 0.7  # px: a feature ends if u or v is so far off after following it forwards and backwards (ours).
-MOST_FEATURES = 400  # Largest number of features.
 
 
 class PicturePoints:
@@ -119,14 +106,12 @@ class PicturePoints:
             return SpacePoints.none()
         c, left = self.config, grey(image)
         blobs = self.foreground.person_blobs(seen.mask)
-        disparity = self.stereo.match(left, grey(right), blobs.label > 0).disparity
+        disparity = self.stereo.match(left, grey(right), blobs.label > 0)
         deviations = (c.pixel_noise, c.pixel_noise, c.disparity_noise)
-        limits = PersonLimits(*PERSON, deviations)
-        people = person_mask(blobs, disparity, self.camera, limits)
+        people = person_mask(blobs, disparity, self.camera, deviations)
         self.foreground.adapt(seen, people)
         spacing = FEATURE_SPACING * self.foreground.scale
-        rules = FeatureRules(c.window_time, spacing, BACK_CHECK, deviations, MOST_FEATURES)
-        found = self.features.step(left, people, disparity, rules)
+        found = self.features.step(left, people, disparity, c.window_time, spacing, deviations)
         return moved_away(found, self.camera, c.surface_offset)
 
 

@@ -8,13 +8,13 @@ The filter is filterpy's. The paper's Phi has a step of 1 frame; here times are 
 a group; here P is that of the centroid, by the filter, and Sigma that of the members. Departures: C_y is without the
 points' own covariances and is shrunk to a prior, as the covariance of few points in six dimensions is singular.
 
-The measurement of a group by the extended Kalman filter: Z = f(X) + noise (eqs 4 to 6), and its Jacobian.
+Also here: the measurement of a group by the extended Kalman filter: Z = f(X) + noise (eqs 4 to 6), and its Jacobian.
 
 The state is X = (x, x', y, y', z, z') (eq. 1). From pictures Z = (u, v, d): the projection of the mean of the group's
 points in space. Departure: the mean of their (u, v, d) would be biased, as the depth b f / d is no linear function of d
 (the bias is -var(z) / z). From detections Z = (x, y, z), so that the filter is a linear Kalman filter.
 
-Data association of `stereo`: which group each point belongs to (sec. 3.3).
+Also here: data association of `stereo`: which group each point belongs to (sec. 3.3).
 
     (y_i - xi_j)' S^-1 (y_i - xi_j) < gamma                  search region of group j (eq. 8)
     m_total = p(y_i | xi_j, P_xi)^k_p p(lambda_i | v_j, P_v)^k_v            (eqs 9 to 11)

@@ -58,17 +58,16 @@ Departures:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
+from sim.arrays import no_ids
 from sim.geometry.hull_kernels import convex_hulls
 from sim.geometry.polygons import FOOTPRINT
-from sim.types import Array, Context, Detections, Frame, Groups, Plane, Tracks
+from sim.types import Context, Detections, Frame, Groups, Plane, Tracks
 from tracking.detect.features import SpacePoints
-from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, reported_event
+from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_group_tracks
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.group_life import born, confirm, merge, remove_lost, sphere_groups, split
 from tracking.papers.stereo.points import PicturePoints, PointLinks
@@ -85,48 +84,6 @@ from tracking.papers.stereo.space_group import (
     predict,
 )
 from tracking.running.image_scale import required
-
-
-@dataclass(frozen=True)
-class ShownFrame:
-    """The frame that is reported.
-
-    index: from 1; t: s; fps: frames per second. plane: of the tracks; scale: units of the plane per m. outline (V, 2):
-    what a point covers round its place, seen from above, m. size_known: True if each point is a person.
-    """
-
-    index: int
-    t: float
-    fps: float
-    plane: Plane
-    scale: float
-    outline: Array
-    size_known: bool
-
-
-def space_tracks(
-    groups: Sequence[SpaceGroup], events: Sequence[WholeGroupEvent], report_coast: float, shown: ShownFrame
-) -> Tracks:
-    """Returns the Tracks, with unit "group", of the confirmed groups measured within the last `report_coast` s."""
-    rows = [g for g in groups if g.confirmed and shown.t - g.last_seen <= report_coast + 1e-9]
-    rows = sorted(rows, key=lambda g: g.id)
-    axes = 3 if shown.plane == "space" else 2
-    order = POS[:axes] + VEL[:axes]
-    s = shown.scale
-    id = np.array([g.id for g in rows], np.int64)
-    x = np.stack([g.ekf.x[order, 0] for g in rows]) if rows else np.zeros((0, 2 * axes))
-    P = np.stack([g.ekf.P[np.ix_(order, order)] for g in rows]) if rows else np.zeros((0, 2 * axes, 2 * axes))
-    flat = np.ix_(POS[:2], POS[:2])
-    extent = np.stack([g.spread[flat] for g in rows]) if rows else np.zeros((0, 2, 2))
-    size = np.array([g.count if shown.size_known else np.nan for g in rows])
-    hulls = convex_hulls([((g.members + g.pos)[:, None, :2] + shown.outline).reshape(-1, 2) * s for g in rows])
-    pos, vel = s * x[:, :axes], s * x[:, axes:]
-    found = Groups(id, tuple(np.zeros(0, np.int64) for _ in rows), pos, vel, s**2 * extent, size, hulls)
-    return Tracks(
-        shown.index, shown.t, shown.plane, "group", id, id.copy(), pos.copy(), vel.copy(), s**2 * P,
-        None, np.ones(len(rows)), found, tuple(reported_event(e, shown.index, shown.t, shown.fps, s) for e in events),
-    )  # fmt: skip
-
 
 LEAST_GROUP = 5  # From pixels: least number of linked features that form a group.
 LEAST_FEATURES = 3  # From pixels: least number of features that update a group (sec. 3.3).
@@ -189,9 +146,23 @@ class Stereo:
         events = merge(self.groups, self.config, t)
         events += confirm(self.groups, self.config, t, self.ids)
         events += remove_lost(self.groups, self.config, t)
-        outline = FOOTPRINT * (FEATURE_OUTLINE if self.pictures is not None else 1.0)
-        shown = ShownFrame(frame.index, t, self.context.fps, self.plane, self.scale, outline, self.pictures is None)
-        return space_tracks(self.groups, events, self.config.report_coast, shown)
+        return self._report(frame, events)
+
+    def _report(self, frame: Frame, events: list[WholeGroupEvent]) -> Tracks:
+        """Returns the confirmed groups measured within the last `report_coast` s, by id."""
+        shown = [g for g in self.groups if g.confirmed and frame.t - g.last_seen <= self.config.report_coast + 1e-9]
+        shown.sort(key=lambda g: g.id)
+        axes, s, from_points = 3 if self.plane == "space" else 2, self.scale, self.pictures is None
+        order, flat = POS[:axes] + VEL[:axes], np.ix_(POS[:2], POS[:2])
+        x = s * np.array([g.ekf.x[order, 0] for g in shown]).reshape(-1, 2 * axes)
+        P = s**2 * np.array([g.ekf.P[np.ix_(order, order)] for g in shown]).reshape(-1, 2 * axes, 2 * axes)
+        extent = s**2 * np.array([g.spread[flat] for g in shown]).reshape(-1, 2, 2)
+        outline = FOOTPRINT * (1.0 if from_points else FEATURE_OUTLINE)  # what a point covers, seen from above, m
+        hulls = convex_hulls([((g.members + g.pos)[:, None, :2] + outline).reshape(-1, 2) * s for g in shown])
+        id, size = np.array([g.id for g in shown], np.int64), np.array([g.count for g in shown], float)
+        size = size if from_points else size * np.nan
+        groups = Groups(id, (no_ids(),) * len(id), x[:, :axes], x[:, axes:], extent, size, hulls)
+        return whole_group_tracks(frame, self.plane, self.context.fps, groups, P, events, s)
 
     def _points(self, frame: Frame, detections: Detections | None) -> SpacePoints:
         if self.pictures is not None:

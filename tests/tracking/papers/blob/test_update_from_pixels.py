@@ -100,6 +100,31 @@ def test_shadows_move_the_centroid_only_where_they_are_foreground(dark, moved):
     assert (off > 3 * np.sqrt(bank[kalman.VAR, 0])) == moved
 
 
+def test_a_track_that_lies_stands_up_where_templates_measure_it():
+    """Two in one blob, one of whom was taken for somebody lying."""
+    pair = [[(80 + 4 * k, 180, TALL), (98 + 4 * k, 181, TALL)] for k in range(30)]
+
+    def fell(tracker, tracks):
+        if tracks.index == 12:
+            tracker.people.angle[0, 0] = 0.0
+
+    made = track(pair, watch=fell)
+    assert made[12].box[0, 2] > made[12].box[0, 3]
+    for t, (a, b) in zip(made[18:], pair[18:], strict=True):
+        assert mine(t, a) == mine(made[11], pair[11][0])
+        assert mine(t, b) == mine(made[11], pair[11][1])
+
+
+def test_windows_follow_the_image_while_nobody_was_seen():
+    scales = []
+    for k in (1, 3):
+        sample = np.stack([painted.picture([], np.random.default_rng(0))] * 12).repeat(k, 1).repeat(k, 2)
+        tracker = painted.Blob()
+        tracker.reset(painted.Context(painted.FPS, float("nan"), background=sample), 0)
+        scales.append(tracker.updater.foreground.scale)
+    assert scales[1] == pytest.approx(3 * scales[0])
+
+
 def test_a_lost_frame_only_predicts():
     way, state = walk(60, 180, 4, 20), []
     frames = [[p] for p in way]

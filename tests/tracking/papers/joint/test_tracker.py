@@ -49,7 +49,7 @@ def kalman(tracker, points, config):
         bank.step(Frame(k, (k - 1) / FPS), detections(k, [points[k - 1]]))
     new = bank.newcomers
     new.predict(1 / FPS)
-    new.measure(np.array([points[frames - 1]]), None, config.point_noise, LARGEST_DISTANCE)
+    new.measure(np.array([points[frames - 1]]), np.full((1, 2), np.nan), config.point_noise, LARGEST_DISTANCE)
     place, rate, var, cross, rate_var = new.bank[:, 0]
     x, P = np.concatenate([place, rate]), np.kron([[var[0], cross[0]], [cross[0], rate_var[0]]], np.eye(2))
     A, H = np.eye(4) + np.eye(4, k=2) / FPS, np.eye(4)[:2]

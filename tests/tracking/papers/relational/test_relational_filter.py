@@ -69,7 +69,9 @@ def seat(tracker, particles):
     """Gives the tracker these people, who have not been measured in the last frame."""
     tracker.particles = particles
     people = particles.people
-    tracker.slots.add(np.full((people, 2), np.nan), birth_keys(np.zeros((people, 2)), 1))
+    tracker.slots.extend(
+        id=np.full(people, -1), size=np.full((people, 2), np.nan), key=birth_keys(np.zeros((people, 2)), 1)
+    )
 
 
 def sight(detect, missed=None):
