@@ -55,7 +55,7 @@ class PersonError:
 
 def matched_people(pairs: Pairs) -> MatchedPeople:
     """Returns the people of both sides with the matches of CLEAR."""
-    found = clear_matches(pairs).found
+    found = clear_matches(pairs)
     track, person = np.full(len(pairs.true), NOBODY, np.int64), np.full(len(pairs.est), NOBODY, np.int64)
     track[found.i], person[found.j] = found.j, found.i
     return MatchedPeople(pairs, track, person)

@@ -123,8 +123,7 @@ def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
 
     MT, PT and ML are shares of the people of the whole recording: each person counts in its frames with equal parts.
     """
-    near, turn = pairs.keep(pairs.s >= FOUND - EPS), turns(pairs)
-    near = near.keep(follow(near, turn))
+    near, turn = clear_matches(pairs), turns(pairs)
     who = near.true_ids[1][near.i]
     share = np.bincount(who, minlength=len(pairs.true_ids[0])) / np.bincount(pairs.true_ids[1])
     order = np.argsort(who, kind="stable")
@@ -154,6 +153,12 @@ def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
         }  # fmt: skip
 
     return score
+
+
+def clear_matches(pairs: Pairs) -> Pairs:
+    """Returns the matches of CLEAR: pairs of similarity 0.5 or more; no id may be twice in a frame."""
+    near = pairs.keep(pairs.s >= FOUND - EPS)
+    return near.keep(follow(near, turns(pairs)))
 
 
 def turns(pairs: Pairs) -> Ints:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from sim.scene.camera import project_pair
+from sim.scene.camera import project, project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import Features, slopes
 

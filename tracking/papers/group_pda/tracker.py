@@ -14,9 +14,9 @@ number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or 
     masses     m_tot = m_d m_N m_g: m_d, m_N                           eq. 4.2            association_mass_kernels
                m_g = 1 if |G_y| = 1 (feasible), else 0                 eq. 4.1            filters.components_kernels
     update     x, P, Sigma, N as means over the associations           eq. 2.4, sec. 4.3  association_kernels
-    split      a group whose associations all have m_g = 0             sec. 3.3, 4.2      splitting
-    merge      R_x: overlapping regions and like velocities            sec. 3.1           merging
-               x, Sigma, N of the union, means weighted by N           eq. 3.1            merging
+    split      a group whose associations all have m_g = 0             sec. 3.3, 4.2      merging_and_splitting
+    merge      R_x: overlapping regions and like velocities            sec. 3.1           merging_and_splitting
+               x, Sigma, N of the union, means weighted by N           eq. 3.1            merging_and_splitting
     birth      unclaimed points, grouped by G_y                        sec. 3.3           births_and_losses
 
 The grouping functions G_0, G_x, G_y of points (sec. 3.3, 4.2.1) are in tracking.filters.components: G_y links points at

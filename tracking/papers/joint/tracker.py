@@ -4,7 +4,7 @@ Bazzani, Cristani, Murino, "Decentralized particle filter for joint individual-g
 state is (X, Z): X places and velocities of K individuals, Z the partition of them into groups; y the detections. N_x
 particles of X, N_z partitions under each. The steps of a frame, with the numbers of Algorithm 1:
 
-    4  X' ~ pi(X' | X, y)              composite proposal                     before eq. 3   individuals
+    4  X' ~ pi(X' | X, y)              composite proposal                     before eq. 3   distributions
          `alpha` of N(A x, Sigma), the rest pi_det
     5  q = qbar p(X' | X, Z)           groups move individuals                eq. 5          individuals_kernels
          N(x + B g, Sigma) for each person, g the mean of the group
@@ -12,7 +12,7 @@ particles of X, N_z partitions under each. The steps of a frame, with the number
     7  Z' ~ pi(Z' | X', X, Z)          Merge, Split, None of each group       eqs 6, 7       group_events_kernels
     1  w = p_Nz(y | X') p_Nz(X' | X) / pi(X' | X, y)                          eq. 4          decentralised_filter
     3  qbar = p(y | X', Z')            exp(-lambda_cl d_cl), Davies-Bouldin   eq. 4          partition_kernels
-       estimate                        means, co-membership                   Fig. 3         estimate
+       estimate                        means, co-membership                   Fig. 3         report
     2  resample X and Z by w                                                                 decentralised_filter
 
 p_Nz(X' | X) is the normaliser of step 5. Steps 4 to 7 run when the new frame is there, as the proposal uses it.

@@ -9,7 +9,7 @@ together. z are the detections of a frame, w the weights. The steps of a frame:
               |u| in Table 3, per axis, e normal
               s^r ~ p(s^r_t | s^a_t, s^r_t-1)    relations from new attributes  eq. 7                transition_kernels
     weight    w = w p(z_t | s^a_t)               sum over all mappings          eqs 6, 12, sec. 3.3  sensor
-    births    x ~ N(z, .), v ~ N(0, .)           relations of newcomers         secs. 2.1.1, 3.2     tracker, relations
+    births    x ~ N(z, .), v ~ N(0, .)           relations of newcomers         secs. 2.1.1, 3.2     tracker
     estimate  means over particles                                                                   particle_set
     resample  residual sampling                                                 sec. 2.1             filters.particles
 

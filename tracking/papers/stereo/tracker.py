@@ -9,10 +9,10 @@ covariance of its points' positions and velocities; N, the number of its points.
     X_k+1 = Phi X_k + noise                                eqs 2, 3            space_group
     Z = (u, v, d) = f(X) + noise                           eqs 4 to 6          measurement, sim.scene.camera
     Sigma <- alpha Sigma + (1 - alpha) C_y                 eq. 7               space_group
-    (y - xi)' S^-1 (y - xi) < gamma                        eq. 8               association
-    m_total = p(y)^k_p p(lambda)^k_v, the largest wins     eqs 9 to 11         association
-    new groups: points whose spheres overlap               eq. 12              births_and_losses
-    merging by the full state, weighted by N               eqs 13 to 15        merging
+    (y - xi)' S^-1 (y - xi) < gamma                        eq. 8               space_group
+    m_total = p(y)^k_p p(lambda)^k_v, the largest wins     eqs 9 to 11         space_group
+    new groups: points whose spheres overlap               eq. 12              group_life
+    merging by the full state, weighted by N               eqs 13 to 15        group_life
 
 C_y is the covariance of the points' positions y and velocities lambda; spheres have the radius `radius`; groups merge
 whose regions of X overlap (`merge_gate`). The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in
