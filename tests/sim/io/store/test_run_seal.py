@@ -295,13 +295,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("key", "value"), [(key, value) for key, values in WRONG.items() for value in values])
-@pytest.mark.parametrize("given", ["", "tracks.txt"])
-def test_values_of_another_kind(tmp_path, make_tracks, key, value, given):
+def test_values_of_another_kind(tmp_path, make_tracks, key, value):
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info={"sequence": "s"})
     run = {**json.loads((folder / "run.json").read_bytes()), key: value}
     (folder / "run.json").write_bytes(json_document(with_hash(run)))
     with pytest.raises(InputError) as error:
-        find_tracks(folder / given)
+        find_tracks(folder)
     assert (error.value.file, error.value.place) == (str(folder / "run.json"), key)
     assert "track again" in error.value.remedy
 
