@@ -245,6 +245,7 @@ def test_what_the_gate_cuts_off(gate: float, correct: bool, extent: float, insid
     assert found[1] == pytest.approx(inside, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_places_of_missed_members(seed: int) -> None:
     """What a centroid with carried places has measured is H x, H = [I, -a I], with R: over many frames, in its spread.
