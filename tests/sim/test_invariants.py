@@ -38,7 +38,7 @@ def partition(group):
     return [{frozenset(np.flatnonzero(row == g).tolist()) for g in set(row.tolist()) - {-1}} for row in group]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(scenes())
 def test_each_plot_has_its_event_at_its_time(plots):
     """The other tests would be empty without it."""
@@ -49,7 +49,7 @@ def test_each_plot_has_its_event_at_its_time(plots):
     assert all(0 <= t - onset <= 1 / FPS + 1e-9 for (_, t), (_, onset) in zip(got, known, strict=True))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(scenes(), st.randoms(use_true_random=False))
 def test_numbers_of_people_do_not_matter(plots, random):
     scene = look(plots, FPS)
@@ -71,7 +71,7 @@ an encounter (hulls within 1.0 m) may begin or end one frame earlier or later.""
 ANGLES = st.one_of(st.floats(0, 360), st.integers(0, 15).map(lambda corners: CORNER_DEG * corners))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(scenes(), st.floats(-1000, 1000), st.floats(-1000, 1000), ANGLES, st.booleans())
 def test_place_and_turn_of_the_world_do_not_matter(plots, x, y, degrees, mirror):
     scene = look(plots, FPS)
@@ -92,7 +92,7 @@ def test_place_and_turn_of_the_world_do_not_matter(plots, x, y, degrees, mirror)
         np.testing.assert_allclose(np.array(a.pos) @ turn + [x, y], b.pos, atol=1e-6)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(scenes(), st.floats(0.4, 0.95))
 def test_what_comes_later_does_not_change_what_has_been(plots, share):
     scene = look(plots, FPS)
@@ -106,7 +106,7 @@ def test_what_comes_later_does_not_change_what_has_been(plots, share):
     assert {r[:2] for r in rows(told)} <= {r[:2] for r in rows(events)}, "nothing is told that then was not"
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(scenes(), st.sampled_from([5.0, 12.5, 20.0, 25.0, 30.0]))
 def test_the_frame_rate_does_not_matter(plots, fps):
     """Onsets to one frame of the slower rate (lines are looked at 10 times a second at most)."""
@@ -116,7 +116,7 @@ def test_the_frame_rate_does_not_matter(plots, fps):
     assert all(abs(a[2] - b[2]) <= 1 / min(FPS, fps) + 0.1 / 2 for a, b in zip(*sides, strict=True))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(scenes(), scenes())
 def test_strangers_far_away_do_not_matter(plots, others):
     few, many = look(plots, FPS), look([*plots, *others], FPS)
@@ -126,7 +126,7 @@ def test_strangers_far_away_do_not_matter(plots, others):
     assert [r for r in rows(told) if r[3][0] <= people] == rows(events)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.one_of(merges(), splits(), crosses()))
 def test_one_who_has_gone_is_nobody(plot):
     """Rows of people who are never there change nothing, whatever numbers stand in them."""

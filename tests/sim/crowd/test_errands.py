@@ -68,14 +68,3 @@ def test_an_order_ends_the_stops_of_its_group(path: Path) -> None:
     split = f"event=[{{ id = 's', type = 'split', group = 'a', when = {{ time = 3 }}, parts = {parts} }}]"
     motion = run(load(path, [far, split]), 1)
     assert motion.pos[-1, :, 0].min() > 23
-
-
-def test_members_start_scattered_and_come_together(path: Path) -> None:
-    calm = ["warmup=0", "crowd.place_noise=[0, 0]", "crowd.velocity_noise=[0, 0]"]
-    close = run(load(path, calm), 1)
-    motion = run(load(path, [*calm, "group.a.scatter=1.5"]), 1)
-    off = np.linalg.norm(motion.pos[0] - close.pos[0], axis=1)
-    np.testing.assert_allclose(off, 1.5, atol=0.2)  # the first frame is a step after the start
-    np.testing.assert_array_equal(motion.height, close.height)
-    gap = np.linalg.norm(motion.pos[:, 0] - motion.pos[:, 1], axis=1)
-    assert gap[100] == pytest.approx(0.8, abs=0.3)

@@ -16,6 +16,7 @@ from sim.dataset.generate import (
     JobOutcome,
     SequenceJob,
     is_stored,
+    lost_job,
     run_job,
     stored_manifest,
 )
@@ -134,3 +135,9 @@ def test_what_differs_is_named(
             (job.folder / "scenario.toml").write_text(unreadable)
         with pytest.raises(InputError, match="scenario_hash"):
             stored_manifest(other)
+
+
+def test_given_up(job: SequenceJob) -> None:
+    outcome = lost_job(job, WorkError(got="an item that killed 3 workers", expected="b", remedy="c"))
+    assert outcome == JobOutcome(outcome.error)
+    assert str(outcome.error).startswith("x-s00001: got an item that killed 3 workers")

@@ -120,3 +120,13 @@ def test_at_and_above_the_horizon_there_is_no_ground_and_no_warning() -> None:
     J = ground_jacobian(camera, uv)
     assert np.isfinite(J).all(axis=(1, 2)).tolist() == [False, False, True]
     assert J[2, 1, 1] == pytest.approx(-2 * 120 / 40**2), "y = f h / (v - 60)"
+
+
+@pytest.mark.parametrize("k", [0.0, *BENDS])
+def test_the_jacobian_is_the_slope(k):
+    camera = pinhole(35, -15).replace(radial=k, focal_px=(480.0, 530.0))
+    uv = np.random.default_rng(2).uniform([20, 260], [620, 470], (100, 2))
+    step = 1e-4
+    slope = [(to_ground(camera, uv + d) - to_ground(camera, uv - d)) / (2 * step) for d in step * np.eye(2)]
+    right = np.stack(slope, axis=2)
+    assert ground_jacobian(camera, uv) == pytest.approx(right, rel=1e-5, abs=1e-8)

@@ -84,17 +84,6 @@ def test_an_unfinished_run(made, tracks, tmp_path, capsys):
     assert "incomplete: track again" in refused(capsys, "score", one, alone)
 
 
-def test_two_trackers_in_one_folder(made, tracks, tmp_path, capsys):
-    shutil.rmtree(tracks / "scene-s40001")
-    shutil.copytree(made / "group-pda" / "scene-s40001", tracks / "scene-s40001")
-    for line in readers(made / "data", tracks, tmp_path / "out"):
-        text = refused(capsys, *line)
-        assert "blob in scene-s40000, group-pda in scene-s40001" in text
-        assert "one folder per run" in text
-    (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())
-    assert run(["score", str(one), str(tracks)]) == 0
-
-
 @pytest.mark.parametrize(
     ("option", "words"),
     [

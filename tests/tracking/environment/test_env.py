@@ -27,6 +27,7 @@ from tracking.running.tracker_registry import names
 
 ID = "flockscope/Tuning-v0"
 SHORT = ["camera.fps=5", "duration=6"]
+TINY = ["camera.fps=5", "duration=3"]
 FAKE = f"{Path(__file__).resolve().parents[2] / 'fake_tracker.py'}:Nearest"
 TOY = f"{Path(__file__).resolve().parents[2] / 'toy_tracker.py'}:Toy"
 
@@ -55,7 +56,7 @@ def played(env, actions=None, **reset):
     [*((name, OBSERVATIONS[0], 10) for name in names()), *((TOY, seen, None) for seen in OBSERVATIONS)],
 )
 def test_gymnasium_checks_it_without_a_warning(tracker, observation, every):
-    env = make(tracker, decision_every=every, observation=observation)
+    env = make(tracker, decision_every=every, observation=observation, set=TINY)
     check_env(env.unwrapped)
 
 
@@ -78,11 +79,11 @@ def test_rewards_sum_to_what_evaluate_says(tracker):
 
 @pytest.mark.parametrize(("tracker", "every"), [*((name, 9) for name in names()), (TOY, None)])
 def test_a_seed_repeats_everything(tracker, every):
-    env = make(tracker, decision_every=every)
+    env = make(tracker, decision_every=every, set=TINY)
     first = played(env, 1, seed=5)
     played(env, 2)
     again = played(env, 1, seed=5)
-    other = played(make(tracker, decision_every=every, cache=0), 1, seed=5)
+    other = played(make(tracker, decision_every=every, cache=0, set=TINY), 1, seed=5)
     for run in (again, other):
         assert np.array_equal(run[0], first[0])
         assert np.array_equal(run[1], first[1])

@@ -84,7 +84,7 @@ def test_nobody_one_and_all_at_the_same_place() -> None:
 points_of = arrays(float, st.tuples(st.integers(1, 12), st.just(2)), elements=st.floats(-6, 6, width=32))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(points_of)
 def test_links_of_any_points(points) -> None:
     d2 = np.square(points[:, None] - points).sum(2)

@@ -46,7 +46,7 @@ def partition(made):
     return [{frozenset(np.flatnonzero(t.group == g).tolist()) for g in set(t.group.tolist()) - {-1}} for t in made]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.lists(st.one_of(merges(), splits(), crosses()), min_size=1, max_size=3))
 def test_each_plot_is_noticed(plots):
     """A split is noticed 2 s after its onset, a merge when near for 80 % of 2 s. Who queues is a group to this rule."""
@@ -60,7 +60,7 @@ def test_each_plot_is_noticed(plots):
 
 
 @both
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(scenes(), st.data())
 def test_ids_do_not_matter(grouping, plots, data):
     scene = look(plots, FPS)
@@ -75,7 +75,7 @@ CORNER = 22.5
 
 
 @both
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     scenes(), st.floats(-500, 500), st.one_of(st.floats(0, 360), st.integers(0, 15).map(lambda k: k * CORNER)),
     st.booleans(), st.sampled_from([1.0, 18.8, 250.0]),
@@ -100,7 +100,7 @@ def test_place_turn_and_unit_do_not_matter(grouping, plots, x, degrees, mirror, 
 
 
 @both
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(scenes(), st.floats(0.4, 0.95))
 def test_what_comes_later_changes_no_label(grouping, plots, share):
     scene = look(plots, FPS)
@@ -113,7 +113,7 @@ def test_what_comes_later_changes_no_label(grouping, plots, share):
 
 
 @both
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(scenes(), scenes())
 def test_strangers_far_away_do_not_matter(grouping, plots, others):
     few, many = (derive(tracks(look(some, FPS)), FPS, grouping=grouping) for some in (plots, [*plots, *others]))
@@ -122,7 +122,7 @@ def test_strangers_far_away_do_not_matter(grouping, plots, others):
     assert [e for e in events(many) if e[3][0] <= people] == events(few)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(scenes(), st.sampled_from([5.0, 20.0, 25.0]))
 def test_the_frame_rate_does_not_matter(plots, fps):
     """To two frames of the slower rate: 80 % of 10 frames are 8, of 50 they are 40."""

@@ -52,7 +52,7 @@ FOUND, MISSED = Scene(TWO, PAIR), Scene({1: (0.1, 0.0)})
 FALSE = Scene({**TWO, 9: (30.0, 0.0)}, {1: ((1, 2), None), 7: ((1, 9), (20.0, 20.0, 22.0, 22.0))})
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.lists(st.integers(0, 3), min_size=12, max_size=12).filter(lambda w: sum(w[:6]) > 0))
 def test_frames_of_weight_n_count_n_times(weight: list[int]) -> None:
     """Joins make nothing here: the same people stand in every frame, and what goes wrong is at the end."""

@@ -48,24 +48,6 @@ def test_gmitre_of_one_frame(true: Sets, est: Sets, right: int, of_est: int, of_
     assert found([scene(*true)], [scene(*est)], "GMITRE") == expected
 
 
-@pytest.mark.parametrize(
-    ("n", "inside", "others", "right"),
-    [
-        # At least ceil(2n/3) members, at most ceil(n/3) others.
-        (2, 1, 1, 0), (2, 2, 1, 1), (2, 2, 2, 0), (3, 2, 0, 1), (3, 2, 1, 1), (3, 2, 2, 0), (3, 1, 1, 0), (4, 3, 2, 1),
-        (4, 3, 3, 0), (4, 2, 0, 0), (5, 4, 2, 1), (5, 3, 0, 0), (5, 4, 3, 0), (6, 4, 2, 1), (6, 3, 0, 0), (6, 6, 3, 0),
-        (7, 5, 3, 1), (7, 4, 0, 0), (3, 3, 0, 1), (5, 5, 0, 1),
-    ],
-)  # fmt: skip
-def test_a_group_is_right_with_two_thirds(n: int, inside: int, others: int, right: int) -> None:
-    people = {k: (3.0 * k, 0.0) for k in range(1, n + others + 1)}
-    true = [scene(tuple(range(1, n + 1)), people=people)]
-    est = [scene((*range(1, inside + 1), *range(n + 1, n + others + 1)), people=people)]
-    assert found(true, est, "right_groups") == (right, right, right)
-    exact = float(inside == n and not others)
-    assert found(true, est, "exact_groups") == (exact, exact, exact)
-
-
 def test_hulls_without_members() -> None:
     """The people inside are the members; of two hulls round one group only one is right. Who is alone is not said."""
     true = [scene((1, 2))]

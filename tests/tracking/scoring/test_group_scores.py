@@ -34,17 +34,6 @@ def test_one_giant_group_is_not_two():
         assert found[f"group_{key}"] == near(value), key
 
 
-def test_a_switch_is_remembered_while_nobody_is_found():
-    # The group is matched with 7, with nobody, with 8 (a switch from 7, not a fresh start), 8, 7 (another):
-    # 1 - (1 missed + 2 switches)/5.
-    def told(name):
-        return Scene(APART, {name: ((1, 2), None)} if name else {})
-
-    found = scores([told(1)] * 5, [told(7), told(0), told(8), told(8), told(7)])
-    assert found["group_IDSW"] == 2
-    assert found["group_MOTA"] == near(1 - 3 / 5)
-
-
 @pytest.mark.parametrize(("size", "enough"), [(2, 2), (3, 2), (4, 3), (5, 3), (6, 4), (7, 5), (8, 5), (35, 21)])
 def test_a_group_is_right_with_60_percent_of_its_people(size, enough):
     # ceil(0.6 n); of 5 three are exactly 60 %, of 35 twenty-one are, whatever 0.6 x 35 is in floating point.

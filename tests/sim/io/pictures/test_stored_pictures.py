@@ -79,18 +79,6 @@ def test_where_pictures_lie(tmp_path, make_pictured):
     assert manifest(tmp_path / "png")["streams"] == ["left", "background"]
 
 
-def test_what_the_exact_streams_hold(tmp_path, make_pictured):
-    live = make_pictured(3, ALL)
-    stored(tmp_path / "a", live)
-    codes = cv2.imread(str(tmp_path / "a/ids/000005.png"), cv2.IMREAD_UNCHANGED)
-    assert codes.dtype == np.uint16
-    assert set(np.unique(codes)) == {0, 2001, 2002, 2999, 3000}
-    steps = cv2.imread(str(tmp_path / "a/disparity/000005.png"), cv2.IMREAD_UNCHANGED)
-    known = live.load_pixels(5).disparity
-    assert np.array_equal(steps == 0, np.isnan(known))
-    assert steps[steps > 0] / 256 == pytest.approx(known[steps > 0])
-
-
 def test_codes_there_and_back():
     ids = np.array([[0, 1, 999], [-2, 2, 0]])
     assert np.array_equal(streams.decode_ids(streams.encode_ids(ids)), ids)

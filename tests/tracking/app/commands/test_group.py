@@ -230,19 +230,6 @@ def test_boxes(tmp_path, capsys):
     assert [g["members"] for g in row["groups"]] == [[1, 2, 3], [4, 6]]
 
 
-def test_frames_that_nobody_labelled(tmp_path, capsys):
-    """Frame numbers of the video though each tenth frame was labelled: the rate given is not that of the rows."""
-    rows = [(1 + 10 * k, p, *at(0.4 * k)) for k in range(50) for p, at in WALK.items()]
-    (tmp_path / "walk.txt").write_text("".join(f"{k} {p} {x} {y}\n" for k, p, x, y in rows))
-    assert run(["group", str(tmp_path / "walk.txt"), "--fps", "25", "--out", str(tmp_path / "g")]) == 0
-    assert "only in every 10th frame" in capsys.readouterr().err
-    (tmp_path / "walk.txt").write_text("".join(f"{(k + 9) // 10} {p} {x} {y}\n" for k, p, x, y in rows))
-    assert run(["group", str(tmp_path / "walk.txt"), "--fps", "2.5", "--out", str(tmp_path / "g")]) == 0
-    found = capsys.readouterr()
-    assert found.err == ""
-    assert "1 2 3" in found.out
-
-
 @pytest.mark.parametrize(
     ("rows", "options", "expected"),
     [

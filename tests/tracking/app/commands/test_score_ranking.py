@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -14,7 +12,6 @@ from sim.io.source import open_source
 from tests.short_scene import write_short_scene
 from tracking import track
 from tracking.app.cli import run
-from tracking.scoring.catalogue import CATALOGUE
 
 FAKE = f"{Path(__file__).resolve().parents[3] / 'fake_tracker.py'}:Nearest"
 
@@ -55,23 +52,6 @@ def test_the_ranking_is_that_of_compare(made: Path, capsys) -> None:
     assert [r["run"] for r in found["ranking"][:2]] == ["oracle from boxes (file)", "oracle from points (file)"]
     assert found["similarity"] == "ground"
     assert len(found["differences"]) == 3
-
-
-@pytest.mark.filterwarnings("ignore::UserWarning")
-def test_what_is_shown_and_stored(made: Path, tmp_path: Path, capsys) -> None:
-    words = ["score", str(made / "data"), str(made / "good"), str(made / "bad")]
-    assert run([*words, "--csv", str(tmp_path / "all.csv")]) == 0
-    short = capsys.readouterr().out
-    assert short.startswith("ranking by objective, mean of 6 sequences, input boxes (file)\n")
-    assert "parameter gate: good 0.999, bad 0.6" in short
-    assert re.search(r"of \d\d rows about \d(\.\d)? would be called sure by chance", short)
-    assert "scene-s00003" not in short
-    rows = list(csv.DictReader((tmp_path / "all.csv").open()))
-    assert len(rows) == 6 * 3
-    assert set(CATALOGUE) < set(rows[0])
-    assert run([*words, "--all"]) == 0
-    assert capsys.readouterr().out.count("scene-s00003") == 3
-    assert run([*words, "--by", "MT"]) == 0
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

@@ -80,17 +80,6 @@ def test_the_truth_stands_beside_over_or_alone(tmp_path: Path) -> None:
     assert not (tmp_path / "x.mp4").exists()
 
 
-def test_a_sequence_without_pictures_is_refused(sequence: Sequence, tracks: list[Tracks], tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="without pictures"):
-        write_overlay(sequence, tracks, tmp_path / "o.mp4")
-
-
-def test_the_source_itself_is_not_replaced(tmp_path: Path) -> None:
-    path = write_overlay(sequence(3), [answer(1, {1: [1, 1, 5, 5]})], tmp_path / "o.mp4")
-    with pytest.raises(InputError, match="the source itself"):
-        write_overlay(sequence(3, path=path), [answer(1, {1: [1, 1, 5, 5]})], path)
-
-
 def test_what_a_frame_lacks_is_told() -> None:
     """A label in red at the right of the banner; the picture before is shown again."""
 

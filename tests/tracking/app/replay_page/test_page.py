@@ -110,14 +110,6 @@ def test_without_ground_there_is_no_plan(sequence: Sequence, truth: Truth) -> No
     assert data["camera"] is None
 
 
-def test_without_boxes_there_is_no_image(sequence: Sequence, truth: Truth) -> None:
-    data = page_data(Sequence("points", 2.5, 160, sequence.frames, lambda: truth.replace(box=None)), None)
-    assert data["image"] is None
-    assert data["truth"]["box"] == []
-    low, high = truth.pos.min(axis=0) - 1, truth.pos.max(axis=0) + 1
-    np.testing.assert_allclose(data["bounds"], [*low, *high], atol=0.01)
-
-
 def test_nobody_anywhere(sequence: Sequence) -> None:
     none = np.zeros(0, np.int64)
     empty = Truth("none", 10.0, 5, 60.0, none, none, none, np.zeros((0, 2)), None, None, np.zeros(0), events=())

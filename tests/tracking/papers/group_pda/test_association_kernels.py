@@ -12,11 +12,13 @@ from filterpy.kalman import KalmanFilter
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.papers.group_pda import association_kernels as kernels
+from tracking.papers.group_pda.association import PointClaims, point_log_density, shares
+from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
 from tracking.papers.group_pda.merging_and_splitting import merged
-from tracking.papers.group_pda.scaled_parameters import scale_parameters
+from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
 
 STATES = ["nothing", "null", "measured"]
 PLAIN = reference.Rules(
@@ -243,6 +245,7 @@ def test_what_the_gate_cuts_off(gate: float, correct: bool, extent: float, insid
     assert found[1] == pytest.approx(inside, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_places_of_missed_members(seed: int) -> None:
     """What a centroid with carried places has measured is H x, H = [I, -a I], with R: over many frames, in its spread.
@@ -308,3 +311,38 @@ def test_merging_pools_moments(seed: int) -> None:
     place, seen, _ = one.members[0]
     np.testing.assert_allclose(place + one.x[0, :2], union, atol=1e-12)
     assert np.array_equal(seen, np.repeat(np.arange(4.0), [len(y) for y in points]))
+
+
+def test_whose_a_shared_point_is() -> None:
+    """By N_g N(y; xi_g, S_g), so that a large diffuse group has no claim on all that lies near a compact one."""
+    for seed in range(100):
+        _, case, region = random_case(seed)
+        points, weights, d2, own, hits, _, x, _, _, size, _ = case
+        claims = PointClaims(points, weights, np.zeros(len(points)), d2, own, hits)
+        log_density = point_log_density(size, region, claims, d2[:, :0])
+        may = np.isfinite(log_density) & (np.random.default_rng(seed).random(d2.shape) < 0.8)
+        found = shares(log_density, may)
+        np.testing.assert_allclose(found, reference.shares(points, x, region, size, own, may), rtol=1e-9, atol=1e-12)
+    region, d2 = np.array([4.0, 0.25])[:, None, None] * np.eye(2), np.array([[1.0], [1.2]])
+    claims = PointClaims(np.zeros((1, 2)), np.ones(1), np.zeros(1), d2, np.full(1, -1), np.full(1, 2))
+    log_density = point_log_density(np.full(2, 2.0), region, claims, d2[:, :0])
+    assert shares(log_density, d2 > 0)[1] > 0.9  # the nearer by d2 is the diffuse one
+    colours = point_log_density(np.full(2, 2.0), region, claims, np.array([[2.0], [-2.0]]))
+    assert shares(colours, d2 > 0)[0] > 0.7
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_near_is_that_of_all_pairs(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    place, points = (np.round(r.uniform(0, 5, (int(r.integers(0, 20)), 2)), 1) for _ in range(2))
+    reach = float(r.choice([0.05, 0.5, 2.0]))
+    squared = np.square(place[:, None] - points).sum(2) <= reach**2
+    np.testing.assert_array_equal(any_within(place, points, reach), squared.any(1))
+
+
+def test_gate_factor() -> None:
+    for gate in (1.0, 3.0, 6.0, 9.21, 20.0):
+        assert gate_factor(gate) == pytest.approx(reference.truncation(gate), rel=1e-12)
+    points = gaussian(100_000)
+    inside = points[np.square(points).sum(1) < 6.0]
+    assert np.var(inside, axis=0) == pytest.approx(gate_factor(6.0), rel=1e-3)

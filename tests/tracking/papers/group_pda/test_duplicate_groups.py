@@ -1,4 +1,4 @@
-"""A group that has gone does not live on another's points; who is hidden for a moment does."""
+"""Groups that have gone, hidden ones, and what bodies hide in a view at an angle: none lives on another's points."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from sim.types import Array, Context, Detections, Frame, Tracks
+from tests import painted
+from tests.painted import TALL, Person
 from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, merged
@@ -69,3 +71,40 @@ def test_the_order_of_groups_does_not_restart_the_clock() -> None:
                 two.add(turned)
                 two.own_people[:] = [0.0, 1.0]
     assert lost == [10, 10]
+
+
+SCALE = TALL / 1.7
+
+
+def watch(frames: list[list[Person]]) -> list[Tracks]:
+    """Groups in pictures of these people."""
+    return painted.watched(GroupPda(), frames, SCALE, painted.sample(np.random.default_rng(0), 28))
+
+
+def merges(made: list[Tracks]) -> int:
+    return sum(e.kind == "merge" for t in made for e in t.events)
+
+
+@pytest.mark.parametrize(("apart", "expected"), [(2.2, 1), (2.65, 0)])
+def test_who_walks_far_behind_does_not_join_though_his_feet_touch_a_head(apart: float, expected: int) -> None:
+    frames = []
+    for k in range(70):
+        behind = max(apart, 3.6 - 0.06 * k) * SCALE
+        frames.append([(60 + 2.0 * k, 225.0, TALL), (60 + 2.0 * k, 225 - behind, TALL)])
+    made = watch(frames)
+    assert made[10].id.tolist() == [1, 2]
+    assert merges(made) == expected
+    assert len(made[-1].id) == 2 - expected
+
+
+def test_who_joins_a_group_behind_its_backs_has_merged_with_it() -> None:
+    frames = []
+    for k in range(90):
+        close = min(max(k - 20, 0) / 50, 1.0)
+        wide, x = 24 - 23 * close, 80 + 1.5 * k
+        three = [(x + wide * i, 200.0, TALL) for i in (-1, 0, 1)]
+        frames.append([*three, (x + 12 + 100 * (1 - close), 194.0, TALL)])
+    made = watch(frames)
+    assert len(made[15].id) == 2
+    assert merges(made) == 1
+    assert len(made[-1].id) == 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, label_of, log_group_dynamics
-from tracking.papers.joint.distributions import Proposal, moved, precision_of, process_noise
+from tracking.papers.joint.distributions import Proposal, log_density, moved, precision_of, process_noise
 from tracking.papers.joint.individuals_kernels import group_dynamics, own_dynamics
 
 DT, NOISE = 0.1, 0.1
@@ -85,3 +85,13 @@ def test_eq_5_of_people_alone_is_eq_3_to_the_last_bit():
     for k in range(5):
         total += own[:, k]
     assert np.array_equal(out, np.repeat(total[:, None], 2, axis=1))
+
+
+def test_the_density_is_the_normal_one():
+    rng = np.random.default_rng(1)
+    x, mean = rng.normal(0, 0.2, (2, 5, 3, 4))
+    P = covariance(SIGMA)
+    expected = [
+        [-(d @ np.linalg.solve(P, d)) / 2 - np.log(np.linalg.det(2 * np.pi * P)) / 2 for d in row] for row in x - mean
+    ]
+    np.testing.assert_allclose(log_density(x, mean, SIGMA), expected)

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, binder_gain, label_of, validity
+from tracking.grouping.belief import default_belief
 from tracking.papers.joint import partition_kernels
 from tracking.papers.joint.distributions import stam_cumulated
 from tracking.papers.joint.report import binder_partition, histogram_partition
+from tracking.papers.joint.tracker import remembered
 
 SCALES = np.array([0.5, 2.0])
 PAIRS = np.array([[0, 0], [0.7, 0], [10, 0], [10.7, 0]])
@@ -121,3 +123,11 @@ def test_the_histogram_takes_each_persons_label_of_most_weight():
     label = np.array([[[1, 1, 0], [1, 1, 1], [0, 0, 0]]])
     assert [r.tolist() for r in histogram_partition(label, np.array([[0.5, 0.2, 0.3]]))] == [[0, 1]]
     assert [r.tolist() for r in histogram_partition(label, np.array([[0.1, 0.8, 0.1]]))] == [[0, 1, 2]]
+
+
+def test_pairs_of_a_group_gain_and_others_lose():
+    found = remembered(np.zeros((4, 4)), np.array([3, 3, -1, -1]), np.array([1.0, 1.0, 1.0, 0.0]), 0.5)
+    stay, come = default_belief().stay / 2, -default_belief().come / 2
+    apart = found[np.triu_indices(4, 1)]
+    np.testing.assert_allclose(apart, [stay, come, 0, come, 0, 0])
+    assert np.array_equal(found, found.T)
