@@ -96,25 +96,17 @@ def _document(sequences: list[Sequence], root: Path, path: Path, min_visibility:
     info["root"] = Path(os.path.relpath(root, path.parent)).as_posix()
     videos, images, annotations = [], list[str](), list[str]()
     for k, sequence in enumerate(sequences, 1):
-        videos.append(json_text({"id": k, "name": sequence.name, **_numbers(sequence), **_size(sequence)}))
+        about = {"id": k, "name": sequence.name, "fps": sequence.fps, "length": sequence.length}
+        videos.append(json_text({**about, **_size(sequence)}))
         for index, row in _images(sequence, root):
             images.append(json_text({"id": len(images) + 1, **row, "video_id": k, "frame": index}))
-            about = {"image_id": len(images), "video_id": k, "category_id": 1}
+            shared = {"image_id": len(images), "video_id": k, "category_id": 1}
             for found in _annotations(sequence, index, min_visibility):
-                annotations.append(json_text({"id": len(annotations) + 1, **about, **found}))
-    blocks = (
-        f'"info": {json_text(info)}, "licenses": []',
-        f'"categories": [{json_text(PERSON)}]',
-        *(
-            f'"{name}": [\n' + ",\n".join(rows) + "\n]"
-            for name, rows in (("videos", videos), ("images", images), ("annotations", annotations))
-        ),
-    )
-    return "{" + ",\n".join(blocks) + "}\n"
-
-
-def _numbers(sequence: Sequence) -> dict[str, Any]:
-    return {"fps": sequence.fps, "length": sequence.length}
+                annotations.append(json_text({"id": len(annotations) + 1, **shared, **found}))
+    lists = {"videos": videos, "images": images, "annotations": annotations}
+    blocks = [f'"{name}": [\n' + ",\n".join(rows) + "\n]" for name, rows in lists.items()]
+    head = f'"info": {json_text(info)}, "licenses": []', f'"categories": [{json_text(PERSON)}]'
+    return "{" + ",\n".join([*head, *blocks]) + "}\n"
 
 
 def _truth(sequence: Sequence) -> tuple[Truth, Array]:
