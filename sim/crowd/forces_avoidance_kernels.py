@@ -32,7 +32,7 @@ BODY = 0.2  # m: distance from a wall or a pillar's edge at contact
 PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the power law
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[no-untyped-def]
     """Returns the avoidance acceleration (fx, fy), m/s², of one of two discs whose radii add up to `radius`.
 
@@ -102,7 +102,7 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
             push[b, 1] -= (2.0 - share) * fy
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped-def]
     """Writes to `found` the groups s + 1 … last - 1 on collision course with group s; returns how many."""
     count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
@@ -121,7 +121,7 @@ def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped
     return k
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-def]
     """Adds the forces between persons i and j to out (N, 2); (dx, dy) = position i - position j, d2 its square."""
     if tag[i, GROUP] == tag[j, GROUP]:
@@ -183,7 +183,7 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
     return order, start, nx
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
     """Appends to found[m:] the people first … last - 1 that may act on person s; returns the new length."""
     x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
