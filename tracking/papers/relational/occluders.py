@@ -26,7 +26,7 @@ def hidden_share(pos: Array, weights: Array, camera: Camera | None, scene: Scene
         hidden |= _behind_pillar(pos, pillar, scene.pillar_height, camera.position)
     for wall in scene.walls:
         hidden |= _behind_wall(pos, wall, scene.wall_height, camera.position)
-    return particle_set_kernels.column_sums(weights, hidden)
+    return particle_set_kernels.column_sums(weights, hidden.astype(float))
 
 
 def _behind_pillar(pos: Array, pillar: Array, top: float, eye: Array) -> Bools:
@@ -61,7 +61,8 @@ def covered_by_people(particles: ParticleSet, camera: Camera | None, radius: flo
     """Returns the probabilities (K,) that each person is hidden behind another one, and that the feet are (ours)."""
     p, hidden, cut = particles, np.zeros(particles.people), np.zeros(particles.people)
     if camera is not None and camera.kind == "pinhole" and radius > 0:
-        mean = np.stack([particle_set_kernels.column_sums(p.weights, p.pos[..., d]) for d in range(2)], axis=1)
+        axes = np.ascontiguousarray(np.moveaxis(p.pos, 2, 0))
+        mean = np.stack([particle_set_kernels.column_sums(p.weights, places) for places in axes], axis=1)
         body = np.array([HEIGHT, radius, LEAST_VISIBLE])
         occluder_kernels.cover(p.pos, p.weights, mean, p.existence, camera.position, body, hidden, cut)
     return hidden, cut
