@@ -33,8 +33,11 @@ NO_CACHE = (
 )
 
 
-def cached_njit(**options: Any) -> Callable[[Any], Any]:
-    """Returns a decorator: numba's njit, whose cache goes to the first place that can be written."""
+def cached_njit(shared: bool = False, **options: Any) -> Callable[[Any], Any]:
+    """Returns a decorator: numba's njit, whose cache goes to the first place that can be written.
+
+    shared: the kernel is called from Python and from kernels with the same types, so that one form serves both.
+    """
 
     def compiled(function: Any) -> Any:
         if not options.get("cache"):
@@ -50,20 +53,24 @@ def cached_njit(**options: Any) -> Callable[[Any], Any]:
             return numba.njit(**{**options, "cache": False})(function)
         stored = _stored(kernel)
         stored._source_stamp = (stored._source_stamp, _used_by(function))
-        _call_without_wrapper(kernel, function, {**options, "cache": False})
+        inner_options = {**options, "cache": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        _call_by_kernels(kernel, kernel if shared else numba.njit(**inner_options)(function))
         return kernel
 
     return compiled
 
 
-def _call_without_wrapper(kernel: Any, function: Any, options: dict[str, Any]) -> None:
-    """Makes other kernels call a second form of `kernel`, which has no wrapper for calls from Python and no cache."""
-    inner = numba.njit(**options, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+def _call_by_kernels(kernel: Any, inner: Any) -> None:
+    """Makes other kernels call `inner`, a form of `kernel` without the wrapper for calls from Python and without cache.
+
+    A form of the kernel that exists already is used instead.
+    """
     own_template, own_overload = kernel.get_call_template, kernel.get_overload
 
     def get_call_template(arguments: Any, named: Any) -> Any:
         plain = tuple(types.unliteral(a) for a in kernel.fold_argument_types(arguments, named)[1])
-        return (own_template if plain in kernel.overloads else inner.get_call_template)(plain, {})
+        template = own_template if inner is kernel or plain in kernel.overloads else inner.get_call_template
+        return template(plain, {})
 
     def get_overload(arguments: Any) -> Any:
         return (own_overload if tuple(arguments) in kernel.overloads else inner.get_overload)(arguments)

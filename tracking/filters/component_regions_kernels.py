@@ -70,7 +70,7 @@ def unset(count: int) -> Ints:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, shared=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[Ints, int]:
     """Returns the first component that each of K is joined with (K,) (G_x, 3.1), and the number of pairs compared."""
     k, compared = len(sums), 0

@@ -134,7 +134,7 @@ def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
     work[COMPONENTS] -= 1
 
 
-@njit(cache=True)
+@njit(cache=True, shared=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
     """Returns the component of each point (M,), numbered by first points, and the moments (K, 6) of the components."""
     m = len(points)
