@@ -69,13 +69,13 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
     strength, horizon, radius = rules[AVOID_GROUP], rules[AVOID_TIME], rules[PERSON_RADIUS]
     reach, cap = rules[GROUP_RANGE], rules[AVOID_MAX]
     push[:] = 0.0
-    live = np.empty(len(status), np.int64)
+    live, place = np.empty(len(status), np.int64), np.empty(len(status))
     m = 0
     for g in range(len(status)):
-        live[m] = g
+        live[m], place[g] = g, status[g, MEAN_X]
         m += status[g, AVOIDED] > 0.0
     live = live[:m]
-    sort_by(status[:, MEAN_X], live)
+    sort_by(place, live)
     rows = np.empty((RADIUS + 1, m))  # columns COUNT … RADIUS of `status` as rows, groups sorted by x
     for s in range(m):
         for k in range(RADIUS + 1):
@@ -159,27 +159,28 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
     x.
     """
     n = len(state)
-    if n <= BRUTE:
-        return np.arange(n), np.array([0, n]), 1
-    x0, y0 = state[0, X], state[0, Y]
-    x1, y1 = x0, y0
+    x0, y0, x1, y1 = np.inf, np.inf, -np.inf, -np.inf
     for i in range(n):
         x0, x1 = min(x0, state[i, X]), max(x1, state[i, X])
         y0, y1 = min(y0, state[i, Y]), max(y1, state[i, Y])
-    cell = max(reach, sqrt((x1 - x0) * (y1 - y0) / (4.0 * n)), (x1 - x0) / 1000.0, (y1 - y0) / 1000.0)
-    nx, ny = int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
+    cell, nx, ny = 1.0, 1, 1
+    if n > BRUTE:
+        cell = max(reach, sqrt((x1 - x0) * (y1 - y0) / (4.0 * n)), (x1 - x0) / 1000.0, (y1 - y0) / 1000.0)
+        nx, ny = int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
     start = np.zeros(nx * ny + 1, np.int64)
     cells = np.empty(n, np.int64)
     for i in range(n):
-        cells[i] = int((state[i, Y] - y0) / cell) * nx + int((state[i, X] - x0) / cell)
+        cells[i] = int((state[i, Y] - y0) / cell) * nx + int((state[i, X] - x0) / cell) if n > BRUTE else 0
         start[cells[i] + 1] += 1
     for c in range(nx * ny):
         start[c + 1] += start[c]
-    fill = start[:-1].copy()
     order = np.empty(n, np.int64)
-    for i in range(n):
-        order[fill[cells[i]]] = i
-        fill[cells[i]] += 1
+    for i in range(n - 1, -1, -1):  # from the last place of each cell, which is the start of the next
+        start[cells[i] + 1] -= 1
+        order[start[cells[i] + 1]] = i
+    for c in range(nx * ny):
+        start[c] = start[c + 1]
+    start[nx * ny] = n
     return order, start, nx
 
 
