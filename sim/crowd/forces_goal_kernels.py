@@ -327,23 +327,8 @@ def drive(  # type: ignore[no-untyped-def]
     _pass_doors(tag, kind, length, current, status)
     _lead_groups(route, kind, length, current, speed, heading, finish, arrived, status, dt, rules)
     _seek(
-        calm,
-        place,
-        target,
-        pace,
-        noise,
-        wanted,
-        tag,
-        route,
-        kind,
-        length,
-        current,
-        speed,
-        heading,
-        status,
-        stairs,
-        rules,
-        out,
-    )
+        calm, place, target, pace, noise, wanted, tag,
+        route, kind, length, current, speed, heading, status, stairs, rules, out,
+    )  # fmt: skip
     _mark_avoided(kind, current, status)
     return True
