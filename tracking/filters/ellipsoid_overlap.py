@@ -4,7 +4,7 @@
 2012: the ellipsoids y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 are disjoint if and only if f(s) = d' (A / (1 - s) +
 B / s)^-1 d > 1 for some s in (0, 1). f is concave. With B = L L', A' = L^-1 A L^-T = U diag(l) U' and e = U' L^-1 d:
 f(s) = sum of s (1 - s) e_k^2 / (1 - s + s l_k), with A and B exchanged where s and 1 - s are. Ellipses in the plane
-have kernels of their own: tracking.filters.ellipse_overlap_kernels.
+have kernels of their own: tracking.filters.components_kernels.
 """
 
 from __future__ import annotations

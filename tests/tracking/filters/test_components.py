@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 
 from tests import reference_components as reference
 from tracking.filters import components_kernels as kernels
-from tracking.filters.component_regions_kernels import FEW
 from tracking.filters.components import Constraint, linked, partition, prefixes
+from tracking.filters.components_kernels import FEW
 
 LINK = 1.5
 RULE = Constraint(LINK, 9.21, 0.09 * np.eye(2), 3.0)

@@ -14,8 +14,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Bools, Ints
-from tracking.filters.component_regions_kernels import WEIGHT, unset
-from tracking.filters.components_kernels import AROUND, cells, components, prefixes
+from tracking.filters.components_kernels import AROUND, WEIGHT, cells, components, prefixes, unset
 from tracking.papers.group_pda.association_mass_kernels import (
     ASSOCIATION,
     COUNT_SD,
