@@ -264,12 +264,14 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
 def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
     """Adds all avoidance accelerations to out (N, 2), and cuts each sum to Steering.max_acceleration.
 
-    state (N, 4), tag (N, 4), status (G, 12), walls (W, 4), pillars (P, 3): columns as in `forces`. rules (21,):
-    Steering.array(). push (G, 2): scratch.
+    state (N, 4), tag (N, 4), status (G, 12), walls (W, 4), pillars (P, 3): columns as in `forces`. walls: None if there
+    are neither walls nor pillars, so that nothing of them is compiled. rules (21,): Steering.array(). push (G, 2):
+    scratch.
     """
     _avoid_groups(status, rules, push)
     _pairs(state, tag, rules, out)
-    _walls(state, walls, pillars, rules, out)
+    if walls is not None:
+        _walls(state, walls, pillars, rules, out)
     cap = rules[MAX_ACCELERATION]
     for i in range(len(state)):
         # People in a queue do not take part in the avoidance of their group as a whole.

@@ -256,7 +256,8 @@ def _seek(  # type: ignore[no-untyped-def]
                 ty = status[g, WANTED_VY] + (status[g, MEAN_Y] + oy - y) / cohesion
                 if status[g, COUNT] > 1.0:
                     align = alignment
-        limit *= _pace_on_stairs(x, y, stairs)
+        if stairs is not None:
+            limit *= _pace_on_stairs(x, y, stairs)
         size = sqrt(tx * tx + ty * ty)
         if size > limit:
             tx, ty = tx * limit / size, ty * limit / size
@@ -313,8 +314,8 @@ def drive(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Overwrites out (N, 2) with the accelerations towards goals, and advances the groups' ways by dt (s).
 
-    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 7): columns as in
-    `forces`. rules (21,): Steering.array(). The others are the fields of PeopleArrays and GroupArrays.
+    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 7), None without stairs:
+    columns as in `forces`. rules (21,): Steering.array(). The others are the fields of PeopleArrays and GroupArrays.
     """
     for i in range(len(state)):
         if not abs(state[i, X]) + abs(state[i, Y]) + abs(state[i, VX]) + abs(state[i, VY]) < 1e9:

@@ -160,8 +160,7 @@ def sample_visibility(  # type: ignore[no-untyped-def]
     """
     # numba leaves out the branches of solids if it is None: a third of what there is to compile.
     rows = len(box)
-    seen, cut, part = np.zeros(rows), np.ones(rows), np.empty((rows, 4))
-    part[:] = np.nan
+    seen, cut, part = np.empty(rows), np.empty(rows), np.empty((rows, 4))
     people = np.empty(rows, np.int64)
     if solids is not None:
         between, before, d = np.empty(len(solids.walls), np.int64), np.empty(len(solids.pillars), np.int64), np.empty(3)
@@ -169,6 +168,9 @@ def sample_visibility(  # type: ignore[no-untyped-def]
     for f in range(len(starts) - 1):
         for i in range(starts[f], starts[f + 1]):
             left, top, width, height = box[i, LEFT], box[i, TOP], box[i, WIDTH], box[i, HEIGHT]
+            seen[i], cut[i] = 0.0, 1.0
+            for k in range(4):
+                part[i, k] = np.nan
             if not (width > 0 and height > 0):
                 continue
             n = _nearer_people(i, starts[f], starts[f + 1], box, distance, people)
