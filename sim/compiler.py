@@ -4,7 +4,7 @@ numba caches compiled kernels beside their files or in the user's cache folder. 
 and numba then refuses to compile. The cache goes to a temporary folder of the user in that case, or is left out. numba
 looks at the file of a kernel alone; here, a change of what a kernel imports makes it compile anew, too.
 
-Three things save a third of the time that compilation takes. What other kernels call is compiled without the wrappers
+Three things save a quarter of the time that compilation takes. What other kernels call is compiled without the wrappers
 for calls from Python. Constants in such a call are no types of their own. Python collects no garbage meanwhile.
 """
 

@@ -211,6 +211,11 @@ def partner_factors(pairs: Ints, related: Bools, weights: Array, missed: Bools, 
     person has the posterior of the joint filter if the partner's is independent of it.
     """
     particles, n = logs.shape
+    some = False
+    for k in range(n):
+        some = some or missed[k]
+    if not some:
+        return
     own, level = np.empty((particles, n)), np.empty(n)
     for v in range(n):
         top, mean, level[v] = -np.inf, 0.0, -np.inf
