@@ -27,6 +27,8 @@ import numpy as np
 from numba.core import event, types
 
 config: Any = numba.config
+unliteral: Any = types.unliteral
+register: Any = event.register
 NO_CACHE = (
     "kernels are compiled anew in every process: their cache has no place, because neither the installation nor the "
     "home folder nor the temporary folder can be written; set NUMBA_CACHE_DIR to a folder that can"
@@ -68,7 +70,7 @@ def _call_by_kernels(kernel: Any, inner: Any) -> None:
     own_template, own_overload = kernel.get_call_template, kernel.get_overload
 
     def get_call_template(arguments: Any, named: Any) -> Any:
-        plain = tuple(types.unliteral(a) for a in kernel.fold_argument_types(arguments, named)[1])
+        plain = tuple(unliteral(a) for a in kernel.fold_argument_types(arguments, named)[1])
         template = own_template if inner is kernel or plain in kernel.overloads else inner.get_call_template
         return template(plain, {})
 
@@ -78,7 +80,7 @@ def _call_by_kernels(kernel: Any, inner: Any) -> None:
     kernel.get_call_template, kernel.get_overload = get_call_template, get_overload
 
 
-class _Compiling(event.Listener):  # type: ignore[misc]
+class _Compiling(event.Listener):
     """Whether numba compiles now (depth above 0), and for how many seconds it has compiled in this process."""
 
     def __init__(self) -> None:
@@ -99,7 +101,7 @@ class _Compiling(event.Listener):  # type: ignore[misc]
 
 
 compiling = _Compiling()
-event.register("numba:compile", compiling)
+register("numba:compile", compiling)
 
 
 def clock() -> float:

@@ -82,7 +82,7 @@ class ProgressMeter:
             columns = (what, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), item)
             bar = Progress(*columns, console=Console(stderr=True), transient=True)
             compiler = sys.modules.get("sim.compiler")  # not imported here, as it imports numba
-            item = "compiling, once" if compiler is not None and compiler.compiling.depth else self.item
-            bar.add_task(self.what, completed=self.done, total=self.total, item=item)
+            shown = "compiling, once" if compiler is not None and compiler.compiling.depth else self.item
+            bar.add_task(self.what, completed=self.done, total=self.total, item=shown)
             bar.start()
             self._bar = bar
