@@ -120,25 +120,34 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
     and m/s; exist (P, K); weights (P, K), sum 1 for each person.
     """
     particles, n = exist.shape
-    state = np.empty(4)
-    for k in range(n):
-        for p in range(particles):
+    share = np.empty((particles, n))
+    for p in range(particles):  # in the order in which arrays lie in memory
+        for k in range(n):
             total[k] += weights[p, k] * exist[p, k]
-        alone = total[k] <= 0.0
-        whole = 1.0 if alone else total[k]
-        for p in range(particles):
-            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
+    for p in range(particles):
+        for k in range(n):
+            w = weights[p, k] * exist[p, k] / total[k] if total[k] > 0.0 else weights[p, k]
+            share[p, k] = w
             mean[k, 0] += w * pos[p, k, 0]
             mean[k, 1] += w * pos[p, k, 1]
             mean[k, 2] += w * vel[p, k, 0]
             mean[k, 3] += w * vel[p, k, 1]
-        for p in range(particles):
-            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
-            for d in range(2):
-                state[d], state[d + 2] = pos[p, k, d] - mean[k, d], vel[p, k, d] - mean[k, d + 2]
-            for a in range(4):
-                for b in range(a + 1):
-                    cov[k, a, b] += w * state[a] * state[b]
+    for p in range(particles):
+        for k in range(n):
+            w, out = share[p, k], cov[k]
+            x, y = pos[p, k, 0] - mean[k, 0], pos[p, k, 1] - mean[k, 1]
+            u, v = vel[p, k, 0] - mean[k, 2], vel[p, k, 1] - mean[k, 3]
+            out[0, 0] += w * x * x
+            out[1, 0] += w * y * x
+            out[1, 1] += w * y * y
+            out[2, 0] += w * u * x
+            out[2, 1] += w * u * y
+            out[2, 2] += w * u * u
+            out[3, 0] += w * v * x
+            out[3, 1] += w * v * y
+            out[3, 2] += w * v * u
+            out[3, 3] += w * v * v
+    for k in range(n):
         for a in range(4):
             for b in range(a):
                 cov[k, b, a] = cov[k, a, b]

@@ -38,7 +38,8 @@ def _boxes(pos):  # type: ignore[no-untyped-def]
     box = np.empty((n, 4))
     for i in range(n):
         box[i, 0], box[i, 1], box[i, 2], box[i, 3] = np.inf, -np.inf, np.inf, -np.inf
-        for p in range(particles):
+    for p in range(particles):
+        for i in range(n):
             x, y = pos[p, i, 0], pos[p, i, 1]
             box[i, 0], box[i, 1] = min(box[i, 0], x), max(box[i, 1], x)
             box[i, 2], box[i, 3] = min(box[i, 2], y), max(box[i, 3], y)
