@@ -18,7 +18,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -129,8 +129,9 @@ def _used_by(function: Any) -> str:
 
 if TYPE_CHECKING:  # a kernel is for mypy what numba's own decorator makes of it
     from numba import njit as njit
+    from numba import njit as shared_njit
 else:
-    njit = cached_njit
+    njit, shared_njit = cached_njit, partial(cached_njit, shared=True)
 
 
 @cache

@@ -21,7 +21,7 @@ from math import sqrt
 
 import numpy as np
 
-from sim.compiler import njit
+from sim.compiler import njit, shared_njit
 from sim.elementary_kernels import find_root, sort_by
 from sim.types import Array, Bools, Ints
 
@@ -150,7 +150,7 @@ def unset(count: int) -> Ints:
     return out
 
 
-@njit(cache=True, shared=True)
+@shared_njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[Ints, int]:
     """Returns the first component that each of K is joined with (K,) (G_x, 3.1), and the number of pairs compared."""
     k, compared = len(sums), 0
@@ -326,7 +326,7 @@ def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
     work[COMPONENTS] -= 1
 
 
-@njit(cache=True, shared=True)
+@shared_njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
     """Returns the component of each point (M,), numbered by first points, and the moments (K, 6) of the components."""
     m = len(points)
