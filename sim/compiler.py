@@ -129,7 +129,8 @@ def _used_by(function: Any) -> str:
 
 if TYPE_CHECKING:  # a kernel is for mypy what numba's own decorator makes of it
     from numba import njit as njit
-    from numba import njit as shared_njit
+
+    shared_njit = njit
 else:
     njit, shared_njit = cached_njit, partial(cached_njit, shared=True)
 
